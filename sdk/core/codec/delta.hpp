@@ -1,0 +1,77 @@
+#pragma once
+// A delta's payload: typed sections. Lifecycle records first, then parameters in force, then corrections.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/codec.hpp"
+
+namespace tandem {
+
+enum class LifecycleKind : std::uint8_t { kDespawn = 0, kSpawn = 1, kTeleport = 2, kTypeChange = 3 };
+
+/// One explicit change of a slot. Within a delta: ascending by slot; for one slot the only pair allowed is
+/// despawn then spawn (reuse within a frame).
+struct LifecycleRecord {
+  LifecycleKind kind = LifecycleKind::kDespawn;
+  Slot slot = 0;
+  std::uint8_t generation = 0;  ///< spawn only
+  TypeId type = 0;              ///< spawn and type change
+  BodyState body;               ///< spawn and teleport
+};
+
+/// Section types. A reader that does not know a type refuses the delta if the critical bit is set, else skips it.
+inline constexpr std::uint16_t kCriticalSection = 0x8000;
+enum class SectionType : std::uint16_t {
+  kLifecycle = 1 | kCriticalSection,
+  kParameters = 2 | kCriticalSection,
+  kCorrections = 3 | kCriticalSection,
+};
+/// u16 type, u32 length of the body, body.
+inline constexpr std::size_t kSectionHeaderBytes = 6;
+
+/// Encodes and decodes whole payloads around a codec. One per side and session. Not thread-safe. After
+/// construction encode() and decode() allocate nothing, except for the message of a refusal.
+class DeltaCodec {
+ public:
+  /// `codec` must be made for `capacity`.
+  DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity, const CodecParameters& parameters,
+             TypeId type_count);
+
+  /// Most bytes encode() writes: lifecycle of every slot, parameters and the codec's bound.
+  [[nodiscard]] std::size_t bound() const;
+
+  struct Encoded {
+    std::size_t size_bytes = 0;       ///< of the payload
+    std::size_t correction_bytes = 0; ///< of the correction sections, headers included: what a budget covers
+    std::uint32_t corrected = 0;      ///< bodies
+  };
+  /// Server side: applies `lifecycle` and corrections to `state` (predicted) and writes them to `out`, which holds
+  /// at least bound() bytes. `target` is the full simulation on the lattice. Preconditions are asserted.
+  Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
+                 std::size_t budget, std::span<std::byte> out);
+
+  /// Server side: parameters from the next encode() on; sent in that delta.
+  void set_parameters(const CodecParameters& parameters);
+  [[nodiscard]] const CodecParameters& parameters() const;
+  /// Client side, from a snapshot: parameters in force, nothing is sent.
+  void restore_parameters(const CodecParameters& parameters);
+
+  /// Client side: validates all of `payload`, then applies it. On error the state is untouched.
+  /// Errors: kMalformed, kUnsupported (unknown critical section).
+  [[nodiscard]] Result<void> decode(State& state, std::span<const std::byte> payload);
+
+  /// Of the last encode() or decode(): slots whose state differs from the prediction, each once, and the records.
+  [[nodiscard]] std::span<const Slot> touched() const;
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;
+  [[nodiscard]] Codec& codec();
+  [[nodiscard]] const Codec& codec() const;
+
+ private:
+  struct Impl;
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace tandem

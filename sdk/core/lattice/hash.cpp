@@ -1,0 +1,48 @@
+#include "sdk/core/lattice/hash.hpp"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <bit>
+
+namespace tandem {
+
+static_assert(std::endian::native == std::endian::little, "columns are hashed in place: little-endian only");
+
+struct StateHasher::Impl {
+  XXH3_state_t* state = XXH3_createState();
+  Impl() = default;
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() { XXH3_freeState(state); }
+};
+
+StateHasher::StateHasher() : impl_(std::make_unique<Impl>()) {}
+StateHasher::StateHasher(StateHasher&&) noexcept = default;
+StateHasher& StateHasher::operator=(StateHasher&&) noexcept = default;
+StateHasher::~StateHasher() = default;
+
+std::uint64_t StateHasher::hash(const State& state, std::span<const std::byte> codec_state) {
+  XXH3_state_t* const h = impl_->state;
+  XXH3_64bits_reset(h);
+  const auto add = [h](const auto& column) { XXH3_64bits_update(h, column.data(), column.size_bytes()); };
+  add(state.alive());
+  add(state.generation());
+  add(state.type());
+  for (std::size_t i = 0; i < kPositionChannels; ++i) add(state.p(i));
+  for (std::size_t i = 0; i < kPositionChannels; ++i) add(state.v(i));
+  for (std::size_t i = 0; i < kPositionChannels; ++i) add(state.c(i));
+  if (!codec_state.empty()) add(codec_state);
+  return XXH3_64bits_digest(h);
+}
+
+std::uint64_t hash_bytes(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+
+std::string to_hex(std::uint64_t hash) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text(16, '0');
+  for (std::size_t i = 0; i < 16; ++i) text[i] = kDigits[(hash >> (60U - 4U * i)) & 15U];
+  return text;
+}
+
+}  // namespace tandem

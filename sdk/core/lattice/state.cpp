@@ -1,0 +1,48 @@
+#include "sdk/core/lattice/state.hpp"
+
+#include <algorithm>
+
+namespace tandem {
+
+State::State(std::uint32_t capacity) : alive_(capacity), generation_(capacity), type_(capacity) {
+  for (auto* columns : {&p_, &v_, &c_}) {
+    for (auto& column : *columns) column.assign(capacity, 0);
+  }
+}
+
+BodyState State::body(Slot slot) const {
+  BodyState body;
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    body.p[i] = p_[i][slot];
+    body.v[i] = v_[i][slot];
+  }
+  return body;
+}
+
+void State::set_body(Slot slot, const BodyState& body) {
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    p_[i][slot] = std::clamp(body.p[i], -kPositionLimit, kPositionLimit);
+    v_[i][slot] = std::clamp(body.v[i], -kVelocityLimit, kVelocityLimit);
+    c_[i][slot] = 0;
+  }
+}
+
+void State::spawn(Slot slot, std::uint8_t generation, TypeId type, const BodyState& body) {
+  alive_[slot] = 1;
+  generation_[slot] = generation;
+  type_[slot] = type;
+  set_body(slot, body);
+}
+
+void State::despawn(Slot slot) {
+  set_body(slot, BodyState{});
+  alive_[slot] = 0;
+  generation_[slot] = 0;
+  type_[slot] = 0;
+}
+
+std::uint32_t State::alive_count() const {
+  return static_cast<std::uint32_t>(std::count(alive_.begin(), alive_.end(), std::uint8_t{1}));
+}
+
+}  // namespace tandem

@@ -1,0 +1,91 @@
+#pragma once
+// The integer state that a server and all of its clients hold bit-identically.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace tandem {
+
+using Slot = std::uint32_t;
+using Frame = std::uint64_t;
+using Epoch = std::uint64_t;
+using TypeId = std::uint16_t;
+using Vec3i = std::array<std::int32_t, 3>;
+
+/// Position is the only channel group so far; its metric is Euclidean over these channels.
+inline constexpr std::size_t kPositionChannels = 3;
+inline constexpr std::uint32_t kMaxCapacity = 1U << 20U;
+/// Slots are cut into runs of this many; each run is coded on its own, with indices local to it.
+inline constexpr std::uint32_t kBlockSlots = 16384;
+inline constexpr std::int32_t kPositionLimit = 1 << 30;
+inline constexpr std::int32_t kVelocityLimit = 1 << 28;
+
+[[nodiscard]] constexpr std::uint32_t block_count(std::uint32_t capacity) {
+  return (capacity + kBlockSlots - 1) / kBlockSlots;
+}
+
+/// One body's place and speed. `p` in lattice units, |p| <= 2^30; `v` in 1/64 unit per frame, |v| <= 2^28.
+struct BodyState {
+  Vec3i p{};
+  Vec3i v{};
+  friend bool operator==(const BodyState&, const BodyState&) = default;
+};
+
+/// Structure of arrays over `capacity` slots. Invariant: every column of a dead slot is zero.
+///
+/// Columns: alive (0 or 1), generation (counts reuse of the slot, wraps), type, and per position channel
+/// p (lattice units), v (1/64 unit per frame) and c (1/64 unit per frame^2).
+/// Copying between equal capacities does not allocate. Not thread-safe; distinct objects are independent.
+class State {
+ public:
+  State() = default;
+  /// All slots dead. `capacity` in [1, kMaxCapacity].
+  explicit State(std::uint32_t capacity);
+
+  [[nodiscard]] std::uint32_t capacity() const { return static_cast<std::uint32_t>(alive_.size()); }
+
+  std::span<std::uint8_t> alive() { return alive_; }
+  [[nodiscard]] std::span<const std::uint8_t> alive() const { return alive_; }
+  std::span<std::uint8_t> generation() { return generation_; }
+  [[nodiscard]] std::span<const std::uint8_t> generation() const { return generation_; }
+  std::span<TypeId> type() { return type_; }
+  [[nodiscard]] std::span<const TypeId> type() const { return type_; }
+  std::span<std::int32_t> p(std::size_t channel) { return p_[channel]; }
+  [[nodiscard]] std::span<const std::int32_t> p(std::size_t channel) const { return p_[channel]; }
+  std::span<std::int32_t> v(std::size_t channel) { return v_[channel]; }
+  [[nodiscard]] std::span<const std::int32_t> v(std::size_t channel) const { return v_[channel]; }
+  std::span<std::int32_t> c(std::size_t channel) { return c_[channel]; }
+  [[nodiscard]] std::span<const std::int32_t> c(std::size_t channel) const { return c_[channel]; }
+
+  [[nodiscard]] BodyState body(Slot slot) const;
+  /// Sets p and v, clamped to their limits, and c = 0. The slot's alive bit is left as it is.
+  void set_body(Slot slot, const BodyState& body);
+  /// Brings a slot to life with c = 0.
+  void spawn(Slot slot, std::uint8_t generation, TypeId type, const BodyState& body);
+  /// Kills a slot and zeroes all of its columns.
+  void despawn(Slot slot);
+  [[nodiscard]] std::uint32_t alive_count() const;
+
+  friend bool operator==(const State&, const State&) = default;
+
+ private:
+  std::vector<std::uint8_t> alive_;
+  std::vector<std::uint8_t> generation_;
+  std::vector<TypeId> type_;
+  std::array<std::vector<std::int32_t>, kPositionChannels> p_, v_, c_;
+};
+
+/// Euclidean length squared of a - b, exact: |components| are at most 2^30, so the sum fits 64 bits.
+[[nodiscard]] inline std::uint64_t distance_squared(const Vec3i& a, const Vec3i& b) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t d = std::int64_t{a[i]} - b[i];
+    sum += static_cast<std::uint64_t>(d * d);
+  }
+  return sum;
+}
+
+}  // namespace tandem

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "sdk/core/predict/predictor.hpp"
+
+namespace tandem {
+
+/// Gravity, damping and the learned acceleration c; bodies do not interact. O(capacity) a step, no scratch memory.
+class Ballistic final : public Predictor {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "ballistic"; }
+  void step(const State& from, State& to, const Drive& drive) override;
+  void step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) override;
+  [[nodiscard]] bool interacts() const override { return false; }
+};
+
+}  // namespace tandem

@@ -1,0 +1,18 @@
+#include "sdk/core/predict/predictor.hpp"
+
+#include <string>
+
+#include "sdk/core/predict/ballistic.hpp"
+
+namespace tandem {
+
+Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t /*capacity*/,
+                                                  std::span<const std::int32_t> constants) {
+  if (name != "ballistic") {
+    return fail(ErrorCode::kUnsupported, "unknown predictor '" + std::string(name) + "' (known: ballistic)");
+  }
+  if (!constants.empty()) return fail(ErrorCode::kMalformed, "predictor 'ballistic' takes no constants");
+  return std::make_unique<Ballistic>();
+}
+
+}  // namespace tandem

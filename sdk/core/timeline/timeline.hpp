@@ -1,0 +1,131 @@
+#pragma once
+// Frames in order, on both sides: predicted steps, deltas, scheduled inputs, snapshots.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/core/predict/predictor.hpp"
+
+namespace tandem {
+
+/// All that both sides must agree on to build a timeline. Comes from TandemSession.
+struct TimelineConfig {
+  std::uint32_t capacity = 0;
+  TypeId type_count = 1;  ///< types are 0 .. type_count - 1
+  std::string codec;
+  std::vector<std::byte> codec_tables;
+  CodecParameters parameters;
+  std::string predictor;
+  std::vector<std::int32_t> predictor_constants;
+  std::uint32_t max_lead = 1;  ///< A: frames a client may simulate beyond its last delta
+};
+
+/// An input that changes the predicted step. `number` counts 1, 2, ... within an epoch.
+struct ScheduledDrive {
+  std::uint64_t number = 0;
+  Frame frame = 0;  ///< acts in the step that produces this frame
+  Drive drive;
+  friend bool operator==(const ScheduledDrive&, const ScheduledDrive&) = default;
+};
+
+/// Scheduled inputs still to act at most; more is refused (kCapacity).
+inline constexpr std::size_t kMaxPendingInputs = 256;
+
+/// The server's side: predicts, encodes and applies, one frame at a time. Not thread-safe.
+class ServerTimeline {
+ public:
+  /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity).
+  static Result<ServerTimeline> create(const TimelineConfig& config, Epoch epoch);
+  ServerTimeline(ServerTimeline&&) noexcept;
+  ServerTimeline& operator=(ServerTimeline&&) noexcept;
+  ServerTimeline(const ServerTimeline&) = delete;
+  ServerTimeline& operator=(const ServerTimeline&) = delete;
+  ~ServerTimeline();
+
+  /// The agreed state at `frame` (frame 0: the start block), before the first advance().
+  void start(Frame frame, const State& state, const Drive& drive);
+  /// Numbers must follow one another and frames must lie in the future. Errors: kOutOfOrder, kCapacity.
+  [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
+
+  struct FrameResult {
+    Frame frame = 0;
+    std::uint64_t last_input = 0;          ///< highest number scheduled before this delta
+    std::uint64_t hash = 0;                ///< of the agreed state
+    std::span<const std::byte> payload;    ///< valid until the next advance()
+    std::size_t correction_bytes = 0;
+    std::uint32_t corrected = 0;
+    double predict_ms = 0, encode_ms = 0;  ///< filled only when a clock was given to create(); see set_clock()
+  };
+  /// Predicts the next frame, encodes towards `target` and applies. Allocates nothing after the first few frames.
+  FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
+                      std::size_t budget = kNoBudget);
+  /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
+  void set_clock(std::int64_t (*now_ns)());
+  void set_parameters(const CodecParameters& parameters);
+
+  [[nodiscard]] Frame frame() const;
+  [[nodiscard]] const State& state() const;
+  [[nodiscard]] const Drive& drive() const;  ///< in force at frame()
+  [[nodiscard]] std::uint64_t last_input() const;
+  [[nodiscard]] std::size_t payload_bound() const;
+  /// One cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content of `out`.
+  void snapshot(std::vector<std::byte>& out);
+  [[nodiscard]] std::size_t snapshot_bound() const;
+
+ private:
+  struct Impl;
+  explicit ServerTimeline(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A client's side: holds the states of all frames from the last delta to now. Not thread-safe.
+class ClientTimeline {
+ public:
+  static Result<ClientTimeline> create(const TimelineConfig& config);
+  ClientTimeline(ClientTimeline&&) noexcept;
+  ClientTimeline& operator=(ClientTimeline&&) noexcept;
+  ClientTimeline(const ClientTimeline&) = delete;
+  ClientTimeline& operator=(const ClientTimeline&) = delete;
+  ~ClientTimeline();
+
+  /// Starts over from a snapshot. Errors: kMalformed, kOutOfOrder (another epoch), kMismatch (its own hash);
+  /// on error the timeline holds nothing (`playing()` is false).
+  [[nodiscard]] Result<void> load(std::span<const std::byte> snapshot, Epoch epoch);
+  [[nodiscard]] bool playing() const;
+
+  /// Scheduled inputs in any order; duplicates and numbers the snapshot already counts are ignored.
+  /// Errors: kCapacity; kOutOfOrder for a frame that was already applied (a gap in the server's promise).
+  [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
+  /// True when every input number up to `number` is held, counted from the snapshot's.
+  [[nodiscard]] bool holds_inputs(std::uint64_t number) const;
+
+  /// Applies delta `frame` == applied() + 1, simulating up to it first if need be, checks the hash and re-simulates
+  /// what was simulated beyond it. Needs holds_inputs(last_input).
+  /// Errors: kOutOfOrder, kMalformed, kUnsupported: state untouched. kMismatch: applied but wrong; load() again.
+  [[nodiscard]] Result<void> apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
+                                   std::span<const std::byte> payload);
+  /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead); returns whether it did.
+  bool step(std::uint32_t lead);
+
+  [[nodiscard]] Frame applied() const;  ///< last frame whose delta is in
+  [[nodiscard]] Frame now() const;      ///< last frame simulated, applied() .. applied() + max_lead
+  /// State of a frame from applied() to now(); valid until the next call that is not const.
+  [[nodiscard]] const State& state(Frame frame) const;
+  [[nodiscard]] std::uint64_t hash() const;  ///< of state(applied()), as last checked
+  [[nodiscard]] const Drive& drive() const;  ///< in force at applied()
+  [[nodiscard]] std::span<const Slot> touched() const;                 ///< by the last apply()
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;    ///< of the last apply()
+
+ private:
+  struct Impl;
+  explicit ClientTimeline(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tandem

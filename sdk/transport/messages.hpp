@@ -1,0 +1,184 @@
+#pragma once
+// What travels on the topics, as plain structs. The DDS types are generated from idl/tandem.idl and stay in dds/.
+// Field meanings, ranges and QoS: idl/PROTOCOL.md.
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem::transport {
+
+inline constexpr std::uint32_t kProtocolVersion = 1;
+using ClientId = std::uint64_t;  ///< random, never 0
+using Bytes = std::vector<std::byte>;
+
+/// Where a sample came from, as the transport knows it: the DDS participant's GUID prefix and entity.
+struct ParticipantId {
+  std::array<std::uint8_t, 16> bytes{};
+  auto operator<=>(const ParticipantId&) const = default;
+};
+
+struct BodyType {
+  std::string name;
+  float radius = 0;                ///< scene units
+  std::uint32_t colour_rgba = 0;   ///< 0xRRGGBBAA
+  bool operator==(const BodyType&) const = default;
+};
+
+struct SessionMessage {
+  std::string session;             ///< key; no wildcard characters, 1..64 bytes of [A-Za-z0-9._-]
+  Epoch epoch = 0;                 ///< ms of wall clock at the server's start
+  std::uint32_t protocol_version = kProtocolVersion;
+  std::uint64_t layout_hash = 0;   ///< XXH3-64 of the canonical layout text; see layout_hash() below
+  std::uint32_t capacity = 0;
+  double frame_rate_hz = 30;
+  double lattice_unit = 0;         ///< scene units per lattice unit
+  std::uint32_t lead = 1;          ///< A, 0 or 1
+  std::uint32_t window_ceiling = 24;
+  std::uint32_t max_delta_bytes = 0;     ///< of a whole payload
+  std::uint32_t max_snapshot_bytes = 0;
+  std::string codec;
+  std::int32_t threshold = 0, position_step = 1, velocity_step = 1;  ///< CodecParameters at frame 0
+  std::string predictor;
+  std::uint32_t client_cost_ns = 0;      ///< client cost class: estimated ns per body and frame on one desktop core
+  std::string scene;               ///< name
+  std::string scene_description;   ///< the geometry as protobuf text (idl/scene.proto), for drawing
+  std::vector<std::int32_t> predictor_constants;
+  std::vector<BodyType> types;
+  Bytes codec_tables;
+  bool operator==(const SessionMessage&) const = default;
+};
+
+struct DeltaMessage {
+  Epoch epoch = 0;
+  Frame frame = 0;
+  std::uint32_t part = 0, parts = 1;
+  std::uint64_t last_input = 0;    ///< number of the last scheduled input issued before this delta
+  std::int64_t server_time_ns = 0; ///< wall clock at publication
+  std::uint64_t hash = 0;
+  Bytes payload;
+  bool operator==(const DeltaMessage&) const = default;
+};
+
+enum class ScheduledKind : std::uint32_t {
+  kDrive = 1,  ///< integers: gravity x, y, z (1/64 lattice unit per frame^2), damping D, decay E
+};
+
+struct ScheduledInputMessage {
+  Epoch epoch = 0;
+  std::uint64_t number = 0;
+  Frame frame = 0;
+  ClientId source_client = 0;
+  std::uint64_t source_number = 0;
+  std::uint32_t kind = 0;
+  std::vector<std::int32_t> values;
+  bool operator==(const ScheduledInputMessage&) const = default;
+};
+
+struct SnapshotMessage {
+  std::uint32_t slot = 0;  ///< key: frame mod 4
+  Epoch epoch = 0;
+  Frame frame = 0;
+  Bytes bytes;
+  bool operator==(const SnapshotMessage&) const = default;
+};
+
+enum class Role : std::uint32_t { kObserver = 0, kParticipant = 1 };
+enum class Phase : std::uint32_t { kJoining = 0, kPlaying = 1 };
+
+/// Why a server answered as it did; in Reply.reason and, for inputs, in a ReplyEntry's code.
+enum class Reason : std::uint32_t {
+  kNone = 0,            ///< all well, or the input was applied
+  kObserver = 1,        ///< observers may not send input
+  kDemoted = 2,         ///< caused more suspension than stall_timeout within 10 s
+  kInvalid = 3,         ///< not finite, out of range, or of an unknown kind
+  kRateLimited = 4,
+  kStaleEpoch = 5,
+  kDuplicate = 6,       ///< a number already handled, or lower than one
+  kNotPlaying = 7,      ///< the client has not finished joining
+  kForeignClient = 8,   ///< the client id belongs to another DDS participant
+  kProtocolVersion = 9,
+  kFull = 10,           ///< the server's client limit is reached
+};
+
+struct ReplyEntry {
+  std::uint64_t number = 0;  ///< the client's input number
+  Frame frame = 0;           ///< the frame it acted on, when code is kNone
+  std::uint32_t code = 0;    ///< Reason
+  bool operator==(const ReplyEntry&) const = default;
+};
+inline constexpr std::size_t kReplyRing = 32;
+
+struct ReplyMessage {
+  ClientId client = 0;  ///< key
+  Epoch epoch = 0;
+  Role role = Role::kObserver;
+  Phase phase = Phase::kJoining;
+  std::uint32_t reason = 0;         ///< Reason
+  std::uint64_t highest_input = 0;  ///< highest input number handled
+  std::int64_t client_clock_ns = 0; ///< echo of the client's clock from its last acknowledgement
+  std::int64_t server_time_ns = 0;
+  std::vector<ReplyEntry> entries;  ///< the last 32 at most, oldest first
+  bool operator==(const ReplyMessage&) const = default;
+};
+
+enum class InputKind : std::uint32_t {
+  kGravity = 1,      ///< values: x, y, z in scene units / s^2 (scheduled)
+  kPush = 2,         ///< values: centre x, y, z; radius; velocity change x, y, z (immediate)
+  kApplication = 16, ///< bytes for the engine (immediate)
+};
+
+struct InputMessage {
+  ClientId client = 0;  ///< key
+  Epoch epoch = 0;
+  std::uint64_t number = 0;  ///< starts at 1 in each epoch; gaps are legal
+  Frame client_frame = 0;
+  std::uint32_t kind = 0;    ///< InputKind
+  std::vector<double> values;  ///< at most 16
+  Bytes bytes;                 ///< at most 1024
+  bool operator==(const InputMessage&) const = default;
+};
+
+struct AckMessage {
+  ClientId client = 0;  ///< key
+  Epoch epoch = 0;
+  std::uint32_t protocol_version = kProtocolVersion;
+  Phase phase = Phase::kJoining;
+  Frame applied = 0;
+  Frame simulated = 0;
+  Role role_wanted = Role::kObserver;
+  std::int64_t clock_ns = 0;        ///< the client's steady clock
+  std::uint32_t join_attempt = 0;   ///< counts the times this client asked for a snapshot; a new value asks again
+  bool operator==(const AckMessage&) const = default;
+};
+
+struct ServerStatusMessage {
+  std::string session;  ///< key
+  Epoch epoch = 0;
+  Frame frame = 0;
+  double uptime_s = 0, frame_rate_hz = 0, mbit_per_s = 0, raw_mbit_per_s = 0, frame_ms_p50 = 0, frame_ms_p99 = 0;
+  double corrected_per_frame = 0;
+  std::uint32_t bodies = 0, participants = 0, observers = 0, window = 0;
+  std::uint64_t payload_bytes = 0, stalls = 0, suspended_ms = 0, refused_inputs = 0, refused_messages = 0,
+                snapshots = 0;
+  std::uint32_t queue_high_water = 0;
+  bool operator==(const ServerStatusMessage&) const = default;
+};
+
+struct ClientStatusMessage {
+  ClientId client = 0;  ///< key
+  std::string session;
+  Epoch epoch = 0;
+  Frame applied = 0;
+  std::uint32_t role = 0, phase = 0;
+  double lag_ms = 0, client_ms_p50 = 0, mbit_per_s = 0;
+  std::uint64_t frames_applied = 0, resyncs = 0, hash_mismatches = 0, inputs_sent = 0, inputs_refused = 0;
+  std::uint32_t queue_high_water = 0;
+  bool operator==(const ClientStatusMessage&) const = default;
+};
+
+}  // namespace tandem::transport

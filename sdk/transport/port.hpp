@@ -1,0 +1,94 @@
+#pragma once
+// The transport port: what a server and a client need from a publish-subscribe middleware.
+// Implementations: dds/ (Cyclone DDS) and simulated/ (in memory, seeded loss, delay and reordering).
+
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+#include "sdk/transport/messages.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::transport {
+
+/// A sample and the participant that wrote it.
+template <class M>
+struct Received {
+  M message;
+  ParticipantId from;
+};
+
+/// A server's endpoints in one session (one DDS partition).
+///
+/// Thread-safety: writes may come from one thread (the publisher) while takes come from another; each of the two
+/// groups is called from one thread only. Takes append to `out`, never block, and drop samples that break a size
+/// limit, counting them in `dropped()`.
+class ServerPort {
+ public:
+  virtual ~ServerPort() = default;
+
+  [[nodiscard]] virtual ParticipantId self() const = 0;
+  /// Session announcements of other live servers in the same partition, newest of each.
+  virtual void take_sessions(std::vector<Received<SessionMessage>>& out) = 0;
+
+  virtual Result<void> write(const SessionMessage&) = 0;
+  virtual Result<void> write(const DeltaMessage&) = 0;
+  virtual Result<void> write(const ScheduledInputMessage&) = 0;
+  virtual Result<void> write(const SnapshotMessage&) = 0;
+  virtual Result<void> write(const ReplyMessage&) = 0;
+  virtual Result<void> write(const ServerStatusMessage&) = 0;
+  /// Removes all published snapshots, so that late joiners are not handed an old one.
+  virtual Result<void> dispose_snapshots() = 0;
+
+  virtual void take(std::vector<Received<InputMessage>>& out) = 0;
+  virtual void take(std::vector<Received<AckMessage>>& out) = 0;
+  /// The delta, scheduled-input and snapshot writers all have a matched reader in that participant.
+  [[nodiscard]] virtual bool joined(const ParticipantId& participant) = 0;
+  /// The participant still has a live acknowledgement writer.
+  [[nodiscard]] virtual bool alive(const ParticipantId& participant) = 0;
+  /// Samples refused for their size or shape since the start.
+  [[nodiscard]] virtual std::uint64_t dropped() const = 0;
+  /// Blocks until something may be there to take, or the timeout. Spurious returns are allowed.
+  virtual void wait(std::chrono::nanoseconds timeout) = 0;
+};
+
+/// A client's endpoints in one session. All calls from one thread; takes as in ServerPort.
+class ClientPort {
+ public:
+  virtual ~ClientPort() = default;
+
+  [[nodiscard]] virtual ParticipantId self() const = 0;
+  /// Session announcements with a live writer, newest first seen last.
+  virtual void take_sessions(std::vector<Received<SessionMessage>>& out) = 0;
+  /// False when the writer of the session's announcement is gone (server ended or died).
+  [[nodiscard]] virtual bool server_alive() = 0;
+
+  /// Subscribes to deltas, scheduled inputs and replies, with limits from the session. Calling it again for
+  /// another epoch drops what was buffered.
+  virtual Result<void> open_stream(const SessionMessage& session) = 0;
+  /// Subscribes to snapshots; close when one was taken.
+  virtual Result<void> open_snapshots(const SessionMessage& session) = 0;
+  virtual void close_snapshots() = 0;
+
+  virtual void take(std::vector<Received<DeltaMessage>>& out) = 0;
+  virtual void take(std::vector<Received<ScheduledInputMessage>>& out) = 0;
+  virtual void take(std::vector<Received<SnapshotMessage>>& out) = 0;
+  virtual void take(std::vector<Received<ReplyMessage>>& out) = 0;
+
+  virtual Result<void> write(const AckMessage&) = 0;
+  virtual Result<void> write(const InputMessage&) = 0;
+  virtual Result<void> write(const ClientStatusMessage&) = 0;
+
+  [[nodiscard]] virtual std::uint64_t dropped() const = 0;
+  virtual void wait(std::chrono::nanoseconds timeout) = 0;
+};
+
+/// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
+[[nodiscard]] Result<void> check_session_name(const std::string& name);
+
+/// XXH3-64 over everything of the session that decides how bytes are read and stepped: version, capacity, codec and
+/// its tables and parameters, predictor and its constants, lead, lattice unit, type count. A client that computes
+/// another value refuses the session.
+[[nodiscard]] std::uint64_t layout_hash(const SessionMessage& session);
+
+}  // namespace tandem::transport

@@ -1,0 +1,95 @@
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "sdk/core/lattice/bytes.hpp"
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem {
+namespace {
+
+TEST(State, ADeadSlotIsZeroInEveryColumn) {
+  State state(3);
+  state.spawn(1, 7, 2, {{10, 20, 30}, {1, 2, 3}});
+  state.c(0)[1] = 5;
+  state.despawn(1);
+  EXPECT_EQ(state, State(3));
+}
+
+TEST(State, SettingABodyClampsToTheLattice) {
+  State state(1);
+  state.spawn(0, 0, 0, {{INT32_MAX, INT32_MIN, 0}, {INT32_MAX, INT32_MIN, 0}});
+  EXPECT_EQ(state.body(0), (BodyState{{kPositionLimit, -kPositionLimit, 0}, {kVelocityLimit, -kVelocityLimit, 0}}));
+}
+
+TEST(State, DistanceIsExactAtTheCornersOfTheLattice) {
+  const Vec3i a{kPositionLimit, kPositionLimit, kPositionLimit};
+  const Vec3i b{-kPositionLimit, -kPositionLimit, -kPositionLimit};
+  EXPECT_EQ(distance_squared(a, b), 3ULL << 62U);
+}
+
+TEST(StateHasher, TheHashOfTwoBodiesIsTheOneOfThePublishedFormat) {
+  State state(2);
+  state.spawn(1, 1, 3, {{-1, 2, 100000}, {64, -64, 0}});
+  std::vector<std::byte> bytes;
+  const auto add = [&bytes](std::initializer_list<int> values) {
+    for (const int value : values) bytes.push_back(static_cast<std::byte>(value));
+  };
+  add({0, 1});                                                                         // alive
+  add({0, 1});                                                                         // generation
+  add({0, 0, 3, 0});                                                                   // type
+  add({0, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0xA0, 0x86, 1, 0});  // p
+  add({0, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0, 0, 0xC0, 255, 255, 255, 0, 0, 0, 0, 0, 0, 0, 0});      // v
+  bytes.resize(bytes.size() + 24);                                                     // c
+  EXPECT_EQ(StateHasher().hash(state), hash_bytes(bytes));
+}
+
+TEST(StateHasher, EveryColumnCounts) {
+  State state(2);
+  state.spawn(0, 1, 1, {{1, 1, 1}, {1, 1, 1}});
+  StateHasher hasher;
+  const auto before = hasher.hash(state);
+  state.c(2)[0] = 1;
+  EXPECT_NE(hasher.hash(state), before);
+  state.c(2)[0] = 0;
+  state.generation()[0] = 2;
+  EXPECT_NE(hasher.hash(state), before);
+}
+
+TEST(Hex, PrintsSixteenDigits) { EXPECT_EQ(to_hex(0x0123456789ABCDEFULL), "0123456789abcdef"); }
+
+TEST(Bytes, WhatWasWrittenIsRead) {
+  std::vector<std::byte> memory(15);
+  ByteWriter out(memory);
+  out.put(std::uint8_t{200});
+  out.put(std::int16_t{-2});
+  out.put(std::int32_t{INT32_MIN});
+  out.put(std::uint64_t{1} << 63U);
+  EXPECT_FALSE(out.overflow());
+  ByteReader in(out.written());
+  EXPECT_EQ(in.get<std::uint8_t>(), 200);
+  EXPECT_EQ(in.get<std::int16_t>(), -2);
+  EXPECT_EQ(in.get<std::int32_t>(), INT32_MIN);
+  EXPECT_EQ(in.get<std::uint64_t>(), std::uint64_t{1} << 63U);
+  EXPECT_TRUE(in.at_end());
+}
+
+TEST(Bytes, ReadingPastTheEndYieldsZeroAndIsRemembered) {
+  const std::vector<std::byte> memory(3, std::byte{1});
+  ByteReader in(memory);
+  EXPECT_EQ(in.get<std::uint32_t>(), 0U);
+  EXPECT_EQ(in.get<std::uint8_t>(), 0U);
+  EXPECT_FALSE(in.ok());
+}
+
+TEST(Bytes, WritingPastTheEndIsRemembered) {
+  std::vector<std::byte> memory(3);
+  ByteWriter out(memory);
+  out.put(std::uint32_t{1});
+  EXPECT_TRUE(out.overflow());
+  EXPECT_EQ(out.size(), 0U);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "sdk/core/predict/ballistic.hpp"
+
+namespace tandem {
+namespace {
+
+// idl/PROTOCOL.md, "Predicted step", word by word in 64 bits.
+void reference_step(State& s, const Drive& drive) {
+  const auto share = [](std::int64_t x, std::int64_t k) { return (x * k + (1 << 15)) >> 16; };
+  const auto clamp = [](std::int64_t x, std::int64_t limit) {
+    return static_cast<std::int32_t>(std::clamp(x, -limit, limit));
+  };
+  for (Slot slot = 0; slot < s.capacity(); ++slot) {
+    if (s.alive()[slot] == 0) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      std::int64_t v = s.v(i)[slot];
+      std::int64_t c = s.c(i)[slot];
+      v += drive.gravity[i] + c;
+      c -= share(c, drive.decay);
+      v -= share(v, drive.damping);
+      s.v(i)[slot] = clamp(v, kVelocityLimit);
+      s.c(i)[slot] = clamp(c, kVelocityLimit);
+      s.p(i)[slot] = clamp(std::int64_t{s.p(i)[slot]} + ((std::int64_t{s.v(i)[slot]} + 32) >> 6), kPositionLimit);
+    }
+  }
+}
+
+State random_state(std::mt19937_64& random, std::uint32_t capacity) {
+  State s(capacity);
+  const auto value = [&random](std::int32_t limit) {
+    // Every magnitude, the limits among them.
+    const auto shift = random() % 31;
+    const std::int64_t x = static_cast<std::int64_t>(random() >> 32U) % (2 * std::int64_t{limit} + 1) - limit;
+    return static_cast<std::int32_t>(x >> shift);
+  };
+  for (Slot slot = 0; slot < capacity; ++slot) {
+    if (random() % 5 == 0) continue;
+    s.spawn(slot, static_cast<std::uint8_t>(random()), 0, {});
+    for (std::size_t i = 0; i < 3; ++i) {
+      s.p(i)[slot] = value(kPositionLimit);
+      s.v(i)[slot] = value(kVelocityLimit);
+      s.c(i)[slot] = value(kVelocityLimit);
+    }
+  }
+  return s;
+}
+
+Drive random_drive(std::mt19937_64& random) {
+  const auto g = [&random] { return static_cast<std::int32_t>(random() % (1U << 29U)) - kVelocityLimit; };
+  return {{g(), g(), g()}, static_cast<std::uint16_t>(random()), static_cast<std::uint16_t>(random())};
+}
+
+TEST(Ballistic, EqualsThePublishedFormulaForAnyState) {
+  constexpr std::uint64_t kSeed = 20261120;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  Ballistic predictor;
+  for (int round = 0; round < 50; ++round) {
+    State state = random_state(random, 300);
+    State expected = state;
+    const Drive drive = random_drive(random);
+    State stepped(300);
+    predictor.step(state, stepped, drive);
+    reference_step(expected, drive);
+    ASSERT_EQ(stepped, expected) << "round " << round;
+    predictor.step(state, state, drive);
+    ASSERT_EQ(state, expected) << "in place, round " << round;
+  }
+}
+
+TEST(Ballistic, SteppingSlotsEqualsSteppingAll) {
+  std::mt19937_64 random(7);
+  Ballistic predictor;
+  const State from = random_state(random, 100);
+  const Drive drive = random_drive(random);
+  State all(100);
+  predictor.step(from, all, drive);
+  State some = all;
+  const std::vector<Slot> slots{0, 3, 4, 99};
+  for (const Slot slot : slots) some.despawn(slot);
+  predictor.step_slots(from, some, drive, slots);
+  EXPECT_EQ(some, all);
+}
+
+TEST(Ballistic, FreeFallFollowsTheParabola) {
+  Ballistic predictor;
+  State state(1);
+  state.spawn(0, 0, 0, {});
+  Drive drive;
+  drive.gravity = {0, -640, 0};  // 10 units per frame^2
+  for (int frame = 0; frame < 20; ++frame) predictor.step(state, state, drive);
+  EXPECT_EQ(state.p(1)[0], -10 * 20 * 21 / 2);  // semi-implicit Euler: g n(n+1)/2
+  EXPECT_EQ(state.v(1)[0], -640 * 20);
+}
+
+TEST(MakePredictor, RefusesWhatItDoesNotKnow) {
+  EXPECT_EQ(make_predictor("psychic", 1, {}).error().code, ErrorCode::kUnsupported);
+  const std::vector<std::int32_t> constants{1};
+  EXPECT_EQ(make_predictor("ballistic", 1, constants).error().code, ErrorCode::kMalformed);
+}
+
+}  // namespace
+}  // namespace tandem
