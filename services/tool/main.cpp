@@ -1,0 +1,30 @@
+// The command line tool: join, bench, export, top, doctor. Exit 0 done, 1 failed, 2 wrong usage.
+
+#include <cstdio>
+#include <exception>
+
+#include "services/tool/commands.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app{"Streams large interactive simulations over DDS: clients, measurements, diagnosis.", "tandem"};
+  app.set_version_flag("--version", "tandem " TANDEM_VERSION);
+  app.require_subcommand(1);
+  app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage. With --json, stdout holds one JSON object.");
+  tandem::tool::Run run;
+  tandem::tool::add_join(app, run);
+  tandem::tool::add_bench(app, run);
+  tandem::tool::add_export(app, run);
+  tandem::tool::add_top(app, run);
+  tandem::tool::add_doctor(app, run);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    return run();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tandem: %s\n", error.what());
+    return 1;
+  }
+}

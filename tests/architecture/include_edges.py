@@ -1,0 +1,143 @@
+"""Reads every #include line of the sources and fails on an edge that the architecture forbids.
+
+    python3 include_edges.py [ROOT]
+
+Prints one line per forbidden edge: file:line: reason. Exit 0 none, 1 some, 2 usage. Which folder may include what
+stands in the tables below; a folder without an entry is an error, so that a new one has to be thought about.
+"""
+
+import pathlib
+import re
+import sys
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+SUFFIXES = {".cpp", ".hpp", ".c", ".h"}
+SKIPPED = {"build", ".git"}
+
+# Project folders that a folder may include, besides itself; the longest matching folder of a file decides.
+# A name ending in .hpp is that header alone. "public" is sdk/include/tandem.
+CORE = ["public/result.hpp", "sdk/core/lattice"]
+TIMELINE = CORE + ["sdk/core/predict", "sdk/core/codec", "sdk/core/timeline"]
+EDGES = {
+    "sdk/include": [],
+    "sdk/core/lattice": ["public/result.hpp"],
+    "sdk/core/predict": CORE,
+    "sdk/core/codec": CORE,
+    "sdk/core/timeline": TIMELINE,
+    "sdk/transport": CORE,
+    "sdk/transport/simulated": CORE + ["sdk/transport"],
+    "sdk/transport/dds": CORE + ["sdk/transport"],
+    "sdk/client": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds"],
+    "sdk/examples": ["public"],
+    "services/engine": [],
+    "services/engine/particles": ["services/engine/simulation.hpp"],
+    "services/scenes": ["public/result.hpp", "services/engine", "services/engine/particles"],
+    "services/server": TIMELINE
+    + ["sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp", "services/scenes"],
+    "services/tool": TIMELINE
+    + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp"]
+    + ["services/scenes", "services/server"],
+    "tests": ["*"],
+}
+
+# Headers from outside the project, and the only folders that may include them.
+OWNERS = [
+    (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
+    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services", "tests/unit/scenes", "tests/unit/server"]),
+    (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
+    (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
+    (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/server"]),
+    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services", "tests"]),
+    (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
+]
+
+# The core is pure: what it computes depends on its arguments alone.
+IMPURE = re.compile(
+    r"^(thread|mutex|shared_mutex|condition_variable|atomic|future|barrier|latch|semaphore|stop_token|chrono|ctime|"
+    r"time\.h|fstream|iostream|ostream|istream|sstream|filesystem|cstdio|stdio\.h|random|cstdlib|unistd\.h|"
+    r"pthread\.h|fcntl\.h|sys/.*)$"
+)
+
+
+def within(path, folder):
+    return path == folder or path.startswith(folder + "/")
+
+
+def rule_of(path, table):
+    """The longest folder of `table` that holds `path`, or None."""
+    return max((folder for folder in table if within(path, folder)), key=len, default=None)
+
+
+def allowed(target, edges):
+    for edge in edges:
+        edge = edge.replace("public", "sdk/include/tandem", 1) if within(edge, "public") else edge
+        if edge == "*" or target == edge:
+            return True
+        # A folder's own files; a subfolder with rules of its own needs an entry of its own.
+        if within(target, edge) and rule_of(target, EDGES) == rule_of(edge, EDGES):
+            return True
+    return False
+
+
+def resolve(root, quoted):
+    """The path from the root that a project include names, or None for a header from outside."""
+    if (root / quoted).is_file():
+        return quoted
+    if (root / "sdk/include" / quoted).is_file():
+        return "sdk/include/" + quoted
+    return None
+
+
+def check_include(root, path, style, name):
+    """The reason why `path` may not include `name`, or None."""
+    rule = rule_of(path, EDGES)
+    target = resolve(root, name)
+    if target is not None:
+        if style == "<" and not within(path, "sdk/examples"):
+            return f"<{name}> is ours: include it with quotes"
+        if rule == rule_of(target, EDGES) or allowed(target, EDGES[rule]):
+            return None
+        return f"{rule} may not include {target}"
+    for pattern, what, owners in OWNERS:
+        if pattern.search(name):
+            if any(within(path, owner) for owner in owners):
+                return None
+            return f'"{name}": {what} headers belong to {", ".join(owners)}'
+    if style == '"':
+        return f'"{name}" is neither a path from the root nor a public header'
+    if within(path, "sdk/core") and IMPURE.search(name):
+        return f"<{name}>: the core knows no threads, clocks, files or randomness"
+    return None
+
+
+def violations(root):
+    """Every forbidden edge below `root`, as "file:line: reason", in path order."""
+    root = pathlib.Path(root)
+    found = []
+    for file in sorted(root.rglob("*")):
+        path = file.relative_to(root).as_posix()
+        if file.suffix not in SUFFIXES or path.split("/")[0] in SKIPPED or path.startswith("build-"):
+            continue
+        if rule_of(path, EDGES) is None:
+            found.append(f"{path}:1: no rule says what this folder may include (tests/architecture)")
+            continue
+        for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+            match = INCLUDE.match(line)
+            reason = check_include(root, path, *match.groups()) if match else None
+            if reason:
+                found.append(f"{path}:{number}: {reason}")
+    return found
+
+
+def main():
+    if len(sys.argv) > 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    root = sys.argv[1] if len(sys.argv) == 2 else pathlib.Path(__file__).resolve().parents[2]
+    found = violations(root)
+    print("\n".join(found) if found else "no forbidden include edge")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
