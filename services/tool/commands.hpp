@@ -6,8 +6,8 @@
 
 namespace tandem::tool {
 
-/// What the chosen subcommand does. Returns the process's exit code: 0 done, 1 failed. Usage errors (2) are CLI11's:
-/// a subcommand checks its flags with validators and throws CLI::ValidationError from its callback.
+/// What the chosen subcommand does. Returns the process's exit code: 0 done, 1 failed. Usage errors (2) are
+/// CLI11's: a subcommand checks its flags with validators and throws CLI::ValidationError from its callback.
 using Run = std::function<int()>;
 
 /// Each adds one subcommand to `app`; when the command line chooses it, its callback sets `run`.

@@ -1,0 +1,260 @@
+#include "services/tool/doctor.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "services/tool/commands.hpp"
+
+namespace tandem::tool {
+namespace {
+
+// A burst of one 240 KB delta, its protocol overhead and as much again while the reader is busy.
+constexpr std::int64_t kWantedBufferBytes = 1 << 20;
+constexpr std::uint64_t kWantedOpenFiles = 256;
+constexpr const char* kDiscoveryGroup = "239.255.0.1";  // the default group of RTPS discovery
+constexpr const char* kLoopbackUri =
+    R"(<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/>)"
+    R"(</Interfaces></General></Domain></CycloneDDS>)";
+
+/// A file descriptor with an owner.
+class Socket {
+ public:
+  Socket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  ~Socket() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  [[nodiscard]] int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+template <class T>
+bool set_option(const Socket& socket, int level, int option, const T& value) {
+  return ::setsockopt(socket.fd(), level, option, &value, sizeof value) == 0;
+}
+
+// The sockets API wants its own address types seen as sockaddr.
+template <class T>
+sockaddr* as_sockaddr(T* address) {
+  return static_cast<sockaddr*>(static_cast<void*>(address));
+}
+
+/// Whether a datagram sent to the group on this interface comes back to a member of the group.
+bool multicast_comes_back(const Interface& interface) {
+  Socket socket;
+  if (socket.fd() < 0) return false;
+  sockaddr_in local{};
+  local.sin_family = AF_INET;
+  local.sin_addr.s_addr = htonl(INADDR_ANY);
+  if (::bind(socket.fd(), as_sockaddr(&local), sizeof local) != 0) return false;
+  socklen_t length = sizeof local;
+  if (::getsockname(socket.fd(), as_sockaddr(&local), &length) != 0) return false;
+  in_addr address{};
+  ip_mreq membership{};
+  if (::inet_pton(AF_INET, interface.address.c_str(), &address) != 1 ||
+      ::inet_pton(AF_INET, kDiscoveryGroup, &membership.imr_multiaddr) != 1) {
+    return false;
+  }
+  membership.imr_interface = address;
+  const unsigned char loop = 1;
+  const unsigned char stay_on_host = 0;
+  if (!set_option(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership) ||
+      !set_option(socket, IPPROTO_IP, IP_MULTICAST_IF, address) ||
+      !set_option(socket, IPPROTO_IP, IP_MULTICAST_LOOP, loop) ||
+      !set_option(socket, IPPROTO_IP, IP_MULTICAST_TTL, stay_on_host)) {
+    return false;
+  }
+  sockaddr_in group = local;
+  group.sin_addr = membership.imr_multiaddr;
+  const char probe[] = "tandem doctor";
+  if (::sendto(socket.fd(), probe, sizeof probe, 0, as_sockaddr(&group), sizeof group) != sizeof probe)
+    return false;
+  pollfd waiting{socket.fd(), POLLIN, 0};
+  if (::poll(&waiting, 1, 200) != 1) return false;
+  char received[sizeof probe] = {};
+  return ::recv(socket.fd(), received, sizeof received, MSG_DONTWAIT) == sizeof probe &&
+         std::memcmp(received, probe, sizeof probe) == 0;
+}
+
+std::vector<Interface> interfaces() {
+  std::vector<Interface> found;
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return found;
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
+  for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
+    sockaddr_in address{};
+    std::memcpy(&address, entry->ifa_addr, sizeof address);
+    char text[INET_ADDRSTRLEN] = {};
+    if (::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text) == nullptr) continue;
+    found.push_back({entry->ifa_name, text, (entry->ifa_flags & IFF_UP) != 0,
+                     (entry->ifa_flags & IFF_LOOPBACK) != 0, (entry->ifa_flags & IFF_MULTICAST) != 0});
+  }
+  return found;
+}
+
+std::int64_t number_in(const char* path) {
+  std::ifstream file(path);
+  std::int64_t value = -1;
+  return file >> value ? value : -1;
+}
+
+Check judge_interfaces(const MachineFacts& facts) {
+  std::string list;
+  bool any_network = false;
+  bool any_up = false;
+  for (const Interface& interface : facts.interfaces) {
+    list += fmt::format("{}{} {} ({}{}{})", list.empty() ? "" : ", ", interface.name, interface.address,
+                        interface.up ? "up" : "down", interface.loopback ? ", loopback" : "",
+                        interface.multicast ? ", multicast" : "");
+    any_up = any_up || interface.up;
+    any_network = any_network || (interface.up && !interface.loopback);
+  }
+  if (!any_up)
+    return {"interfaces", Verdict::kFailure, list.empty() ? "none" : list,
+            "bring an interface up: ip link set lo up"};
+  if (!any_network) {
+    return {"interfaces", Verdict::kWarning, list,
+            fmt::format("only this machine can take part; for that set CYCLONEDDS_URI='{}'", kLoopbackUri)};
+  }
+  return {"interfaces", Verdict::kGood, list, ""};
+}
+
+Check judge_multicast(const MachineFacts& facts) {
+  std::string works;
+  std::string fails;
+  for (const Interface& interface : facts.interfaces) {
+    if (!interface.up) continue;
+    const bool good = std::find(facts.multicast_works.begin(), facts.multicast_works.end(), interface.name) !=
+                      facts.multicast_works.end();
+    std::string& list = good ? works : fails;
+    list += (list.empty() ? "" : ", ") + interface.name;
+  }
+  if (works.empty()) {
+    return {"multicast", Verdict::kWarning, "works on no interface",
+            "clients find the server by unicast only: name it in CYCLONEDDS_URI, Discovery/Peers, on every "
+            "client"};
+  }
+  return {"multicast", Verdict::kGood,
+          fmt::format("works on {}{} (within this host; switches are not tested)", works,
+                      fails.empty() ? "" : "; not on " + fails),
+          ""};
+}
+
+Check judge_buffer(const char* name, const char* setting, std::int64_t bytes) {
+  if (bytes < 0) return {name, Verdict::kWarning, fmt::format("{} cannot be read", setting), ""};
+  std::string detail = fmt::format("{} = {} bytes", setting, bytes);
+  if (bytes >= kWantedBufferBytes) return {name, Verdict::kGood, std::move(detail), ""};
+  return {name, Verdict::kWarning, std::move(detail),
+          fmt::format("large deltas and snapshots may need repair: sysctl -w {}={}", setting,
+                      kWantedBufferBytes)};
+}
+
+Check judge_configuration(const MachineFacts& facts) {
+  if (facts.cyclonedds_uri.empty())
+    return {"CYCLONEDDS_URI", Verdict::kGood, "unset: Cyclone DDS picks the interface", ""};
+  if (!facts.cyclonedds_uri_readable) {
+    return {"CYCLONEDDS_URI", Verdict::kFailure, facts.cyclonedds_uri, "the file it names cannot be read"};
+  }
+  return {"CYCLONEDDS_URI", Verdict::kGood, facts.cyclonedds_uri, ""};
+}
+
+/// A configuration is XML text or names of files, with or without file://, separated by commas.
+bool configuration_readable(const std::string& uri) {
+  if (uri.empty() || uri.front() == '<') return true;
+  const std::string first = uri.substr(0, uri.find(','));
+  const std::string scheme = "file://";
+  return std::ifstream(first.rfind(scheme, 0) == 0 ? first.substr(scheme.size()) : first).good();
+}
+
+const char* word(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kGood:
+      return "ok";
+    case Verdict::kWarning:
+      return "warning";
+    case Verdict::kFailure:
+      return "failure";
+  }
+  return "";
+}
+
+int print(const std::vector<Check>& checks, bool json) {
+  const bool failed = std::any_of(checks.begin(), checks.end(),
+                                  [](const Check& c) { return c.verdict == Verdict::kFailure; });
+  if (json) {
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    for (const Check& check : checks) {
+      rows.push_back({{"name", check.name},
+                      {"verdict", word(check.verdict)},
+                      {"detail", check.detail},
+                      {"advice", check.advice}});
+    }
+    fmt::print("{}\n", nlohmann::ordered_json{{"ok", !failed}, {"checks", rows}}.dump());
+    return failed ? 1 : 0;
+  }
+  for (const Check& check : checks) {
+    fmt::print("{:<8} {:<15} {}\n", word(check.verdict), check.name, check.detail);
+    if (!check.advice.empty()) fmt::print("{:<8} {:<15} -> {}\n", "", "", check.advice);
+  }
+  return failed ? 1 : 0;
+}
+
+}  // namespace
+
+MachineFacts machine_facts() {
+  MachineFacts facts;
+  facts.interfaces = interfaces();
+  for (const Interface& interface : facts.interfaces) {
+    if (interface.up && multicast_comes_back(interface)) facts.multicast_works.push_back(interface.name);
+  }
+  facts.receive_buffer_max_bytes = number_in("/proc/sys/net/core/rmem_max");
+  facts.send_buffer_max_bytes = number_in("/proc/sys/net/core/wmem_max");
+  rlimit files{};
+  if (::getrlimit(RLIMIT_NOFILE, &files) == 0) facts.open_files_limit = files.rlim_cur;
+  if (const char* uri = std::getenv("CYCLONEDDS_URI")) facts.cyclonedds_uri = uri;
+  facts.cyclonedds_uri_readable = configuration_readable(facts.cyclonedds_uri);
+  return facts;
+}
+
+std::vector<Check> judge(const MachineFacts& facts) {
+  Check files{"open files", Verdict::kGood, fmt::format("limit {}", facts.open_files_limit), ""};
+  if (facts.open_files_limit < kWantedOpenFiles) {
+    files.verdict = Verdict::kWarning;
+    files.advice = fmt::format("raise it: ulimit -n {}", kWantedOpenFiles);
+  }
+  return {judge_interfaces(facts),
+          judge_multicast(facts),
+          judge_buffer("receive buffer", "net.core.rmem_max", facts.receive_buffer_max_bytes),
+          judge_buffer("send buffer", "net.core.wmem_max", facts.send_buffer_max_bytes),
+          files,
+          judge_configuration(facts)};
+}
+
+void add_doctor(CLI::App& app, Run& run) {
+  CLI::App* command = app.add_subcommand(
+      "doctor", "Checks interfaces, multicast, socket buffers and limits, and says what to change.");
+  const auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "One JSON object: ok, checks[name, verdict, detail, advice]");
+  command->footer("Exit 1 when something keeps sessions from working at all; warnings exit 0.");
+  command->callback([json, &run] { run = [json] { return print(judge(machine_facts()), *json); }; });
+}
+
+}  // namespace tandem::tool

@@ -1,0 +1,45 @@
+#pragma once
+// `tandem doctor`: looks at what a session needs from this machine and says what to change.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tandem::tool {
+
+enum class Verdict : std::uint8_t { kGood, kWarning, kFailure };
+
+/// One thing looked at.
+struct Check {
+  std::string name;
+  Verdict verdict = Verdict::kGood;
+  std::string detail;  ///< what was found
+  std::string advice;  ///< what to change; empty when all is well
+};
+
+/// A network interface that carries IPv4.
+struct Interface {
+  std::string name;
+  std::string address;  ///< dotted
+  bool up = false, loopback = false, multicast = false;
+};
+
+/// What the machine says about itself; a plain value, so that verdicts can be tested without a machine.
+struct MachineFacts {
+  std::vector<Interface> interfaces;
+  std::vector<std::string> multicast_works;  ///< names of interfaces where a datagram to a group came back
+  std::int64_t receive_buffer_max_bytes = 0,
+               send_buffer_max_bytes = 0;  ///< net.core.{r,w}mem_max; -1 unknown
+  std::uint64_t open_files_limit = 0;
+  std::string cyclonedds_uri;           ///< empty: unset
+  bool cyclonedds_uri_readable = true;  ///< false: it names a file that cannot be read
+};
+
+/// Looks at this machine. Sends one datagram per interface to a multicast group with a time to live of 0, so
+/// that it never leaves the host. Takes at most a second.
+[[nodiscard]] MachineFacts machine_facts();
+
+/// Judges the facts. One check each for interfaces, multicast, buffers, limits and configuration.
+[[nodiscard]] std::vector<Check> judge(const MachineFacts& facts);
+
+}  // namespace tandem::tool
