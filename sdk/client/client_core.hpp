@@ -1,0 +1,89 @@
+#pragma once
+// A client without a clock, a thread or a socket: join, reconstruct, re-simulate, rejoin, acknowledge, send
+// input.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/sent_inputs.hpp"
+#include "sdk/client/statistics.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/port.hpp"
+#include "tandem/client.hpp"
+
+namespace tandem::client {
+
+/// Both clocks at one moment.
+struct Now {
+  std::int64_t steady_ns = 0;  ///< never goes back
+  std::int64_t wall_ns = 0;    ///< comparable with the server's stamps when both run on one host
+};
+
+struct CoreOptions {
+  std::string session;
+  transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
+  transport::Role role = transport::Role::kParticipant;
+  std::uint32_t lead = 1;
+  std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
+  /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
+  std::int64_t (*measure_ns)() = nullptr;
+};
+
+/// Hears what a client takes in, in order. For hash logs, captures and tests; must not call the client.
+class CoreListener {
+ public:
+  virtual ~CoreListener() = default;
+  virtual void on_session(const transport::SessionMessage& /*session*/) {}
+  /// Loaded: the state of `snapshot.frame` is held.
+  virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
+  /// New to this client, and in its timeline.
+  virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/) {}
+  /// Applied, and its hash was right.
+  virtual void on_applied(Epoch /*epoch*/, const CompleteDelta& /*delta*/) {}
+  virtual void on_outcome(const InputOutcome& /*outcome*/) {}
+  virtual void on_resync(ResyncReason /*reason*/) {}
+};
+
+/// The rules of idl/STATES.md for one client. Every buffer is bounded. Not thread-safe.
+class ClientCore {
+ public:
+  /// `port` and `listener` (may be null) must outlive it.
+  ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener = nullptr);
+  ~ClientCore();
+  ClientCore(const ClientCore&) = delete;
+  ClientCore& operator=(const ClientCore&) = delete;
+
+  /// Takes what arrived and does what is due. Returns the steady time at which it wants to be called again
+  /// even if nothing arrives.
+  std::int64_t poll(Now now);
+
+  /// Sends an input of the current epoch; returns its number.
+  /// Errors: kOutOfOrder (not playing, or joined as an observer), kInvalidArgument (a value that is not
+  /// finite, more than 16 values or 1,024 bytes), kTransport.
+  Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
+                             Now now);
+
+  [[nodiscard]] ClientPhase phase() const;
+  [[nodiscard]] const Statistics& statistics() const;
+  /// Last announcement that was accepted or refused; null before the first.
+  [[nodiscard]] const transport::SessionMessage* session() const;
+  /// Null unless playing.
+  [[nodiscard]] const ClientTimeline* timeline() const;
+  [[nodiscard]] ClientStatus status(Now now) const;
+  [[nodiscard]] std::uint32_t join_attempt() const;
+
+  /// See Client::sample().
+  bool sample(Sample& out, SampleMode mode, Now now);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tandem::client

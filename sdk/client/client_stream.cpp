@@ -1,0 +1,217 @@
+// The stream of one epoch: buffer, join, play, join again.
+#include <algorithm>
+#include <utility>
+
+#include "sdk/client/client_core_impl.hpp"
+
+namespace tandem::client {
+
+// Deltas first: whatever scheduled inputs they promise were published before them, so taking the inputs
+// afterwards finds the most.
+void ClientCore::Impl::take_stream(Now now) {
+  if (!epoch->stream_open) return;
+  take_deltas(now);
+  take_scheduled(now);
+  take_snapshots(now);
+}
+
+void ClientCore::Impl::take_deltas(Now now) {
+  using Outcome = DeltaAssembly::Outcome;
+  deltas.clear();
+  port.take(deltas);
+  for (auto& received : deltas) {
+    if (!belongs(received)) continue;
+    const Frame frame = received.message.frame;
+    const std::int64_t server_time_ns = received.message.server_time_ns;
+    const bool last_part = received.message.part + 1 == received.message.parts;
+    const Outcome outcome = epoch->assembly.add(std::move(received.message));
+    statistics.queue_high_water = std::max(statistics.queue_high_water, epoch->assembly.high_water());
+    if (outcome == Outcome::kStored && last_part) epoch->pacer.on_delta(frame, server_time_ns, now.steady_ns);
+    const std::string at = " at frame " + std::to_string(frame);
+    if (outcome == Outcome::kRefused) {
+      ++statistics.refused_messages;
+      rejoin(ResyncReason::kRefused, "malformed delta" + at, now);
+    } else if (outcome == Outcome::kOverflow) {
+      rejoin(ResyncReason::kOverflow, "too many deltas waiting" + at, now);
+    } else if (outcome == Outcome::kLostPart) {
+      rejoin(ResyncReason::kLostPart, "part of a delta lost" + at, now);
+    } else if (outcome == Outcome::kGap) {
+      rejoin(ResyncReason::kGap, "gap before the delta" + at, now);
+    }
+  }
+}
+
+void ClientCore::Impl::take_scheduled(Now now) {
+  inputs.clear();
+  port.take(inputs);
+  for (const auto& received : inputs) {
+    if (!belongs(received)) continue;
+    const auto input = read_scheduled(received.message);
+    if (!input) {
+      // Its number stays missing, which brings about a rejoin when a delta needs it.
+      ++statistics.refused_messages;
+      log(LogLevel::kWarning, input.error().message);
+      continue;
+    }
+    epoch->scheduled.add(*input);
+    listener.on_scheduled(received.message);
+    if (epoch->joining) continue;
+    if (auto scheduled = epoch->timeline.schedule(*input); !scheduled) {
+      ++statistics.refused_messages;
+      rejoin(ResyncReason::kRefused, scheduled.error().message, now);
+    }
+  }
+}
+
+void ClientCore::Impl::take_snapshots(Now /*now*/) {
+  if (!epoch->joining) return;
+  snapshots.clear();
+  port.take(snapshots);
+  for (auto& received : snapshots) {
+    if (!belongs(received)) continue;
+    if (received.message.bytes.size() > epoch->session.max_snapshot_bytes) {
+      ++statistics.refused_messages;
+      continue;
+    }
+    epoch->joiner.offer(std::move(received.message));
+  }
+}
+
+void ClientCore::Impl::join(Now now) {
+  EpochState& e = *epoch;
+  if (!e.stream_open) {
+    if (auto opened = port.open_stream(e.session); !opened) {
+      log(LogLevel::kError, opened.error().message);
+      return;
+    }
+    e.stream_open = true;
+  }
+  if (e.joiner.poll(now.steady_ns)) {
+    if (auto opened = port.open_snapshots(e.session); !opened) log(LogLevel::kError, opened.error().message);
+    ack_due = true;
+  }
+  const CompleteDelta* first = e.assembly.front();
+  auto snapshot =
+      e.joiner.choose(first != nullptr ? std::optional(first->frame) : std::nullopt, now.steady_ns);
+  if (snapshot) load(std::move(*snapshot), now);
+}
+
+void ClientCore::Impl::load(transport::SnapshotMessage&& snapshot, Now now) {
+  EpochState& e = *epoch;
+  auto loaded = e.timeline.load(snapshot.bytes, e.session.epoch);
+  if (loaded && e.timeline.applied() != snapshot.frame) {
+    loaded = fail(ErrorCode::kMalformed, "snapshot of another frame than announced");
+  }
+  for (auto it = e.scheduled.held().begin(); loaded && it != e.scheduled.held().end(); ++it) {
+    loaded = e.timeline.schedule(it->second);
+  }
+  if (!loaded) {
+    ++statistics.refused_messages;
+    if (loaded.error().code == ErrorCode::kMismatch) ++statistics.hash_mismatches;
+    log(LogLevel::kWarning, "snapshot refused: " + loaded.error().message);
+    e.joiner.ask_again(now.steady_ns);
+    return;
+  }
+  port.close_snapshots();
+  e.assembly.drop_through(snapshot.frame);
+  e.sampler.on_loaded();
+  e.joining = false;
+  e.played = true;
+  e.input_missing_ns = 0;
+  e.frame_cost_ns = 0;
+  ack_due = true;
+  statistics.join_ns = now.steady_ns - e.join_began_ns;
+  listener.on_snapshot(snapshot);
+  log(LogLevel::kInfo, "playing from frame " + std::to_string(snapshot.frame));
+}
+
+void ClientCore::Impl::play(Now now, std::int64_t since_last_poll_ns) {
+  EpochState& e = *epoch;
+  play_ahead(now);
+  while (const CompleteDelta* delta = e.assembly.front()) {
+    if (delta->frame <= e.timeline.applied()) {
+      e.assembly.pop();
+      continue;
+    }
+    if (delta->frame != e.timeline.applied() + 1) {
+      rejoin(ResyncReason::kGap, "gap before frame " + std::to_string(delta->frame), now);
+      return;
+    }
+    if (!e.timeline.holds_inputs(delta->last_input)) {
+      e.input_missing_ns += since_last_poll_ns;
+      if (e.input_missing_ns < kInputPatienceNs) return;
+      rejoin(ResyncReason::kMissingInput,
+             "scheduled inputs up to " + std::to_string(delta->last_input) + " did not come", now);
+      return;
+    }
+    e.input_missing_ns = 0;
+    e.sampler.before_apply(e.timeline);
+    const std::int64_t began_ns = measure();
+    const auto applied = e.timeline.apply(delta->frame, delta->last_input, delta->hash, delta->payload);
+    const std::int64_t cost_ns = std::exchange(e.frame_cost_ns, 0) + measure() - began_ns;
+    if (!applied) {
+      const bool mismatch = applied.error().code == ErrorCode::kMismatch;
+      ++(mismatch ? statistics.hash_mismatches : statistics.refused_messages);
+      const std::string why = "frame " + std::to_string(delta->frame) + ": " + applied.error().message;
+      e.assembly.pop();  // of no use any more, while those behind it are
+      rejoin(mismatch ? ResyncReason::kMismatch : ResyncReason::kRefused, why, now);
+      return;
+    }
+    e.sampler.after_apply(e.timeline);
+    ++statistics.frames_applied;
+    statistics.payload_bytes += delta->payload.size();
+    statistics.latency.add(now.wall_ns + measure() - poll_began_ns - delta->server_time_ns);
+    if (options.measure_ns != nullptr) statistics.frame_cost.add(cost_ns);
+    if (statistics.first_applied_ns == 0) statistics.first_applied_ns = now.steady_ns;
+    statistics.last_applied_ns = now.steady_ns;
+    sent.on_applied(delta->frame, now.steady_ns, outcomes);
+    listener.on_applied(e.session.epoch, *delta);
+    ack_due = true;
+    e.assembly.pop();
+    play_ahead(now);
+  }
+}
+
+// Simulates the frames that the server simulates by now, as far as the lead allows.
+void ClientCore::Impl::play_ahead(Now now) {
+  EpochState& e = *epoch;
+  if (!e.pacer.known()) return;
+  const std::int64_t began_ns = measure();
+  while (e.pacer.due_ns(e.timeline.now() + 1) <= now.steady_ns && e.timeline.step(e.lead)) {
+  }
+  e.frame_cost_ns += measure() - began_ns;
+}
+
+void ClientCore::Impl::rejoin(ResyncReason reason, const std::string& why, Now now) {
+  EpochState& e = *epoch;
+  listener.on_resync(reason);
+  if (e.joining) {
+    // Not playing yet: the buffer starts again, and the snapshot asked for may still fit what follows.
+    if (reason != ResyncReason::kGap && reason != ResyncReason::kLostPart) e.joiner.ask_again(now.steady_ns);
+    return;
+  }
+  ++statistics.resyncs;
+  ++statistics.resyncs_by_reason[static_cast<std::size_t>(reason)];
+  log(LogLevel::kWarning, "joining again: " + why);
+  e.joining = true;
+  e.join_began_ns = now.steady_ns;
+  e.input_missing_ns = 0;
+  e.joiner.start(now.steady_ns);
+}
+
+std::int64_t ClientCore::Impl::next_due_ns(Now now) const {
+  std::int64_t due = now.steady_ns + kMaxSleepNs;
+  due = std::min(due, last_status_ns + kStatusPeriodNs);
+  if (epoch != nullptr) {
+    due = std::min(due, last_ack_ns + kAckRepeatNs);
+    if (epoch->joining) {
+      due = std::min(due, epoch->joiner.next_due_ns());
+    } else if (epoch->pacer.known() && epoch->timeline.now() < epoch->timeline.applied() + epoch->lead) {
+      due = std::min(due, epoch->pacer.due_ns(epoch->timeline.now() + 1));
+    }
+  }
+  // Never in the past and never a busy loop, whatever the estimates say.
+  return std::max(due, now.steady_ns + kMillisecondNs / 2);
+}
+
+}  // namespace tandem::client

@@ -1,0 +1,72 @@
+#pragma once
+// Deltas from their parts: a bounded queue of complete deltas without a gap.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "sdk/transport/messages.hpp"
+
+namespace tandem::client {
+
+struct CompleteDelta {
+  Frame frame = 0;
+  std::uint64_t last_input = 0;
+  std::int64_t server_time_ns = 0;
+  std::uint64_t hash = 0;
+  transport::Bytes payload;
+};
+
+/// One writer's samples keep their order, so parts arrive as 0, 1, ... n - 1 and frames one after another;
+/// whatever else arrives means that something was lost. Holds one run of frames without a gap. Not
+/// thread-safe.
+class DeltaAssembly {
+ public:
+  struct Limits {
+    std::size_t delta_bytes = 0;           ///< of a whole payload, as the session declares
+    std::size_t frames = 1024;             ///< complete deltas held
+    std::size_t total_bytes = 64U << 20U;  ///< held payload; at least four deltas are allowed in any case
+  };
+  enum class Outcome : std::uint8_t {
+    kStored,   ///< taken; front() may be ready
+    kIgnored,  ///< a frame that was complete before, or the tail of a frame whose start this reader never saw
+    kLostPart,  ///< a new frame while one was incomplete, or a part was skipped: the run starts again here
+    kGap,       ///< a frame was skipped: the run starts again here
+    kRefused,   ///< breaks a rule of the format or a limit; all is dropped
+    kOverflow,  ///< the queue is full; all is dropped
+  };
+
+  explicit DeltaAssembly(const Limits& limits) : limits_(limits) {}
+
+  /// Takes one sample of the session's epoch. Untrusted.
+  Outcome add(transport::DeltaMessage&& part);
+  /// Oldest complete delta, or null.
+  [[nodiscard]] const CompleteDelta* front() const { return queue_.empty() ? nullptr : &queue_.front(); }
+  void pop();
+  /// Drops complete deltas up to and including `frame`.
+  void drop_through(Frame frame);
+  /// Forgets everything, the expected frame too.
+  void clear();
+
+  [[nodiscard]] std::size_t size() const { return queue_.size(); }
+  [[nodiscard]] std::size_t high_water() const { return high_water_; }
+
+ private:
+  Outcome start_again(transport::DeltaMessage&& part, Outcome why);
+  Outcome begin(transport::DeltaMessage&& part);
+  Outcome append(transport::DeltaMessage&& part);
+  Outcome finish();
+
+  Limits limits_;
+  std::deque<CompleteDelta> queue_;
+  std::size_t queued_bytes_ = 0;
+  std::size_t high_water_ = 0;
+  std::optional<Frame> last_complete_;
+  // The frame being put together; parts_ is 0 when there is none.
+  CompleteDelta open_;
+  std::uint32_t parts_ = 0;
+  std::uint32_t next_part_ = 0;
+};
+
+}  // namespace tandem::client

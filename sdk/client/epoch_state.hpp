@@ -1,0 +1,47 @@
+#pragma once
+// All that a client holds of one epoch. A new epoch is a new object, so nothing can survive from the old one.
+
+#include <cstdint>
+#include <optional>
+
+#include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/joiner.hpp"
+#include "sdk/client/sampler.hpp"
+#include "sdk/client/scheduled_inputs.hpp"
+#include "sdk/client/server_clock.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/messages.hpp"
+
+namespace tandem::client {
+
+struct EpochState {
+  EpochState(transport::SessionMessage announced, const transport::ParticipantId& announced_by,
+             ClientTimeline made_timeline, std::uint32_t wanted_lead)
+      : session(std::move(announced)),
+        server(announced_by),
+        timeline(std::move(made_timeline)),
+        lead(std::min(wanted_lead, session.lead)),
+        assembly({.delta_bytes = session.max_delta_bytes}),
+        pacer(session.frame_rate_hz),
+        sampler(session.capacity, session.lattice_unit) {}
+
+  transport::SessionMessage session;
+  transport::ParticipantId server;
+  ClientTimeline timeline;
+  std::uint32_t lead;  ///< in force: not above the session's
+  DeltaAssembly assembly;
+  ScheduledInputs scheduled;
+  Joiner joiner;
+  Pacer pacer;
+  Sampler sampler;
+
+  bool stream_open = false;
+  bool joining = true;
+  bool played = false;                ///< has been playing in this epoch
+  std::int64_t join_began_ns = 0;     ///< the session was learned, or something was lost
+  std::int64_t input_missing_ns = 0;  ///< how long the front delta has waited for a scheduled input
+  std::int64_t frame_cost_ns = 0;     ///< simulation since the last applied delta
+  std::optional<transport::ReplyMessage> reply;  ///< newest
+};
+
+}  // namespace tandem::client

@@ -1,0 +1,37 @@
+#pragma once
+// Scheduled inputs of one epoch, kept for as long as a snapshot may still need them.
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/messages.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::client {
+
+/// Reads a scheduled input. Untrusted. Errors: kUnsupported (kind), kMalformed (count or range of the
+/// integers).
+[[nodiscard]] Result<ScheduledDrive> read_scheduled(const transport::ScheduledInputMessage& message);
+
+/// The inputs received in this epoch, by number. A sample is delivered once, but a rejoin starts from a
+/// snapshot that may be older than inputs already received; so they stay here, the highest numbers first. Not
+/// thread-safe.
+class ScheduledInputs {
+ public:
+  /// As deep as the topic's history, twice: more can not be on their way to one reader.
+  static constexpr std::size_t kKept = 512;
+
+  void add(const ScheduledDrive& input) {
+    held_.emplace(input.number, input);
+    if (held_.size() > kKept) held_.erase(held_.begin());
+  }
+  void clear() { held_.clear(); }
+  [[nodiscard]] const std::map<std::uint64_t, ScheduledDrive>& held() const { return held_; }
+
+ private:
+  std::map<std::uint64_t, ScheduledDrive> held_;
+};
+
+}  // namespace tandem::client

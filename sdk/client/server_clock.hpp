@@ -1,0 +1,79 @@
+#pragma once
+// The server's clock as seen from here, and which frame it is at.
+
+#include <cstdint>
+#include <limits>
+
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem::client {
+
+/// Estimates offset = server wall clock - client steady clock from one-way stamps. A delta that arrived
+/// proves offset >= sent - received; an echo of our own clock proves offset <= server time - echoed. The
+/// truth lies between; the middle is the guess, as in NTP. Bounds are forgotten after two to four seconds,
+/// which follows drift between the two clocks, and at once when they contradict each other (somebody set the
+/// clock).
+class ServerClock {
+ public:
+  /// How long one set of bounds is collected. Shorter follows drift closer, longer filters delay better.
+  static constexpr std::int64_t kSpanNs = 2'000'000'000;
+
+  void on_message(std::int64_t server_time_ns, std::int64_t now_ns);
+  void on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns);
+  void reset() { *this = ServerClock(); }
+
+  [[nodiscard]] bool known() const { return lower() != kNone; }
+  [[nodiscard]] std::int64_t offset_ns() const;
+  /// Offset seen through the fastest delivery: what the offset would be if delivery took no time.
+  [[nodiscard]] std::int64_t arrival_offset_ns() const { return lower(); }
+  /// Time from an acknowledgement to a reply that echoes it, at best; 0 while unknown.
+  [[nodiscard]] std::int64_t round_trip_ns() const;
+
+ private:
+  static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::min();
+  struct Bounds {
+    std::int64_t lower = kNone;
+    std::int64_t upper = std::numeric_limits<std::int64_t>::max();
+  };
+  void turn(std::int64_t now_ns);
+  [[nodiscard]] std::int64_t lower() const;
+  [[nodiscard]] std::int64_t upper() const;
+
+  Bounds current_, previous_;
+  std::int64_t turned_ns_ = kNone;
+};
+
+/// The frame the server is at, as a fraction, from the times it published deltas. Follows its rate, its drift
+/// and the jitter of its loop; a suspension or a change of rate starts the estimate again.
+class Pacer {
+ public:
+  explicit Pacer(double frame_rate_hz) : period_ns_(1e9 / frame_rate_hz) {}
+
+  void on_delta(Frame frame, std::int64_t server_time_ns, std::int64_t now_ns);
+  void on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns) {
+    clock_.on_echo(server_time_ns, echoed_client_ns, now_ns);
+  }
+  [[nodiscard]] bool known() const { return started_; }
+  /// The server publishes frame f when this reaches f.
+  [[nodiscard]] double server_frame(std::int64_t now_ns) const;
+  /// Frame f is expected to have arrived when this reaches f; behind server_frame by the delivery and the
+  /// jitter.
+  [[nodiscard]] double arrived_frame(std::int64_t now_ns) const;
+  /// Client time at which the server publishes `frame`.
+  [[nodiscard]] std::int64_t due_ns(Frame frame) const;
+  [[nodiscard]] double jitter_ms() const { return jitter_ns_ / 1e6; }
+  [[nodiscard]] const ServerClock& clock() const { return clock_; }
+  [[nodiscard]] double period_ns() const { return period_ns_; }
+
+ private:
+  double period_ns_;
+  ServerClock clock_;
+  bool started_ = false;
+  // Anchor: frame base_frame_ is published at base_ns_ + phase_ns_. Kept apart, so that doubles stay exact.
+  Frame base_frame_ = 0;
+  std::int64_t base_ns_ = 0;
+  double phase_ns_ = 0;
+  double jitter_ns_ = 0;
+};
+
+}  // namespace tandem::client

@@ -1,0 +1,49 @@
+#pragma once
+// Figures of one client.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "sdk/client/quantiles.hpp"
+
+namespace tandem::client {
+
+/// Why a client had to join again.
+enum class ResyncReason : std::uint8_t {
+  kGap = 0,           ///< a frame was missing
+  kLostPart = 1,      ///< a new frame began while one was incomplete
+  kMissingInput = 2,  ///< a scheduled input did not come in time
+  kMismatch = 3,      ///< the state hash differed from the server's
+  kRefused = 4,       ///< bytes that broke a rule of the format
+  kOverflow = 5,      ///< more deltas waited than the buffer holds
+};
+inline constexpr std::size_t kResyncReasons = 6;
+
+/// Counts since the client was made; they survive rejoins and epochs.
+struct Statistics {
+  std::uint64_t frames_applied = 0;
+  std::uint64_t payload_bytes = 0;
+  std::uint64_t resyncs = 0;  ///< by loss, gap or refusal; a first join and a new epoch are none
+  std::array<std::uint64_t, kResyncReasons> resyncs_by_reason{};
+  std::uint64_t epochs = 0;
+  std::uint64_t hash_mismatches = 0;
+  std::uint64_t refused_messages = 0;  ///< malformed deltas, snapshots, scheduled inputs, sessions
+  std::uint64_t stale_messages = 0;    ///< of another epoch
+  std::uint64_t foreign_messages = 0;  ///< not from the participant that announced the session
+  std::uint64_t inputs_sent = 0, inputs_acted = 0, inputs_refused = 0, inputs_unknown = 0;
+  std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
+  std::int64_t join_ns = 0;                                ///< last join
+  std::size_t queue_high_water = 0;
+  Quantiles latency;        ///< publish to applied
+  Quantiles input_latency;  ///< sent to the frame it acted on applied
+  Quantiles frame_cost;     ///< decode, apply and simulate, per applied frame
+
+  /// Payload since the first applied frame; 2^20 bits to the Mbit.
+  [[nodiscard]] double mbit_per_s() const {
+    const auto span_ns = static_cast<double>(last_applied_ns - first_applied_ns);
+    return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / (1U << 20U) / (span_ns / 1e9) : 0;
+  }
+};
+
+}  // namespace tandem::client
