@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -17,19 +16,29 @@ namespace tandem {
 
 /// What a decoder reads besides its bytes. May change between frames; a change travels in the delta itself.
 struct CodecParameters {
-  std::int32_t threshold = 0;      ///< lattice units; bodies further off than this are corrected. > 0
-  std::int32_t position_step = 1;  ///< lattice units per quantisation step (range / 127). > 0
-  std::int32_t velocity_step = 1;  ///< 1/64 unit per frame per quantisation step (range / 127). > 0
+  std::int32_t threshold = 0;      ///< lattice units; bodies further off than this are corrected. 1 .. 2^30
+  std::int32_t position_step = 1;  ///< lattice units per quantisation step (range / 127). 1 .. 2^24
+  std::int32_t velocity_step = 1;  ///< 1/64 unit per frame per quantisation step (range / 127). 1 .. 2^24
   friend bool operator==(const CodecParameters&, const CodecParameters&) = default;
 };
+/// 127 steps of this size span the lattice from end to end.
+inline constexpr std::int32_t kMaxStep = 1 << 24;
+
+/// True when all parameters are in their ranges.
+[[nodiscard]] constexpr bool valid_parameters(const CodecParameters& parameters) {
+  const auto in = [](std::int32_t value, std::int32_t most) { return value >= 1 && value <= most; };
+  return in(parameters.threshold, kPositionLimit) && in(parameters.position_step, kMaxStep) &&
+         in(parameters.velocity_step, kMaxStep);
+}
 
 /// Budget that never binds.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
 
 /// The corrections part of a delta: one implementation a codec name (paper, sections 3.3.1 and 3.3.2).
 ///
-/// encode() and parse()+apply() leave the same state on both sides. Both see the state after the delta's lifecycle
-/// records. Nothing here allocates after construction. Not thread-safe.
+/// encode() and parse()+apply() leave the same state on both sides. Both see the state after the delta's
+/// lifecycle records. Only the first encode() allocates (a decoder needs no encoder's memory). Not
+/// thread-safe.
 class Codec {
  public:
   virtual ~Codec() = default;
@@ -38,34 +47,40 @@ class Codec {
   [[nodiscard]] virtual std::size_t bound() const = 0;
 
   /// Writes correction sections that move `state` (predicted) towards `target`, and moves it.
-  /// `target` has the same alive slots. Never writes more than `budget` bytes, section headers included;
-  /// where the budget binds, the largest errors go first. Returns the number of corrected bodies.
+  /// `target` has the same alive slots. Never writes more than `budget` bytes, section headers included, nor
+  /// beyond the end of `out`; where that binds, the largest errors go first, ties by slot, up to the first
+  /// body that does not fit. Any codec obeys a budget; by name, only `limited` is meant to have one. Returns
+  /// the number of corrected bodies.
   virtual std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
                                std::size_t budget, ByteWriter& out) = 0;
 
   /// Forgets what parse() collected. Call before the first section of a delta.
   virtual void begin() = 0;
-  /// Validates the body of one corrections section against `alive` (the alive column after lifecycle) and collects
-  /// its corrections; changes no state. Errors: kMalformed with the reason.
+  /// Validates the body of one corrections section against `alive` (the alive column after lifecycle) and
+  /// collects its corrections; changes no state. Blocks ascend. `section` must stay until apply(). Errors:
+  /// kMalformed with the reason.
   virtual Result<void> parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
                              const CodecParameters& parameters) = 0;
   /// Applies all collected corrections. Only after every section of the delta parsed.
   virtual void apply(State& state) = 0;
-  /// Slots corrected by the last encode() or apply(), each once.
+  /// Slots corrected by the last encode() or apply(), each once, ascending.
   [[nodiscard]] virtual std::span<const Slot> corrected() const = 0;
 
   /// The codec's own per-body bytes, part of the state hash and of snapshots. Empty for the paper's codecs.
   [[nodiscard]] virtual std::span<const std::byte> body_state() const { return {}; }
   /// Coder state that lives across frames, as it goes into a snapshot. Nothing for the paper's codecs.
   virtual void save(ByteWriter& /*out*/) const {}
+  /// Most bytes save() writes.
+  [[nodiscard]] virtual std::size_t save_bound() const { return 0; }
   [[nodiscard]] virtual Result<void> load(std::span<const std::byte> bytes) {
     if (!bytes.empty()) return fail(ErrorCode::kMalformed, "this codec keeps no coder state");
     return {};
   }
 };
 
-/// Makes the codec a session names. `tables` travel in the session (code lengths of `entropy` and `limited`, empty
-/// for the others). Errors: kUnsupported for an unknown name, kMalformed for tables that do not fit it.
+/// Makes the codec a session names. `tables` travel in the session: 512 code lengths for `entropy` and
+/// `limited` (training.hpp makes them, trained or default), nothing for the others. Errors: kUnsupported for
+/// an unknown name, kMalformed for tables that do not fit it.
 [[nodiscard]] Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
                                                         std::span<const std::byte> tables);
 

@@ -22,7 +22,8 @@ struct LifecycleRecord {
   BodyState body;               ///< spawn and teleport
 };
 
-/// Section types. A reader that does not know a type refuses the delta if the critical bit is set, else skips it.
+/// Section types. A reader that does not know a type refuses the delta if the critical bit is set, else skips
+/// it.
 inline constexpr std::uint16_t kCriticalSection = 0x8000;
 enum class SectionType : std::uint16_t {
   kLifecycle = 1 | kCriticalSection,
@@ -32,30 +33,41 @@ enum class SectionType : std::uint16_t {
 /// u16 type, u32 length of the body, body.
 inline constexpr std::size_t kSectionHeaderBytes = 6;
 
-/// Encodes and decodes whole payloads around a codec. One per side and session. Not thread-safe. After
-/// construction encode() and decode() allocate nothing, except for the message of a refusal.
+struct CodecStatistics;
+
+/// Encodes and decodes whole payloads around a codec. One per side and session. Not thread-safe. encode() and
+/// decode() allocate only on the first call, for more lifecycle records than ever before, and for the message
+/// of a refusal.
 class DeltaCodec {
  public:
   /// `codec` must be made for `capacity`.
   DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity, const CodecParameters& parameters,
              TypeId type_count);
+  DeltaCodec(DeltaCodec&&) noexcept;
+  DeltaCodec& operator=(DeltaCodec&&) noexcept;
+  DeltaCodec(const DeltaCodec&) = delete;
+  DeltaCodec& operator=(const DeltaCodec&) = delete;
+  ~DeltaCodec();
 
   /// Most bytes encode() writes: lifecycle of every slot, parameters and the codec's bound.
   [[nodiscard]] std::size_t bound() const;
 
   struct Encoded {
-    std::size_t size_bytes = 0;       ///< of the payload
-    std::size_t correction_bytes = 0; ///< of the correction sections, headers included: what a budget covers
-    std::uint32_t corrected = 0;      ///< bodies
+    std::size_t size_bytes = 0;        ///< of the payload
+    std::size_t correction_bytes = 0;  ///< of the correction sections, headers included: what a budget covers
+    std::uint32_t corrected = 0;       ///< bodies
   };
-  /// Server side: applies `lifecycle` and corrections to `state` (predicted) and writes them to `out`, which holds
-  /// at least bound() bytes. `target` is the full simulation on the lattice. Preconditions are asserted.
+  /// Server side: applies `lifecycle` and corrections to `state` (predicted) and writes them to `out`, which
+  /// holds at least bound() bytes. `target` is the full simulation on the lattice. Preconditions are
+  /// asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
                  std::size_t budget, std::span<std::byte> out);
 
   /// Server side: parameters from the next encode() on; sent in that delta.
   void set_parameters(const CodecParameters& parameters);
   [[nodiscard]] const CodecParameters& parameters() const;
+  /// Server side, for training: every encode() adds what it sees after the lifecycle records. Null ends it.
+  void set_statistics(CodecStatistics* statistics);
   /// Client side, from a snapshot: parameters in force, nothing is sent.
   void restore_parameters(const CodecParameters& parameters);
 
@@ -63,7 +75,8 @@ class DeltaCodec {
   /// Errors: kMalformed, kUnsupported (unknown critical section).
   [[nodiscard]] Result<void> decode(State& state, std::span<const std::byte> payload);
 
-  /// Of the last encode() or decode(): slots whose state differs from the prediction, each once, and the records.
+  /// Of the last encode() or decode(): slots that records or corrections named, each once, ascending; the
+  /// records.
   [[nodiscard]] std::span<const Slot> touched() const;
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;
   [[nodiscard]] Codec& codec();
@@ -71,7 +84,7 @@ class DeltaCodec {
 
  private:
   struct Impl;
-  std::shared_ptr<Impl> impl_;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace tandem

@@ -14,6 +14,9 @@
 
 namespace tandem {
 
+/// Frames that any client may simulate beyond its last delta at most. Sessions use 0 or 1.
+inline constexpr std::uint32_t kMaxLead = 8;
+
 /// All that both sides must agree on to build a timeline. Comes from TandemSession.
 struct TimelineConfig {
   std::uint32_t capacity = 0;
@@ -40,8 +43,11 @@ inline constexpr std::size_t kMaxPendingInputs = 256;
 /// The server's side: predicts, encodes and applies, one frame at a time. Not thread-safe.
 class ServerTimeline {
  public:
-  /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity).
+  /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
   static Result<ServerTimeline> create(const TimelineConfig& config, Epoch epoch);
+  /// With a predictor of the caller's own; the one that `config` names is not looked at.
+  static Result<ServerTimeline> create(const TimelineConfig& config, Epoch epoch,
+                                       std::unique_ptr<Predictor> predictor);
   ServerTimeline(ServerTimeline&&) noexcept;
   ServerTimeline& operator=(ServerTimeline&&) noexcept;
   ServerTimeline(const ServerTimeline&) = delete;
@@ -50,28 +56,35 @@ class ServerTimeline {
 
   /// The agreed state at `frame` (frame 0: the start block), before the first advance().
   void start(Frame frame, const State& state, const Drive& drive);
-  /// Numbers must follow one another and frames must lie in the future. Errors: kOutOfOrder, kCapacity.
+  /// Numbers must follow one another and frames must lie in the future. The last number issued for a frame
+  /// wins. Errors: kOutOfOrder, kCapacity, kInvalidArgument (gravity out of range).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
 
   struct FrameResult {
     Frame frame = 0;
-    std::uint64_t last_input = 0;          ///< highest number scheduled before this delta
-    std::uint64_t hash = 0;                ///< of the agreed state
-    std::span<const std::byte> payload;    ///< valid until the next advance()
+    std::uint64_t last_input = 0;        ///< highest number scheduled before this delta
+    std::uint64_t hash = 0;              ///< of the agreed state
+    std::span<const std::byte> payload;  ///< valid until the next advance()
     std::size_t correction_bytes = 0;
     std::uint32_t corrected = 0;
-    double predict_ms = 0, encode_ms = 0;  ///< filled only when a clock was given to create(); see set_clock()
+    /// Encoding applies as it goes. Filled only when a clock was given: set_clock().
+    double predict_ms = 0, encode_ms = 0, hash_ms = 0;
   };
-  /// Predicts the next frame, encodes towards `target` and applies. Allocates nothing after the first few frames.
+  /// Predicts the next frame, encodes towards `target` and applies. Allocates nothing after the first few
+  /// frames.
   FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
                       std::size_t budget = kNoBudget);
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
+  /// In force from the next advance() on; travels in that delta.
   void set_parameters(const CodecParameters& parameters);
+  /// For training: every advance() adds what it corrects (training.hpp). Null ends it.
+  void set_statistics(CodecStatistics* statistics);
 
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] const State& state() const;
   [[nodiscard]] const Drive& drive() const;  ///< in force at frame()
+  [[nodiscard]] std::uint64_t hash() const;  ///< of state()
   [[nodiscard]] std::uint64_t last_input() const;
   [[nodiscard]] std::size_t payload_bound() const;
   /// One cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content of `out`.
@@ -87,7 +100,10 @@ class ServerTimeline {
 /// A client's side: holds the states of all frames from the last delta to now. Not thread-safe.
 class ClientTimeline {
  public:
+  /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
   static Result<ClientTimeline> create(const TimelineConfig& config);
+  /// With a predictor of the caller's own; the one that `config` names is not looked at.
+  static Result<ClientTimeline> create(const TimelineConfig& config, std::unique_ptr<Predictor> predictor);
   ClientTimeline(ClientTimeline&&) noexcept;
   ClientTimeline& operator=(ClientTimeline&&) noexcept;
   ClientTimeline(const ClientTimeline&) = delete;
@@ -99,15 +115,17 @@ class ClientTimeline {
   [[nodiscard]] Result<void> load(std::span<const std::byte> snapshot, Epoch epoch);
   [[nodiscard]] bool playing() const;
 
-  /// Scheduled inputs in any order; duplicates and numbers the snapshot already counts are ignored.
-  /// Errors: kCapacity; kOutOfOrder for a frame that was already applied (a gap in the server's promise).
+  /// Scheduled inputs in any order, after load(); duplicates and numbers the snapshot already counts are
+  /// ignored. A frame that was simulated but not applied is simulated again, and all after it. Errors:
+  /// kCapacity; kMalformed; kOutOfOrder before load() and for a frame that was already applied (a gap in the
+  /// server's promise).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
   /// True when every input number up to `number` is held, counted from the snapshot's.
   [[nodiscard]] bool holds_inputs(std::uint64_t number) const;
 
-  /// Applies delta `frame` == applied() + 1, simulating up to it first if need be, checks the hash and re-simulates
-  /// what was simulated beyond it. Needs holds_inputs(last_input).
-  /// Errors: kOutOfOrder, kMalformed, kUnsupported: state untouched. kMismatch: applied but wrong; load() again.
+  /// Applies delta `frame` == applied() + 1, simulating up to it first if need be, checks the hash and
+  /// re-simulates what was simulated beyond it. Needs holds_inputs(last_input). Errors: kOutOfOrder,
+  /// kMalformed, kUnsupported: state untouched. kMismatch: applied but wrong; load() again.
   [[nodiscard]] Result<void> apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload);
   /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead); returns whether it did.
@@ -117,10 +135,20 @@ class ClientTimeline {
   [[nodiscard]] Frame now() const;      ///< last frame simulated, applied() .. applied() + max_lead
   /// State of a frame from applied() to now(); valid until the next call that is not const.
   [[nodiscard]] const State& state(Frame frame) const;
-  [[nodiscard]] std::uint64_t hash() const;  ///< of state(applied()), as last checked
-  [[nodiscard]] const Drive& drive() const;  ///< in force at applied()
-  [[nodiscard]] std::span<const Slot> touched() const;                 ///< by the last apply()
-  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;    ///< of the last apply()
+  [[nodiscard]] std::uint64_t hash() const;                          ///< of state(applied()), as last checked
+  [[nodiscard]] const Drive& drive() const;                          ///< in force at applied()
+  [[nodiscard]] std::span<const Slot> touched() const;               ///< by the last apply()
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< of the last apply()
+  [[nodiscard]] const CodecParameters& parameters() const;           ///< in force at applied()
+
+  /// Of the last apply(): decoding and correcting the frame; checking its hash and re-simulating. Zero
+  /// without a clock.
+  struct Timings {
+    double decode_ms = 0, apply_ms = 0;
+  };
+  [[nodiscard]] Timings timings() const;
+  /// For measurement only, as ServerTimeline::set_clock().
+  void set_clock(std::int64_t (*now_ns)());
 
  private:
   struct Impl;

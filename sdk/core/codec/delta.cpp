@@ -1,0 +1,213 @@
+#include "sdk/core/codec/delta.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "sdk/core/codec/lifecycle.hpp"
+#include "sdk/core/codec/training.hpp"
+#include "sdk/core/lattice/assert.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::size_t kParametersBytes = 12;
+
+Result<CodecParameters> read_parameters(std::span<const std::byte> section) {
+  ByteReader in(section);
+  CodecParameters parameters;
+  parameters.threshold = in.get<std::int32_t>();
+  parameters.position_step = in.get<std::int32_t>();
+  parameters.velocity_step = in.get<std::int32_t>();
+  if (!in.at_end()) return fail(ErrorCode::kMalformed, "parameters section of wrong length");
+  if (!valid_parameters(parameters)) return fail(ErrorCode::kMalformed, "parameters out of range");
+  return parameters;
+}
+
+void write_section_header(SectionType type, std::size_t size_bytes, ByteWriter& out) {
+  out.put(static_cast<std::uint16_t>(type));
+  out.put(static_cast<std::uint32_t>(size_bytes));
+}
+
+}  // namespace
+
+struct DeltaCodec::Impl {
+  std::unique_ptr<Codec> codec;
+  std::uint32_t capacity;
+  TypeId type_count;
+  CodecParameters parameters;  // in force
+  CodecParameters next;        // server: from the next encode() on
+  CodecStatistics* statistics = nullptr;
+  std::vector<LifecycleRecord> lifecycle;
+  std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
+  std::vector<Slot> merged;         // touched slots; used only where lifecycle adds to the corrected ones
+  std::span<const Slot> touched;
+
+  // Where a section belongs among the others: lifecycle, parameters, corrections.
+  struct Parsed {
+    int stage = 0;
+    CodecParameters parameters;
+    std::span<const std::uint8_t> alive;
+  };
+  Result<void> parse(std::span<const std::byte> payload, const State& state, Parsed& parsed);
+  Result<void> parse_section(std::uint16_t type, std::span<const std::byte> body, const State& state,
+                             Parsed& parsed);
+  void merge_touched();
+};
+
+Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const std::byte> body,
+                                             const State& state, Parsed& parsed) {
+  const auto enter = [&parsed](int stage) {
+    // Corrections may repeat (one section a block), the others may not.
+    if (stage < parsed.stage || (stage == parsed.stage && stage != 3)) return false;
+    parsed.stage = stage;
+    return true;
+  };
+  switch (static_cast<SectionType>(type)) {
+    case SectionType::kLifecycle: {
+      if (!enter(1)) break;
+      if (auto read = read_lifecycle(body, lifecycle); !read) return read;
+      std::copy(state.alive().begin(), state.alive().end(), alive.begin());
+      if (const char* reason = check_lifecycle(lifecycle, alive, type_count)) {
+        return fail(ErrorCode::kMalformed, reason);
+      }
+      parsed.alive = alive;
+      return {};
+    }
+    case SectionType::kParameters: {
+      if (!enter(2)) break;
+      const auto read = read_parameters(body);
+      if (!read) return tl::unexpected<Error>(read.error());
+      parsed.parameters = *read;
+      return {};
+    }
+    case SectionType::kCorrections:
+      if (!enter(3)) break;
+      return codec->parse(body, parsed.alive, parsed.parameters);
+    default:
+      if ((type & kCriticalSection) == 0) return {};
+      return fail(ErrorCode::kUnsupported,
+                  "unknown critical section " + std::to_string(type & ~kCriticalSection));
+  }
+  return fail(ErrorCode::kMalformed, "sections out of order or repeated");
+}
+
+void DeltaCodec::Impl::merge_touched() {
+  touched = codec->corrected();
+  if (lifecycle.empty()) return;
+  merged.clear();
+  auto corrected = touched.begin();
+  for (const LifecycleRecord& record : lifecycle) {
+    if (!merged.empty() && merged.back() == record.slot) continue;
+    while (corrected != touched.end() && *corrected < record.slot) merged.push_back(*corrected++);
+    if (corrected != touched.end() && *corrected == record.slot) ++corrected;
+    merged.push_back(record.slot);
+  }
+  merged.insert(merged.end(), corrected, touched.end());
+  touched = merged;
+}
+
+DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
+                       const CodecParameters& parameters, TypeId type_count)
+    : impl_(std::make_unique<Impl>()) {
+  TANDEM_ASSERT(valid_parameters(parameters));
+  impl_->codec = std::move(codec);
+  impl_->capacity = capacity;
+  impl_->type_count = type_count;
+  impl_->parameters = parameters;
+  impl_->next = parameters;
+  impl_->lifecycle.reserve(std::min<std::size_t>(capacity, 1024));
+  impl_->alive.resize(capacity);
+  impl_->merged.reserve(capacity);
+}
+DeltaCodec::DeltaCodec(DeltaCodec&&) noexcept = default;
+DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
+DeltaCodec::~DeltaCodec() = default;
+
+std::size_t DeltaCodec::bound() const {
+  return kSectionHeaderBytes + impl_->capacity * kMostLifecycleBytesPerSlot + kSectionHeaderBytes +
+         kParametersBytes + impl_->codec->bound();
+}
+
+DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
+                                       std::span<const LifecycleRecord> lifecycle, std::size_t budget,
+                                       std::span<std::byte> out) {
+  TANDEM_ASSERT(out.size() >= bound());
+  TANDEM_ASSERT(state.capacity() == impl_->capacity && target.capacity() == impl_->capacity);
+  ByteWriter writer(out);
+  impl_->lifecycle.assign(lifecycle.begin(), lifecycle.end());
+  if (!lifecycle.empty()) {
+#ifdef TANDEM_ASSERTIONS
+    std::copy(state.alive().begin(), state.alive().end(), impl_->alive.begin());
+    TANDEM_ASSERT(check_lifecycle(lifecycle, impl_->alive, impl_->type_count) == nullptr);
+#endif
+    const std::size_t at = writer.size();
+    write_section_header(SectionType::kLifecycle, 0, writer);
+    write_lifecycle(lifecycle, writer);
+    writer.patch_u32(at + 2, static_cast<std::uint32_t>(writer.size() - at - kSectionHeaderBytes));
+    apply_lifecycle(lifecycle, state);
+  }
+  if (impl_->next != impl_->parameters) {
+    impl_->parameters = impl_->next;
+    write_section_header(SectionType::kParameters, kParametersBytes, writer);
+    writer.put(impl_->parameters.threshold);
+    writer.put(impl_->parameters.position_step);
+    writer.put(impl_->parameters.velocity_step);
+  }
+  TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
+  if (impl_->statistics != nullptr) impl_->statistics->observe(state, target, impl_->parameters);
+  Encoded encoded;
+  const std::size_t before = writer.size();
+  encoded.corrected = impl_->codec->encode(state, target, impl_->parameters, budget, writer);
+  encoded.size_bytes = writer.size();
+  encoded.correction_bytes = writer.size() - before;
+  TANDEM_ASSERT(!writer.overflow());
+  impl_->merge_touched();
+  return encoded;
+}
+
+void DeltaCodec::set_parameters(const CodecParameters& parameters) {
+  TANDEM_ASSERT(valid_parameters(parameters));
+  impl_->next = parameters;
+}
+const CodecParameters& DeltaCodec::parameters() const { return impl_->parameters; }
+void DeltaCodec::set_statistics(CodecStatistics* statistics) { impl_->statistics = statistics; }
+void DeltaCodec::restore_parameters(const CodecParameters& parameters) {
+  set_parameters(parameters);
+  impl_->parameters = parameters;
+}
+
+Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const State& state, Parsed& parsed) {
+  ByteReader in(payload);
+  while (in.remaining() > 0) {
+    const auto type = in.get<std::uint16_t>();
+    const auto size_bytes = in.get<std::uint32_t>();
+    const std::span<const std::byte> body = in.get_bytes(size_bytes);
+    if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated section");
+    if (auto section = parse_section(type, body, state, parsed); !section) return section;
+  }
+  return {};
+}
+
+Result<void> DeltaCodec::decode(State& state, std::span<const std::byte> payload) {
+  TANDEM_ASSERT(state.capacity() == impl_->capacity);
+  impl_->lifecycle.clear();
+  impl_->codec->begin();
+  impl_->touched = {};
+  Impl::Parsed parsed{0, impl_->parameters, state.alive()};
+  if (auto result = impl_->parse(payload, state, parsed); !result) {
+    impl_->lifecycle.clear();
+    return result;
+  }
+  impl_->parameters = impl_->next = parsed.parameters;
+  apply_lifecycle(impl_->lifecycle, state);
+  impl_->codec->apply(state);
+  impl_->merge_touched();
+  return {};
+}
+
+std::span<const Slot> DeltaCodec::touched() const { return impl_->touched; }
+std::span<const LifecycleRecord> DeltaCodec::lifecycle() const { return impl_->lifecycle; }
+Codec& DeltaCodec::codec() { return *impl_->codec; }
+const Codec& DeltaCodec::codec() const { return *impl_->codec; }
+
+}  // namespace tandem

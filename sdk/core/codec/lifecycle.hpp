@@ -1,0 +1,31 @@
+#pragma once
+// Lifecycle records as bytes: a section of a delta's payload.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/delta.hpp"
+
+namespace tandem {
+
+/// Despawn and spawn of one slot: the most that a slot can cost.
+inline constexpr std::size_t kMostLifecycleBytesPerSlot = 5 + 32;
+
+/// Why `records` break the rules (order, alive and dead slots, ranges) on top of the `alive` column; null if
+/// they do not. Leaves in `alive` the column after the records.
+[[nodiscard]] const char* check_lifecycle(std::span<const LifecycleRecord> records,
+                                          std::span<std::uint8_t> alive, TypeId type_count);
+
+/// Appends the body of a lifecycle section.
+void write_lifecycle(std::span<const LifecycleRecord> records, ByteWriter& out);
+
+/// Reads all of `section` into `records` (replaced). Checks the layout only. Errors: kMalformed.
+[[nodiscard]] Result<void> read_lifecycle(std::span<const std::byte> section,
+                                          std::vector<LifecycleRecord>& records);
+
+/// Does what the records say. They must have passed check_lifecycle().
+void apply_lifecycle(std::span<const LifecycleRecord> records, State& state);
+
+}  // namespace tandem

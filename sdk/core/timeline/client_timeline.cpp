@@ -1,0 +1,170 @@
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/timeline/input_schedule.hpp"
+#include "sdk/core/timeline/parts.hpp"
+#include "sdk/core/timeline/snapshot.hpp"
+#include "sdk/core/timeline/stopwatch.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+
+namespace tandem {
+
+struct ClientTimeline::Impl {
+  // A frame in the ring: its state and the drive of the step that produced it.
+  struct Held {
+    State state;
+    Drive drive;
+  };
+
+  Impl(TimelineParts made, const TimelineConfig& config)
+      : parts(std::move(made)), type_count(config.type_count), max_lead(config.max_lead) {
+    // With lead 0 the next frame still needs a place while its delta is being checked.
+    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(config.capacity), Drive{}});
+  }
+
+  Held& at(Frame frame) { return ring[frame % ring.size()]; }
+
+  void simulate(Frame frame) {
+    const Held& before = at(frame - 1);
+    Held& next = at(frame);
+    next.drive = inputs.drive_for(frame, before.drive);
+    parts.predictor->step(before.state, next.state, next.drive);
+  }
+
+  // After a delta changed the touched slots of the frame just applied.
+  void resimulate_touched() {
+    const std::span<const Slot> touched = parts.delta.touched();
+    if (touched.empty()) return;
+    for (Frame frame = applied + 1; frame <= now; ++frame) {
+      Held& next = at(frame);
+      if (parts.predictor->interacts()) {
+        parts.predictor->step(at(frame - 1).state, next.state, next.drive);
+      } else {
+        parts.predictor->step_slots(at(frame - 1).state, next.state, next.drive, touched);
+      }
+    }
+  }
+
+  TimelineParts parts;
+  TypeId type_count;
+  std::uint32_t max_lead;
+  std::vector<Held> ring;  // frames applied .. now, by frame modulo size
+  Frame applied = 0;
+  Frame now = 0;
+  bool playing = false;
+  InputSchedule inputs;
+  StateHasher hasher;
+  std::uint64_t hash = 0;
+  Timings timings;
+  Stopwatch::Clock clock = nullptr;
+};
+
+Result<ClientTimeline> ClientTimeline::create(const TimelineConfig& config) {
+  auto predictor = make_predictor(config.predictor, config.capacity, config.predictor_constants);
+  if (!predictor) return tl::unexpected<Error>(predictor.error());
+  return create(config, std::move(*predictor));
+}
+
+Result<ClientTimeline> ClientTimeline::create(const TimelineConfig& config,
+                                              std::unique_ptr<Predictor> predictor) {
+  auto parts = make_parts(config, std::move(predictor));
+  if (!parts) return tl::unexpected<Error>(parts.error());
+  return ClientTimeline(std::make_unique<Impl>(std::move(*parts), config));
+}
+
+ClientTimeline::ClientTimeline(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ClientTimeline::ClientTimeline(ClientTimeline&&) noexcept = default;
+ClientTimeline& ClientTimeline::operator=(ClientTimeline&&) noexcept = default;
+ClientTimeline::~ClientTimeline() = default;
+
+Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epoch) {
+  Impl& m = *impl_;
+  m.playing = false;
+  State& state = m.ring[0].state;
+  const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
+  if (!read) return tl::unexpected<Error>(read.error());
+  if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
+  const std::uint64_t hash = m.hasher.hash(state, m.parts.delta.codec().body_state());
+  if (hash != read->hash) {
+    return fail(ErrorCode::kMismatch,
+                "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
+  }
+  std::swap(m.ring[0], m.at(read->frame));
+  m.at(read->frame).drive = read->drive;
+  m.parts.delta.restore_parameters(read->parameters);
+  m.inputs.reset(read->last_input, read->pending);
+  m.applied = m.now = read->frame;
+  m.hash = hash;
+  m.playing = true;
+  return {};
+}
+
+bool ClientTimeline::playing() const { return impl_->playing; }
+
+Result<void> ClientTimeline::schedule(const ScheduledDrive& input) {
+  Impl& m = *impl_;
+  if (!m.playing) return fail(ErrorCode::kOutOfOrder, "no snapshot loaded");
+  const auto added = m.inputs.add(input, m.applied);
+  if (!added) return tl::unexpected<Error>(added.error());
+  if (*added) {
+    for (Frame frame = input.frame; frame <= m.now; ++frame) m.simulate(frame);
+  }
+  return {};
+}
+
+bool ClientTimeline::holds_inputs(std::uint64_t number) const { return number <= impl_->inputs.held_to(); }
+
+Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
+                                   std::span<const std::byte> payload) {
+  Impl& m = *impl_;
+  if (!m.playing) return fail(ErrorCode::kOutOfOrder, "no snapshot loaded");
+  if (frame != m.applied + 1) {
+    return fail(ErrorCode::kOutOfOrder,
+                "delta " + std::to_string(frame) + " does not follow " + std::to_string(m.applied));
+  }
+  if (!holds_inputs(last_input)) {
+    return fail(ErrorCode::kOutOfOrder,
+                "scheduled inputs up to " + std::to_string(last_input) + " are not all here");
+  }
+  Stopwatch watch(m.clock);
+  const bool ahead = m.now > m.applied;
+  if (!ahead) m.simulate(frame);
+  if (auto decoded = m.parts.delta.decode(m.at(frame).state, payload); !decoded) return decoded;
+  m.applied = frame;
+  m.now = std::max(m.now, frame);
+  m.inputs.forget(frame);
+  m.timings.decode_ms = watch.lap_ms();
+  m.hash = m.hasher.hash(m.at(frame).state, m.parts.delta.codec().body_state());
+  m.resimulate_touched();
+  m.timings.apply_ms = watch.lap_ms();
+  if (m.hash != hash) {
+    return fail(ErrorCode::kMismatch, "frame " + std::to_string(frame) + " is " + to_hex(m.hash) +
+                                          ", the server has " + to_hex(hash));
+  }
+  return {};
+}
+
+bool ClientTimeline::step(std::uint32_t lead) {
+  Impl& m = *impl_;
+  if (!m.playing || m.now >= m.applied + std::min(lead, m.max_lead)) return false;
+  m.simulate(++m.now);
+  return true;
+}
+
+Frame ClientTimeline::applied() const { return impl_->applied; }
+Frame ClientTimeline::now() const { return impl_->now; }
+const State& ClientTimeline::state(Frame frame) const {
+  TANDEM_ASSERT(impl_->applied <= frame && frame <= impl_->now);
+  return impl_->at(frame).state;
+}
+std::uint64_t ClientTimeline::hash() const { return impl_->hash; }
+const Drive& ClientTimeline::drive() const { return impl_->at(impl_->applied).drive; }
+std::span<const Slot> ClientTimeline::touched() const { return impl_->parts.delta.touched(); }
+std::span<const LifecycleRecord> ClientTimeline::lifecycle() const { return impl_->parts.delta.lifecycle(); }
+const CodecParameters& ClientTimeline::parameters() const { return impl_->parts.delta.parameters(); }
+ClientTimeline::Timings ClientTimeline::timings() const { return impl_->timings; }
+void ClientTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns; }
+
+}  // namespace tandem

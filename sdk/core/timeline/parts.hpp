@@ -1,0 +1,19 @@
+#pragma once
+// What a timeline of either side is made of.
+
+#include <memory>
+
+#include "sdk/core/timeline/timeline.hpp"
+
+namespace tandem {
+
+struct TimelineParts {
+  std::unique_ptr<Predictor> predictor;
+  DeltaCodec delta;
+};
+
+/// Checks `config` and makes its codec. Errors: kUnsupported, kMalformed, kInvalidArgument.
+[[nodiscard]] Result<TimelineParts> make_parts(const TimelineConfig& config,
+                                               std::unique_ptr<Predictor> predictor);
+
+}  // namespace tandem

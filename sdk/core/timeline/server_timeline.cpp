@@ -1,0 +1,126 @@
+#include <utility>
+
+#include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/timeline/input_schedule.hpp"
+#include "sdk/core/timeline/parts.hpp"
+#include "sdk/core/timeline/snapshot.hpp"
+#include "sdk/core/timeline/stopwatch.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+
+namespace tandem {
+
+struct ServerTimeline::Impl {
+  Impl(TimelineParts made, std::uint32_t capacity, Epoch the_epoch)
+      : parts(std::move(made)), epoch(the_epoch), state(capacity), payload(parts.delta.bound()) {
+    hash = hasher.hash(state, parts.delta.codec().body_state());
+  }
+
+  TimelineParts parts;
+  Epoch epoch;
+  Frame frame = 0;
+  State state;
+  Drive drive;
+  InputSchedule inputs;
+  StateHasher hasher;
+  std::uint64_t hash = 0;
+  std::vector<std::byte> payload;
+  Stopwatch::Clock clock = nullptr;
+};
+
+Result<ServerTimeline> ServerTimeline::create(const TimelineConfig& config, Epoch epoch) {
+  auto predictor = make_predictor(config.predictor, config.capacity, config.predictor_constants);
+  if (!predictor) return tl::unexpected<Error>(predictor.error());
+  return create(config, epoch, std::move(*predictor));
+}
+
+Result<ServerTimeline> ServerTimeline::create(const TimelineConfig& config, Epoch epoch,
+                                              std::unique_ptr<Predictor> predictor) {
+  auto parts = make_parts(config, std::move(predictor));
+  if (!parts) return tl::unexpected<Error>(parts.error());
+  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), config.capacity, epoch));
+}
+
+ServerTimeline::ServerTimeline(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ServerTimeline::ServerTimeline(ServerTimeline&&) noexcept = default;
+ServerTimeline& ServerTimeline::operator=(ServerTimeline&&) noexcept = default;
+ServerTimeline::~ServerTimeline() = default;
+
+void ServerTimeline::start(Frame frame, const State& state, const Drive& drive) {
+  TANDEM_ASSERT(state.capacity() == impl_->state.capacity() && valid_drive(drive));
+  impl_->frame = frame;
+  impl_->state = state;
+  impl_->drive = drive;
+  impl_->inputs.reset(0, {});
+  impl_->hash = impl_->hasher.hash(impl_->state, impl_->parts.delta.codec().body_state());
+}
+
+Result<void> ServerTimeline::schedule(const ScheduledDrive& input) {
+  if (input.number != impl_->inputs.held_to() + 1) {
+    return fail(ErrorCode::kOutOfOrder, "scheduled inputs are numbered without gaps");
+  }
+  if (!valid_drive(input.drive)) return fail(ErrorCode::kInvalidArgument, "gravity out of range");
+  const auto added = impl_->inputs.add(input, impl_->frame);
+  if (!added) return tl::unexpected<Error>(added.error());
+  return {};
+}
+
+ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
+                                                    std::span<const LifecycleRecord> lifecycle,
+                                                    std::size_t budget) {
+  Impl& m = *impl_;
+  FrameResult result;
+  Stopwatch watch(m.clock);
+  ++m.frame;
+  m.drive = m.inputs.drive_for(m.frame, m.drive);
+  m.inputs.forget(m.frame);
+  m.parts.predictor->step(m.state, m.state, m.drive);
+  result.predict_ms = watch.lap_ms();
+  const DeltaCodec::Encoded encoded = m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload);
+  result.encode_ms = watch.lap_ms();
+  m.hash = m.hasher.hash(m.state, m.parts.delta.codec().body_state());
+  result.hash_ms = watch.lap_ms();
+  result.frame = m.frame;
+  result.last_input = m.inputs.held_to();
+  result.hash = m.hash;
+  result.payload = std::span<const std::byte>(m.payload).first(encoded.size_bytes);
+  result.correction_bytes = encoded.correction_bytes;
+  result.corrected = encoded.corrected;
+  return result;
+}
+
+void ServerTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns; }
+void ServerTimeline::set_parameters(const CodecParameters& parameters) {
+  impl_->parts.delta.set_parameters(parameters);
+}
+void ServerTimeline::set_statistics(CodecStatistics* statistics) {
+  impl_->parts.delta.set_statistics(statistics);
+}
+
+Frame ServerTimeline::frame() const { return impl_->frame; }
+const State& ServerTimeline::state() const { return impl_->state; }
+const Drive& ServerTimeline::drive() const { return impl_->drive; }
+std::uint64_t ServerTimeline::hash() const { return impl_->hash; }
+std::uint64_t ServerTimeline::last_input() const { return impl_->inputs.held_to(); }
+std::size_t ServerTimeline::payload_bound() const { return impl_->parts.delta.bound(); }
+
+void ServerTimeline::snapshot(std::vector<std::byte>& out) {
+  const auto pending = impl_->inputs.pending();
+  const Snapshot snapshot{impl_->epoch,
+                          impl_->frame,
+                          impl_->inputs.held_to(),
+                          impl_->drive,
+                          impl_->parts.delta.parameters(),
+                          impl_->hash,
+                          {pending.begin(), pending.end()}};
+  out.resize(snapshot_bound());
+  ByteWriter writer(out);
+  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), writer);
+  TANDEM_ASSERT(!writer.overflow());
+  out.resize(writer.size());
+}
+
+std::size_t ServerTimeline::snapshot_bound() const {
+  return snapshot_bytes_bound(impl_->state.capacity(), impl_->parts.delta.codec().save_bound());
+}
+
+}  // namespace tandem

@@ -1,0 +1,121 @@
+#pragma once
+// Seeded synthetic states, targets and lifecycle records: what tests of codecs and timelines are fed with.
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/codec/training.hpp"
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem::synthetic {
+
+/// Only the engine of the standard library is the same everywhere; its distributions are not.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  /// 0 .. count - 1.
+  std::uint64_t below(std::uint64_t count) { return engine_() % count; }
+  bool one_in(std::uint64_t count) { return below(count) == 0; }
+  /// Within +-limit, every order of magnitude about as often as any other.
+  std::int32_t value(std::int32_t limit) {
+    const auto spread = static_cast<std::int64_t>(below(2 * static_cast<std::uint64_t>(limit) + 1)) - limit;
+    return static_cast<std::int32_t>(spread >> below(30));
+  }
+  /// Within +-limit, evenly.
+  std::int32_t even(std::int32_t limit) {
+    return static_cast<std::int32_t>(
+        static_cast<std::int64_t>(below(2 * static_cast<std::uint64_t>(limit) + 1)) - limit);
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+inline constexpr TypeId kTypes = 3;
+
+inline BodyState random_body(Random& random) {
+  BodyState body;
+  for (std::int32_t& p : body.p) p = random.value(kPositionLimit);
+  for (std::int32_t& v : body.v) v = random.value(kVelocityLimit);
+  return body;
+}
+
+/// One slot in `dead_one_in` is dead (0: none).
+inline State random_state(Random& random, std::uint32_t capacity, std::uint64_t dead_one_in = 4) {
+  State state(capacity);
+  for (Slot slot = 0; slot < capacity; ++slot) {
+    if (dead_one_in != 0 && random.one_in(dead_one_in)) continue;
+    state.spawn(slot, static_cast<std::uint8_t>(random.below(256)), static_cast<TypeId>(random.below(kTypes)),
+                random_body(random));
+  }
+  return state;
+}
+
+/// `state` with one alive body in `moved_one_in` moved (0: none), mostly a little, sometimes to anywhere.
+inline State random_target(Random& random, const State& state, std::uint64_t moved_one_in) {
+  State target = state;
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.alive()[slot] == 0 || moved_one_in == 0 || !random.one_in(moved_one_in)) continue;
+    BodyState body = state.body(slot);
+    if (random.one_in(10)) body = random_body(random);
+    const auto shifted = [&random](std::int32_t from, std::int32_t by, std::int32_t limit) {
+      return std::clamp(from + random.value(by), -limit, limit);
+    };
+    for (std::int32_t& p : body.p) p = shifted(p, 1 << 14, kPositionLimit);
+    for (std::int32_t& v : body.v) v = shifted(v, 1 << 16, kVelocityLimit);
+    target.set_body(slot, body);
+  }
+  return target;
+}
+
+/// Valid records for about one slot in `one_in`, applied to `target` too.
+inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State& state, State& target,
+                                                     std::uint64_t one_in) {
+  std::vector<LifecycleRecord> records;
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (!random.one_in(one_in)) continue;
+    LifecycleRecord record{LifecycleKind::kSpawn, slot, static_cast<std::uint8_t>(random.below(256)),
+                           static_cast<TypeId>(random.below(kTypes)), random_body(random)};
+    if (state.alive()[slot] == 0) {
+      records.push_back(record);
+      target.spawn(slot, record.generation, record.type, record.body);
+      continue;
+    }
+    switch (random.below(4)) {
+      case 0:
+        records.push_back({LifecycleKind::kDespawn, slot, 0, 0, {}});
+        target.despawn(slot);
+        break;
+      case 1:
+        records.push_back({LifecycleKind::kDespawn, slot, 0, 0, {}});
+        records.push_back(record);
+        target.spawn(slot, record.generation, record.type, record.body);
+        break;
+      case 2:
+        records.push_back({LifecycleKind::kTeleport, slot, 0, 0, record.body});
+        target.set_body(slot, record.body);
+        break;
+      default:
+        records.push_back({LifecycleKind::kTypeChange, slot, 0, record.type, {}});
+        target.type()[slot] = record.type;
+        break;
+    }
+  }
+  return records;
+}
+
+/// The tables that make_codec() wants for a name.
+inline std::vector<std::byte> tables_for(std::string_view codec) {
+  return codec == "entropy" || codec == "limited" ? default_code_tables() : std::vector<std::byte>{};
+}
+
+inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
+                             const CodecParameters& parameters) {
+  return {std::move(*make_codec(codec, capacity, tables_for(codec))), capacity, parameters, kTypes};
+}
+
+}  // namespace tandem::synthetic
