@@ -12,6 +12,22 @@
 
 namespace tandem::transport {
 
+/// Why a server answered as it did; in Reply.reason and, for inputs, in a ReplyEntry's code.
+enum class Reason : std::uint32_t {
+  kNone = 0,            ///< all well, or the input was applied
+  kObserver = 1,        ///< observers may not send input
+  kDemoted = 2,         ///< caused more suspension than stall_timeout within 10 s
+  kInvalid = 3,         ///< not finite, out of range, or of an unknown kind
+  kRateLimited = 4,
+  kStaleEpoch = 5,
+  kDuplicate = 6,       ///< a number already handled, or lower than one
+  kNotPlaying = 7,      ///< the client has not finished joining
+  kForeignClient = 8,   ///< the client id belongs to another DDS participant
+  kProtocolVersion = 9,
+  kFull = 10,           ///< the server's client limit is reached
+};
+
+// After Reason, or g++ 12 warns that its enumerator shadows this.
 inline constexpr std::uint32_t kProtocolVersion = 1;
 using ClientId = std::uint64_t;  ///< random, never 0
 using Bytes = std::vector<std::byte>;
@@ -89,21 +105,6 @@ struct SnapshotMessage {
 
 enum class Role : std::uint32_t { kObserver = 0, kParticipant = 1 };
 enum class Phase : std::uint32_t { kJoining = 0, kPlaying = 1 };
-
-/// Why a server answered as it did; in Reply.reason and, for inputs, in a ReplyEntry's code.
-enum class Reason : std::uint32_t {
-  kNone = 0,            ///< all well, or the input was applied
-  kObserver = 1,        ///< observers may not send input
-  kDemoted = 2,         ///< caused more suspension than stall_timeout within 10 s
-  kInvalid = 3,         ///< not finite, out of range, or of an unknown kind
-  kRateLimited = 4,
-  kStaleEpoch = 5,
-  kDuplicate = 6,       ///< a number already handled, or lower than one
-  kNotPlaying = 7,      ///< the client has not finished joining
-  kForeignClient = 8,   ///< the client id belongs to another DDS participant
-  kProtocolVersion = 9,
-  kFull = 10,           ///< the server's client limit is reached
-};
 
 struct ReplyEntry {
   std::uint64_t number = 0;  ///< the client's input number

@@ -50,6 +50,8 @@ class ServerPort {
   [[nodiscard]] virtual std::uint64_t dropped() const = 0;
   /// Blocks until something may be there to take, or the timeout. Spurious returns are allowed.
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
+  /// Ends a wait() of another thread. Thread-safe.
+  virtual void wake() {}
 };
 
 /// A client's endpoints in one session. All calls from one thread; takes as in ServerPort.
@@ -81,6 +83,8 @@ class ClientPort {
 
   [[nodiscard]] virtual std::uint64_t dropped() const = 0;
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
+  /// Ends a wait() of another thread. The one call that any thread may make.
+  virtual void wake() {}
 };
 
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.

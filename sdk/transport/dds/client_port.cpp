@@ -1,0 +1,134 @@
+#include <optional>
+#include <utility>
+
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/dds/node.hpp"
+
+namespace tandem::transport {
+namespace {
+
+using dds::Node;
+using dds::Reader;
+using dds::Writer;
+
+class DdsClientPort final : public ClientPort {
+ public:
+  struct Endpoints {
+    Node node;
+    Reader<SessionMessage> sessions;
+    Writer<AckMessage> ack;
+    Writer<InputMessage> input;
+    Writer<ClientStatusMessage> status;
+  };
+
+  DdsClientPort(Endpoints endpoints, const DdsOptions& options)
+      : endpoints_(std::move(endpoints)), options_(options) {}
+
+  [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
+
+  void take_sessions(std::vector<Received<SessionMessage>>& out) override {
+    refresh();
+    book_.take_current(out);
+  }
+  [[nodiscard]] bool server_alive() override {
+    refresh();
+    return epoch_ ? book_.epoch_live(*epoch_) : book_.any_live();
+  }
+
+  Result<void> open_stream(const SessionMessage& session) override {
+    limits_ = Limits{session.max_delta_bytes, session.max_snapshot_bytes};
+    if (stream_ && epoch_ == session.epoch) return {};
+    // New readers, because the old ones may already have been handed scheduled inputs of the new epoch, which
+    // are sent once to each reader.
+    stream_.reset();
+    epoch_ = session.epoch;
+    const auto depth = static_cast<std::int32_t>(options_.delta_depth);
+    auto delta = endpoints_.node.reader<DeltaMessage>("deltas", depth);
+    if (!delta) return tl::unexpected(delta.error());
+    auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");
+    if (!scheduled) return tl::unexpected(scheduled.error());
+    auto reply = endpoints_.node.reader<ReplyMessage>("replies");
+    if (!reply) return tl::unexpected(reply.error());
+    stream_.emplace(Stream{std::move(*delta), std::move(*scheduled), std::move(*reply)});
+    return {};
+  }
+  Result<void> open_snapshots(const SessionMessage& session) override {
+    limits_.max_snapshot_bytes = session.max_snapshot_bytes;
+    snapshots_.reset();  // a reader that stayed open would not be handed what the writer holds
+    auto reader = endpoints_.node.reader<SnapshotMessage>("snapshots");
+    if (!reader) return tl::unexpected(reader.error());
+    snapshots_.emplace(std::move(*reader));
+    return {};
+  }
+  void close_snapshots() override { snapshots_.reset(); }
+
+  void take(std::vector<Received<DeltaMessage>>& out) override {
+    if (stream_) stream_->delta.take(limits_, dropped_, out);
+  }
+  void take(std::vector<Received<ScheduledInputMessage>>& out) override {
+    if (stream_) stream_->scheduled.take(limits_, dropped_, out);
+  }
+  void take(std::vector<Received<SnapshotMessage>>& out) override {
+    if (snapshots_) snapshots_->take(limits_, dropped_, out);
+  }
+  void take(std::vector<Received<ReplyMessage>>& out) override {
+    if (stream_) stream_->reply.take(limits_, dropped_, out);
+  }
+
+  Result<void> write(const AckMessage& message) override { return endpoints_.ack.write(message); }
+  Result<void> write(const InputMessage& message) override { return endpoints_.input.write(message); }
+  Result<void> write(const ClientStatusMessage& message) override { return endpoints_.status.write(message); }
+
+  [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
+  void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
+  void wake() override { endpoints_.node.wake(); }
+
+ private:
+  struct Stream {
+    Reader<DeltaMessage> delta;
+    Reader<ScheduledInputMessage> scheduled;
+    Reader<ReplyMessage> reply;
+  };
+
+  void refresh() {
+    endpoints_.sessions.take(limits_, dropped_, [this](auto writer, Received<SessionMessage>&& announcement) {
+      if (announcement.message.session == options_.session) {
+        book_.put(writer, std::move(announcement));
+      } else {
+        ++dropped_;
+      }
+    });
+    book_.update([this](std::uint64_t writer) { return endpoints_.sessions.state(writer); });
+  }
+
+  Endpoints endpoints_;
+  DdsOptions options_;
+  std::optional<Stream> stream_;
+  std::optional<Reader<SnapshotMessage>> snapshots_;
+  std::optional<Epoch> epoch_;  // of the open stream
+  Limits limits_;
+  SessionBook book_;
+  std::atomic<std::uint64_t> dropped_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options) {
+  if (auto named = check_session_name(options.session); !named) return tl::unexpected(named.error());
+  auto node = Node::create(options, "tandem client " + to_hex(options.client), options.session);
+  if (!node) return tl::unexpected(node.error());
+  auto ack = node->writer<AckMessage>("acknowledgements");
+  if (!ack) return tl::unexpected(ack.error());
+  auto input = node->writer<InputMessage>("inputs");
+  if (!input) return tl::unexpected(input.error());
+  auto status = node->writer<ClientStatusMessage>("client status");
+  if (!status) return tl::unexpected(status.error());
+  auto sessions = node->reader<SessionMessage>("sessions");
+  if (!sessions) return tl::unexpected(sessions.error());
+  return std::make_unique<DdsClientPort>(
+      DdsClientPort::Endpoints{std::move(*node), std::move(*sessions), std::move(*ack), std::move(*input),
+                               std::move(*status)},
+      options);
+}
+
+}  // namespace tandem::transport

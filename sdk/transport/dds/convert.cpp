@@ -1,0 +1,344 @@
+#include "sdk/transport/dds/convert.hpp"
+
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace tandem::transport::dds {
+namespace {
+
+// The generated structs have no const, although dds_write only reads.
+template <class Sequence, class Element>
+void lend(Sequence& sequence, const std::vector<Element>& elements) {
+  using Target = std::remove_pointer_t<decltype(sequence._buffer)>;
+  static_assert(sizeof(Target) == sizeof(Element));
+  sequence._maximum = sequence._length = static_cast<std::uint32_t>(elements.size());
+  sequence._buffer = reinterpret_cast<Target*>(const_cast<Element*>(elements.data()));
+  sequence._release = false;
+}
+
+char* lend(const std::string& text) { return const_cast<char*>(text.c_str()); }
+
+std::string to_string(const char* text) { return text == nullptr ? std::string() : std::string(text); }
+
+template <class Element, class Sequence>
+std::vector<Element> to_vector(const Sequence& sequence) {
+  const auto* const first = reinterpret_cast<const Element*>(sequence._buffer);
+  return std::vector<Element>(first, first + sequence._length);
+}
+
+}  // namespace
+
+dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
+  std::vector<tandem_BodyType> types;
+  types.reserve(message.types.size());
+  for (const BodyType& type : message.types) {
+    types.push_back(tandem_BodyType{type.radius, type.colour_rgba, lend(type.name)});
+  }
+  tandem_TandemSession wire{};
+  wire.epoch = message.epoch;
+  wire.protocol_version = message.protocol_version;
+  wire.capacity = message.capacity;
+  wire.layout_hash = message.layout_hash;
+  wire.frame_rate_hz = message.frame_rate_hz;
+  wire.lattice_unit = message.lattice_unit;
+  wire.lead = message.lead;
+  wire.window_ceiling = message.window_ceiling;
+  wire.max_delta_bytes = message.max_delta_bytes;
+  wire.max_snapshot_bytes = message.max_snapshot_bytes;
+  wire.threshold = message.threshold;
+  wire.position_step = message.position_step;
+  wire.velocity_step = message.velocity_step;
+  wire.client_cost_ns = message.client_cost_ns;
+  wire.session = lend(message.session);
+  wire.codec = lend(message.codec);
+  wire.predictor = lend(message.predictor);
+  wire.scene = lend(message.scene);
+  wire.scene_description = lend(message.scene_description);
+  lend(wire.predictor_constants, message.predictor_constants);
+  lend(wire.types, types);
+  lend(wire.codec_tables, message.codec_tables);
+  return dds_write(writer, &wire);
+}
+
+SessionMessage to_message(const tandem_TandemSession& wire) {
+  SessionMessage message;
+  message.epoch = wire.epoch;
+  message.protocol_version = wire.protocol_version;
+  message.capacity = wire.capacity;
+  message.layout_hash = wire.layout_hash;
+  message.frame_rate_hz = wire.frame_rate_hz;
+  message.lattice_unit = wire.lattice_unit;
+  message.lead = wire.lead;
+  message.window_ceiling = wire.window_ceiling;
+  message.max_delta_bytes = wire.max_delta_bytes;
+  message.max_snapshot_bytes = wire.max_snapshot_bytes;
+  message.threshold = wire.threshold;
+  message.position_step = wire.position_step;
+  message.velocity_step = wire.velocity_step;
+  message.client_cost_ns = wire.client_cost_ns;
+  message.session = to_string(wire.session);
+  message.codec = to_string(wire.codec);
+  message.predictor = to_string(wire.predictor);
+  message.scene = to_string(wire.scene);
+  message.scene_description = to_string(wire.scene_description);
+  message.predictor_constants = to_vector<std::int32_t>(wire.predictor_constants);
+  message.types.reserve(wire.types._length);
+  for (std::uint32_t i = 0; i < wire.types._length; ++i) {
+    const tandem_BodyType& type = wire.types._buffer[i];
+    message.types.push_back(BodyType{to_string(type.name), type.radius, type.colour_rgba});
+  }
+  message.codec_tables = to_vector<std::byte>(wire.codec_tables);
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const DeltaMessage& message) {
+  tandem_TandemDelta wire{};
+  wire.epoch = message.epoch;
+  wire.frame = message.frame;
+  wire.part = message.part;
+  wire.parts = message.parts;
+  wire.last_input = message.last_input;
+  wire.server_time_ns = message.server_time_ns;
+  wire.hash = message.hash;
+  lend(wire.payload, message.payload);
+  return dds_write(writer, &wire);
+}
+
+DeltaMessage to_message(const tandem_TandemDelta& wire) {
+  DeltaMessage message;
+  message.epoch = wire.epoch;
+  message.frame = wire.frame;
+  message.part = wire.part;
+  message.parts = wire.parts;
+  message.last_input = wire.last_input;
+  message.server_time_ns = wire.server_time_ns;
+  message.hash = wire.hash;
+  message.payload = to_vector<std::byte>(wire.payload);
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const ScheduledInputMessage& message) {
+  tandem_TandemScheduledInput wire{};
+  wire.epoch = message.epoch;
+  wire.number = message.number;
+  wire.frame = message.frame;
+  wire.source_client = message.source_client;
+  wire.source_number = message.source_number;
+  wire.kind = message.kind;
+  lend(wire.values, message.values);
+  return dds_write(writer, &wire);
+}
+
+ScheduledInputMessage to_message(const tandem_TandemScheduledInput& wire) {
+  ScheduledInputMessage message;
+  message.epoch = wire.epoch;
+  message.number = wire.number;
+  message.frame = wire.frame;
+  message.source_client = wire.source_client;
+  message.source_number = wire.source_number;
+  message.kind = wire.kind;
+  message.values = to_vector<std::int32_t>(wire.values);
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const SnapshotMessage& message) {
+  tandem_TandemSnapshot wire{};
+  wire.slot = message.slot;
+  wire.epoch = message.epoch;
+  wire.frame = message.frame;
+  lend(wire.bytes, message.bytes);
+  return dds_write(writer, &wire);
+}
+
+SnapshotMessage to_message(const tandem_TandemSnapshot& wire) {
+  SnapshotMessage message;
+  message.slot = wire.slot;
+  message.epoch = wire.epoch;
+  message.frame = wire.frame;
+  message.bytes = to_vector<std::byte>(wire.bytes);
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const ReplyMessage& message) {
+  std::vector<tandem_ReplyEntry> entries;
+  entries.reserve(message.entries.size());
+  for (const ReplyEntry& entry : message.entries) {
+    entries.push_back(tandem_ReplyEntry{entry.number, entry.frame, entry.code});
+  }
+  tandem_TandemReply wire{};
+  wire.client = message.client;
+  wire.epoch = message.epoch;
+  wire.role = static_cast<std::uint32_t>(message.role);
+  wire.phase = static_cast<std::uint32_t>(message.phase);
+  wire.reason = message.reason;
+  wire.highest_input = message.highest_input;
+  wire.client_clock_ns = message.client_clock_ns;
+  wire.server_time_ns = message.server_time_ns;
+  lend(wire.entries, entries);
+  return dds_write(writer, &wire);
+}
+
+ReplyMessage to_message(const tandem_TandemReply& wire) {
+  ReplyMessage message;
+  message.client = wire.client;
+  message.epoch = wire.epoch;
+  message.role = static_cast<Role>(wire.role);
+  message.phase = static_cast<Phase>(wire.phase);
+  message.reason = wire.reason;
+  message.highest_input = wire.highest_input;
+  message.client_clock_ns = wire.client_clock_ns;
+  message.server_time_ns = wire.server_time_ns;
+  message.entries.reserve(wire.entries._length);
+  for (std::uint32_t i = 0; i < wire.entries._length; ++i) {
+    const tandem_ReplyEntry& entry = wire.entries._buffer[i];
+    message.entries.push_back(ReplyEntry{entry.number, entry.frame, entry.code});
+  }
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const InputMessage& message) {
+  tandem_TandemInput wire{};
+  wire.client = message.client;
+  wire.epoch = message.epoch;
+  wire.number = message.number;
+  wire.client_frame = message.client_frame;
+  wire.kind = message.kind;
+  lend(wire.values, message.values);
+  lend(wire.bytes, message.bytes);
+  return dds_write(writer, &wire);
+}
+
+InputMessage to_message(const tandem_TandemInput& wire) {
+  InputMessage message;
+  message.client = wire.client;
+  message.epoch = wire.epoch;
+  message.number = wire.number;
+  message.client_frame = wire.client_frame;
+  message.kind = wire.kind;
+  message.values = to_vector<double>(wire.values);
+  message.bytes = to_vector<std::byte>(wire.bytes);
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const AckMessage& message) {
+  tandem_TandemAck wire{};
+  wire.client = message.client;
+  wire.epoch = message.epoch;
+  wire.protocol_version = message.protocol_version;
+  wire.phase = static_cast<std::uint32_t>(message.phase);
+  wire.applied = message.applied;
+  wire.simulated = message.simulated;
+  wire.role_wanted = static_cast<std::uint32_t>(message.role_wanted);
+  wire.join_attempt = message.join_attempt;
+  wire.clock_ns = message.clock_ns;
+  return dds_write(writer, &wire);
+}
+
+AckMessage to_message(const tandem_TandemAck& wire) {
+  AckMessage message;
+  message.client = wire.client;
+  message.epoch = wire.epoch;
+  message.protocol_version = wire.protocol_version;
+  message.phase = static_cast<Phase>(wire.phase);
+  message.applied = wire.applied;
+  message.simulated = wire.simulated;
+  message.role_wanted = static_cast<Role>(wire.role_wanted);
+  message.join_attempt = wire.join_attempt;
+  message.clock_ns = wire.clock_ns;
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const ServerStatusMessage& message) {
+  tandem_TandemServerStatus wire{};
+  wire.epoch = message.epoch;
+  wire.frame = message.frame;
+  wire.uptime_s = message.uptime_s;
+  wire.frame_rate_hz = message.frame_rate_hz;
+  wire.mbit_per_s = message.mbit_per_s;
+  wire.raw_mbit_per_s = message.raw_mbit_per_s;
+  wire.frame_ms_p50 = message.frame_ms_p50;
+  wire.frame_ms_p99 = message.frame_ms_p99;
+  wire.corrected_per_frame = message.corrected_per_frame;
+  wire.bodies = message.bodies;
+  wire.participants = message.participants;
+  wire.observers = message.observers;
+  wire.window = message.window;
+  wire.payload_bytes = message.payload_bytes;
+  wire.stalls = message.stalls;
+  wire.suspended_ms = message.suspended_ms;
+  wire.refused_inputs = message.refused_inputs;
+  wire.refused_messages = message.refused_messages;
+  wire.snapshots = message.snapshots;
+  wire.queue_high_water = message.queue_high_water;
+  wire.session = lend(message.session);
+  return dds_write(writer, &wire);
+}
+
+ServerStatusMessage to_message(const tandem_TandemServerStatus& wire) {
+  ServerStatusMessage message;
+  message.epoch = wire.epoch;
+  message.frame = wire.frame;
+  message.uptime_s = wire.uptime_s;
+  message.frame_rate_hz = wire.frame_rate_hz;
+  message.mbit_per_s = wire.mbit_per_s;
+  message.raw_mbit_per_s = wire.raw_mbit_per_s;
+  message.frame_ms_p50 = wire.frame_ms_p50;
+  message.frame_ms_p99 = wire.frame_ms_p99;
+  message.corrected_per_frame = wire.corrected_per_frame;
+  message.bodies = wire.bodies;
+  message.participants = wire.participants;
+  message.observers = wire.observers;
+  message.window = wire.window;
+  message.payload_bytes = wire.payload_bytes;
+  message.stalls = wire.stalls;
+  message.suspended_ms = wire.suspended_ms;
+  message.refused_inputs = wire.refused_inputs;
+  message.refused_messages = wire.refused_messages;
+  message.snapshots = wire.snapshots;
+  message.queue_high_water = wire.queue_high_water;
+  message.session = to_string(wire.session);
+  return message;
+}
+
+dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& message) {
+  tandem_TandemClientStatus wire{};
+  wire.client = message.client;
+  wire.epoch = message.epoch;
+  wire.applied = message.applied;
+  wire.role = message.role;
+  wire.phase = message.phase;
+  wire.lag_ms = message.lag_ms;
+  wire.client_ms_p50 = message.client_ms_p50;
+  wire.mbit_per_s = message.mbit_per_s;
+  wire.frames_applied = message.frames_applied;
+  wire.resyncs = message.resyncs;
+  wire.hash_mismatches = message.hash_mismatches;
+  wire.inputs_sent = message.inputs_sent;
+  wire.inputs_refused = message.inputs_refused;
+  wire.queue_high_water = message.queue_high_water;
+  wire.session = lend(message.session);
+  return dds_write(writer, &wire);
+}
+
+ClientStatusMessage to_message(const tandem_TandemClientStatus& wire) {
+  ClientStatusMessage message;
+  message.client = wire.client;
+  message.epoch = wire.epoch;
+  message.applied = wire.applied;
+  message.role = wire.role;
+  message.phase = wire.phase;
+  message.lag_ms = wire.lag_ms;
+  message.client_ms_p50 = wire.client_ms_p50;
+  message.mbit_per_s = wire.mbit_per_s;
+  message.frames_applied = wire.frames_applied;
+  message.resyncs = wire.resyncs;
+  message.hash_mismatches = wire.hash_mismatches;
+  message.inputs_sent = wire.inputs_sent;
+  message.inputs_refused = wire.inputs_refused;
+  message.queue_high_water = wire.queue_high_water;
+  message.session = to_string(wire.session);
+  return message;
+}
+
+}  // namespace tandem::transport::dds

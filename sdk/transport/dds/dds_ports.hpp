@@ -1,0 +1,54 @@
+#pragma once
+// Ports over Cyclone DDS. This header sees no DDS; everything behind it does.
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sdk/transport/port.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::transport {
+
+struct DdsOptions {
+  std::uint32_t domain = 0;  ///< DDS domain, 0..230
+  std::string session = "default";
+  ClientId client = 0;  ///< client ports: only for the name that DDS tools show
+  /// Deltas a server keeps for slow readers and a client for a slow application; see delta_depth() in
+  /// limits.hpp.
+  std::uint32_t delta_depth = 64;
+  /// A peer that shows no sign of life for this long counts as dead. Shorter gives false alarms on busy
+  /// machines.
+  std::chrono::nanoseconds lease = std::chrono::seconds(1);
+  /// How long one write is repeated while the middleware cannot take it, before kTimeout.
+  std::chrono::nanoseconds write_timeout = std::chrono::seconds(2);
+  /// When not null and set, writes stop repeating. Must outlive the port.
+  const std::atomic<bool>* stop = nullptr;
+};
+
+/// Joins the domain as "tandemd SESSION". Environment: CYCLONEDDS_URI, on top of our defaults
+/// (idl/PROTOCOL.md). Errors: kInvalidArgument (session name, depth, CYCLONEDDS_URI), kTransport.
+[[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
+
+/// Joins the domain as "tandem client ID". Errors: as above.
+[[nodiscard]] Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options);
+
+/// Watches all sessions of a domain without taking part in any. All calls from one thread.
+class Monitor {
+ public:
+  virtual ~Monitor() = default;
+  /// Announcements of all live servers.
+  virtual void list_sessions(std::vector<Received<SessionMessage>>& out) = 0;
+  /// Status samples since the last call, at most one of each server and client.
+  virtual void take(std::vector<Received<ServerStatusMessage>>& out) = 0;
+  virtual void take(std::vector<Received<ClientStatusMessage>>& out) = 0;
+  virtual void wait(std::chrono::nanoseconds timeout) = 0;
+};
+
+/// Joins the domain as "tandem monitor"; only `options.domain` is used. Errors: as above.
+[[nodiscard]] Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options);
+
+}  // namespace tandem::transport

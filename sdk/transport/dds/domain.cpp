@@ -1,0 +1,85 @@
+#include "sdk/transport/dds/domain.hpp"
+
+#include <dds/dds.h>
+
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "sdk/transport/limits.hpp"
+
+namespace tandem::transport::dds {
+namespace {
+
+struct Domains {
+  struct Use {
+    dds_entity_t handle = 0;  // 0: not ours to delete
+    unsigned users = 0;
+  };
+  std::mutex mutex;
+  std::map<std::uint32_t, Use> uses;
+};
+
+// Cyclone keeps one table of domains per process; this counts our uses of it. Never destroyed, so that a port
+// held by a static object may still close.
+Domains& domains() {
+  static auto* const kDomains = new Domains;
+  return *kDomains;
+}
+
+// Reasons and effects: idl/PROTOCOL.md, "Cyclone DDS configuration".
+std::string defaults() {
+  return "<CycloneDDS><Domain id=\"any\">"
+         "<Discovery><SPDPInterval>1s</SPDPInterval><MaxAutoParticipantIndex>100</MaxAutoParticipantIndex></"
+         "Discovery>"
+         "<Internal>"
+         "<Watermarks><WhcLow>1 GB</WhcLow><WhcHigh>1 GB</WhcHigh><WhcHighInit>1 GB</WhcHighInit>"
+         "<WhcAdaptive>false</WhcAdaptive></Watermarks>"
+         "<NackDelay>10ms</NackDelay><HeartbeatInterval>20ms</HeartbeatInterval>"
+         "<MaxSampleSize>" +
+         std::to_string(kMaxSampleBytes + (1U << 20U)) +
+         " B</MaxSampleSize>"
+         "</Internal></Domain></CycloneDDS>";
+}
+
+}  // namespace
+
+std::string domain_configuration() {
+  std::string configuration = defaults();
+  if (const char* theirs = std::getenv("CYCLONEDDS_URI"); theirs != nullptr && *theirs != '\0') {
+    configuration += ',';
+    configuration += theirs;
+  }
+  return configuration;
+}
+
+Result<DomainUse> DomainUse::acquire(std::uint32_t domain) {
+  const std::lock_guard lock(domains().mutex);
+  if (const auto known = domains().uses.find(domain); known != domains().uses.end()) {
+    ++known->second.users;
+    return DomainUse(domain);
+  }
+  const dds_entity_t handle = dds_create_domain(domain, domain_configuration().c_str());
+  if (handle < 0 && handle != DDS_RETCODE_PRECONDITION_NOT_MET) {
+    return fail(ErrorCode::kInvalidArgument,
+                "DDS domain " + std::to_string(domain) + " cannot be opened (" + dds_strretcode(handle) +
+                    "): check CYCLONEDDS_URI, the interfaces it names and the number");
+  }
+  domains().uses.emplace(domain, Domains::Use{handle > 0 ? handle : 0, 1});
+  return DomainUse(domain);
+}
+
+DomainUse::DomainUse(DomainUse&& other) noexcept
+    : domain_(other.domain_), held_(std::exchange(other.held_, false)) {}
+
+DomainUse::~DomainUse() {
+  if (!held_) return;
+  const std::lock_guard lock(domains().mutex);
+  const auto use = domains().uses.find(domain_);
+  if (--use->second.users > 0) return;
+  if (use->second.handle > 0) dds_delete(use->second.handle);
+  domains().uses.erase(use);
+}
+
+}  // namespace tandem::transport::dds

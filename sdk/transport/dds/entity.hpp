@@ -1,0 +1,89 @@
+#pragma once
+// Ownership of Cyclone DDS handles: entities, QoS, loans.
+
+#include <dds/dds.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "tandem/result.hpp"
+
+namespace tandem::transport::dds {
+
+/// Owns an entity and deletes it with all of its children.
+class Entity {
+ public:
+  Entity() = default;
+  explicit Entity(dds_entity_t handle) : handle_(handle) {}
+  Entity(Entity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  Entity& operator=(Entity&& other) noexcept {
+    if (this != &other) {
+      reset();
+      handle_ = std::exchange(other.handle_, 0);
+    }
+    return *this;
+  }
+  Entity(const Entity&) = delete;
+  Entity& operator=(const Entity&) = delete;
+  ~Entity() { reset(); }
+
+  [[nodiscard]] dds_entity_t get() const { return handle_; }
+  [[nodiscard]] explicit operator bool() const { return handle_ > 0; }
+  void reset() {
+    if (handle_ > 0) dds_delete(handle_);
+    handle_ = 0;
+  }
+
+ private:
+  dds_entity_t handle_ = 0;
+};
+
+struct QosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
+
+/// "creating the delta writer: Bad Parameter"
+[[nodiscard]] inline tl::unexpected<Error> dds_failure(const std::string& doing, dds_return_t code) {
+  return fail(code == DDS_RETCODE_TIMEOUT ? ErrorCode::kTimeout : ErrorCode::kTransport,
+              doing + ": " + dds_strretcode(code));
+}
+
+/// Takes over what a dds_create_... function returned.
+[[nodiscard]] inline Result<Entity> own(dds_entity_t created, const std::string& doing) {
+  if (created < 0) return dds_failure("creating " + doing, created);
+  return Entity(created);
+}
+
+/// Up to kBatch samples taken from a reader without copying; given back at the end of its life.
+class Loan {
+ public:
+  static constexpr std::uint32_t kBatch = 64;
+
+  explicit Loan(dds_entity_t reader)
+      : reader_(reader), count_(dds_take(reader, samples_, infos_, kBatch, kBatch)) {}
+  Loan(const Loan&) = delete;
+  Loan& operator=(const Loan&) = delete;
+  Loan(Loan&&) = delete;
+  Loan& operator=(Loan&&) = delete;
+  ~Loan() {
+    if (count_ > 0) dds_return_loan(reader_, samples_, count_);
+  }
+
+  [[nodiscard]] std::uint32_t size() const { return count_ > 0 ? static_cast<std::uint32_t>(count_) : 0; }
+  /// Null for a sample that only tells that its instance was disposed of or lost its writer.
+  [[nodiscard]] const void* data(std::uint32_t i) const {
+    return infos_[i].valid_data ? samples_[i] : nullptr;
+  }
+  [[nodiscard]] dds_instance_handle_t writer(std::uint32_t i) const { return infos_[i].publication_handle; }
+
+ private:
+  dds_entity_t reader_;
+  void* samples_[kBatch] = {};
+  dds_sample_info_t infos_[kBatch] = {};
+  dds_return_t count_;
+};
+
+}  // namespace tandem::transport::dds

@@ -1,0 +1,69 @@
+#include "sdk/transport/dds/live_writers.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace tandem::transport::dds {
+namespace {
+
+// Writer handles are never reused, so entries only age; far above the number of writers a session has.
+constexpr std::size_t kMaxKnown = 4096;
+
+struct EndpointDeleter {
+  void operator()(dds_builtintopic_endpoint_t* endpoint) const { dds_builtintopic_free_endpoint(endpoint); }
+};
+
+}  // namespace
+
+LiveWriters::LiveWriters() : listener_(dds_create_listener(this)) {
+  dds_lset_liveliness_changed(
+      listener_.get(), [](dds_entity_t /*reader*/, const dds_liveliness_changed_status_t status, void* self) {
+        static_cast<LiveWriters*>(self)->note(status);
+      });
+}
+
+void LiveWriters::note(const dds_liveliness_changed_status_t& status) {
+  const std::lock_guard lock(mutex_);
+  const dds_instance_handle_t writer = status.last_publication_handle;
+  if (status.alive_count_change > 0) {
+    live_[writer] = true;
+  } else if (status.not_alive_count_change > 0) {
+    live_[writer] = false;
+  } else {
+    live_.erase(writer);
+  }
+}
+
+WriterState LiveWriters::state(dds_instance_handle_t writer) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = live_.find(writer);
+  if (found == live_.end()) return WriterState::kGone;
+  return found->second ? WriterState::kLive : WriterState::kSilent;
+}
+
+std::set<dds_instance_handle_t> LiveWriters::live() const {
+  const std::lock_guard lock(mutex_);
+  std::set<dds_instance_handle_t> writers;
+  for (const auto& [writer, is_live] : live_) {
+    if (is_live) writers.insert(writer);
+  }
+  return writers;
+}
+
+std::optional<ParticipantId> Participants::of_writer(dds_entity_t reader, dds_instance_handle_t writer) {
+  if (const auto known = known_.find(writer); known != known_.end()) return known->second;
+  const std::unique_ptr<dds_builtintopic_endpoint_t, EndpointDeleter> endpoint(
+      dds_get_matched_publication_data(reader, writer));
+  if (!endpoint) return std::nullopt;
+  if (known_.size() >= kMaxKnown) known_.clear();
+  return known_.emplace(writer, to_participant_id(endpoint->participant_key)).first->second;
+}
+
+ParticipantId to_participant_id(const dds_guid_t& guid) {
+  ParticipantId id;
+  static_assert(sizeof guid.v == sizeof id.bytes);
+  std::copy(std::begin(guid.v), std::end(guid.v), id.bytes.begin());
+  return id;
+}
+
+}  // namespace tandem::transport::dds

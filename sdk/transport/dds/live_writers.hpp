@@ -1,0 +1,58 @@
+#pragma once
+// Who writes to a reader, and which participants these writers belong to.
+
+#include <dds/dds.h>
+
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <unordered_map>
+
+#include "sdk/transport/dds/entity.hpp"
+#include "sdk/transport/session_book.hpp"
+
+namespace tandem::transport::dds {
+
+/// Tracks the liveliness of every writer matched with one reader. Thread-safe.
+///
+/// DDS itself only tells how many writers live; a listener is the one way to learn which. It does nothing but
+/// note.
+class LiveWriters {
+ public:
+  LiveWriters();
+  LiveWriters(const LiveWriters&) = delete;
+  LiveWriters& operator=(const LiveWriters&) = delete;
+  LiveWriters(LiveWriters&&) = delete;
+  LiveWriters& operator=(LiveWriters&&) = delete;
+  ~LiveWriters() = default;
+
+  /// For the creation of the reader, which must not outlive this object.
+  [[nodiscard]] const dds_listener_t* listener() const { return listener_.get(); }
+  [[nodiscard]] WriterState state(dds_instance_handle_t writer) const;
+  [[nodiscard]] std::set<dds_instance_handle_t> live() const;
+
+ private:
+  struct ListenerDeleter {
+    void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
+  };
+  void note(const dds_liveliness_changed_status_t& status);
+
+  mutable std::mutex mutex_;
+  std::map<dds_instance_handle_t, bool> live_;
+  std::unique_ptr<dds_listener_t, ListenerDeleter> listener_;
+};
+
+/// Finds the participant behind a writer handle, and remembers it. Not thread-safe.
+class Participants {
+ public:
+  /// Empty when the writer is not matched with `reader` any more.
+  [[nodiscard]] std::optional<ParticipantId> of_writer(dds_entity_t reader, dds_instance_handle_t writer);
+
+ private:
+  std::unordered_map<dds_instance_handle_t, ParticipantId> known_;
+};
+
+[[nodiscard]] ParticipantId to_participant_id(const dds_guid_t& guid);
+
+}  // namespace tandem::transport::dds

@@ -1,0 +1,102 @@
+#include "sdk/transport/dds/node.hpp"
+
+#include <algorithm>
+
+namespace tandem::transport::dds {
+namespace {
+
+// A full history blocks no writer (see domain.cpp), so this is only how often a write looks at its stop flag.
+constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
+
+}  // namespace
+
+Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
+  Qos qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), topic.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       kMaxBlocking);
+  dds_qset_durability(qos.get(),
+                      topic.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  // No resource limits: a reliable reader that refuses a sample stops all delivery from that peer until it
+  // fits.
+  dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
+                              DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, lease);
+  // Instances may have writers in two participants; the end of one must not end the other's.
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  return qos;
+}
+
+Node::Node(DomainUse domain, const DdsOptions& options)
+    : domain_(std::move(domain)), options_(options), lease_(options.lease.count()) {}
+
+Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition) {
+  if (options.delta_depth < 1 || options.delta_depth > (1U << 20U)) {
+    return fail(ErrorCode::kInvalidArgument, "delta depth must be 1 to 2^20");
+  }
+  if (options.lease < std::chrono::milliseconds(100)) {
+    return fail(ErrorCode::kInvalidArgument, "a lease under 0.1 s declares healthy peers dead");
+  }
+  auto domain = DomainUse::acquire(options.domain);
+  if (!domain) return tl::unexpected(domain.error());
+  Node node(std::move(*domain), options);
+
+  const Qos named(dds_create_qos());
+  dds_qset_entity_name(named.get(), name.c_str());
+  auto participant = own(dds_create_participant(options.domain, named.get(), nullptr), "the participant");
+  if (!participant) return tl::unexpected(participant.error());
+  node.participant_ = std::move(*participant);
+  dds_guid_t guid;
+  if (const auto code = dds_get_guid(node.participant_.get(), &guid); code != DDS_RETCODE_OK) {
+    return dds_failure("reading the participant's GUID", code);
+  }
+  node.self_ = to_participant_id(guid);
+
+  const Qos grouped(dds_create_qos());
+  dds_qset_partition1(grouped.get(), partition.c_str());
+  const dds_entity_t parent = node.participant_.get();
+  auto publisher = own(dds_create_publisher(parent, grouped.get(), nullptr), "the publisher");
+  if (!publisher) return tl::unexpected(publisher.error());
+  node.publisher_ = std::move(*publisher);
+  auto subscriber = own(dds_create_subscriber(parent, grouped.get(), nullptr), "the subscriber");
+  if (!subscriber) return tl::unexpected(subscriber.error());
+  node.subscriber_ = std::move(*subscriber);
+  auto waitset = own(dds_create_waitset(parent), "the waitset");
+  if (!waitset) return tl::unexpected(waitset.error());
+  node.waitset_ = std::move(*waitset);
+  auto guard = own(dds_create_guardcondition(parent), "the guard condition");
+  if (!guard) return tl::unexpected(guard.error());
+  node.guard_ = std::move(*guard);
+  if (const auto code = dds_waitset_attach(node.waitset_.get(), node.guard_.get(), 0);
+      code != DDS_RETCODE_OK) {
+    return dds_failure("attaching the guard condition", code);
+  }
+  return node;
+}
+
+Result<Entity> Node::make_topic(const dds_topic_descriptor_t& descriptor, const char* name) {
+  return own(dds_create_topic(participant_.get(), &descriptor, name, nullptr, nullptr),
+             std::string("the topic ") + name);
+}
+
+Result<void> Node::watch(dds_entity_t reader) {
+  // The condition is the reader's child: it goes with it, and so leaves the waitset.
+  const dds_entity_t condition = dds_create_readcondition(reader, DDS_ANY_STATE);
+  if (condition < 0) return dds_failure("creating a read condition", condition);
+  if (const auto code = dds_waitset_attach(waitset_.get(), condition, 0); code != DDS_RETCODE_OK) {
+    return dds_failure("attaching a read condition", code);
+  }
+  return {};
+}
+
+void Node::wait(std::chrono::nanoseconds timeout) {
+  const dds_duration_t duration = std::max<dds_duration_t>(0, timeout.count());
+  if (dds_waitset_wait(waitset_.get(), nullptr, 0, duration) > 0) {
+    bool triggered = false;
+    (void)dds_take_guardcondition(guard_.get(), &triggered);
+  }
+}
+
+void Node::wake() { (void)dds_set_guardcondition(guard_.get(), true); }
+
+}  // namespace tandem::transport::dds

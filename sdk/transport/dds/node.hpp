@@ -1,0 +1,156 @@
+#pragma once
+// A participant with its publisher, subscriber, readers and writers: what the ports and the monitor have in
+// common.
+
+#include <atomic>
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/dds/domain.hpp"
+#include "sdk/transport/dds/live_writers.hpp"
+#include "sdk/transport/dds/topics.hpp"
+#include "sdk/transport/limits.hpp"
+
+namespace tandem::transport::dds {
+
+/// Writes one topic. A write that the middleware could not take in time reached nobody, so it is repeated.
+template <class M>
+class Writer {
+ public:
+  Writer(Entity topic, Entity entity, const DdsOptions& options)
+      : topic_(std::move(topic)),
+        entity_(std::move(entity)),
+        timeout_(options.write_timeout),
+        stop_(options.stop) {}
+
+  Result<void> write(const M& message) {
+    const auto deadline = std::chrono::steady_clock::now() + timeout_;
+    for (;;) {
+      const dds_return_t code = write_sample(entity_.get(), message);
+      if (code == DDS_RETCODE_OK) return {};
+      const bool stopped = stop_ != nullptr && stop_->load();
+      if (code != DDS_RETCODE_TIMEOUT || stopped || std::chrono::steady_clock::now() >= deadline) {
+        return dds_failure(std::string("writing ") + Topic<M>::kName, code);
+      }
+    }
+  }
+  [[nodiscard]] dds_entity_t get() const { return entity_.get(); }
+
+ private:
+  Entity topic_;
+  Entity entity_;
+  std::chrono::nanoseconds timeout_;
+  const std::atomic<bool>* stop_;
+};
+
+/// Reads one topic and knows the participants behind it.
+template <class M>
+class Reader {
+ public:
+  Reader(Entity topic, Entity entity, std::unique_ptr<LiveWriters> writers)
+      : writers_(std::move(writers)), topic_(std::move(topic)), entity_(std::move(entity)) {}
+
+  /// Calls `sink(writer, Received<M>&&)` for each sample in order; counts in `dropped` what breaks a limit.
+  /// A sample whose writer has left the participant's endpoints in between cannot be attributed and is passed
+  /// over.
+  template <class Sink>
+  void take(const Limits& limits, std::atomic<std::uint64_t>& dropped, Sink&& sink) {
+    for (;;) {
+      const Loan loan(entity_.get());
+      for (std::uint32_t i = 0; i < loan.size(); ++i) {
+        if (loan.data(i) == nullptr) continue;
+        const auto from = participants_.of_writer(entity_.get(), loan.writer(i));
+        if (!from) continue;
+        M message = to_message(*static_cast<const typename Topic<M>::Wire*>(loan.data(i)));
+        if (within_limits(message, limits)) {
+          sink(loan.writer(i), Received<M>{std::move(message), *from});
+        } else {
+          ++dropped;
+        }
+      }
+      if (loan.size() < Loan::kBatch) return;
+    }
+  }
+  void take(const Limits& limits, std::atomic<std::uint64_t>& dropped, std::vector<Received<M>>& out) {
+    take(limits, dropped, [&out](dds_instance_handle_t, Received<M>&& r) { out.push_back(std::move(r)); });
+  }
+
+  [[nodiscard]] WriterState state(dds_instance_handle_t writer) const { return writers_->state(writer); }
+  /// True while a live writer of that participant is matched.
+  [[nodiscard]] bool alive(const ParticipantId& participant) {
+    for (const dds_instance_handle_t writer : writers_->live()) {
+      if (participants_.of_writer(entity_.get(), writer) == participant) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::unique_ptr<LiveWriters> writers_;  // its listener runs until the entity is gone, so it comes first
+  Entity topic_;
+  Entity entity_;
+  Participants participants_;
+};
+
+class Node {
+ public:
+  /// `name` is what DDS tools show. `partition` may be "*".
+  static Result<Node> create(const DdsOptions& options, const std::string& name,
+                             const std::string& partition);
+
+  template <class M>
+  Result<Writer<M>> writer(const std::string& name, std::int32_t depth = Topic<M>::kQos.writer_depth) {
+    auto topic = make_topic(Topic<M>::descriptor(), Topic<M>::kName);
+    if (!topic) return tl::unexpected(topic.error());
+    // The status writer's short lease only paces the liveliness messages of its participant: at 0.4 s, two of
+    // them may be late before the other writers' lease runs out.
+    const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ * 2 / 5;
+    const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
+    dds_qset_entity_name(qos.get(), name.c_str());
+    auto entity = own(dds_create_writer(publisher_.get(), topic->get(), qos.get(), nullptr),
+                      std::string("the writer of ") + Topic<M>::kName);
+    if (!entity) return tl::unexpected(entity.error());
+    return Writer<M>(std::move(*topic), std::move(*entity), options_);
+  }
+
+  template <class M>
+  Result<Reader<M>> reader(const std::string& name, std::int32_t depth = Topic<M>::kQos.reader_depth,
+                           bool ignore_own = false) {
+    auto topic = make_topic(Topic<M>::descriptor(), Topic<M>::kName);
+    if (!topic) return tl::unexpected(topic.error());
+    const Qos qos = make_qos(Topic<M>::kQos, depth, DDS_INFINITY);
+    dds_qset_entity_name(qos.get(), name.c_str());
+    if (ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+    auto writers = std::make_unique<LiveWriters>();
+    auto entity = own(dds_create_reader(subscriber_.get(), topic->get(), qos.get(), writers->listener()),
+                      std::string("the reader of ") + Topic<M>::kName);
+    if (!entity) return tl::unexpected(entity.error());
+    if (auto watched = watch(entity->get()); !watched) return tl::unexpected(watched.error());
+    return Reader<M>(std::move(*topic), std::move(*entity), std::move(writers));
+  }
+
+  [[nodiscard]] const ParticipantId& self() const { return self_; }
+  /// Until a reader created here has something to take, wake() was called, or the timeout.
+  void wait(std::chrono::nanoseconds timeout);
+  void wake();
+
+ private:
+  Node(DomainUse domain, const DdsOptions& options);
+  Result<Entity> make_topic(const dds_topic_descriptor_t& descriptor, const char* name);
+  Result<void> watch(dds_entity_t reader);
+
+  // Destroyed in reverse: children before the participant, the participant before the domain.
+  DomainUse domain_;
+  DdsOptions options_;
+  dds_duration_t lease_;
+  Entity participant_;
+  Entity publisher_;
+  Entity subscriber_;
+  Entity waitset_;
+  Entity guard_;
+  ParticipantId self_;
+};
+
+}  // namespace tandem::transport::dds

@@ -1,0 +1,147 @@
+#include <array>
+#include <utility>
+
+#include "sdk/transport/dds/node.hpp"
+
+namespace tandem::transport {
+namespace {
+
+using dds::Node;
+using dds::Reader;
+using dds::Writer;
+
+class DdsServerPort final : public ServerPort {
+ public:
+  struct Endpoints {
+    Node node;
+    Writer<SessionMessage> session;
+    Writer<DeltaMessage> delta;
+    Writer<ScheduledInputMessage> scheduled;
+    Writer<SnapshotMessage> snapshot;
+    Writer<ReplyMessage> reply;
+    Writer<ServerStatusMessage> status;
+    Reader<SessionMessage> others;
+    Reader<InputMessage> input;
+    Reader<AckMessage> ack;
+  };
+
+  DdsServerPort(Endpoints endpoints, std::string session)
+      : endpoints_(std::move(endpoints)), session_(std::move(session)) {}
+
+  [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
+
+  void take_sessions(std::vector<Received<SessionMessage>>& out) override {
+    endpoints_.others.take(limits_, dropped_, [this](auto writer, Received<SessionMessage>&& announcement) {
+      if (announcement.message.session == session_) {
+        others_.put(writer, std::move(announcement));
+      } else {
+        ++dropped_;
+      }
+    });
+    others_.update([this](std::uint64_t writer) { return endpoints_.others.state(writer); });
+    others_.list_live(out);
+  }
+
+  Result<void> write(const SessionMessage& message) override { return endpoints_.session.write(message); }
+  Result<void> write(const DeltaMessage& message) override { return endpoints_.delta.write(message); }
+  Result<void> write(const ScheduledInputMessage& message) override {
+    return endpoints_.scheduled.write(message);
+  }
+  Result<void> write(const SnapshotMessage& message) override {
+    if (message.slot >= kSnapshotSlots) return fail(ErrorCode::kInvalidArgument, "snapshot slots are 0 to 3");
+    published_[message.slot] = true;
+    return endpoints_.snapshot.write(message);
+  }
+  Result<void> write(const ReplyMessage& message) override { return endpoints_.reply.write(message); }
+  Result<void> write(const ServerStatusMessage& message) override { return endpoints_.status.write(message); }
+
+  Result<void> dispose_snapshots() override {
+    for (std::uint32_t slot = 0; slot < kSnapshotSlots; ++slot) {
+      if (!published_[slot]) continue;
+      tandem_TandemSnapshot key{};
+      key.slot = slot;
+      if (const auto code = dds_dispose(endpoints_.snapshot.get(), &key); code != DDS_RETCODE_OK) {
+        return dds::dds_failure("disposing of a snapshot", code);
+      }
+      published_[slot] = false;
+    }
+    return {};
+  }
+
+  void take(std::vector<Received<InputMessage>>& out) override {
+    endpoints_.input.take(limits_, dropped_, out);
+  }
+  void take(std::vector<Received<AckMessage>>& out) override { endpoints_.ack.take(limits_, dropped_, out); }
+
+  [[nodiscard]] bool joined(const ParticipantId& participant) override {
+    return reads(endpoints_.delta.get(), participant) && reads(endpoints_.scheduled.get(), participant) &&
+           reads(endpoints_.snapshot.get(), participant);
+  }
+  [[nodiscard]] bool alive(const ParticipantId& participant) override {
+    return endpoints_.ack.alive(participant);
+  }
+  [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
+  void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
+  void wake() override { endpoints_.node.wake(); }
+
+ private:
+  static bool reads(dds_entity_t writer, const ParticipantId& participant) {
+    std::vector<dds_instance_handle_t> readers(64);
+    for (;;) {
+      const dds_return_t matched = dds_get_matched_subscriptions(writer, readers.data(), readers.size());
+      if (matched < 0) return false;
+      const auto count = static_cast<std::size_t>(matched);
+      const bool complete = count <= readers.size();
+      readers.resize(count);
+      if (complete) break;
+    }
+    for (const dds_instance_handle_t reader : readers) {
+      dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_subscription_data(writer, reader);
+      if (endpoint == nullptr) continue;
+      const bool found = dds::to_participant_id(endpoint->participant_key) == participant;
+      dds_builtintopic_free_endpoint(endpoint);
+      if (found) return true;
+    }
+    return false;
+  }
+
+  Endpoints endpoints_;
+  std::string session_;
+  Limits limits_;
+  SessionBook others_;
+  std::array<bool, kSnapshotSlots> published_{};
+  std::atomic<std::uint64_t> dropped_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options) {
+  if (auto named = check_session_name(options.session); !named) return tl::unexpected(named.error());
+  auto node = Node::create(options, "tandemd " + options.session, options.session);
+  if (!node) return tl::unexpected(node.error());
+  const auto depth = static_cast<std::int32_t>(options.delta_depth);
+  auto session = node->writer<SessionMessage>("session");
+  auto delta = node->writer<DeltaMessage>("deltas", depth);
+  auto scheduled = node->writer<ScheduledInputMessage>("scheduled inputs");
+  auto snapshot = node->writer<SnapshotMessage>("snapshots");
+  auto reply = node->writer<ReplyMessage>("replies");
+  auto status = node->writer<ServerStatusMessage>("server status");
+  auto others =
+      node->reader<SessionMessage>("other servers", dds::Topic<SessionMessage>::kQos.reader_depth, true);
+  auto input = node->reader<InputMessage>("inputs");
+  auto ack = node->reader<AckMessage>("acknowledgements");
+  const Error* failed = nullptr;
+  const auto check = [&failed](const auto& part) {
+    if (!part && failed == nullptr) failed = &part.error();
+  };
+  check(session), check(delta), check(scheduled), check(snapshot), check(reply), check(status);
+  check(others), check(input), check(ack);
+  if (failed != nullptr) return tl::unexpected(*failed);
+  return std::make_unique<DdsServerPort>(
+      DdsServerPort::Endpoints{std::move(*node), std::move(*session), std::move(*delta),
+                               std::move(*scheduled), std::move(*snapshot), std::move(*reply),
+                               std::move(*status), std::move(*others), std::move(*input), std::move(*ack)},
+      options.session);
+}
+
+}  // namespace tandem::transport

@@ -1,0 +1,76 @@
+#include "sdk/transport/limits.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sdk/transport/port.hpp"
+
+namespace tandem::transport {
+namespace {
+
+bool is_name(const std::string& text) { return text.size() <= kMaxNameBytes; }
+bool is_positive(double value) { return std::isfinite(value) && value > 0; }
+bool is_role(Role role) { return role == Role::kObserver || role == Role::kParticipant; }
+bool is_phase(Phase phase) { return phase == Phase::kJoining || phase == Phase::kPlaying; }
+
+}  // namespace
+
+bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
+  return check_session_name(message.session).has_value() && message.capacity >= 1 &&
+         message.capacity <= kMaxCapacity && is_positive(message.frame_rate_hz) &&
+         is_positive(message.lattice_unit) && message.window_ceiling >= 1 &&
+         message.window_ceiling <= kMaxWindowCeiling && message.max_delta_bytes <= kMaxSampleBytes &&
+         message.max_snapshot_bytes <= kMaxSampleBytes && is_name(message.codec) &&
+         is_name(message.predictor) && is_name(message.scene) &&
+         message.scene_description.size() <= kMaxDescriptionBytes &&
+         message.predictor_constants.size() <= kMaxPredictorConstants && message.types.size() <= kMaxTypes &&
+         std::all_of(message.types.begin(), message.types.end(),
+                     [](const BodyType& type) { return is_name(type.name) && std::isfinite(type.radius); }) &&
+         message.codec_tables.size() <= kMaxTableBytes;
+}
+
+bool within_limits(const DeltaMessage& message, const Limits& limits) {
+  return message.parts >= 1 && message.parts <= kMaxParts && message.part < message.parts &&
+         message.payload.size() <= limits.max_delta_bytes;
+}
+
+bool within_limits(const ScheduledInputMessage& message, const Limits& /*limits*/) {
+  return message.number >= 1 && message.values.size() <= kMaxScheduledValues;
+}
+
+bool within_limits(const SnapshotMessage& message, const Limits& limits) {
+  return message.slot == message.frame % kSnapshotSlots && message.bytes.size() <= limits.max_snapshot_bytes;
+}
+
+bool within_limits(const ReplyMessage& message, const Limits& /*limits*/) {
+  return message.client != 0 && is_role(message.role) && is_phase(message.phase) &&
+         message.entries.size() <= kReplyRing;
+}
+
+bool within_limits(const InputMessage& message, const Limits& /*limits*/) {
+  return message.client != 0 && message.values.size() <= kMaxInputValues &&
+         message.bytes.size() <= kMaxInputBytes;
+}
+
+bool within_limits(const AckMessage& message, const Limits& /*limits*/) {
+  return message.client != 0 && is_role(message.role_wanted) && is_phase(message.phase);
+}
+
+bool within_limits(const ServerStatusMessage& message, const Limits& /*limits*/) {
+  return check_session_name(message.session).has_value();
+}
+
+bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/) {
+  return message.client != 0 && check_session_name(message.session).has_value();
+}
+
+std::uint32_t delta_depth(std::uint32_t window_ceiling, std::uint32_t parts, std::uint32_t max_part_bytes,
+                          std::uint64_t memory_bytes) {
+  const std::uint64_t window = std::clamp<std::uint64_t>(window_ceiling, 1, kMaxWindowCeiling);
+  const std::uint64_t count = std::clamp<std::uint64_t>(parts, 1, kMaxParts);
+  const std::uint64_t wanted = std::max<std::uint64_t>(64, 2 * window * count);
+  const std::uint64_t affordable = memory_bytes / std::max<std::uint64_t>(1, max_part_bytes);
+  return static_cast<std::uint32_t>(std::max(std::min(wanted, affordable), (window + 1) * count));
+}
+
+}  // namespace tandem::transport

@@ -1,0 +1,51 @@
+#pragma once
+// Sizes and shapes that a received sample must have. Every transport applies them before it hands a sample
+// on.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "sdk/transport/messages.hpp"
+
+namespace tandem::transport {
+
+/// No sample is larger, whatever a session declares; transports refuse it on the wire where they can.
+inline constexpr std::uint32_t kMaxSampleBytes = 64U << 20U;
+inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
+inline constexpr std::uint32_t kMaxParts = 4096;  ///< of one delta
+inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
+inline constexpr std::size_t kMaxTypes = 65536;   ///< body types of a session (type ids have 16 bits)
+inline constexpr std::size_t kMaxPredictorConstants = 1U << 20U;
+inline constexpr std::size_t kMaxDescriptionBytes = 1U << 20U;
+inline constexpr std::size_t kMaxTableBytes = 4U << 20U;  ///< codec tables
+inline constexpr std::size_t kMaxScheduledValues = 64;
+inline constexpr std::size_t kMaxInputValues = 16;
+inline constexpr std::size_t kMaxInputBytes = 1024;
+inline constexpr std::uint32_t kSnapshotSlots = 4;  ///< snapshot key: frame modulo this
+
+/// What the session declares; until one is known, the fixed maximum.
+struct Limits {
+  std::uint32_t max_delta_bytes = kMaxSampleBytes;
+  std::uint32_t max_snapshot_bytes = kMaxSampleBytes;
+};
+
+/// True when lengths, counts and enumerations are in range. Says nothing about epochs, numbers or values:
+/// those are answered, not dropped.
+[[nodiscard]] bool within_limits(const SessionMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const DeltaMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const ScheduledInputMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const SnapshotMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const ReplyMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const InputMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const AckMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const ServerStatusMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const ClientStatusMessage& message, const Limits& limits);
+
+/// Deltas that writer and reader keep: at least two windows and 64, `parts` each, but no more than
+/// `memory_bytes` of them (never below one window, or a suspended server could overwrite what a participant
+/// still needs).
+[[nodiscard]] std::uint32_t delta_depth(std::uint32_t window_ceiling, std::uint32_t parts,
+                                        std::uint32_t max_part_bytes,
+                                        std::uint64_t memory_bytes = 256ULL << 20U);
+
+}  // namespace tandem::transport
