@@ -1,6 +1,7 @@
 #include "services/server/mirror.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace tandem::server {
 namespace {
@@ -11,8 +12,6 @@ constexpr std::uint8_t mark(engine::Event::Kind kind) {
 constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
 constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
 constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
-
-constexpr double kLargestFloat = 3.4028234663852886e38;
 
 }  // namespace
 
@@ -32,10 +31,11 @@ void Mirror::quantise(const engine::Bodies& bodies) {
   std::ranges::fill(off_, 0);
   const double position = lattice_.position_scale();
   const double velocity = lattice_.velocity_scale();
+  const auto world = static_cast<float>(kPositionLimit * lattice_.unit);
+  constexpr float kFinite = std::numeric_limits<float>::max();
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    quantise_column(bodies.position[i], position, kPositionLimit, kPositionLimit, target_.p(i), off_);
-    quantise_column(bodies.velocity[i], velocity, kVelocityLimit, kLargestFloat * velocity, target_.v(i),
-                    off_);
+    quantise_column(bodies.position[i], position, kPositionLimit, world, target_.p(i), off_);
+    quantise_column(bodies.velocity[i], velocity, kVelocityLimit, kFinite, target_.v(i), off_);
   }
   const std::size_t capacity = shown_.size();
   for (std::size_t s = 0; s < capacity; ++s) {

@@ -13,10 +13,10 @@
 
 namespace tandem::server {
 
-/// Rounds one column of floats to integers, saturating at +-limit; `off` is set to 1 (never cleared) where a
-/// value is not finite or its rounded magnitude exceeds `off_limit`. Spans have equal length. Vectorisable:
-/// no branches.
-void quantise_column(std::span<const float> in, double scale, double limit, double off_limit,
+/// Rounds one column of floats (times `scale`) to integers, saturating at +-limit; `off` is set to 1 (never
+/// cleared) where a value is NaN or its magnitude exceeds `off_bound` (units of `in`). Spans have equal
+/// length. Plain loops that vectorise.
+void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
                      std::span<std::int32_t> out, std::span<std::int32_t> off);
 
 /// Follows a simulation. A body is shown to clients while it is alive, finite, on the lattice and of a listed
