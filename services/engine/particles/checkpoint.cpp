@@ -1,0 +1,150 @@
+#include <bit>
+#include <cstring>
+#include <type_traits>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include "services/engine/particles/columns.hpp"
+
+namespace tandem::engine {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "checkpoints hold the machine's own layout");
+
+constexpr std::uint64_t kMagic = 0x31545250444E4154;  // "TANDPRT1"
+
+class Writer {
+ public:
+  explicit Writer(std::vector<std::byte>& out) : out_(out) {}
+  template <class T>
+  void column(const std::vector<T>& values) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes(values.data(), values.size() * sizeof(T));
+  }
+  template <class T>
+  void value(const T& v) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes(&v, sizeof v);
+  }
+
+ private:
+  void bytes(const void* from, std::size_t size) {
+    const auto* first = static_cast<const std::byte*>(from);
+    out_.insert(out_.end(), first, first + size);
+  }
+  std::vector<std::byte>& out_;
+};
+
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte> in) : in_(in) {}
+  template <class T>
+  void column(std::vector<T>& values) {
+    bytes(values.data(), values.size() * sizeof(T));
+  }
+  template <class T>
+  void value(T& v) {
+    bytes(&v, sizeof v);
+  }
+  [[nodiscard]] bool ok() const { return ok_; }
+  [[nodiscard]] bool at_end() const { return ok_ && in_.empty(); }
+
+ private:
+  void bytes(void* to, std::size_t size) {
+    ok_ = ok_ && in_.size() >= size;
+    if (!ok_ || size == 0) return;
+    std::memcpy(to, in_.data(), size);
+    in_ = in_.subspan(size);
+  }
+  std::span<const std::byte> in_;
+  bool ok_ = true;
+};
+
+std::uint64_t checksum(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+
+// One list for both directions, so that they cannot differ.
+template <class Io, class C>
+void each_fixed(Io& io, C& columns) {
+  for (auto& column : columns.position) io.column(column);
+  for (auto& column : columns.velocity) io.column(column);
+  io.column(columns.alive);
+  io.column(columns.type);
+  for (auto& contact : columns.contact) {
+    io.value(contact.force);
+    io.value(contact.touching);
+  }
+  io.value(columns.frame);
+  io.value(columns.spawned);
+  io.value(columns.gravity);
+  io.column(columns.due);
+}
+
+}  // namespace
+
+std::uint64_t fingerprint(const World& world) {
+  std::vector<std::byte> bytes;
+  Writer out(bytes);
+  out.value(world.capacity);
+  out.value(world.seed);
+  out.value(world.dt_s);
+  out.value(world.substeps);
+  out.value(world.damping_per_s);
+  out.value(world.low);
+  out.value(world.high);
+  out.value(world.pair);
+  out.value(world.wall);
+  out.column(world.types);
+  out.column(world.planes);
+  out.column(world.boxes);
+  out.column(world.balls);
+  for (const Emitter& e : world.emitters) {
+    for (const Vec3f& v : {e.low, e.high, e.velocity}) out.value(v);
+    out.value(e.rate_per_s);
+    out.value(e.type);
+  }
+  for (const Region& r : world.regions) {
+    for (const Vec3f& v : {r.low, r.high, r.offset}) out.value(v);
+    out.value(r.action);
+    out.value(r.type);
+  }
+  return checksum(bytes);
+}
+
+void save_columns(const Columns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out) {
+  const std::size_t begin = out.size();
+  Writer writer(out);
+  writer.value(kMagic);
+  writer.value(world_fingerprint);
+  writer.value(static_cast<std::uint64_t>(columns.pushes.size()));
+  each_fixed(writer, columns);
+  writer.column(columns.pushes);
+  writer.value(checksum(std::span<const std::byte>(out).subspan(begin)));
+}
+
+bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint, Columns& columns) {
+  if (bytes.size() < sizeof(std::uint64_t)) return false;
+  const std::span<const std::byte> body = bytes.first(bytes.size() - sizeof(std::uint64_t));
+  std::uint64_t sum = 0;
+  Reader(bytes.last(sizeof sum)).value(sum);
+  if (sum != checksum(body)) return false;
+
+  Reader reader(body);
+  std::uint64_t magic = 0;
+  std::uint64_t world = 0;
+  std::uint64_t pushes = 0;
+  reader.value(magic);
+  reader.value(world);
+  reader.value(pushes);
+  if (!reader.ok() || magic != kMagic || world != world_fingerprint || pushes > kMaxPushes) return false;
+  Columns loaded(static_cast<std::uint32_t>(columns.alive.size()));
+  loaded.due.resize(columns.due.size());
+  loaded.pushes.resize(pushes);
+  each_fixed(reader, loaded);
+  reader.column(loaded.pushes);
+  if (!reader.at_end()) return false;
+  columns = std::move(loaded);
+  return true;
+}
+
+}  // namespace tandem::engine

@@ -1,0 +1,68 @@
+#pragma once
+// A pool of threads that share out blocks of work, first come first served.
+
+#include <atomic>
+#include <barrier>
+#include <cfenv>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+namespace tandem::engine {
+
+/// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
+/// because a static split waits for the thread whose core somebody else is using. Jobs write to places of
+/// their own.
+class Workers {
+ public:
+  explicit Workers(std::uint32_t threads);
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+  Workers(Workers&&) = delete;
+  Workers& operator=(Workers&&) = delete;
+  ~Workers();
+
+  /// Calls job(begin, end) for blocks of at most `block` that cover [0, count); returns when all are done.
+  template <class Job>
+  void run(std::uint32_t count, std::uint32_t block, const Job& job) {
+    if (threads_.empty() || count <= block) {
+      if (count > 0) job(std::uint32_t{0}, count);
+      return;
+    }
+    context_ = &job;
+    call_ = [](const void* context, std::uint32_t begin, std::uint32_t end) {
+      (*static_cast<const Job*>(context))(begin, end);
+    };
+    share(count, block);
+  }
+
+ private:
+  void share(std::uint32_t count, std::uint32_t block);
+  void take_blocks();
+
+  const void* context_ = nullptr;
+  void (*call_)(const void*, std::uint32_t, std::uint32_t) = nullptr;
+  std::uint32_t count_ = 0;
+  std::uint32_t block_ = 1;
+  std::atomic<std::uint32_t> next_{0};
+  bool stop_ = false;
+  std::barrier<> barrier_;
+  std::vector<std::jthread> threads_;
+};
+
+/// Sets the default rounding mode and full denormals for its lifetime: a plug-in linked with fast-math may
+/// have changed them for this thread, and with them every result.
+class FloatEnvironment {
+ public:
+  FloatEnvironment();
+  FloatEnvironment(const FloatEnvironment&) = delete;
+  FloatEnvironment& operator=(const FloatEnvironment&) = delete;
+  FloatEnvironment(FloatEnvironment&&) = delete;
+  FloatEnvironment& operator=(FloatEnvironment&&) = delete;
+  ~FloatEnvironment();
+
+ private:
+  std::fenv_t saved_{};
+};
+
+}  // namespace tandem::engine
