@@ -1,0 +1,347 @@
+#include "sdk/transport/simulated/fabric.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace tandem::transport::simulated {
+namespace {
+
+struct TopicRules {
+  bool reliable = true;
+  bool transient_local = false;
+};
+// In the order of AnyMessage; the same QoS as in dds/topics.hpp.
+constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
+    {true, true},    // session
+    {true, false},   // delta
+    {true, true},    // scheduled input
+    {true, true},    // snapshot
+    {true, true},    // reply
+    {true, false},   // input
+    {true, false},   // acknowledgement
+    {false, false},  // server status
+    {false, false},  // client status
+}};
+
+std::pair<std::uint32_t, std::uint32_t> ordered(std::uint32_t a, std::uint32_t b) {
+  return {std::min(a, b), std::max(a, b)};
+}
+
+}  // namespace
+
+std::uint64_t Random::next() {
+  std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ULL);
+  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
+  return z ^ (z >> 31U);
+}
+
+bool Random::chance(double probability) {
+  return probability > 0 && static_cast<double>(next() >> 11U) * 0x1.0p-53 < probability;
+}
+
+std::int64_t Random::between(std::int64_t low, std::int64_t high) {
+  if (high <= low) return low;
+  const auto span = static_cast<std::uint64_t>(high - low) + 1;
+  return low + static_cast<std::int64_t>(next() % span);
+}
+
+Fabric::Index Fabric::add_participant(const std::string& session) {
+  const auto index = static_cast<Index>(participants_.size());
+  Participant participant;
+  participant.session = session;
+  // Random first, so that which of two servers has the lower id depends on the seed; the index makes it
+  // unique.
+  const std::uint64_t high = random_.next();
+  for (std::size_t i = 0; i < 8; ++i) participant.id.bytes[i] = static_cast<std::uint8_t>(high >> (8U * i));
+  for (std::size_t i = 0; i < 4; ++i)
+    participant.id.bytes[8 + i] = static_cast<std::uint8_t>(index >> (8U * i));
+  participants_.push_back(std::move(participant));
+  return index;
+}
+
+Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint32_t depth) {
+  const auto index = static_cast<Index>(writers_.size());
+  Writer writer;
+  writer.participant = participant;
+  writer.topic = topic;
+  writer.depth = depth;
+  writers_.push_back(std::move(writer));
+  participants_[participant].writers.push_back(index);
+  for (Index reader = 0; reader < readers_.size(); ++reader) add_pair(index, reader);
+  return index;
+}
+
+Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint32_t depth) {
+  const auto index = static_cast<Index>(readers_.size());
+  Reader reader;
+  reader.participant = participant;
+  reader.topic = topic;
+  reader.depth = depth;
+  readers_.push_back(std::move(reader));
+  participants_[participant].readers.push_back(index);
+  for (Index writer = 0; writer < writers_.size(); ++writer) add_pair(writer, index);
+  return index;
+}
+
+void Fabric::add_pair(Index writer, Index reader) {
+  const Writer& from = writers_[writer];
+  const Reader& to = readers_[reader];
+  if (from.topic != to.topic || from.participant == to.participant || to.closed || gone(from.participant) ||
+      gone(to.participant) ||
+      participants_[from.participant].session != participants_[to.participant].session) {
+    return;
+  }
+  const auto index = static_cast<Index>(pairs_.size());
+  Pair pair;
+  pair.writer = writer;
+  pair.reader = reader;
+  pairs_.push_back(std::move(pair));
+  writers_[writer].pairs.push_back(index);
+  readers_[reader].pairs.push_back(index);
+  schedule(index, now_ns_ + random_.between(options_.match_min_ns, options_.match_max_ns));
+}
+
+void Fabric::close_reader(Index reader) {
+  readers_[reader].closed = true;
+  readers_[reader].arrived.clear();
+  for (const Index pair : readers_[reader].pairs) {
+    pairs_[pair].matched = false;
+    pairs_[pair].travelling.clear();
+    std::erase(writers_[pairs_[pair].writer].pairs, pair);
+  }
+  readers_[reader].pairs.clear();
+}
+
+void Fabric::close_participant(Index participant) {
+  participants_[participant].closed = true;
+  for (const Index reader : participants_[participant].readers) close_reader(reader);
+  for (const Index writer : participants_[participant].writers) {
+    for (const Index pair : writers_[writer].pairs) {
+      pairs_[pair].matched = false;
+      pairs_[pair].travelling.clear();
+      std::erase(readers_[pairs_[pair].reader].pairs, pair);
+    }
+    writers_[writer].pairs.clear();
+    writers_[writer].history.clear();
+  }
+}
+
+Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) {
+  Writer& from = writers_[writer];
+  if (gone(from.participant)) return fail(ErrorCode::kTransport, "this participant was killed");
+  const Sample sample{from.next_sequence++, key, std::make_shared<const AnyMessage>(std::move(message))};
+  if (kRules[from.topic].reliable) {
+    std::deque<Sample>& kept = from.history[key];
+    kept.push_back(sample);
+    if (kept.size() > from.depth) kept.pop_front();
+  }
+  for (const Index pair : from.pairs) {
+    if (pairs_[pair].matched) send(pair, sample);
+  }
+  return {};
+}
+
+void Fabric::forget_history(Index writer) { writers_[writer].history.clear(); }
+
+void Fabric::send(Index pair, const Sample& sample) {
+  Pair& way = pairs_[pair];
+  const Writer& writer = writers_[way.writer];
+  const Index to = readers_[way.reader].participant;
+  const LinkModel& model = link(writer.participant, to);
+  Travelling travelling{sample, now_ns_ + model.delay_ns + random_.between(0, model.jitter_ns), false};
+  if (is_cut(writer.participant, to) || random_.chance(model.loss)) {
+    if (!kRules[writer.topic].reliable) return;
+    if (random_.chance(model.lost_for_good)) {
+      ++counts_.lost_for_good;
+      return;
+    }
+    travelling.to_repair = true;
+    travelling.due_ns += model.repair_ns;
+  }
+  schedule(pair, travelling.due_ns);
+  way.travelling.push_back(std::move(travelling));
+}
+
+void Fabric::schedule(Index pair, std::int64_t at_ns) { events_.push(Event{at_ns, next_order_++, pair}); }
+
+void Fabric::advance_to(std::int64_t now_ns) {
+  while (!events_.empty() && events_.top().at_ns <= now_ns) {
+    const Event event = events_.top();
+    events_.pop();
+    now_ns_ = std::max(now_ns_, event.at_ns);
+    process(event.pair);
+  }
+  now_ns_ = std::max(now_ns_, now_ns);
+}
+
+std::optional<std::int64_t> Fabric::next_event_ns() const {
+  if (events_.empty()) return std::nullopt;
+  return events_.top().at_ns;
+}
+
+void Fabric::process(Index pair) {
+  Pair& way = pairs_[pair];
+  const Writer& writer = writers_[way.writer];
+  const Reader& reader = readers_[way.reader];
+  if (reader.closed || gone(reader.participant) || participants_[writer.participant].closed) return;
+  const bool unreachable = participants_[reader.participant].frozen_ns != kNever ||
+                           participants_[writer.participant].frozen_ns != kNever ||
+                           is_cut(writer.participant, reader.participant);
+  if (!way.matched) {
+    if (gone(writer.participant)) return;
+    if (unreachable) {  // discovery is repeated until it succeeds
+      schedule(pair, now_ns_ + random_.between(options_.match_min_ns, options_.match_max_ns));
+      return;
+    }
+    way.matched = true;
+    if (!kRules[writer.topic].transient_local) return;
+    std::vector<Sample> kept;
+    for (const auto& [key, samples] : writer.history) kept.insert(kept.end(), samples.begin(), samples.end());
+    std::sort(kept.begin(), kept.end(),
+              [](const Sample& a, const Sample& b) { return a.sequence < b.sequence; });
+    for (const Sample& sample : kept) send(pair, sample);
+    return;
+  }
+  while (!way.travelling.empty() && way.travelling.front().due_ns <= now_ns_ && settle_front(way, pair)) {
+  }
+}
+
+bool Fabric::settle_front(Pair& pair, Index index) {
+  const Writer& writer = writers_[pair.writer];
+  const Index to = readers_[pair.reader].participant;
+  Travelling& front = pair.travelling.front();
+  const LinkModel& model = link(writer.participant, to);
+  if (participants_[to].frozen_ns != kNever) return false;  // set_frozen() takes it up again
+  if (front.to_repair) {
+    if (gone(writer.participant) || !keeps(writer, front.sample)) {
+      ++counts_.overwritten;
+      pair.travelling.pop_front();
+      return true;
+    }
+    if (participants_[writer.participant].frozen_ns != kNever || is_cut(writer.participant, to) ||
+        random_.chance(model.loss)) {
+      front.due_ns = now_ns_ + std::max<std::int64_t>(1, model.repair_ns);
+      schedule(index, front.due_ns);
+      return false;
+    }
+    ++counts_.repaired;
+  }
+  deliver(pair, front.sample);
+  pair.travelling.pop_front();
+  return true;
+}
+
+void Fabric::deliver(const Pair& pair, const Sample& sample) {
+  Reader& reader = readers_[pair.reader];
+  const auto same_key = [&](const Arrived& arrived) { return arrived.key == sample.key; };
+  if (reader.arrived.size() >= reader.depth &&
+      std::count_if(reader.arrived.begin(), reader.arrived.end(), same_key) >=
+          static_cast<std::ptrdiff_t>(reader.depth)) {
+    reader.arrived.erase(std::find_if(reader.arrived.begin(), reader.arrived.end(), same_key));
+    ++counts_.pushed_out;
+  }
+  reader.arrived.push_back(Arrived{writers_[pair.writer].participant, sample.key, sample.message});
+  ++counts_.delivered;
+}
+
+bool Fabric::keeps(const Writer& writer, const Sample& sample) const {
+  const auto kept = writer.history.find(sample.key);
+  return kept != writer.history.end() && !kept->second.empty() &&
+         kept->second.front().sequence <= sample.sequence;
+}
+
+WriterState Fabric::state(Index observer, Index other) const {
+  const Participant& subject = participants_[other];
+  if (subject.closed) return WriterState::kGone;
+  std::int64_t silent_ns = std::min(subject.killed_ns, subject.frozen_ns);
+  if (const auto cut = cuts_.find(ordered(observer, other)); cut != cuts_.end()) {
+    silent_ns = std::min(silent_ns, cut->second);
+  }
+  const bool expired = silent_ns != kNever && now_ns_ - silent_ns >= options_.lease_ns;
+  return expired ? WriterState::kSilent : WriterState::kLive;
+}
+
+bool Fabric::reaches(Index writer, const ParticipantId& participant) const {
+  const Index observer = writers_[writer].participant;
+  return std::any_of(writers_[writer].pairs.begin(), writers_[writer].pairs.end(), [&](Index pair) {
+    const Index reader = readers_[pairs_[pair].reader].participant;
+    return pairs_[pair].matched && participants_[reader].id == participant &&
+           state(observer, reader) == WriterState::kLive;
+  });
+}
+
+bool Fabric::hears(Index reader, const ParticipantId& participant) const {
+  const Index observer = readers_[reader].participant;
+  return std::any_of(readers_[reader].pairs.begin(), readers_[reader].pairs.end(), [&](Index pair) {
+    const Index writer = writers_[pairs_[pair].writer].participant;
+    return pairs_[pair].matched && participants_[writer].id == participant &&
+           state(observer, writer) == WriterState::kLive;
+  });
+}
+
+Fabric::Index Fabric::find(const ParticipantId& participant) const {
+  const auto found = std::find_if(participants_.begin(), participants_.end(),
+                                  [&](const Participant& other) { return other.id == participant; });
+  return static_cast<Index>(found - participants_.begin());
+}
+
+const LinkModel& Fabric::link(Index from, Index to) const {
+  const auto own = links_.find({from, to});
+  return own == links_.end() ? options_.link : own->second;
+}
+
+bool Fabric::is_cut(Index a, Index b) const { return !cuts_.empty() && cuts_.contains(ordered(a, b)); }
+
+bool Fabric::gone(Index participant) const {
+  return participants_[participant].closed || participants_[participant].killed_ns != kNever;
+}
+
+void Fabric::set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link) {
+  links_[{find(from), find(to)}] = link;
+}
+
+void Fabric::set_all_links(const LinkModel& link) {
+  options_.link = link;
+  links_.clear();
+}
+
+void Fabric::set_cut(const ParticipantId& a, const ParticipantId& b, bool cut) {
+  const auto ends = ordered(find(a), find(b));
+  if (cut) {
+    cuts_.emplace(ends, now_ns_);
+  } else {
+    cuts_.erase(ends);
+  }
+}
+
+void Fabric::set_frozen(const ParticipantId& participant, bool frozen) {
+  const Index index = find(participant);
+  Participant& subject = participants_[index];
+  if (frozen) {
+    subject.frozen_ns = std::min(subject.frozen_ns, now_ns_);
+    return;
+  }
+  subject.frozen_ns = kNever;
+  // What came while it was frozen overran its socket; it asks for it again.
+  for (const Index reader : subject.readers) {
+    for (const Index index_of_pair : readers_[reader].pairs) {
+      Pair& pair = pairs_[index_of_pair];
+      const Writer& writer = writers_[pair.writer];
+      if (!kRules[writer.topic].reliable) pair.travelling.clear();
+      for (Travelling& travelling : pair.travelling) {
+        if (travelling.due_ns > now_ns_) continue;
+        travelling.to_repair = true;
+        travelling.due_ns = now_ns_ + link(writer.participant, index).repair_ns;
+        schedule(index_of_pair, travelling.due_ns);
+      }
+    }
+  }
+}
+
+void Fabric::kill(const ParticipantId& participant) {
+  Participant& subject = participants_[find(participant)];
+  subject.killed_ns = std::min(subject.killed_ns, now_ns_);
+}
+
+}  // namespace tandem::transport::simulated

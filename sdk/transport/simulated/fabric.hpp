@@ -1,0 +1,174 @@
+#pragma once
+// The inside of the simulated network: participants, endpoints, samples on their way.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <queue>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "sdk/transport/session_book.hpp"
+#include "sdk/transport/simulated/network.hpp"
+
+namespace tandem::transport::simulated {
+
+/// Any message; its index() is the topic.
+using AnyMessage =
+    std::variant<SessionMessage, DeltaMessage, ScheduledInputMessage, SnapshotMessage, ReplyMessage,
+                 InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage>;
+template <class M, class... Messages>
+[[nodiscard]] constexpr std::size_t topic_in(const std::variant<Messages...>* /*type*/) {
+  std::size_t index = 0;
+  (void)((std::is_same_v<M, Messages> || (++index, false)) || ...);
+  return index;
+}
+template <class M>
+inline constexpr std::size_t kTopic = topic_in<M>(static_cast<const AnyMessage*>(nullptr));
+
+/// splitmix64 (Steele, Lea, Flood 2014): enough for choosing delays, and the same everywhere.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed) {}
+  std::uint64_t next();
+  bool chance(double probability);
+  std::int64_t between(std::int64_t low, std::int64_t high);
+
+ private:
+  std::uint64_t state_;
+};
+
+class Fabric {
+ public:
+  using Index = std::uint32_t;
+  explicit Fabric(const NetworkOptions& options) : options_(options), random_(options.seed) {}
+
+  // What ports do.
+  Index add_participant(const std::string& session);
+  Index add_writer(Index participant, std::size_t topic, std::uint32_t depth);
+  Index add_reader(Index participant, std::size_t topic, std::uint32_t depth);
+  void close_reader(Index reader);
+  void close_participant(Index participant);
+  [[nodiscard]] Result<void> write(Index writer, std::uint64_t key, AnyMessage message);
+  /// Drops what a writer keeps for late readers and repairs.
+  void forget_history(Index writer);
+  /// Calls `sink(participant, message)` for all that arrived.
+  template <class Sink>
+  void take(Index reader, Sink&& sink) {
+    for (const Arrived& arrived : std::exchange(readers_[reader].arrived, {})) {
+      sink(arrived.from, *arrived.message);
+    }
+  }
+  [[nodiscard]] const ParticipantId& id(Index participant) const { return participants_[participant].id; }
+  [[nodiscard]] bool killed(Index participant) const {
+    return participants_[participant].killed_ns != kNever;
+  }
+  /// How `observer` sees the other.
+  [[nodiscard]] WriterState state(Index observer, Index other) const;
+  /// A reader in `participant` has been matched.
+  [[nodiscard]] bool reaches(Index writer, const ParticipantId& participant) const;
+  /// A live writer in `participant` has been matched.
+  [[nodiscard]] bool hears(Index reader, const ParticipantId& participant) const;
+
+  // What the network does.
+  [[nodiscard]] std::int64_t now_ns() const { return now_ns_; }
+  void advance_to(std::int64_t now_ns);
+  [[nodiscard]] std::optional<std::int64_t> next_event_ns() const;
+  void set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link);
+  void set_all_links(const LinkModel& link);
+  void set_cut(const ParticipantId& a, const ParticipantId& b, bool cut);
+  void set_frozen(const ParticipantId& participant, bool frozen);
+  void kill(const ParticipantId& participant);
+  [[nodiscard]] const NetworkCounts& counts() const { return counts_; }
+
+ private:
+  static constexpr std::int64_t kNever = INT64_MAX;
+
+  struct Participant {
+    ParticipantId id;
+    std::string session;
+    bool closed = false;
+    std::int64_t killed_ns = kNever;
+    std::int64_t frozen_ns = kNever;
+    std::vector<Index> writers;
+    std::vector<Index> readers;
+  };
+  struct Sample {
+    std::uint64_t sequence = 0;
+    std::uint64_t key = 0;
+    std::shared_ptr<const AnyMessage> message;
+  };
+  struct Writer {
+    Index participant = 0;
+    std::size_t topic = 0;
+    std::uint32_t depth = 1;
+    std::uint64_t next_sequence = 1;
+    std::map<std::uint64_t, std::deque<Sample>> history;  // by key, each ascending by sequence
+    std::vector<Index> pairs;
+  };
+  struct Arrived {
+    Index from = 0;
+    std::uint64_t key = 0;
+    std::shared_ptr<const AnyMessage> message;
+  };
+  struct Reader {
+    Index participant = 0;
+    std::size_t topic = 0;
+    std::uint32_t depth = 1;
+    bool closed = false;
+    std::deque<Arrived> arrived;
+    std::vector<Index> pairs;
+  };
+  struct Travelling {
+    Sample sample;
+    std::int64_t due_ns = 0;
+    bool to_repair = false;
+  };
+  /// A writer and a reader of one topic in one session.
+  struct Pair {
+    Index writer = 0;
+    Index reader = 0;
+    bool matched = false;
+    std::deque<Travelling> travelling;  // in the order of writing
+  };
+  struct Event {
+    std::int64_t at_ns = 0;
+    std::uint64_t order = 0;
+    Index pair = 0;
+    bool operator>(const Event& other) const {
+      return at_ns != other.at_ns ? at_ns > other.at_ns : order > other.order;
+    }
+  };
+
+  [[nodiscard]] Index find(const ParticipantId& participant) const;
+  void add_pair(Index writer, Index reader);
+  void schedule(Index pair, std::int64_t at_ns);
+  void send(Index pair, const Sample& sample);
+  void process(Index pair);
+  /// False while the front of the pair has to wait.
+  bool settle_front(Pair& pair, Index index);
+  void deliver(const Pair& pair, const Sample& sample);
+  [[nodiscard]] bool keeps(const Writer& writer, const Sample& sample) const;
+  [[nodiscard]] const LinkModel& link(Index from, Index to) const;
+  [[nodiscard]] bool is_cut(Index a, Index b) const;
+  [[nodiscard]] bool gone(Index participant) const;
+
+  NetworkOptions options_;
+  Random random_;
+  std::int64_t now_ns_ = 0;
+  std::uint64_t next_order_ = 0;
+  std::vector<Participant> participants_;
+  std::vector<Writer> writers_;
+  std::vector<Reader> readers_;
+  std::vector<Pair> pairs_;
+  std::map<std::pair<Index, Index>, LinkModel> links_;
+  std::map<std::pair<Index, Index>, std::int64_t> cuts_;  // since when, lower index first
+  std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
+  NetworkCounts counts_;
+};
+
+}  // namespace tandem::transport::simulated

@@ -1,0 +1,247 @@
+#include "sdk/transport/simulated/network.hpp"
+
+#include <array>
+#include <atomic>
+#include <utility>
+
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/simulated/fabric.hpp"
+
+namespace tandem::transport::simulated {
+namespace {
+
+constexpr std::uint32_t kSessionReaderDepth = 8;
+constexpr std::uint32_t kScheduledDepth = 256;
+constexpr std::uint32_t kInputDepth = 64;
+
+/// What both kinds of port share: a participant and its samples.
+class Member {
+ public:
+  Member(std::shared_ptr<Fabric> fabric, std::string session)
+      : fabric_(std::move(fabric)), session_(std::move(session)), self_(fabric_->add_participant(session_)) {}
+  Member(const Member&) = delete;
+  Member& operator=(const Member&) = delete;
+  Member(Member&&) = delete;
+  Member& operator=(Member&&) = delete;
+  ~Member() { fabric_->close_participant(self_); }
+
+  [[nodiscard]] Fabric& fabric() const { return *fabric_; }
+  [[nodiscard]] Fabric::Index index() const { return self_; }
+  [[nodiscard]] ParticipantId id() const { return fabric_->id(self_); }
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+
+  template <class M>
+  Fabric::Index writer(std::uint32_t depth = 1) {
+    return fabric_->add_writer(self_, kTopic<M>, depth);
+  }
+  template <class M>
+  Fabric::Index reader(std::uint32_t depth = 1) {
+    return fabric_->add_reader(self_, kTopic<M>, depth);
+  }
+  template <class M>
+  void take(Fabric::Index reader, const Limits& limits, std::vector<Received<M>>& out) {
+    if (fabric_->killed(self_)) return;
+    fabric_->take(reader, [&](Fabric::Index from, const AnyMessage& any) {
+      const M& message = std::get<M>(any);
+      if (within_limits(message, limits)) {
+        out.push_back(Received<M>{message, fabric_->id(from)});
+      } else {
+        ++dropped_;
+      }
+    });
+  }
+  /// Takes announcements into the book, which afterwards knows who lives.
+  void refresh(Fabric::Index reader, SessionBook& book) {
+    if (fabric_->killed(self_)) return;
+    fabric_->take(reader, [&](Fabric::Index from, const AnyMessage& any) {
+      const auto& message = std::get<SessionMessage>(any);
+      if (within_limits(message, Limits{}) && message.session == session_) {
+        book.put(from, Received<SessionMessage>{message, fabric_->id(from)});
+      } else {
+        ++dropped_;
+      }
+    });
+    book.update([&](std::uint64_t from) { return fabric_->state(self_, static_cast<Fabric::Index>(from)); });
+  }
+
+ private:
+  std::shared_ptr<Fabric> fabric_;
+  std::string session_;
+  Fabric::Index self_;
+  std::uint64_t dropped_ = 0;
+};
+
+class SimulatedServerPort final : public ServerPort {
+ public:
+  SimulatedServerPort(std::shared_ptr<Fabric> fabric, const std::string& session, std::uint32_t delta_depth)
+      : member_(std::move(fabric), session),
+        session_(member_.writer<SessionMessage>()),
+        delta_(member_.writer<DeltaMessage>(delta_depth)),
+        scheduled_(member_.writer<ScheduledInputMessage>(kScheduledDepth)),
+        snapshot_(member_.writer<SnapshotMessage>()),
+        reply_(member_.writer<ReplyMessage>()),
+        status_(member_.writer<ServerStatusMessage>()),
+        others_(member_.reader<SessionMessage>(kSessionReaderDepth)),
+        input_(member_.reader<InputMessage>(kInputDepth)),
+        ack_(member_.reader<AckMessage>()) {}
+
+  [[nodiscard]] ParticipantId self() const override { return member_.id(); }
+  void take_sessions(std::vector<Received<SessionMessage>>& out) override {
+    member_.refresh(others_, book_);
+    book_.list_live(out);
+  }
+  Result<void> write(const SessionMessage& message) override {
+    return member_.fabric().write(session_, 0, message);
+  }
+  Result<void> write(const DeltaMessage& message) override {
+    return member_.fabric().write(delta_, 0, message);
+  }
+  Result<void> write(const ScheduledInputMessage& message) override {
+    return member_.fabric().write(scheduled_, 0, message);
+  }
+  Result<void> write(const SnapshotMessage& message) override {
+    if (message.slot >= kSnapshotSlots) return fail(ErrorCode::kInvalidArgument, "snapshot slots are 0 to 3");
+    return member_.fabric().write(snapshot_, message.slot, message);
+  }
+  Result<void> write(const ReplyMessage& message) override {
+    return member_.fabric().write(reply_, message.client, message);
+  }
+  Result<void> write(const ServerStatusMessage& message) override {
+    return member_.fabric().write(status_, 0, message);
+  }
+  Result<void> dispose_snapshots() override {
+    member_.fabric().forget_history(snapshot_);
+    return {};
+  }
+  void take(std::vector<Received<InputMessage>>& out) override { member_.take(input_, Limits{}, out); }
+  void take(std::vector<Received<AckMessage>>& out) override { member_.take(ack_, Limits{}, out); }
+  [[nodiscard]] bool joined(const ParticipantId& participant) override {
+    return member_.fabric().reaches(delta_, participant) &&
+           member_.fabric().reaches(scheduled_, participant) &&
+           member_.fabric().reaches(snapshot_, participant);
+  }
+  [[nodiscard]] bool alive(const ParticipantId& participant) override {
+    return member_.fabric().hears(ack_, participant);
+  }
+  [[nodiscard]] std::uint64_t dropped() const override { return member_.dropped(); }
+  void wait(std::chrono::nanoseconds /*timeout*/) override {}
+
+ private:
+  Member member_;
+  Fabric::Index session_, delta_, scheduled_, snapshot_, reply_, status_;
+  Fabric::Index others_, input_, ack_;
+  SessionBook book_;
+};
+
+class SimulatedClientPort final : public ClientPort {
+ public:
+  SimulatedClientPort(std::shared_ptr<Fabric> fabric, const std::string& session, std::uint32_t delta_depth)
+      : member_(std::move(fabric), session),
+        delta_depth_(delta_depth),
+        ack_(member_.writer<AckMessage>()),
+        input_(member_.writer<InputMessage>(kInputDepth)),
+        status_(member_.writer<ClientStatusMessage>()),
+        sessions_(member_.reader<SessionMessage>(kSessionReaderDepth)) {}
+
+  [[nodiscard]] ParticipantId self() const override { return member_.id(); }
+  void take_sessions(std::vector<Received<SessionMessage>>& out) override {
+    member_.refresh(sessions_, book_);
+    book_.take_current(out);
+  }
+  [[nodiscard]] bool server_alive() override {
+    member_.refresh(sessions_, book_);
+    return stream_ ? book_.epoch_live(stream_->epoch) : book_.any_live();
+  }
+  Result<void> open_stream(const SessionMessage& session) override {
+    limits_ = Limits{session.max_delta_bytes, session.max_snapshot_bytes};
+    if (stream_ && stream_->epoch == session.epoch) return {};
+    if (stream_) {
+      for (const Fabric::Index reader : {stream_->delta, stream_->scheduled, stream_->reply}) {
+        member_.fabric().close_reader(reader);
+      }
+    }
+    stream_ = Stream{session.epoch, member_.reader<DeltaMessage>(delta_depth_),
+                     member_.reader<ScheduledInputMessage>(kScheduledDepth), member_.reader<ReplyMessage>()};
+    return {};
+  }
+  Result<void> open_snapshots(const SessionMessage& session) override {
+    limits_.max_snapshot_bytes = session.max_snapshot_bytes;
+    close_snapshots();
+    snapshots_ = member_.reader<SnapshotMessage>();
+    return {};
+  }
+  void close_snapshots() override {
+    if (snapshots_) member_.fabric().close_reader(*snapshots_);
+    snapshots_.reset();
+  }
+  void take(std::vector<Received<DeltaMessage>>& out) override {
+    if (stream_) member_.take(stream_->delta, limits_, out);
+  }
+  void take(std::vector<Received<ScheduledInputMessage>>& out) override {
+    if (stream_) member_.take(stream_->scheduled, limits_, out);
+  }
+  void take(std::vector<Received<SnapshotMessage>>& out) override {
+    if (snapshots_) member_.take(*snapshots_, limits_, out);
+  }
+  void take(std::vector<Received<ReplyMessage>>& out) override {
+    if (stream_) member_.take(stream_->reply, limits_, out);
+  }
+  Result<void> write(const AckMessage& message) override {
+    return member_.fabric().write(ack_, message.client, message);
+  }
+  Result<void> write(const InputMessage& message) override {
+    return member_.fabric().write(input_, message.client, message);
+  }
+  Result<void> write(const ClientStatusMessage& message) override {
+    return member_.fabric().write(status_, message.client, message);
+  }
+  [[nodiscard]] std::uint64_t dropped() const override { return member_.dropped(); }
+  void wait(std::chrono::nanoseconds /*timeout*/) override {}
+
+ private:
+  struct Stream {
+    Epoch epoch = 0;
+    Fabric::Index delta = 0, scheduled = 0, reply = 0;
+  };
+  Member member_;
+  std::uint32_t delta_depth_;
+  Fabric::Index ack_, input_, status_, sessions_;
+  std::optional<Stream> stream_;
+  std::optional<Fabric::Index> snapshots_;
+  Limits limits_;
+  SessionBook book_;
+};
+
+}  // namespace
+
+Network::Network(const NetworkOptions& options) : fabric_(std::make_shared<Fabric>(options)) {}
+std::int64_t Network::now_ns() const { return fabric_->now_ns(); }
+void Network::advance_to(std::int64_t now_ns) { fabric_->advance_to(now_ns); }
+std::optional<std::int64_t> Network::next_event_ns() const { return fabric_->next_event_ns(); }
+
+Result<std::unique_ptr<ServerPort>> Network::make_server(const std::string& session,
+                                                         std::uint32_t delta_depth) {
+  if (auto named = check_session_name(session); !named) return tl::unexpected(named.error());
+  return std::make_unique<SimulatedServerPort>(fabric_, session, delta_depth);
+}
+
+Result<std::unique_ptr<ClientPort>> Network::make_client(const std::string& session,
+                                                         std::uint32_t delta_depth) {
+  if (auto named = check_session_name(session); !named) return tl::unexpected(named.error());
+  return std::make_unique<SimulatedClientPort>(fabric_, session, delta_depth);
+}
+
+void Network::set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link) {
+  fabric_->set_link(from, to, link);
+}
+void Network::set_all_links(const LinkModel& link) { fabric_->set_all_links(link); }
+void Network::set_cut(const ParticipantId& a, const ParticipantId& b, bool cut) {
+  fabric_->set_cut(a, b, cut);
+}
+void Network::set_frozen(const ParticipantId& participant, bool frozen) {
+  fabric_->set_frozen(participant, frozen);
+}
+void Network::kill(const ParticipantId& participant) { fabric_->kill(participant); }
+const NetworkCounts& Network::counts() const { return fabric_->counts(); }
+
+}  // namespace tandem::transport::simulated

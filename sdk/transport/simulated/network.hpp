@@ -1,0 +1,84 @@
+#pragma once
+// A publish-subscribe network in memory, with a manual clock and seeded delay, loss and matching.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "sdk/transport/port.hpp"
+
+namespace tandem::transport::simulated {
+
+/// How samples travel from one participant to another.
+struct LinkModel {
+  std::int64_t delay_ns = 1'000'000;
+  std::int64_t jitter_ns = 0;  ///< added uniformly; order within a topic and writer is kept nevertheless
+  double loss = 0;             ///< chance that one transmission is lost, first or repeated
+  std::int64_t repair_ns =
+      20'000'000;            ///< a lost sample of a reliable topic is sent again after this, if still kept
+  double lost_for_good = 0;  ///< chance that a lost sample of a reliable topic is never repaired
+};
+
+struct NetworkOptions {
+  std::uint64_t seed = 1;
+  LinkModel link;  ///< of all links without one of their own
+  std::int64_t match_min_ns =
+      1'000'000;  ///< a writer and a reader find each other after a time in this range,
+  std::int64_t match_max_ns = 20'000'000;  ///< drawn for every pair
+  std::int64_t lease_ns = 1'000'000'000;   ///< a frozen, killed or cut-off peer counts as dead after this
+};
+
+/// What happened to samples on the way, for tests that want to know whether they tested anything.
+struct NetworkCounts {
+  std::uint64_t delivered = 0;
+  std::uint64_t repaired = 0;
+  std::uint64_t overwritten = 0;  ///< gone from the writer's history before their repair
+  std::uint64_t lost_for_good = 0;
+  std::uint64_t pushed_out = 0;  ///< of a reader that did not take in time
+};
+
+class Fabric;
+
+/// Makes ports and moves the clock. The same calls with the same seed give the same deliveries.
+///
+/// The rules are those of DDS as the ports in dds/ use it: order is kept within a topic and writer and
+/// nowhere else; a lost sample holds up later ones of its topic and writer until it is repaired or gone;
+/// histories keep the last n samples of each key; transient-local topics hand theirs to late readers; a
+/// writer reaches only readers that it has been matched with. Nothing moves but in advance_to(); wait()
+/// returns at once. Not thread-safe.
+class Network {
+ public:
+  explicit Network(const NetworkOptions& options);
+
+  [[nodiscard]] std::int64_t now_ns() const;
+  /// Delivers all that is due until then. Never goes back.
+  void advance_to(std::int64_t now_ns);
+  /// When something will happen by itself next.
+  [[nodiscard]] std::optional<std::int64_t> next_event_ns() const;
+
+  /// Ports may outlive the network. Destroying a port leaves the session at once, as a clean exit does.
+  /// `delta_depth`: deltas kept by the server's writer, and by a client's reader. Errors: kInvalidArgument
+  /// (name).
+  [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_server(const std::string& session,
+                                                                std::uint32_t delta_depth = 64);
+  [[nodiscard]] Result<std::unique_ptr<ClientPort>> make_client(const std::string& session,
+                                                                std::uint32_t delta_depth = 64);
+
+  /// From now on, in this direction.
+  void set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link);
+  void set_all_links(const LinkModel& link);
+  /// Cuts or mends both directions.
+  void set_cut(const ParticipantId& a, const ParticipantId& b, bool cut);
+  /// A frozen process neither receives nor repairs. Its port must not be called meanwhile.
+  void set_frozen(const ParticipantId& participant, bool frozen);
+  /// Gone without a word; others notice after the lease. Calls on its port have no effect any more.
+  void kill(const ParticipantId& participant);
+
+  [[nodiscard]] const NetworkCounts& counts() const;
+
+ private:
+  std::shared_ptr<Fabric> fabric_;
+};
+
+}  // namespace tandem::transport::simulated
