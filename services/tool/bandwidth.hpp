@@ -1,0 +1,64 @@
+#pragma once
+// What `tandem bench bandwidth` measures: codecs side by side over one trajectory, without a network.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "services/tool/replay.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::tool {
+
+/// A codec as a session would set it up.
+struct CodecSetup {
+  std::string name;
+  std::vector<std::byte> tables;
+  std::size_t budget_bytes = kNoBudget;
+};
+
+/// One row of the result: a scene, a size and a codec. Times are medians over the frames.
+struct BandwidthRow {
+  std::string scene;
+  std::optional<int> number;  ///< of the paper's scene, 1..5
+  std::uint32_t bodies = 0;
+  std::string codec, predictor;
+  std::uint32_t threads = 1;
+  std::uint64_t seed = 0;
+  std::uint64_t frames = 0;
+  double threshold = 0;                       ///< scene units
+  double mbit_per_s = 0;                      ///< payload only, at the nominal rate; 2^20 bits to the Mbit
+  double max_error = 0, rms_error = 0;        ///< scene units; agreed state against the simulation's floats
+  double corrected_per_frame = 0;             ///< bodies
+  std::optional<double> colliding_per_frame;  ///< bodies; not known for recorded trajectories
+  double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;
+};
+
+/// What all codecs of a run share.
+struct BandwidthRun {
+  TimelineConfig timeline;  ///< codec name and tables are filled in per codec
+  server::Lattice lattice;
+  std::uint64_t frames = 0;
+};
+
+/// Runs `replay` for `run.frames` frames; every codec encodes every frame on a server's timeline, and a
+/// client's timeline decodes it and checks the hash. Fills the measured fields of a row per codec; `progress`
+/// gets the frame. Errors: what the timelines and the replay refuse; kMismatch when a client's state ever
+/// differs.
+[[nodiscard]] Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay, const BandwidthRun& run,
+                                                                  std::span<const CodecSetup> codecs,
+                                                                  const std::function<void(Frame)>& progress);
+
+/// The paper's table 5.3 in Mbit/s, where it has this scene, size and codec.
+[[nodiscard]] std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec);
+
+/// {"rows": [...]}, one line.
+[[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows);
+/// A table for people, with the paper's numbers beside ours.
+[[nodiscard]] std::string to_table(std::span<const BandwidthRow> rows);
+
+}  // namespace tandem::tool

@@ -1,0 +1,102 @@
+// `tandem top`: sessions and clients of a DDS domain, from their status topics.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "services/tool/commands.hpp"
+#include "services/tool/replay.hpp"
+#include "services/tool/top_view.hpp"
+
+namespace tandem::tool {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+// Status comes once a second; discovery takes up to as long.
+constexpr std::int64_t kOnceNs = 5 * kSecondNs / 2;
+
+struct TopOptions {
+  std::uint32_t domain = 0;
+  std::string session;
+  bool once = false, json = false, stream = false;
+};
+
+volatile std::sig_atomic_t stopped = 0;
+
+void collect(transport::Monitor& monitor, TopView& view) {
+  std::vector<transport::Received<transport::ServerStatusMessage>> servers;
+  std::vector<transport::Received<transport::ClientStatusMessage>> clients;
+  monitor.take(servers);
+  monitor.take(clients);
+  const std::int64_t now_ns = steady_ns();
+  for (const auto& server : servers) view.update(server.message, now_ns);
+  for (const auto& client : clients) view.update(client.message, now_ns);
+  view.forget_silent(now_ns);
+}
+
+/// False when nobody reads any more.
+bool show(const TopView& view, const TopOptions& options) {
+  const bool screen = !options.once && !options.stream && ::isatty(STDOUT_FILENO) != 0;
+  if (screen) std::fputs("\x1b[H\x1b[2J", stdout);
+  std::fputs(options.json || options.stream ? (view.to_json() + '\n').c_str() : view.to_table().c_str(),
+             stdout);
+  return std::fflush(stdout) == 0;
+}
+
+int run_top(const TopOptions& options) {
+  transport::DdsOptions dds;
+  dds.domain = options.domain;
+  auto monitor = transport::make_dds_monitor(dds);
+  if (!monitor) {
+    fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
+    return 1;
+  }
+  std::signal(SIGINT, [](int) { stopped = 1; });
+  std::signal(SIGTERM, [](int) { stopped = 1; });
+  std::signal(SIGPIPE, SIG_IGN);
+  TopView view;
+  if (!options.session.empty()) view.only(options.session);
+  const std::int64_t start_ns = steady_ns();
+  std::int64_t shown_ns = start_ns;
+  while (stopped == 0) {
+    (*monitor)->wait(std::chrono::milliseconds(100));
+    collect(**monitor, view);
+    const std::int64_t now_ns = steady_ns();
+    if (options.once) {
+      if (now_ns - start_ns < kOnceNs) continue;
+      show(view, options);
+      return view.empty() ? 1 : 0;
+    }
+    if (now_ns - shown_ns >= kSecondNs) {
+      shown_ns += kSecondNs;
+      if (!show(view, options)) return 0;
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_top(CLI::App& app, Run& run) {
+  CLI::App* command =
+      app.add_subcommand("top", "Shows the sessions and clients of a domain, their bandwidth and lag.");
+  const auto options = std::make_shared<TopOptions>();
+  command->add_option("--domain", options->domain, "DDS domain")
+      ->check(CLI::Range(0, 230))
+      ->capture_default_str();
+  command->add_option("--session", options->session, "Only this session (default: all)");
+  CLI::Option* once = command->add_flag("--once", options->once,
+                                        "Listen for 2.5 s, print once and end; exit 1 if nothing was heard");
+  command->add_flag("--json", options->json, "One JSON object: sessions, clients")->needs(once);
+  command->add_flag("--stream", options->stream, "A JSON object a line, once a second, until stopped")
+      ->excludes(once);
+  command->footer("Without flags: a table that is refreshed once a second, until Ctrl-C.");
+  command->callback([options, &run] { run = [options] { return run_top(*options); }; });
+}
+
+}  // namespace tandem::tool

@@ -1,0 +1,131 @@
+#include "services/tool/top_view.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace tandem::tool {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::int64_t kSilenceNs = 3'000'000'000;
+// A machine that floods the status topics shall not fill this one's memory.
+constexpr std::size_t kMostShown = 4096;
+
+const char* role_word(std::uint32_t role) {
+  return role == static_cast<std::uint32_t>(transport::Role::kParticipant) ? "participant" : "observer";
+}
+
+const char* phase_word(std::uint32_t phase) {
+  return phase == static_cast<std::uint32_t>(transport::Phase::kPlaying) ? "playing" : "joining";
+}
+
+double share_percent(const transport::ServerStatusMessage& s) {
+  return s.raw_mbit_per_s > 0 ? 100 * s.mbit_per_s / s.raw_mbit_per_s : 0;
+}
+
+Json json_of(const transport::ServerStatusMessage& s) {
+  return {{"session", s.session},
+          {"epoch", s.epoch},
+          {"frame", s.frame},
+          {"uptime_s", s.uptime_s},
+          {"frame_rate_hz", s.frame_rate_hz},
+          {"mbit_per_s", s.mbit_per_s},
+          {"raw_mbit_per_s", s.raw_mbit_per_s},
+          {"frame_ms", {{"p50", s.frame_ms_p50}, {"p99", s.frame_ms_p99}}},
+          {"corrected_per_frame", s.corrected_per_frame},
+          {"bodies", s.bodies},
+          {"participants", s.participants},
+          {"observers", s.observers},
+          {"window", s.window},
+          {"payload_bytes", s.payload_bytes},
+          {"stalls", s.stalls},
+          {"suspended_ms", s.suspended_ms},
+          {"refused_inputs", s.refused_inputs},
+          {"refused_messages", s.refused_messages},
+          {"snapshots", s.snapshots},
+          {"queue_high_water", s.queue_high_water}};
+}
+
+Json json_of(const transport::ClientStatusMessage& c) {
+  return {{"client", fmt::format("{:016x}", c.client)},
+          {"session", c.session},
+          {"epoch", c.epoch},
+          {"applied", c.applied},
+          {"role", role_word(c.role)},
+          {"phase", phase_word(c.phase)},
+          {"lag_ms", c.lag_ms},
+          {"client_ms_p50", c.client_ms_p50},
+          {"mbit_per_s", c.mbit_per_s},
+          {"frames_applied", c.frames_applied},
+          {"resyncs", c.resyncs},
+          {"hash_mismatches", c.hash_mismatches},
+          {"inputs_sent", c.inputs_sent},
+          {"inputs_refused", c.inputs_refused},
+          {"queue_high_water", c.queue_high_water}};
+}
+
+/// Names come from the network: what is not printable must not reach the terminal.
+std::string printable(const std::string& text) {
+  std::string clean = text.substr(0, 64);
+  for (char& c : clean) {
+    if (c < 0x20 || c > 0x7e) c = '?';
+  }
+  return clean;
+}
+
+}  // namespace
+
+void TopView::update(const transport::ServerStatusMessage& status, std::int64_t now_ns) {
+  if (!shown(status.session) || (sessions_.size() >= kMostShown && !sessions_.contains(status.session)))
+    return;
+  sessions_[status.session] = {status, now_ns};
+}
+
+void TopView::update(const transport::ClientStatusMessage& status, std::int64_t now_ns) {
+  if (!shown(status.session) || (clients_.size() >= kMostShown && !clients_.contains(status.client))) return;
+  clients_[status.client] = {status, now_ns};
+}
+
+void TopView::forget_silent(std::int64_t now_ns) {
+  const auto silent = [now_ns](const auto& entry) { return now_ns - entry.second.at_ns > kSilenceNs; };
+  std::erase_if(sessions_, silent);
+  std::erase_if(clients_, silent);
+}
+
+std::string TopView::to_json() const {
+  Json sessions = Json::array();
+  for (const auto& [name, heard] : sessions_) sessions.push_back(json_of(heard.status));
+  Json clients = Json::array();
+  for (const auto& [id, heard] : clients_) clients.push_back(json_of(heard.status));
+  return Json{{"sessions", sessions}, {"clients", clients}}.dump(-1, ' ', false,
+                                                                 Json::error_handler_t::replace);
+}
+
+std::string TopView::to_table() const {
+  if (empty()) return "no session heard of on this domain\n";
+  std::string text =
+      fmt::format("{:<20} {:>9} {:>6} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}\n", "SESSION", "FRAME", "HZ",
+                  "BODIES", "MBIT/S (OF RAW)", "CORRECTED", "FRAME MS", "CLIENTS", "WINDOW", "STALLS");
+  for (const auto& [name, heard] : sessions_) {
+    const transport::ServerStatusMessage& s = heard.status;
+    text +=
+        fmt::format("{:<20} {:>9} {:>6.1f} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}\n",
+                    printable(s.session), s.frame, s.frame_rate_hz, s.bodies,
+                    fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
+                    s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls);
+  }
+  text +=
+      fmt::format("\n{:<16} {:<20} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}\n", "CLIENT", "SESSION",
+                  "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS", "MBIT/S", "REJOINS", "WRONG");
+  for (const auto& [id, heard] : clients_) {
+    const transport::ClientStatusMessage& c = heard.status;
+    text += fmt::format("{:016x} {:<20} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}\n",
+                        c.client, printable(c.session), role_word(c.role), phase_word(c.phase), c.applied,
+                        c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches);
+  }
+  return text;
+}
+
+}  // namespace tandem::tool

@@ -1,0 +1,43 @@
+#pragma once
+// What `tandem top` shows: the newest status of every session and client, as JSON or as a table.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "sdk/transport/messages.hpp"
+
+namespace tandem::tool {
+
+/// Collects status messages. Status is published once a second; what was not heard of for three is forgotten,
+/// so memory stays bounded by what is alive. Time comes in as an argument. Not thread-safe.
+class TopView {
+ public:
+  /// Shows only this session from now on.
+  void only(std::string session) { only_ = std::move(session); }
+
+  void update(const transport::ServerStatusMessage& status, std::int64_t now_ns);
+  void update(const transport::ClientStatusMessage& status, std::int64_t now_ns);
+  void forget_silent(std::int64_t now_ns);
+
+  [[nodiscard]] bool empty() const { return sessions_.empty() && clients_.empty(); }
+  /// {"sessions": [...], "clients": [...]}, one line; fields as in the status topics.
+  [[nodiscard]] std::string to_json() const;
+  [[nodiscard]] std::string to_table() const;
+
+ private:
+  template <class M>
+  struct Heard {
+    M status;
+    std::int64_t at_ns = 0;
+  };
+  [[nodiscard]] bool shown(const std::string& session) const { return !only_ || *only_ == session; }
+
+  std::optional<std::string> only_;
+  std::map<std::string, Heard<transport::ServerStatusMessage>> sessions_;
+  std::map<transport::ClientId, Heard<transport::ClientStatusMessage>> clients_;
+};
+
+}  // namespace tandem::tool

@@ -1,0 +1,172 @@
+#include "services/tool/bandwidth.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "sdk/core/codec/training.hpp"
+
+namespace tandem::tool {
+namespace {
+
+constexpr std::uint32_t kBodies = 500;
+constexpr double kDt = 1.0 / 30;
+constexpr double kThreshold = 0.05;
+
+/// Bodies that fall freely and bounce on the plane y = 0; body i starts i / 100 higher. Gravity turns at an
+/// input.
+class Bouncing final : public engine::Simulation {
+ public:
+  Bouncing() {
+    for (auto& column : position_) column.assign(kBodies, 0);
+    for (auto& column : velocity_) column.assign(kBodies, 0);
+    for (std::size_t i = 0; i < kBodies; ++i) position_[1][i] = static_cast<float>(i) * 0.01F;
+    alive_.assign(kBodies, 1);
+    type_.assign(kBodies, 0);
+  }
+  [[nodiscard]] std::uint32_t capacity() const override { return kBodies; }
+  [[nodiscard]] double dt_s() const override { return kDt; }
+  [[nodiscard]] engine::Vec3 gravity() const override { return gravity_; }
+  [[nodiscard]] double damping_per_s() const override { return 0; }
+  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override {
+    engine::Classification result;
+    if (input.values.size() != 3) return result;
+    result.effect = engine::Classification::Effect::kScheduled;
+    result.gravity = {input.values[0], input.values[1], input.values[2]};
+    return result;
+  }
+  void apply(const engine::Input& input) override {
+    gravity_ = {input.values[0], input.values[1], input.values[2]};
+  }
+  void step() override {
+    for (std::size_t i = 0; i < kBodies; ++i) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        velocity_[channel][i] += static_cast<float>(gravity_[channel] * kDt);
+        position_[channel][i] += static_cast<float>(kDt) * velocity_[channel][i];
+      }
+      if (position_[1][i] < 0) velocity_[1][i] = std::fabs(velocity_[1][i]);
+    }
+  }
+  [[nodiscard]] engine::Bodies bodies() const override {
+    return {{position_[0], position_[1], position_[2]},
+            {velocity_[0], velocity_[1], velocity_[2]},
+            alive_,
+            type_};
+  }
+  [[nodiscard]] std::span<const engine::Event> events() const override { return {}; }
+  [[nodiscard]] std::uint32_t colliding() const override { return 7; }
+  void save(std::vector<std::byte>&) const override {}
+  [[nodiscard]] bool load(std::span<const std::byte>) override { return false; }
+
+ private:
+  engine::Vec3 gravity_{0, -9.81, 0};
+  std::array<std::vector<float>, 3> position_, velocity_;
+  std::vector<std::uint8_t> alive_;
+  std::vector<std::uint16_t> type_;
+};
+
+BandwidthRun run_of(std::uint64_t frames) {
+  BandwidthRun run;
+  run.lattice = *server::choose_lattice(kThreshold, 100, kDt);
+  run.timeline.capacity = kBodies;
+  run.timeline.parameters = *server::codec_parameters(run.lattice, kThreshold, 0, 0);
+  run.timeline.predictor = "ballistic";
+  run.frames = frames;
+  return run;
+}
+
+std::vector<CodecSetup> paper_codecs() {
+  const std::vector<std::byte> tables = default_code_tables();
+  return {{"none", {}, kNoBudget},
+          {"selective", {}, kNoBudget},
+          {"quantized", {}, kNoBudget},
+          {"entropy", tables, kNoBudget},
+          {"limited", tables, 100}};
+}
+
+std::vector<BandwidthRow> measure(std::vector<TimedInput> script, std::uint64_t frames) {
+  Bouncing simulation;
+  const BandwidthRun run = run_of(frames);
+  auto replay = Replay::create(simulation, std::move(script), run.lattice, 1);
+  EXPECT_TRUE(replay) << replay.error().message;
+  std::uint64_t last = 0;
+  auto rows = measure_bandwidth(*replay, run, paper_codecs(), [&last](Frame frame) { last = frame; });
+  EXPECT_TRUE(rows) << rows.error().message;
+  EXPECT_EQ(last, frames);
+  return rows ? *rows : std::vector<BandwidthRow>{};
+}
+
+TEST(Bandwidth, without_compression_a_body_costs_24_bytes_a_frame) {
+  const auto rows = measure({}, 30);
+  ASSERT_EQ(rows.size(), 5U);
+  const double raw = 24.0 * 8 * kBodies * 30 / 1048576;
+  EXPECT_NEAR(rows[0].mbit_per_s, raw, 0.005 * raw);
+  EXPECT_EQ(rows[0].corrected_per_frame, kBodies);
+}
+
+TEST(Bandwidth, each_step_of_the_papers_method_saves_and_keeps_to_the_threshold) {
+  const auto rows = measure({}, 120);
+  ASSERT_EQ(rows.size(), 5U);
+  for (std::size_t i = 1; i < rows.size(); ++i)
+    EXPECT_LT(rows[i].mbit_per_s, rows[i - 1].mbit_per_s) << rows[i].codec;
+  EXPECT_LE(rows[1].max_error, kThreshold * 1.01) << "selective";
+  EXPECT_GT(rows[1].max_error, 0);
+  EXPECT_LE(rows[1].rms_error, rows[1].max_error);
+  EXPECT_EQ(rows[1].colliding_per_frame, 7.0);
+  EXPECT_LE(rows[4].mbit_per_s, 100 * 8.0 * 30 / 1048576) << "the budget of limited";
+}
+
+TEST(Bandwidth, scripted_gravity_reaches_both_sides_on_its_frame) {
+  const auto rows = measure({{10, {1, {3.0, 9.81, 0.0}, {}}}, {11, {1, {0.0, 20.0, 1.0}, {}}}}, 40);
+  ASSERT_EQ(rows.size(), 5U);
+  // Before frame 10 the lower bodies bounce; afterwards all fly freely, so prediction is almost perfect.
+  EXPECT_LT(rows[1].corrected_per_frame, kBodies / 5.0);
+}
+
+TEST(Bandwidth, a_refused_scripted_input_names_its_frame) {
+  Bouncing simulation;
+  const BandwidthRun run = run_of(5);
+  auto replay = Replay::create(simulation, {{3, {}}}, run.lattice, 1);
+  ASSERT_TRUE(replay);
+  const auto rows = measure_bandwidth(*replay, run, paper_codecs(), [](Frame) {});
+  ASSERT_FALSE(rows);
+  EXPECT_THAT(rows.error().message, ::testing::HasSubstr("frame 3"));
+}
+
+TEST(Bandwidth, an_unknown_codec_is_named) {
+  Bouncing simulation;
+  const BandwidthRun run = run_of(5);
+  auto replay = Replay::create(simulation, {}, run.lattice, 1);
+  ASSERT_TRUE(replay);
+  const std::vector<CodecSetup> codecs{{"zip", {}, kNoBudget}};
+  const auto rows = measure_bandwidth(*replay, run, codecs, [](Frame) {});
+  ASSERT_FALSE(rows);
+  EXPECT_THAT(rows.error().message, ::testing::HasSubstr("zip"));
+}
+
+TEST(Bandwidth, knows_the_papers_table) {
+  EXPECT_EQ(paper_mbit_per_s(1, 10000, "entropy"), 1.35);
+  EXPECT_EQ(paper_mbit_per_s(5, 5000, "limited"), 1.44);
+  EXPECT_EQ(paper_mbit_per_s(1, 20000, "entropy"), std::nullopt);
+  EXPECT_EQ(paper_mbit_per_s(1, 10000, "tracker"), std::nullopt);
+}
+
+TEST(Bandwidth, rows_have_the_agreed_fields) {
+  BandwidthRow row;
+  row.scene = "half_pipe";
+  const auto json = nlohmann::json::parse(to_json(std::vector{row}));
+  ASSERT_EQ(json["rows"].size(), 1U);
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
+  EXPECT_THAT(keys,
+              ::testing::UnorderedElementsAre("scene", "number", "bodies", "codec", "predictor", "threads",
+                                              "seed", "frames", "threshold", "mbit_per_s", "max_error",
+                                              "rms_error", "corrected_per_frame", "colliding_per_frame",
+                                              "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms"));
+  EXPECT_TRUE(json["rows"][0]["number"].is_null());
+  EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
+}
+
+}  // namespace
+}  // namespace tandem::tool

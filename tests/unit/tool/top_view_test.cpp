@@ -1,0 +1,99 @@
+#include "services/tool/top_view.hpp"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+namespace tandem::tool {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+transport::ServerStatusMessage server(const std::string& session) {
+  transport::ServerStatusMessage status;
+  status.session = session;
+  status.epoch = 7;
+  status.frame = 300;
+  status.bodies = 10000;
+  status.mbit_per_s = 1.5;
+  status.raw_mbit_per_s = 50;
+  status.participants = 2;
+  status.observers = 1;
+  return status;
+}
+
+transport::ClientStatusMessage client(transport::ClientId id, const std::string& session) {
+  transport::ClientStatusMessage status;
+  status.client = id;
+  status.session = session;
+  status.role = static_cast<std::uint32_t>(transport::Role::kParticipant);
+  status.phase = static_cast<std::uint32_t>(transport::Phase::kPlaying);
+  status.applied = 299;
+  status.lag_ms = 12.5;
+  return status;
+}
+
+TEST(TopView, shows_the_newest_status_of_each_session_and_client) {
+  TopView view;
+  view.update(server("a"), 0);
+  view.update(server("b"), 0);
+  transport::ServerStatusMessage newer = server("a");
+  newer.frame = 301;
+  view.update(newer, kSecond);
+  view.update(client(0xabc, "a"), kSecond);
+  const auto json = nlohmann::json::parse(view.to_json());
+  ASSERT_EQ(json["sessions"].size(), 2U);
+  EXPECT_EQ(json["sessions"][0]["session"], "a");
+  EXPECT_EQ(json["sessions"][0]["frame"], 301);
+  ASSERT_EQ(json["clients"].size(), 1U);
+  EXPECT_EQ(json["clients"][0]["client"], "0000000000000abc");
+  EXPECT_EQ(json["clients"][0]["role"], "participant");
+  EXPECT_EQ(json["clients"][0]["phase"], "playing");
+  EXPECT_EQ(json["clients"][0]["lag_ms"], 12.5);
+  EXPECT_THAT(view.to_table(), HasSubstr("1.50 (3.0 %)"));
+  EXPECT_THAT(view.to_table(), HasSubstr("2+1"));
+}
+
+TEST(TopView, forgets_who_is_silent_for_more_than_three_seconds) {
+  TopView view;
+  view.update(server("a"), 0);
+  view.update(client(1, "a"), 2 * kSecond);
+  view.forget_silent(3 * kSecond);
+  EXPECT_EQ(nlohmann::json::parse(view.to_json())["sessions"].size(), 1U);
+  view.forget_silent(3 * kSecond + 1);
+  EXPECT_EQ(nlohmann::json::parse(view.to_json())["sessions"].size(), 0U);
+  EXPECT_FALSE(view.empty());
+  view.forget_silent(5 * kSecond + 1);
+  EXPECT_TRUE(view.empty());
+}
+
+TEST(TopView, can_show_one_session_only) {
+  TopView view;
+  view.only("a");
+  view.update(server("b"), 0);
+  view.update(client(1, "b"), 0);
+  EXPECT_TRUE(view.empty());
+  view.update(client(1, "a"), 0);
+  EXPECT_FALSE(view.empty());
+}
+
+TEST(TopView, keeps_control_characters_and_broken_text_off_the_terminal) {
+  TopView view;
+  view.update(server("evil\x1b[2J\xff"), 0);
+  EXPECT_THAT(view.to_table(), Not(HasSubstr("\x1b")));
+  EXPECT_TRUE(nlohmann::json::accept(view.to_json()));
+}
+
+TEST(TopView, holds_a_bounded_number_of_clients) {
+  TopView view;
+  for (transport::ClientId id = 1; id <= 5000; ++id) view.update(client(id, "a"), 0);
+  EXPECT_EQ(nlohmann::json::parse(view.to_json())["clients"].size(), 4096U);
+}
+
+TEST(TopView, says_when_nothing_was_heard) { EXPECT_THAT(TopView().to_table(), HasSubstr("no session")); }
+
+}  // namespace
+}  // namespace tandem::tool
