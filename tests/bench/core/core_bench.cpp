@@ -1,0 +1,144 @@
+// A frame of server and client at 10,000 bodies, a tenth of them corrected. Seeded; same bytes every run.
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+#include "tests/property/synthetic.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kBodies = 10000;
+constexpr std::size_t kFrames = 200;
+constexpr std::uint64_t kSeed = 42;
+
+struct Delta {
+  Frame frame;
+  std::uint64_t hash;
+  std::vector<std::byte> payload;
+};
+
+struct Recording {
+  TimelineConfig config;
+  std::vector<std::byte> snapshot;
+  std::vector<Delta> deltas;
+  double corrected = 0;
+  std::vector<double> predict_us, encode_us, hash_us;
+};
+
+std::int64_t now_ns() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+// Bodies in a box of 2^23 units whose full simulation pushes one in ten beyond the threshold each frame.
+Recording record(std::string_view codec) {
+  Recording r;
+  r.config.capacity = kBodies;
+  r.config.type_count = synthetic::kTypes;
+  r.config.codec = codec;
+  r.config.codec_tables = synthetic::tables_for(codec);
+  r.config.parameters = {4096, 256, 1024};
+  r.config.predictor = "ballistic";
+  synthetic::Random random(kSeed);
+  State state(kBodies);
+  const auto vector = [&random](std::int32_t limit) {
+    return Vec3i{random.even(limit), random.even(limit), random.even(limit)};
+  };
+  for (Slot slot = 0; slot < kBodies; ++slot) state.spawn(slot, 0, 0, {vector(1 << 22), vector(1 << 19)});
+  auto server = *ServerTimeline::create(r.config, 1);
+  server.set_clock(now_ns);
+  server.start(0, state, Drive{{0, -2000, 0}, 300, 0});
+  server.snapshot(r.snapshot);
+  Ballistic predictor;
+  State target(kBodies);
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    predictor.step(server.state(), target, server.drive());
+    for (Slot slot = 0; slot < kBodies; ++slot) {
+      if (!random.one_in(10)) continue;
+      BodyState body = target.body(slot);
+      body.p[random.below(3)] += random.one_in(2) ? 5000 : -5000;
+      for (std::int32_t& p : body.p) p += random.even(800);
+      for (std::int32_t& v : body.v) v += random.value(100000);
+      target.set_body(slot, body);
+    }
+    const auto frame = server.advance(target, {});
+    r.deltas.push_back({frame.frame, frame.hash, {frame.payload.begin(), frame.payload.end()}});
+    r.corrected += static_cast<double>(frame.corrected) / kFrames;
+    r.predict_us.push_back(1e3 * frame.predict_ms);
+    r.encode_us.push_back(1e3 * frame.encode_ms);
+    r.hash_us.push_back(1e3 * frame.hash_ms);
+  }
+  return r;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void server_frame(benchmark::State& bench, std::string_view codec) {
+  std::vector<double> predict, encode, hash;
+  Recording r;
+  for (auto _ : bench) {
+    r = record(codec);
+    predict.push_back(median(r.predict_us));
+    encode.push_back(median(r.encode_us));
+    hash.push_back(median(r.hash_us));
+  }
+  double bytes = 0;
+  for (const Delta& delta : r.deltas) bytes += static_cast<double>(delta.payload.size()) / kFrames;
+  bench.counters["predict_us"] = median(predict);
+  bench.counters["encode_us"] = median(encode);
+  bench.counters["hash_us"] = median(hash);
+  bench.counters["corrected"] = r.corrected;
+  bench.counters["bytes"] = bytes;
+  bench.counters["snapshot_B_per_body"] = static_cast<double>(r.snapshot.size()) / kBodies;
+}
+
+// Lead 1: simulate a frame ahead, then take the delta of the frame before it.
+void client_frame(benchmark::State& bench, std::string_view codec) {
+  const Recording r = record(codec);
+  auto client = *ClientTimeline::create(r.config);
+  client.set_clock(now_ns);
+  std::vector<double> total_us, decode_us, apply_us;
+  std::size_t next = kFrames;
+  for (auto _ : bench) {
+    if (next == kFrames) {
+      if (!client.load(r.snapshot, 1)) bench.SkipWithError("snapshot refused");
+      client.step(1);
+      next = 0;
+    }
+    const Delta& delta = r.deltas[next++];
+    const std::int64_t start = now_ns();
+    const bool applied = client.apply(delta.frame, 0, delta.hash, delta.payload).has_value();
+    client.step(1);
+    const std::int64_t taken = now_ns() - start;
+    if (!applied) bench.SkipWithError("delta refused");
+    bench.SetIterationTime(static_cast<double>(taken) * 1e-9);
+    total_us.push_back(static_cast<double>(taken) * 1e-3);
+    decode_us.push_back(1e3 * client.timings().decode_ms);
+    apply_us.push_back(1e3 * client.timings().apply_ms);
+  }
+  bench.counters["p50_us"] = median(total_us);
+  bench.counters["decode_us"] = median(decode_us);
+  bench.counters["apply_us"] = median(apply_us);
+}
+
+const bool kRegistered = [] {
+  for (const std::string_view codec : codec_names()) {
+    benchmark::RegisterBenchmark(("server/" + std::string(codec)).c_str(), server_frame, codec)
+        ->Iterations(3)
+        ->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(("client/" + std::string(codec)).c_str(), client_frame, codec)
+        ->UseManualTime()
+        ->Unit(benchmark::kMicrosecond);
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace tandem
