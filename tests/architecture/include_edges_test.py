@@ -61,7 +61,7 @@ class IncludeEdges(unittest.TestCase):
 
     def test_an_engine_sees_only_the_simulation_interface(self):
         self.assert_one("services/engine/particles/a.cpp", '"sdk/core/lattice/state.hpp"', "may not include")
-        self.assert_one("services/engine/particles/a.cpp", '"tandem/result.hpp"', "may not include")
+        self.assert_one("services/engine/particles/a.cpp", '"services/server/host.hpp"', "neither a path")
 
     def test_public_headers_include_only_public_headers(self):
         self.assert_one("sdk/include/tandem/client.hpp", '"sdk/core/lattice/state.hpp"', "may not include")
@@ -71,6 +71,10 @@ class IncludeEdges(unittest.TestCase):
 
     def test_a_relative_include_is_refused(self):
         self.assert_one("sdk/core/lattice/a.cpp", '"state.hpp"', "neither a path from the root")
+
+    def test_tests_may_include_their_neighbours(self):
+        files = ("tests/unit/a/a.cpp", '#include "fake.hpp"\n'), ("tests/unit/a/fake.hpp", "")
+        self.assertEqual(self.found(*files), [])
 
     def test_a_folder_without_a_rule_is_refused(self):
         found = self.found(("sdk/novelty/a.cpp", ""))
