@@ -1,0 +1,382 @@
+// The DDS ports within one process, over loopback.
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <thread>
+
+#include "tests/integration/transport/loopback.hpp"
+
+namespace tandem::transport {
+namespace {
+
+using test::a_delta;
+using test::a_scheduled_input;
+using test::a_session;
+using test::a_snapshot;
+using test::an_ack;
+using test::eventually;
+using namespace std::chrono_literals;
+
+constexpr Epoch kEpoch = 1'700'000'000'000;
+
+class DdsPorts : public ::testing::Test {
+ protected:
+  DdsPorts() : options_(test::loopback()) {}
+
+  std::unique_ptr<ServerPort> server() {
+    auto port = make_dds_server_port(options_);
+    EXPECT_TRUE(port) << (port ? "" : port.error().message);
+    return port ? std::move(*port) : nullptr;
+  }
+  std::unique_ptr<ClientPort> client() {
+    auto port = make_dds_client_port(options_);
+    EXPECT_TRUE(port) << (port ? "" : port.error().message);
+    return port ? std::move(*port) : nullptr;
+  }
+  /// Announces, opens everything and waits until the server sees all of it.
+  SessionMessage join(ServerPort& server, ClientPort& client) {
+    const SessionMessage session = a_session(options_.session, kEpoch);
+    EXPECT_TRUE(server.write(session));
+    EXPECT_TRUE(client.open_stream(session));
+    EXPECT_TRUE(client.open_snapshots(session));
+    EXPECT_TRUE(eventually([&] { return server.joined(client.self()) && server.alive(client.self()); }));
+    return session;
+  }
+  /// The next `count` messages of a type.
+  template <class M, class Port>
+  std::vector<Received<M>> receive(Port& port, std::size_t count) {
+    std::vector<Received<M>> out;
+    EXPECT_TRUE(eventually([&] {
+      port.wait(1ms);
+      port.take(out);
+      return out.size() >= count;
+    })) << "got "
+        << out.size() << " of " << count;
+    return out;
+  }
+  template <class Port>
+  std::vector<Received<SessionMessage>> receive_sessions(Port& port, std::size_t count = 1) {
+    std::vector<Received<SessionMessage>> out;
+    EXPECT_TRUE(eventually([&] {
+      out.clear();
+      port.take_sessions(out);
+      return out.size() >= count;
+    }));
+    return out;
+  }
+
+  DdsOptions options_;
+};
+
+TEST_F(DdsPorts, SessionNamesWithWildcardsAreRefused) {
+  for (const char* name : {"", "*", "a?", "a/b", "a b"}) {
+    options_.session = name;
+    EXPECT_EQ(make_dds_server_port(options_).error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(make_dds_client_port(options_).error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
+TEST_F(DdsPorts, AnUnreadableConfigurationIsAnErrorThatNamesIt) {
+  options_.domain = 230;
+  setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><NoSuchThing/></Domain></CycloneDDS>", 1);
+  const auto port = make_dds_server_port(options_);
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(port.error().message.find("CYCLONEDDS_URI"), std::string::npos) << port.error().message;
+}
+
+TEST_F(DdsPorts, EveryTopicArrivesAsItWasWritten) {
+  const auto server = this->server();
+  const auto client = this->client();
+  const SessionMessage session = join(*server, *client);
+  const auto announced = receive_sessions(*client);
+  ASSERT_EQ(announced.size(), 1U);
+  EXPECT_EQ(announced[0].message, session);
+  EXPECT_EQ(announced[0].from, server->self());
+
+  const DeltaMessage delta = a_delta(kEpoch, 1);
+  ASSERT_TRUE(server->write(delta));
+  EXPECT_EQ(receive<DeltaMessage>(*client, 1)[0].message, delta);
+  const ScheduledInputMessage scheduled = a_scheduled_input(kEpoch, 1);
+  ASSERT_TRUE(server->write(scheduled));
+  EXPECT_EQ(receive<ScheduledInputMessage>(*client, 1)[0].message, scheduled);
+  const SnapshotMessage snapshot = a_snapshot(kEpoch, 6);
+  ASSERT_TRUE(server->write(snapshot));
+  EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message, snapshot);
+  ReplyMessage reply;
+  reply.client = 77;
+  reply.epoch = kEpoch;
+  reply.role = Role::kParticipant;
+  reply.phase = Phase::kPlaying;
+  reply.reason = 2;
+  reply.highest_input = 40;
+  reply.client_clock_ns = -5;
+  reply.server_time_ns = 6;
+  for (std::uint64_t i = 9; i < 9 + kReplyRing; ++i) reply.entries.push_back(ReplyEntry{i, i * 2, 3});
+  ASSERT_TRUE(server->write(reply));
+  EXPECT_EQ(receive<ReplyMessage>(*client, 1)[0].message, reply);
+
+  const AckMessage ack = an_ack(77, kEpoch, 5);
+  ASSERT_TRUE(client->write(ack));
+  const auto acks = receive<AckMessage>(*server, 1);
+  EXPECT_EQ(acks[0].message, ack);
+  EXPECT_EQ(acks[0].from, client->self());
+  InputMessage input;
+  input.client = 77;
+  input.epoch = kEpoch;
+  input.number = 3;
+  input.client_frame = 5;
+  input.kind = static_cast<std::uint32_t>(InputKind::kPush);
+  input.values = {1.5, -2, std::numeric_limits<double>::infinity()};
+  input.bytes = Bytes(1024, std::byte{1});
+  ASSERT_TRUE(client->write(input));
+  EXPECT_EQ(receive<InputMessage>(*server, 1)[0].message, input);
+  EXPECT_EQ(server->dropped() + client->dropped(), 0U);
+}
+
+TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
+  const auto monitor = make_dds_monitor(options_);
+  ASSERT_TRUE(monitor);
+  const auto server = this->server();
+  const auto client = this->client();
+  join(*server, *client);
+  ServerStatusMessage server_status;
+  server_status.session = options_.session;
+  server_status.epoch = kEpoch;
+  server_status.frame = 12;
+  server_status.mbit_per_s = 1.25;
+  server_status.snapshots = 3;
+  server_status.queue_high_water = 2;
+  ClientStatusMessage client_status;
+  client_status.client = 77;
+  client_status.session = options_.session;
+  client_status.lag_ms = 3.5;
+  client_status.resyncs = 1;
+  std::vector<Received<ServerStatusMessage>> servers;
+  std::vector<Received<ClientStatusMessage>> clients;
+  EXPECT_TRUE(eventually([&] {  // best effort: repeated, as the programs do
+    EXPECT_TRUE(server->write(server_status));
+    EXPECT_TRUE(client->write(client_status));
+    (*monitor)->wait(10ms);
+    (*monitor)->take(servers);
+    (*monitor)->take(clients);
+    return !servers.empty() && !clients.empty();
+  }));
+  EXPECT_EQ(servers.at(0).message, server_status);
+  EXPECT_EQ(servers.at(0).from, server->self());
+  EXPECT_EQ(clients.at(0).message, client_status);
+  std::vector<Received<SessionMessage>> sessions;
+  EXPECT_TRUE(eventually([&] {
+    (*monitor)->list_sessions(sessions);
+    return !sessions.empty();
+  }));
+  EXPECT_EQ(sessions.at(0).message.session, options_.session);
+}
+
+TEST_F(DdsPorts, ALateJoinerGetsSessionScheduledInputsAndSnapshotButNoOldDeltas) {
+  const auto server = this->server();
+  const SessionMessage session = a_session(options_.session, kEpoch);
+  ASSERT_TRUE(server->write(session));
+  for (std::uint64_t number = 1; number <= 300; ++number) {
+    ASSERT_TRUE(server->write(a_scheduled_input(kEpoch, number)));
+  }
+  for (Frame frame = 1; frame <= 20; ++frame) ASSERT_TRUE(server->write(a_delta(kEpoch, frame)));
+  ASSERT_TRUE(server->write(a_snapshot(kEpoch, 20)));
+
+  const auto client = this->client();
+  EXPECT_EQ(receive_sessions(*client)[0].message, session);
+  ASSERT_TRUE(client->open_stream(session));
+  ASSERT_TRUE(client->open_snapshots(session));
+  const auto scheduled = receive<ScheduledInputMessage>(*client, 256);
+  ASSERT_EQ(scheduled.size(), 256U) << "keep-last 256";
+  for (std::size_t i = 0; i < 256; ++i) EXPECT_EQ(scheduled[i].message.number, 45 + i);
+  EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message.frame, 20U);
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
+  ASSERT_TRUE(server->write(a_delta(kEpoch, 21)));
+  EXPECT_EQ(receive<DeltaMessage>(*client, 1)[0].message.frame, 21U);
+}
+
+TEST_F(DdsPorts, EveryDeltaWrittenAfterJoinedArrives) {
+  const auto server = this->server();
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    const auto client = this->client();
+    join(*server, *client);
+    for (Frame frame = 1; frame <= 30; ++frame) ASSERT_TRUE(server->write(a_delta(kEpoch, frame)));
+    const auto deltas = receive<DeltaMessage>(*client, 30);
+    ASSERT_EQ(deltas.size(), 30U);
+    for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(deltas[i].message.frame, i + 1);
+  }
+}
+
+TEST_F(DdsPorts, ADisposedSnapshotIsNotDelivered) {
+  const auto server = this->server();
+  const SessionMessage session = a_session(options_.session, kEpoch);
+  ASSERT_TRUE(server->write(session));
+  for (Frame frame = 1; frame <= 4; ++frame) ASSERT_TRUE(server->write(a_snapshot(kEpoch, frame)));
+  ASSERT_TRUE(server->dispose_snapshots());
+  ASSERT_TRUE(server->dispose_snapshots()) << "twice is harmless";
+  const auto client = this->client();
+  ASSERT_TRUE(client->open_stream(session));
+  ASSERT_TRUE(client->open_snapshots(session));
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
+  ASSERT_TRUE(server->write(a_snapshot(kEpoch, 9)));
+  const auto snapshots = receive<SnapshotMessage>(*client, 1);
+  ASSERT_EQ(snapshots.size(), 1U);
+  EXPECT_EQ(snapshots[0].message.frame, 9U);
+}
+
+TEST_F(DdsPorts, TheSameClientIdFromTwoParticipantsIsToldApart) {
+  const auto server = this->server();
+  const auto first = this->client();
+  const auto second = this->client();
+  join(*server, *first);
+  ASSERT_TRUE(eventually([&] { return server->alive(second->self()); }));
+  ASSERT_TRUE(first->write(an_ack(5, kEpoch, 1)));
+  EXPECT_EQ(receive<AckMessage>(*server, 1)[0].from, first->self());
+  ASSERT_TRUE(second->write(an_ack(5, kEpoch, 2)));
+  EXPECT_EQ(receive<AckMessage>(*server, 1)[0].from, second->self());
+}
+
+TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
+  const auto server = this->server();
+  auto client = this->client();
+  const ParticipantId id = client->self();
+  const SessionMessage session = a_session(options_.session, kEpoch);
+  ASSERT_TRUE(eventually([&] { return server->alive(id); }));
+  EXPECT_FALSE(server->joined(id));
+  ASSERT_TRUE(client->open_stream(session));
+  ASSERT_TRUE(client->open_snapshots(session));
+  ASSERT_TRUE(eventually([&] { return server->joined(id); }));
+  client->close_snapshots();
+  EXPECT_TRUE(eventually([&] { return !server->joined(id); }));
+  client.reset();
+  EXPECT_TRUE(eventually([&] { return !server->alive(id); }));
+}
+
+TEST_F(DdsPorts, AServerSeesOthersButNotItself) {
+  const auto first = this->server();
+  const auto second = this->server();
+  ASSERT_TRUE(first->write(a_session(options_.session, kEpoch)));
+  ASSERT_TRUE(second->write(a_session(options_.session, kEpoch + 1)));
+  const auto seen_by_first = receive_sessions(*first);
+  ASSERT_EQ(seen_by_first.size(), 1U);
+  EXPECT_EQ(seen_by_first[0].from, second->self());
+  const auto seen_by_second = receive_sessions(*second);
+  ASSERT_EQ(seen_by_second.size(), 1U);
+  EXPECT_EQ(seen_by_second[0].from, first->self());
+}
+
+TEST_F(DdsPorts, WhenTheLatestServerEndsAClientIsToldOfTheOneThatStays) {
+  const auto stays = this->server();
+  auto ends = this->server();
+  const auto client = this->client();
+  ASSERT_TRUE(stays->write(a_session(options_.session, kEpoch)));
+  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch);
+  const SessionMessage later = a_session(options_.session, kEpoch + 1);
+  ASSERT_TRUE(ends->write(later));
+  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch + 1);
+  ASSERT_TRUE(client->open_stream(later));
+  EXPECT_TRUE(client->server_alive());
+  ends.reset();
+  EXPECT_TRUE(eventually([&] { return !client->server_alive(); }));
+  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch);
+}
+
+TEST_F(DdsPorts, SessionsWithDifferentNamesDoNotMeet) {
+  const auto server = this->server();
+  const auto client = this->client();
+  options_.session += "-other";
+  const auto stranger = this->client();
+  join(*server, *client);
+  EXPECT_FALSE(stranger->server_alive());
+  EXPECT_FALSE(server->alive(stranger->self()));
+}
+
+TEST_F(DdsPorts, OversizeAndMisshapenSamplesAreDroppedAndCounted) {
+  const auto server = this->server();
+  const auto client = this->client();
+  SessionMessage session = join(*server, *client);
+  session.max_delta_bytes = 1000;
+  session.max_snapshot_bytes = 2000;
+  ASSERT_TRUE(client->open_stream(session));
+  ASSERT_TRUE(client->open_snapshots(session));
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
+  ASSERT_TRUE(server->write(a_delta(kEpoch, 1, 1001)));
+  DeltaMessage misshapen = a_delta(kEpoch, 2);
+  misshapen.part = misshapen.parts = 3;
+  ASSERT_TRUE(server->write(misshapen));
+  ASSERT_TRUE(server->write(a_delta(kEpoch, 3, 1000)));
+  const auto deltas = receive<DeltaMessage>(*client, 1);
+  EXPECT_EQ(deltas.at(0).message.frame, 3U);
+  EXPECT_EQ(client->dropped(), 2U);
+
+  InputMessage input;
+  input.client = 5;
+  input.epoch = kEpoch;
+  input.number = 1;
+  input.bytes = Bytes(1025);
+  ASSERT_TRUE(client->write(input));
+  input.bytes.clear();
+  input.values = std::vector<double>(17);
+  ASSERT_TRUE(client->write(input));
+  AckMessage ack = an_ack(5, kEpoch, 1);
+  ack.phase = static_cast<Phase>(9);
+  ASSERT_TRUE(client->write(ack));
+  input.values.clear();
+  input.number = 2;
+  ASSERT_TRUE(client->write(input));
+  EXPECT_EQ(receive<InputMessage>(*server, 1).at(0).message.number, 2U);
+  ASSERT_TRUE(eventually([&] {
+    std::vector<Received<AckMessage>> acks;
+    server->take(acks);
+    EXPECT_TRUE(acks.empty());
+    return server->dropped() == 3;
+  }));
+}
+
+TEST_F(DdsPorts, DeltasInPartsAndALargeSnapshotArriveWhole) {
+  const auto server = this->server();
+  const auto client = this->client();
+  join(*server, *client);
+  for (std::uint32_t part = 0; part < 3; ++part) {
+    DeltaMessage delta = a_delta(kEpoch, 1, 200'000 + part);
+    delta.part = part;
+    delta.parts = 3;
+    ASSERT_TRUE(server->write(delta));
+  }
+  const auto deltas = receive<DeltaMessage>(*client, 3);
+  for (std::uint32_t part = 0; part < 3; ++part) {
+    EXPECT_EQ(deltas.at(part).message.part, part);
+    EXPECT_EQ(deltas.at(part).message.payload.size(), 200'000U + part);
+  }
+  const SnapshotMessage snapshot = a_snapshot(kEpoch, 5, 1'000'000);
+  ASSERT_TRUE(server->write(snapshot));
+  EXPECT_EQ(receive<SnapshotMessage>(*client, 1).at(0).message, snapshot);
+}
+
+TEST_F(DdsPorts, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
+  const auto server = this->server();
+  const auto client = this->client();
+  SessionMessage session = join(*server, *client);
+  ASSERT_TRUE(server->write(a_scheduled_input(kEpoch + 1, 1)));
+  ASSERT_TRUE(server->write(a_delta(kEpoch, 1)));
+  receive<DeltaMessage>(*client, 1);
+  ASSERT_TRUE(server->write(a_delta(kEpoch, 2)));
+  session.epoch = kEpoch + 1;
+  ASSERT_TRUE(client->open_stream(session));
+  EXPECT_EQ(receive<ScheduledInputMessage>(*client, 1).at(0).message.epoch, kEpoch + 1);
+  std::vector<Received<DeltaMessage>> deltas;
+  client->take(deltas);
+  EXPECT_TRUE(deltas.empty());
+}
+
+TEST_F(DdsPorts, WakeEndsAWaitOfAnotherThread) {
+  const auto client = this->client();
+  std::thread waker([&] { client->wake(); });
+  client->wait(60s);
+  waker.join();
+}
+
+}  // namespace
+}  // namespace tandem::transport

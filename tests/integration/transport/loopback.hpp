@@ -1,0 +1,110 @@
+#pragma once
+// What the DDS tests share: loopback only, a domain and session of their own, waiting for a condition.
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <string>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+
+namespace tandem::transport::test {
+
+using namespace std::chrono_literals;
+
+inline constexpr const char* kLoopback =
+    "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/>"
+    "</Interfaces></General></Domain></CycloneDDS>";
+
+/// A domain of this process' own; runs that share one by chance still differ in their session names.
+inline DdsOptions loopback() {
+  static int count = 0;
+  setenv("CYCLONEDDS_URI", kLoopback, 1);
+  DdsOptions options;
+  options.domain = 1 + static_cast<std::uint32_t>(getpid()) % 229;
+  options.session = "test-" + std::to_string(getpid()) + "-" + std::to_string(++count);
+  return options;
+}
+
+/// Looks until `condition` holds; the limit only ends a test that fails.
+template <class Condition>
+[[nodiscard]] bool eventually(Condition&& condition, std::chrono::milliseconds limit = 10s) {
+  const auto end = std::chrono::steady_clock::now() + limit;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    usleep(2000);
+  }
+  return true;
+}
+
+inline SessionMessage a_session(const std::string& name, Epoch epoch) {
+  SessionMessage session;
+  session.session = name;
+  session.epoch = epoch;
+  session.capacity = 10000;
+  session.lattice_unit = 1.0 / 1024;
+  session.max_delta_bytes = 1U << 20U;
+  session.max_snapshot_bytes = 1U << 20U;
+  session.codec = "entropy";
+  session.threshold = 100;
+  session.position_step = 7;
+  session.velocity_step = 9;
+  session.predictor = "ballistic";
+  session.client_cost_ns = 12;
+  session.scene = "half_pipe";
+  session.scene_description = "plane { }";
+  session.predictor_constants = {1, -2, 3};
+  session.types = {BodyType{"sand", 0.25F, 0xFF8800FF}, BodyType{"", 1.5F, 7}};
+  session.codec_tables = Bytes(300, std::byte{5});
+  session.layout_hash = layout_hash(session);
+  return session;
+}
+
+inline DeltaMessage a_delta(Epoch epoch, Frame frame, std::size_t size = 100) {
+  DeltaMessage delta;
+  delta.epoch = epoch;
+  delta.frame = frame;
+  delta.last_input = frame / 2;
+  delta.server_time_ns = -static_cast<std::int64_t>(frame);
+  delta.hash = frame * 31;
+  delta.payload = Bytes(size, static_cast<std::byte>(frame));
+  return delta;
+}
+
+inline SnapshotMessage a_snapshot(Epoch epoch, Frame frame, std::size_t size = 1000) {
+  SnapshotMessage snapshot;
+  snapshot.slot = static_cast<std::uint32_t>(frame % 4);
+  snapshot.epoch = epoch;
+  snapshot.frame = frame;
+  snapshot.bytes = Bytes(size, static_cast<std::byte>(frame));
+  return snapshot;
+}
+
+inline ScheduledInputMessage a_scheduled_input(Epoch epoch, std::uint64_t number) {
+  ScheduledInputMessage input;
+  input.epoch = epoch;
+  input.number = number;
+  input.frame = number * 10;
+  input.source_client = 99;
+  input.source_number = number + 1;
+  input.kind = static_cast<std::uint32_t>(ScheduledKind::kDrive);
+  input.values = {0, -980, 0, 12, 0};
+  return input;
+}
+
+inline AckMessage an_ack(ClientId client, Epoch epoch, Frame applied) {
+  AckMessage ack;
+  ack.client = client;
+  ack.epoch = epoch;
+  ack.phase = Phase::kPlaying;
+  ack.applied = applied;
+  ack.simulated = applied + 1;
+  ack.role_wanted = Role::kParticipant;
+  ack.clock_ns = 123456789;
+  ack.join_attempt = 2;
+  return ack;
+}
+
+}  // namespace tandem::transport::test
