@@ -2,73 +2,20 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "sdk/core/codec/training.hpp"
+#include "tests/unit/tool/bouncing.hpp"
 
 namespace tandem::tool {
 namespace {
 
 constexpr std::uint32_t kBodies = 500;
-constexpr double kDt = 1.0 / 30;
 constexpr double kThreshold = 0.05;
-
-/// Bodies that fall freely and bounce on the plane y = 0; body i starts i / 100 higher. Gravity turns at an
-/// input.
-class Bouncing final : public engine::Simulation {
- public:
-  Bouncing() {
-    for (auto& column : position_) column.assign(kBodies, 0);
-    for (auto& column : velocity_) column.assign(kBodies, 0);
-    for (std::size_t i = 0; i < kBodies; ++i) position_[1][i] = static_cast<float>(i) * 0.01F;
-    alive_.assign(kBodies, 1);
-    type_.assign(kBodies, 0);
-  }
-  [[nodiscard]] std::uint32_t capacity() const override { return kBodies; }
-  [[nodiscard]] double dt_s() const override { return kDt; }
-  [[nodiscard]] engine::Vec3 gravity() const override { return gravity_; }
-  [[nodiscard]] double damping_per_s() const override { return 0; }
-  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override {
-    engine::Classification result;
-    if (input.values.size() != 3) return result;
-    result.effect = engine::Classification::Effect::kScheduled;
-    result.gravity = {input.values[0], input.values[1], input.values[2]};
-    return result;
-  }
-  void apply(const engine::Input& input) override {
-    gravity_ = {input.values[0], input.values[1], input.values[2]};
-  }
-  void step() override {
-    for (std::size_t i = 0; i < kBodies; ++i) {
-      for (std::size_t channel = 0; channel < 3; ++channel) {
-        velocity_[channel][i] += static_cast<float>(gravity_[channel] * kDt);
-        position_[channel][i] += static_cast<float>(kDt) * velocity_[channel][i];
-      }
-      if (position_[1][i] < 0) velocity_[1][i] = std::fabs(velocity_[1][i]);
-    }
-  }
-  [[nodiscard]] engine::Bodies bodies() const override {
-    return {{position_[0], position_[1], position_[2]},
-            {velocity_[0], velocity_[1], velocity_[2]},
-            alive_,
-            type_};
-  }
-  [[nodiscard]] std::span<const engine::Event> events() const override { return {}; }
-  [[nodiscard]] std::uint32_t colliding() const override { return 7; }
-  void save(std::vector<std::byte>&) const override {}
-  [[nodiscard]] bool load(std::span<const std::byte>) override { return false; }
-
- private:
-  engine::Vec3 gravity_{0, -9.81, 0};
-  std::array<std::vector<float>, 3> position_, velocity_;
-  std::vector<std::uint8_t> alive_;
-  std::vector<std::uint16_t> type_;
-};
 
 BandwidthRun run_of(std::uint64_t frames) {
   BandwidthRun run;
-  run.lattice = *server::choose_lattice(kThreshold, 100, kDt);
+  run.lattice = *server::choose_lattice(kThreshold, 100, Bouncing::kDt);
   run.timeline.capacity = kBodies;
   run.timeline.parameters = *server::codec_parameters(run.lattice, kThreshold, 0, 0);
   run.timeline.predictor = "ballistic";
@@ -86,7 +33,7 @@ std::vector<CodecSetup> paper_codecs() {
 }
 
 std::vector<BandwidthRow> measure(std::vector<TimedInput> script, std::uint64_t frames) {
-  Bouncing simulation;
+  Bouncing simulation(kBodies);
   const BandwidthRun run = run_of(frames);
   auto replay = Replay::create(simulation, std::move(script), run.lattice, 1);
   EXPECT_TRUE(replay) << replay.error().message;
@@ -125,7 +72,7 @@ TEST(Bandwidth, scripted_gravity_reaches_both_sides_on_its_frame) {
 }
 
 TEST(Bandwidth, a_refused_scripted_input_names_its_frame) {
-  Bouncing simulation;
+  Bouncing simulation(kBodies);
   const BandwidthRun run = run_of(5);
   auto replay = Replay::create(simulation, {{3, {}}}, run.lattice, 1);
   ASSERT_TRUE(replay);
@@ -135,7 +82,7 @@ TEST(Bandwidth, a_refused_scripted_input_names_its_frame) {
 }
 
 TEST(Bandwidth, an_unknown_codec_is_named) {
-  Bouncing simulation;
+  Bouncing simulation(kBodies);
   const BandwidthRun run = run_of(5);
   auto replay = Replay::create(simulation, {}, run.lattice, 1);
   ASSERT_TRUE(replay);

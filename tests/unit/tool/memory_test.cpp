@@ -1,0 +1,50 @@
+#include "services/tool/memory.hpp"
+
+#include <gtest/gtest.h>
+
+#include "sdk/core/codec/training.hpp"
+#include "tests/unit/tool/bouncing.hpp"
+
+namespace tandem::tool {
+namespace {
+
+Result<MemoryUse> measure(std::uint32_t bodies) {
+  return measure_memory(
+      [bodies]() -> Result<HostedSimulation> {
+        HostedSimulation hosted;
+        hosted.simulation = std::make_unique<Bouncing>(bodies);
+        hosted.config.lattice = *server::choose_lattice(0.05, 1000, Bouncing::kDt);
+        hosted.config.parameters = *server::codec_parameters(hosted.config.lattice, 0.05, 0, 0);
+        hosted.config.codec_tables = default_code_tables();
+        return hosted;
+      },
+      20);
+}
+
+TEST(Memory, counts_at_least_what_the_state_needs_and_grows_with_the_slots) {
+  const auto small = measure(1000);
+  ASSERT_TRUE(small) << small.error().message;
+  const auto large = measure(20000);
+  ASSERT_TRUE(large) << large.error().message;
+  constexpr double state_bytes = 1 + 1 + 2 + 9 * 4;  // alive, generation, type, p, v, c
+  EXPECT_GT(per_slot(small->client_bytes, large->client_bytes, 1000, 20000).slot_bytes, state_bytes);
+  EXPECT_GT(per_slot(small->server_bytes, large->server_bytes, 1000, 20000).slot_bytes, state_bytes);
+  // Six float columns, alive and type.
+  EXPECT_NEAR(per_slot(small->engine_bytes, large->engine_bytes, 1000, 20000).slot_bytes, 27, 1);
+}
+
+TEST(Memory, a_line_through_two_sizes_gives_slot_and_fixed_cost) {
+  const PerSlot cost = per_slot(1100, 2100, 10, 20);
+  EXPECT_EQ(cost.slot_bytes, 100);
+  EXPECT_EQ(cost.fixed_bytes, 100);
+}
+
+TEST(Memory, says_what_the_host_refuses) {
+  const auto refused =
+      measure_memory([]() -> Result<HostedSimulation> { return fail(ErrorCode::kIo, "no scene"); }, 1);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "no scene");
+}
+
+}  // namespace
+}  // namespace tandem::tool
