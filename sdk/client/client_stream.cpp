@@ -117,7 +117,7 @@ void ClientCore::Impl::load(transport::SnapshotMessage&& snapshot, Now now) {
   e.sampler.on_loaded();
   e.joining = false;
   e.played = true;
-  e.input_missing_ns = 0;
+  e.input_missing_ns.reset();
   e.frame_cost_ns = 0;
   ack_due = true;
   statistics.join_ns = now.steady_ns - e.join_began_ns;
@@ -138,13 +138,13 @@ void ClientCore::Impl::play(Now now, std::int64_t since_last_poll_ns) {
       return;
     }
     if (!e.timeline.holds_inputs(delta->last_input)) {
-      e.input_missing_ns += since_last_poll_ns;
-      if (e.input_missing_ns < kInputPatienceNs) return;
+      e.input_missing_ns = e.input_missing_ns ? *e.input_missing_ns + since_last_poll_ns : 0;
+      if (*e.input_missing_ns < kInputPatienceNs) return;
       rejoin(ResyncReason::kMissingInput,
              "scheduled inputs up to " + std::to_string(delta->last_input) + " did not come", now);
       return;
     }
-    e.input_missing_ns = 0;
+    e.input_missing_ns.reset();
     e.sampler.before_apply(e.timeline);
     const std::int64_t began_ns = measure();
     const auto applied = e.timeline.apply(delta->frame, delta->last_input, delta->hash, delta->payload);
@@ -195,7 +195,7 @@ void ClientCore::Impl::rejoin(ResyncReason reason, const std::string& why, Now n
   log(LogLevel::kWarning, "joining again: " + why);
   e.joining = true;
   e.join_began_ns = now.steady_ns;
-  e.input_missing_ns = 0;
+  e.input_missing_ns.reset();
   e.joiner.start(now.steady_ns);
 }
 

@@ -8,7 +8,7 @@
 namespace tandem::client {
 namespace {
 
-constexpr std::uint32_t kMaxLead = 1;
+constexpr std::uint32_t kDefinedLead = 1;
 constexpr double kMaxFrameRateHz = 10'000;
 // The largest payload is `none` over all slots with a lifecycle record each: below 64 bytes a slot, plus
 // headers.
@@ -21,7 +21,7 @@ Result<void> check_values(const transport::SessionMessage& s) {
   if (s.capacity == 0 || s.capacity > kMaxCapacity) return bad("capacity " + std::to_string(s.capacity));
   if (!(s.frame_rate_hz > 0) || s.frame_rate_hz > kMaxFrameRateHz) return bad("frame rate out of range");
   if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
-  if (s.lead > kMaxLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
+  if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
   if (s.types.empty() || s.types.size() > std::numeric_limits<TypeId>::max())
     return bad("no list of body types");
   for (const auto& type : s.types) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tandem/export.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem {
@@ -30,7 +31,7 @@ enum class LogLevel : std::uint8_t { kInfo = 0, kWarning = 1, kError = 2 };
 
 struct ClientOptions {
   std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
-  std::uint32_t domain = 0;         ///< DDS domain, 0..232
+  std::uint32_t domain = 0;         ///< DDS domain, 0..230
   ClientRole role = ClientRole::kParticipant;
   std::uint32_t lead = 1;  ///< frames to simulate beyond the last delta; clamped to what the session allows
   /// True: a thread of the client's own does the work. False: the application calls poll() often (at least
@@ -101,7 +102,7 @@ struct Sample {
 };
 
 /// One client of one session. Movable. All members may be called from any thread.
-class Client {
+class TANDEM_API Client {
  public:
   /// Starts looking for the session; returns at once, whether a server is there or not.
   /// Errors: kInvalidArgument (session name, domain, lead), kTransport (DDS could not start).
@@ -116,6 +117,8 @@ class Client {
   /// Without a thread: takes what arrived, follows the session, and waits at most `wait_s` for something to
   /// do.
   void poll(double wait_s = 0);
+  /// Lets the session go on for `seconds`: polls, or sleeps when a thread does the polling.
+  void run_for(double seconds);
   [[nodiscard]] ClientStatus status() const;
   /// Blocks until playing, or `timeout_s` passed; returns whether it plays. Polls itself when there is no
   /// thread.
@@ -124,12 +127,12 @@ class Client {
   /// Sends an input and returns its number. It acts on the same frame everywhere; status() counts the
   /// outcome. Errors: kOutOfOrder while not playing or as an observer, kInvalidArgument (not finite, above
   /// 1,024 bytes), kTransport.
-  Result<std::uint64_t> send_gravity(std::array<double, 3> metres_per_s2);
+  [[nodiscard]] Result<std::uint64_t> send_gravity(std::array<double, 3> metres_per_s2);
   /// Adds `velocity` to the bodies within `radius` of `centre`; scene units.
-  Result<std::uint64_t> send_push(std::array<double, 3> centre, double radius,
-                                  std::array<double, 3> velocity);
+  [[nodiscard]] Result<std::uint64_t> send_push(std::array<double, 3> centre, double radius,
+                                                std::array<double, 3> velocity);
   /// Bytes for the engine.
-  Result<std::uint64_t> send_bytes(std::span<const std::byte> bytes);
+  [[nodiscard]] Result<std::uint64_t> send_bytes(std::span<const std::byte> bytes);
 
   /// Body types of the session joined; empty before.
   [[nodiscard]] std::vector<BodyTypeInfo> types() const;

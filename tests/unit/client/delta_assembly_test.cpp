@@ -1,0 +1,114 @@
+#include "sdk/client/delta_assembly.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tandem::client {
+namespace {
+
+using Outcome = DeltaAssembly::Outcome;
+
+transport::DeltaMessage sample(Frame frame, std::uint32_t part = 0, std::uint32_t parts = 1,
+                               std::size_t size = 4) {
+  transport::DeltaMessage m;
+  m.frame = frame;
+  m.part = part;
+  m.parts = parts;
+  m.hash = frame * 10;
+  m.payload.assign(size, static_cast<std::byte>(part));
+  return m;
+}
+
+TEST(DeltaAssembly, PutsPartsTogetherInOrder) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  EXPECT_EQ(assembly.add(sample(7, 0, 3)), Outcome::kStored);
+  EXPECT_EQ(assembly.add(sample(7, 1, 3)), Outcome::kStored);
+  EXPECT_EQ(assembly.front(), nullptr);
+  EXPECT_EQ(assembly.add(sample(7, 2, 3, 1)), Outcome::kStored);
+  ASSERT_NE(assembly.front(), nullptr);
+  EXPECT_EQ(assembly.front()->frame, 7U);
+  EXPECT_EQ(assembly.front()->payload.size(), 9U);
+  EXPECT_EQ(assembly.front()->payload.back(), std::byte{2});
+}
+
+TEST(DeltaAssembly, ANewFrameWhileOneIsIncompleteMeansALostPart) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  static_cast<void>(assembly.add(sample(7, 0, 2)));
+  EXPECT_EQ(assembly.add(sample(8)), Outcome::kLostPart);
+  ASSERT_NE(assembly.front(), nullptr);
+  EXPECT_EQ(assembly.front()->frame, 8U);
+}
+
+TEST(DeltaAssembly, ASkippedPartMeansALostPart) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  static_cast<void>(assembly.add(sample(7, 0, 3)));
+  EXPECT_EQ(assembly.add(sample(7, 2, 3)), Outcome::kLostPart);
+  EXPECT_EQ(assembly.front(), nullptr);
+  EXPECT_EQ(assembly.add(sample(8)), Outcome::kStored);
+}
+
+TEST(DeltaAssembly, ALostFirstPartIsNoticed) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  static_cast<void>(assembly.add(sample(7)));
+  EXPECT_EQ(assembly.add(sample(8, 1, 2)), Outcome::kLostPart);
+  EXPECT_EQ(assembly.front(), nullptr);
+}
+
+TEST(DeltaAssembly, ASkippedFrameIsAGapAndTheRunStartsBehindIt) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  static_cast<void>(assembly.add(sample(7)));
+  EXPECT_EQ(assembly.add(sample(9)), Outcome::kGap);
+  EXPECT_EQ(assembly.size(), 1U);
+  EXPECT_EQ(assembly.front()->frame, 9U);
+  EXPECT_EQ(assembly.add(sample(10)), Outcome::kStored);
+}
+
+TEST(DeltaAssembly, AFrameHeldAlreadyIsIgnored) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  static_cast<void>(assembly.add(sample(7)));
+  EXPECT_EQ(assembly.add(sample(7)), Outcome::kIgnored);
+  EXPECT_EQ(assembly.add(sample(6)), Outcome::kIgnored);
+  EXPECT_EQ(assembly.size(), 1U);
+}
+
+TEST(DeltaAssembly, SubscribingInTheMiddleOfAFrameIsNoLoss) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  EXPECT_EQ(assembly.add(sample(7, 1, 2)), Outcome::kIgnored);
+  EXPECT_EQ(assembly.add(sample(8)), Outcome::kStored);
+}
+
+TEST(DeltaAssembly, RefusesWhatBreaksTheFormat) {
+  for (auto bad : {sample(7, 0, 0), sample(7, 2, 2), sample(0), sample(7, 0, 1, 101), sample(7, 0, 2, 0)}) {
+    DeltaAssembly assembly({.delta_bytes = 100});
+    EXPECT_EQ(assembly.add(std::move(bad)), Outcome::kRefused);
+    EXPECT_EQ(assembly.front(), nullptr);
+  }
+}
+
+TEST(DeltaAssembly, RefusesPartsThatDisagreeOrGrowBeyondTheDeclaredSize) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  static_cast<void>(assembly.add(sample(7, 0, 2)));
+  auto other = sample(7, 1, 2);
+  other.hash += 1;
+  EXPECT_EQ(assembly.add(std::move(other)), Outcome::kRefused);
+  static_cast<void>(assembly.add(sample(7, 0, 2, 60)));
+  EXPECT_EQ(assembly.add(sample(7, 1, 2, 60)), Outcome::kRefused);
+}
+
+TEST(DeltaAssembly, OverflowDropsAllAndCountsTheHighWaterMark) {
+  DeltaAssembly assembly({.delta_bytes = 100, .frames = 3});
+  for (Frame f = 1; f <= 3; ++f) EXPECT_EQ(assembly.add(sample(f)), Outcome::kStored);
+  EXPECT_EQ(assembly.add(sample(4)), Outcome::kOverflow);
+  EXPECT_EQ(assembly.size(), 0U);
+  EXPECT_EQ(assembly.high_water(), 3U);
+  EXPECT_EQ(assembly.add(sample(9)), Outcome::kStored);
+}
+
+TEST(DeltaAssembly, HeldBytesAreBounded) {
+  DeltaAssembly assembly({.delta_bytes = 100, .frames = 1000, .total_bytes = 500});
+  Frame f = 1;
+  while (assembly.add(sample(f, 0, 1, 100)) == Outcome::kStored) ++f;
+  EXPECT_EQ(f, 6U);
+}
+
+}  // namespace
+}  // namespace tandem::client

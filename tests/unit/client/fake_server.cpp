@@ -1,0 +1,161 @@
+#include "fake_server.hpp"
+
+#include <algorithm>
+
+namespace tandem::client {
+
+transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead) {
+  transport::SessionMessage s;
+  s.session = "default";
+  s.epoch = epoch;
+  s.capacity = capacity;
+  s.lattice_unit = 0.001;
+  s.lead = lead;
+  s.max_delta_bytes = 100'000;
+  s.max_snapshot_bytes = 100'000;
+  s.codec = "quantized";
+  s.threshold = 50;
+  s.position_step = 40;
+  s.velocity_step = 40;
+  s.predictor = "ballistic";
+  s.scene = "test";
+  s.types = {{"ball", 0.1F, 0xFFFFFFFF}};
+  s.layout_hash = transport::layout_hash(s);
+  return s;
+}
+
+ServerTimeline FakeServer::make(const transport::SessionMessage& s) {
+  TimelineConfig config;
+  config.capacity = s.capacity;
+  config.codec = s.codec;
+  config.parameters = {s.threshold, s.position_step, s.velocity_step};
+  config.predictor = s.predictor;
+  config.max_lead = s.lead;
+  return std::move(*ServerTimeline::create(config, s.epoch));
+}
+
+FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead)
+    : session(make_session(epoch, capacity, lead)), timeline_(make(session)), target_(capacity) {
+  for (Slot slot = 0; slot < capacity; ++slot) {
+    const auto place = static_cast<std::int32_t>(slot * 1000);
+    target_.spawn(slot, 0, 0, {{place, 100'000, -place}, {64, 0, 128}});
+  }
+  timeline_.start(0, target_, {{0, -20, 0}, 300, 0});
+  hashes[0] = timeline_.hash();
+}
+
+transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
+  // The target is the prediction disturbed: about a third of the bodies move off by more than the threshold.
+  for (Slot slot = 0; slot < target_.capacity(); ++slot) {
+    BodyState body = timeline_.state().body(slot);
+    for (std::size_t i = 0; i < 3; ++i) body.p[i] += body.v[i] / 64;
+    random_ ^= random_ << 13U;
+    random_ ^= random_ >> 7U;
+    random_ ^= random_ << 17U;
+    if (random_ % 3 == 0) {
+      body.p[random_ % 3] += static_cast<std::int32_t>(random_ % 3000) - 1500;
+      body.v[random_ % 2] += static_cast<std::int32_t>(random_ % 900) - 450;
+    }
+    target_.set_body(slot, body);
+  }
+  std::vector<LifecycleRecord> records;
+  if (teleport_ >= 0) {
+    const auto slot = static_cast<Slot>(teleport_);
+    LifecycleRecord record;
+    record.kind = LifecycleKind::kTeleport;
+    record.slot = slot;
+    record.body = {{900'000, 900'000, 900'000}, {}};
+    target_.set_body(slot, record.body);
+    records.push_back(record);
+    teleport_ = -1;
+  }
+  const auto result = timeline_.advance(target_, records);
+  hashes[result.frame] = result.hash;
+  transport::DeltaMessage delta;
+  delta.epoch = session.epoch;
+  delta.frame = result.frame;
+  delta.last_input = result.last_input;
+  delta.server_time_ns = server_time_ns;
+  delta.hash = result.hash;
+  delta.payload.assign(result.payload.begin(), result.payload.end());
+  return delta;
+}
+
+transport::ScheduledInputMessage FakeServer::schedule(std::int32_t gravity_y) {
+  ScheduledDrive input;
+  input.number = ++last_number_;
+  input.frame = frame() + 1 + session.lead;
+  input.drive = {{0, gravity_y, 0}, 300, 0};
+  EXPECT_TRUE(timeline_.schedule(input).has_value());
+  transport::ScheduledInputMessage message;
+  message.epoch = session.epoch;
+  message.number = input.number;
+  message.frame = input.frame;
+  message.kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive);
+  message.values = {0, gravity_y, 0, 300, 0};
+  return message;
+}
+
+transport::SnapshotMessage FakeServer::snapshot() {
+  transport::SnapshotMessage message;
+  message.epoch = session.epoch;
+  message.frame = frame();
+  message.slot = static_cast<std::uint32_t>(frame() % 4);
+  timeline_.snapshot(message.bytes);
+  return message;
+}
+
+std::vector<transport::DeltaMessage> split(const transport::DeltaMessage& whole, std::size_t parts) {
+  std::vector<transport::DeltaMessage> out(parts, whole);
+  const std::size_t step = (whole.payload.size() + parts - 1) / parts;
+  for (std::size_t i = 0; i < parts; ++i) {
+    const auto at = [&](std::size_t n) {
+      return whole.payload.begin() + static_cast<std::ptrdiff_t>(std::min(n * step, whole.payload.size()));
+    };
+    out[i].part = static_cast<std::uint32_t>(i);
+    out[i].parts = static_cast<std::uint32_t>(parts);
+    out[i].payload.assign(at(i), at(i + 1));
+  }
+  return out;
+}
+
+void ClientTest::start(std::uint32_t lead, transport::Role role) {
+  CoreOptions options;
+  options.session = "default";
+  options.id = kClient;
+  options.role = role;
+  options.lead = lead;
+  options.log = [this](LogLevel, std::string_view line) { log.emplace_back(line); };
+  core = std::make_unique<ClientCore>(std::move(options), port, &recorder);
+}
+
+void ClientTest::poll(std::int64_t later_ns) {
+  now_ns += later_ns;
+  core->poll({now_ns, wall_ns()});
+}
+
+void ClientTest::frame(std::int64_t later_ns) {
+  deliver(server.advance(wall_ns() + later_ns));
+  poll(later_ns);
+}
+
+void ClientTest::join() {
+  if (!core) start();
+  port.sessions.push_back(from_server(server.session));
+  poll();
+  ASSERT_EQ(core->phase(), ClientPhase::kJoining);
+  deliver(server.advance(wall_ns()));
+  port.snapshots.push_back(from_server(server.snapshot()));
+  poll();
+  ASSERT_EQ(core->phase(), ClientPhase::kPlaying);
+}
+
+void ClientTest::expect_agreed() const {
+  for (const auto& [frame, hash] : recorder.hashes)
+    EXPECT_EQ(hash, server.hashes.at(frame)) << "frame " << frame;
+  ASSERT_NE(core->timeline(), nullptr);
+  EXPECT_EQ(core->timeline()->hash(), server.hashes.at(core->timeline()->applied()));
+  EXPECT_EQ(figures().hash_mismatches, 0U);
+}
+
+}  // namespace tandem::client

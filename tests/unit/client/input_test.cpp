@@ -1,0 +1,149 @@
+#include <limits>
+
+#include "fake_server.hpp"
+
+namespace tandem::client {
+namespace {
+
+using InputTest = ClientTest;
+using transport::InputKind;
+
+transport::ReplyMessage reply(std::vector<transport::ReplyEntry> entries, std::uint64_t highest) {
+  transport::ReplyMessage m;
+  m.client = kClient;
+  m.epoch = 1000;
+  m.role = transport::Role::kParticipant;
+  m.phase = transport::Phase::kPlaying;
+  m.highest_input = highest;
+  m.entries = std::move(entries);
+  return m;
+}
+
+TEST_F(InputTest, NumbersStartAtOneAndCountUp) {
+  join();
+  for (std::uint64_t n = 1; n <= 3; ++n) {
+    EXPECT_EQ(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}).value(), n);
+  }
+  ASSERT_EQ(port.sent_inputs.size(), 3U);
+  EXPECT_EQ(port.sent_inputs[2].number, 3U);
+  EXPECT_EQ(port.sent_inputs[2].epoch, 1000U);
+  EXPECT_EQ(port.sent_inputs[2].client, kClient);
+}
+
+TEST_F(InputTest, NumbersGoOnAfterARejoin) {
+  join();
+  static_cast<void>(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}));
+  static_cast<void>(server.advance());
+  frame();
+  EXPECT_FALSE(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}).has_value());
+  poll(200 * kMs);
+  port.snapshots.push_back(from_server(server.snapshot()));
+  poll();
+  EXPECT_EQ(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}).value(), 2U);
+}
+
+TEST_F(InputTest, ObserversAreToldAtOnce) {
+  start(1, transport::Role::kObserver);
+  join();
+  const auto sent = core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()});
+  ASSERT_FALSE(sent.has_value());
+  EXPECT_EQ(sent.error().code, ErrorCode::kOutOfOrder);
+  EXPECT_TRUE(port.sent_inputs.empty());
+}
+
+TEST_F(InputTest, ValuesThatAreNotFiniteAndTooMuchDataAreRefusedHere) {
+  join();
+  const Now now{now_ns, wall_ns()};
+  EXPECT_FALSE(
+      core->send(InputKind::kGravity, {0, std::numeric_limits<double>::quiet_NaN(), 0}, {}, now).has_value());
+  EXPECT_FALSE(core->send(InputKind::kPush, std::vector<double>(17), {}, now).has_value());
+  EXPECT_FALSE(core->send(InputKind::kApplication, {}, transport::Bytes(1025), now).has_value());
+  EXPECT_TRUE(port.sent_inputs.empty());
+}
+
+TEST_F(InputTest, LatencyRunsUntilTheFrameItActedOnIsApplied) {
+  join();
+  static_cast<void>(core->send(InputKind::kPush, std::vector<double>(7), {}, {now_ns, wall_ns()}));
+  port.replies.push_back(from_server(reply({{1, 4, 0}}, 1)));
+  frame();
+  EXPECT_TRUE(recorder.outcomes.empty());
+  frame();
+  frame();
+  ASSERT_EQ(recorder.outcomes.size(), 1U);
+  EXPECT_EQ(recorder.outcomes[0].frame, 4U);
+  EXPECT_EQ(recorder.outcomes[0].latency_ns, 3 * kFrameNs);
+  EXPECT_EQ(figures().inputs_acted, 1U);
+}
+
+TEST_F(InputTest, AReplyAfterTheFrameStillFindsWhenItWasApplied) {
+  join();
+  static_cast<void>(core->send(InputKind::kPush, std::vector<double>(7), {}, {now_ns, wall_ns()}));
+  for (int i = 0; i < 5; ++i) frame();
+  port.replies.push_back(from_server(reply({{1, 3, 0}}, 1)));
+  poll();
+  ASSERT_EQ(recorder.outcomes.size(), 1U);
+  EXPECT_EQ(recorder.outcomes[0].latency_ns, 2 * kFrameNs);
+}
+
+TEST_F(InputTest, ARefusalIsCountedWithItsReason) {
+  join();
+  static_cast<void>(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}));
+  port.replies.push_back(
+      from_server(reply({{1, 0, static_cast<std::uint32_t>(transport::Reason::kRateLimited)}}, 1)));
+  poll();
+  ASSERT_EQ(recorder.outcomes.size(), 1U);
+  EXPECT_EQ(recorder.outcomes[0].kind, InputOutcome::Kind::kRefused);
+  EXPECT_EQ(recorder.outcomes[0].reason, static_cast<std::uint32_t>(transport::Reason::kRateLimited));
+  EXPECT_EQ(figures().inputs_refused, 1U);
+}
+
+TEST_F(InputTest, AnInputThatTheServerPassedOverIsUnknownAndNotSentAgain) {
+  join();
+  for (int i = 0; i < 2; ++i) {
+    static_cast<void>(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}));
+  }
+  port.replies.push_back(from_server(reply({{2, 1, 0}}, 2)));
+  for (int i = 0; i < 100; ++i) frame();
+  EXPECT_EQ(figures().inputs_unknown, 1U);
+  EXPECT_EQ(figures().inputs_acted, 1U);
+  EXPECT_EQ(port.sent_inputs.size(), 2U);
+}
+
+TEST_F(InputTest, UnansweredInputsAreBounded) {
+  join();
+  for (int i = 0; i < 300; ++i) {
+    static_cast<void>(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}));
+  }
+  poll();
+  EXPECT_EQ(figures().inputs_unknown, 44U);
+}
+
+TEST_F(InputTest, RepliesToOthersAndOfOtherEpochsAreIgnored) {
+  join();
+  static_cast<void>(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}));
+  auto other = reply({{1, 2, 0}}, 1);
+  other.client = 5;
+  port.replies.push_back(from_server(other));
+  other = reply({{1, 2, 0}}, 1);
+  other.epoch = 5;
+  port.replies.push_back(from_server(other));
+  for (int i = 0; i < 5; ++i) frame();
+  EXPECT_TRUE(recorder.outcomes.empty());
+}
+
+TEST_F(InputTest, TheRoleAndTheReasonComeFromTheServer) {
+  join();
+  auto told = reply({}, 0);
+  port.replies.push_back(from_server(told));
+  poll();
+  EXPECT_EQ(core->status({now_ns, wall_ns()}).role, ClientRole::kParticipant);
+  told.role = transport::Role::kObserver;
+  told.reason = static_cast<std::uint32_t>(transport::Reason::kDemoted);
+  port.replies.push_back(from_server(told));
+  poll();
+  EXPECT_EQ(core->status({now_ns, wall_ns()}).role, ClientRole::kObserver);
+  EXPECT_NE(core->status({now_ns, wall_ns()}).reason.find("delayed the others"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::client

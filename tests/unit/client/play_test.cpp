@@ -1,0 +1,167 @@
+#include "fake_server.hpp"
+
+namespace tandem::client {
+namespace {
+
+using PlayTest = ClientTest;
+
+TEST_F(PlayTest, EveryFrameIsAppliedAndAcknowledgedWithTheServersHash) {
+  join();
+  port.acks.clear();
+  for (int i = 0; i < 200; ++i) frame();
+  EXPECT_EQ(core->timeline()->applied(), 201U);
+  EXPECT_EQ(figures().frames_applied, 200U);
+  EXPECT_EQ(port.acks.size(), 200U);
+  EXPECT_EQ(port.acks.back().applied, 201U);
+  expect_agreed();
+}
+
+TEST_F(PlayTest, DeltasInPartsAreApplied) {
+  join();
+  for (int i = 0; i < 20; ++i) {
+    for (auto& part : split(server.advance(), 3)) deliver(std::move(part));
+    poll(kFrameNs);
+  }
+  EXPECT_EQ(core->timeline()->applied(), 21U);
+  expect_agreed();
+}
+
+TEST_F(PlayTest, ALostPartBringsARejoin) {
+  join();
+  auto parts = split(server.advance(), 3);
+  deliver(parts[0]);
+  deliver(parts[2]);
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+  EXPECT_EQ(figures().resyncs_by_reason[static_cast<std::size_t>(ResyncReason::kLostPart)], 1U);
+}
+
+TEST_F(PlayTest, AGapBringsARejoinThatKeepsWhatFollows) {
+  join();
+  static_cast<void>(server.advance());
+  deliver(server.advance());
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+  poll(100 * kMs);
+  EXPECT_EQ(port.acks.back().phase, transport::Phase::kJoining);
+  EXPECT_EQ(port.acks.back().join_attempt, 2U);
+  port.snapshots.push_back(from_server(server.snapshot()));
+  poll();
+  for (int i = 0; i < 5; ++i) frame();
+  EXPECT_EQ(core->timeline()->applied(), 8U);
+  EXPECT_EQ(figures().resyncs, 1U);
+  expect_agreed();
+}
+
+TEST_F(PlayTest, AScheduledInputThatComesAfterItsDeltaIsWaitedFor) {
+  join();
+  const auto input = server.schedule(700);
+  frame();
+  EXPECT_EQ(core->timeline()->applied(), 1U);
+  frame();
+  EXPECT_EQ(core->timeline()->applied(), 1U);
+  port.inputs.push_back(from_server(input));
+  poll();
+  EXPECT_EQ(core->timeline()->applied(), 3U);
+  EXPECT_EQ(figures().resyncs, 0U);
+  expect_agreed();
+}
+
+TEST_F(PlayTest, AScheduledInputStillMissingAfterAQuarterOfASecondBringsARejoin) {
+  join();
+  static_cast<void>(server.schedule(700));
+  frame();
+  for (int i = 0; i < 6; ++i) poll(40 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  poll(40 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+  EXPECT_EQ(figures().resyncs_by_reason[static_cast<std::size_t>(ResyncReason::kMissingInput)], 1U);
+  port.snapshots.push_back(from_server(server.snapshot()));
+  poll(40 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  for (int i = 0; i < 5; ++i) frame();
+  expect_agreed();
+}
+
+TEST_F(PlayTest, APauseOfTheProcessIsNotHeldAgainstAMissingInput) {
+  join();
+  const auto input = server.schedule(700);
+  frame();
+  poll(5000 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  port.inputs.push_back(from_server(input));
+  poll();
+  EXPECT_EQ(core->timeline()->applied(), 2U);
+}
+
+TEST_F(PlayTest, AnInputActsOnItsFrame) {
+  join();
+  port.inputs.push_back(from_server(server.schedule(700)));  // frame 1 is out, acts on 3
+  frame();
+  EXPECT_EQ(core->timeline()->drive().gravity[1], -20);
+  frame();
+  EXPECT_EQ(core->timeline()->applied(), 3U);
+  EXPECT_EQ(core->timeline()->drive().gravity[1], 700);
+  expect_agreed();
+}
+
+TEST_F(PlayTest, ItSimulatesOneFrameAheadWhenTheServerDoesAndHaltsThere) {
+  join();
+  for (int i = 0; i < 20; ++i) frame();
+  EXPECT_EQ(core->timeline()->now(), core->timeline()->applied());
+  poll(kFrameNs);  // the next frame is due, its delta is late
+  EXPECT_EQ(core->timeline()->now(), core->timeline()->applied() + 1);
+  for (int i = 0; i < 10; ++i) poll(kFrameNs);
+  EXPECT_EQ(core->timeline()->now(), core->timeline()->applied() + 1);
+  EXPECT_EQ(port.acks.back().simulated, 22U);
+  frame();
+  EXPECT_EQ(core->timeline()->applied(), 22U);
+  expect_agreed();
+}
+
+TEST_F(PlayTest, WithLeadZeroItNeverSimulatesAhead) {
+  start(0);
+  join();
+  for (int i = 0; i < 20; ++i) frame();
+  for (int i = 0; i < 10; ++i) poll(kFrameNs);
+  EXPECT_EQ(core->timeline()->now(), core->timeline()->applied());
+}
+
+TEST_F(PlayTest, PollAsksToBeCalledWhenTheNextFrameIsDue) {
+  join();
+  for (int i = 0; i < 40; ++i) frame();
+  const std::int64_t due = core->poll({now_ns, wall_ns()});
+  EXPECT_GT(due, now_ns);
+  EXPECT_LE(due, now_ns + 50 * kMs);
+  EXPECT_NEAR(static_cast<double>(due - now_ns), static_cast<double>(kFrameNs), 2e6);
+}
+
+TEST_F(PlayTest, TheAcknowledgementIsRepeatedWhenNoFrameComes) {
+  join();
+  port.acks.clear();
+  for (int i = 0; i < 20; ++i) poll(50 * kMs);
+  EXPECT_GE(port.acks.size(), 3U);
+  EXPECT_LE(port.acks.size(), 5U);
+}
+
+TEST_F(PlayTest, LatencyIsMeasuredFromPublicationToApplication) {
+  join();
+  for (int i = 0; i < 100; ++i) {
+    deliver(server.advance(wall_ns() + kFrameNs - 12 * kMs));
+    poll(kFrameNs);
+  }
+  EXPECT_NEAR(figures().latency.at_ms(0.5), 12, 0.3);
+}
+
+TEST_F(PlayTest, TheStatusGoesOutOnceASecond) {
+  join();
+  port.statuses.clear();
+  for (int i = 0; i < 95; ++i) frame();
+  EXPECT_EQ(port.statuses.size(), 3U);
+  EXPECT_EQ(port.statuses.back().client, kClient);
+  EXPECT_GT(port.statuses.back().mbit_per_s, 0);
+  EXPECT_GT(port.statuses.back().frames_applied, 60U);
+}
+
+}  // namespace
+}  // namespace tandem::client

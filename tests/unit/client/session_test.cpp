@@ -1,0 +1,137 @@
+#include <limits>
+
+#include "fake_server.hpp"
+#include "sdk/client/session_check.hpp"
+
+namespace tandem::client {
+namespace {
+
+using SessionTest = ClientTest;
+
+TEST_F(SessionTest, WithoutAServerTheClientSearchesAndSaysNothing) {
+  start();
+  for (int i = 0; i < 100; ++i) poll(50 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kSearching);
+  EXPECT_TRUE(port.acks.empty());
+  EXPECT_TRUE(port.opened_epochs.empty());
+}
+
+TEST_F(SessionTest, AnotherSessionsAnnouncementIsIgnored) {
+  start();
+  auto other = server.session;
+  other.session = "other";
+  port.sessions.push_back(from_server(other));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kSearching);
+}
+
+TEST_F(SessionTest, AnotherProtocolVersionIsRefusedAndSaid) {
+  start();
+  auto other = server.session;
+  other.protocol_version += 1;
+  port.sessions.push_back(from_server(other));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+  EXPECT_NE(core->status({now_ns, wall_ns()}).reason.find("protocol version 2"), std::string::npos);
+  EXPECT_EQ(figures().refused_messages, 1U);
+  EXPECT_TRUE(port.acks.empty());
+}
+
+TEST_F(SessionTest, AnotherLayoutHashIsRefused) {
+  start();
+  auto other = server.session;
+  other.layout_hash ^= 1;
+  port.sessions.push_back(from_server(other));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+}
+
+TEST_F(SessionTest, AnUnknownCodecIsRefused) {
+  start();
+  auto other = server.session;
+  other.codec = "of the future";
+  other.layout_hash = transport::layout_hash(other);
+  port.sessions.push_back(from_server(other));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+}
+
+TEST_F(SessionTest, AfterARefusedSessionAGoodOneIsPlayed) {
+  start();
+  auto other = server.session;
+  other.epoch -= 1;
+  other.protocol_version += 1;
+  port.sessions.push_back(from_server(other));
+  poll();
+  join();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+}
+
+TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
+  const auto refused = [&](auto change) {
+    auto s = server.session;
+    change(s);
+    s.layout_hash = transport::layout_hash(s);
+    return !check_session(s).has_value();
+  };
+  EXPECT_FALSE(refused([](auto&) {}));
+  EXPECT_TRUE(refused([](auto& s) { s.capacity = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.capacity = kMaxCapacity + 1; }));
+  EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = std::numeric_limits<double>::quiet_NaN(); }));
+  EXPECT_TRUE(refused([](auto& s) { s.lattice_unit = std::numeric_limits<double>::infinity(); }));
+  EXPECT_TRUE(refused([](auto& s) { s.lead = 2; }));
+  EXPECT_TRUE(refused([](auto& s) { s.max_delta_bytes = 0xFFFFFFFF; }));
+  EXPECT_TRUE(refused([](auto& s) { s.max_snapshot_bytes = 0xFFFFFFFF; }));
+  EXPECT_TRUE(refused([](auto& s) { s.types.clear(); }));
+  EXPECT_TRUE(refused([](auto& s) { s.threshold = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.epoch = 0; }));
+}
+
+TEST_F(SessionTest, ANewEpochEmptiesEverything) {
+  join();
+  for (int i = 0; i < 5; ++i) frame();
+  const auto sent = core->send(transport::InputKind::kGravity, {0, -1, 0}, {}, {now_ns, wall_ns()});
+  ASSERT_TRUE(sent.has_value());
+  FakeServer next(999);  // lower than the one held, and new all the same
+  port.sessions.push_back(from_server(next.session));
+  deliver(server.advance());  // of the old epoch
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+  EXPECT_EQ(port.opened_epochs.back(), 999U);
+  EXPECT_EQ(port.acks.back().epoch, 999U);
+  EXPECT_EQ(figures().resyncs, 0U);
+  ASSERT_EQ(recorder.outcomes.size(), 1U);
+  EXPECT_EQ(recorder.outcomes[0].kind, InputOutcome::Kind::kUnknown);
+
+  deliver(next.advance());
+  port.snapshots.push_back(from_server(next.snapshot()));
+  poll(100 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(core->timeline()->hash(), next.hashes.at(1));
+  EXPECT_EQ(figures().stale_messages, 1U);
+  EXPECT_EQ(core->send(transport::InputKind::kGravity, {0, -1, 0}, {}, {now_ns, wall_ns()}).value(), 1U);
+}
+
+TEST_F(SessionTest, TheSameAnnouncementAgainChangesNothing) {
+  join();
+  port.sessions.push_back(from_server(server.session));
+  frame();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(figures().epochs, 1U);
+}
+
+TEST_F(SessionTest, SamplesOfAParticipantThatIsNotTheServerAreCountedAndIgnored) {
+  join();
+  auto forged = server.advance();
+  port.deltas.push_back({forged, {{9, 9, 9}}});
+  poll();
+  EXPECT_EQ(figures().foreign_messages, 1U);
+  EXPECT_EQ(core->timeline()->applied(), 1U);
+  deliver(forged);
+  poll();
+  EXPECT_EQ(core->timeline()->applied(), 2U);
+}
+
+}  // namespace
+}  // namespace tandem::client
