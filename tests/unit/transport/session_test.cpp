@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "sdk/transport/session_book.hpp"
+
+namespace tandem::transport {
+namespace {
+
+Received<SessionMessage> announcement(Epoch epoch) {
+  Received<SessionMessage> received;
+  received.message.epoch = epoch;
+  return received;
+}
+
+class Book : public ::testing::Test {
+ protected:
+  void update() {
+    book_.update([this](std::uint64_t writer) { return states_.at(writer); });
+  }
+  std::vector<Epoch> current() {
+    update();
+    std::vector<Received<SessionMessage>> out;
+    book_.take_current(out);
+    std::vector<Epoch> epochs;
+    for (const auto& received : out) epochs.push_back(received.message.epoch);
+    return epochs;
+  }
+  SessionBook book_;
+  std::map<std::uint64_t, WriterState> states_{{1, WriterState::kLive}, {2, WriterState::kLive}};
+};
+
+using Epochs = std::vector<Epoch>;
+
+TEST_F(Book, ReportsEachAnnouncementOnce) {
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
+  EXPECT_EQ(current(), Epochs{});
+  book_.put(1, announcement(11));
+  EXPECT_EQ(current(), Epochs{11});
+}
+
+TEST_F(Book, ReportsTheLatestOfTwoServersAndTheOtherWhenItEnds) {
+  book_.put(1, announcement(10));
+  book_.put(2, announcement(20));
+  EXPECT_EQ(current(), Epochs{20});
+  states_[2] = WriterState::kGone;
+  EXPECT_EQ(current(), Epochs{10});
+}
+
+TEST_F(Book, ReportsAServerAgainThatWasSilentForAWhile) {
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
+  states_[1] = WriterState::kSilent;
+  EXPECT_EQ(current(), Epochs{});
+  EXPECT_FALSE(book_.epoch_live(10));
+  EXPECT_FALSE(book_.any_live());
+  states_[1] = WriterState::kLive;
+  EXPECT_EQ(current(), Epochs{10});
+  EXPECT_TRUE(book_.epoch_live(10));
+}
+
+TEST_F(Book, ListsEveryLiveServerInTheOrderSeen) {
+  book_.put(2, announcement(20));
+  book_.put(1, announcement(10));
+  update();
+  std::vector<Received<SessionMessage>> out;
+  book_.list_live(out);
+  ASSERT_EQ(out.size(), 2U);
+  EXPECT_EQ(out[0].message.epoch, 20U);
+  EXPECT_EQ(out[1].message.epoch, 10U);
+}
+
+TEST_F(Book, IsBoundedInTheNumberOfWriters) {
+  for (std::uint64_t writer = 1; writer <= 1000; ++writer) {
+    states_[writer] = WriterState::kLive;
+    book_.put(writer, announcement(writer));
+  }
+  update();
+  std::vector<Received<SessionMessage>> out;
+  book_.list_live(out);
+  EXPECT_EQ(out.size(), 64U);
+  EXPECT_EQ(out.back().message.epoch, 1000U);
+}
+
+TEST(SessionName, TakesLettersDigitsDotUnderscoreAndMinus) {
+  EXPECT_TRUE(check_session_name("default"));
+  EXPECT_TRUE(check_session_name("A.b_c-9"));
+  EXPECT_TRUE(check_session_name(std::string(64, 'x')));
+}
+
+TEST(SessionName, RefusesWildcardsAndWhatIsNoName) {
+  for (const std::string name : {"", "*", "a*", "a?b", "[ab]", "a b", "a/b", "\xC3\xA4", "a\n"}) {
+    EXPECT_FALSE(check_session_name(name)) << name;
+  }
+  EXPECT_FALSE(check_session_name(std::string(65, 'x')));
+  EXPECT_FALSE(check_session_name(std::string("a\0b", 3)));
+}
+
+TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
+  SessionMessage session;
+  session.codec = "entropy";
+  session.predictor = "ballistic";
+  std::set<std::uint64_t> hashes{layout_hash(session)};
+  const auto differs = [&](auto&& change) {
+    SessionMessage changed = session;
+    change(changed);
+    return hashes.insert(layout_hash(changed)).second;
+  };
+  EXPECT_TRUE(differs([](auto& s) { s.protocol_version = 2; }));
+  EXPECT_TRUE(differs([](auto& s) { s.capacity = 1; }));
+  EXPECT_TRUE(differs([](auto& s) { s.lattice_unit = 0.5; }));
+  EXPECT_TRUE(differs([](auto& s) { s.lead = 0; }));
+  EXPECT_TRUE(differs([](auto& s) { s.codec = "none"; }));
+  EXPECT_TRUE(differs([](auto& s) { s.codec_tables = Bytes(1); }));
+  EXPECT_TRUE(differs([](auto& s) { s.threshold = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.position_step = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.velocity_step = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.predictor = "field"; }));
+  EXPECT_TRUE(differs([](auto& s) { s.predictor_constants = {1}; }));
+  EXPECT_TRUE(differs([](auto& s) { s.types.resize(1); }));
+  EXPECT_FALSE(differs([](auto& s) { s.epoch = 5; })) << "a restarted server has the same layout";
+  EXPECT_FALSE(differs([](auto& s) { s.scene_description = "x"; })) << "drawing does not matter";
+}
+
+TEST(LayoutHash, OfAFixedSessionIsAFixedNumber) {
+  SessionMessage session;
+  session.capacity = 10000;
+  session.lattice_unit = 0.0009765625;
+  session.codec = "entropy";
+  session.threshold = 100;
+  session.predictor = "ballistic";
+  session.types.resize(2);
+  EXPECT_EQ(layout_hash(session), 0xf2d62373ce44cb3cULL) << "part of the protocol: old clients would refuse the session";
+}
+
+}  // namespace
+}  // namespace tandem::transport

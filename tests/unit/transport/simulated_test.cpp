@@ -1,0 +1,428 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "sdk/transport/simulated/network.hpp"
+
+namespace tandem::transport::simulated {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr Epoch kEpoch = 7;
+
+SessionMessage session(Epoch epoch = kEpoch) {
+  SessionMessage message;
+  message.session = "s";
+  message.epoch = epoch;
+  message.capacity = 10;
+  message.lattice_unit = 1;
+  message.max_delta_bytes = 100;
+  message.max_snapshot_bytes = 100;
+  return message;
+}
+
+DeltaMessage delta(Frame frame) {
+  DeltaMessage message;
+  message.epoch = kEpoch;
+  message.frame = frame;
+  return message;
+}
+
+ScheduledInputMessage scheduled(std::uint64_t number) {
+  ScheduledInputMessage message;
+  message.epoch = kEpoch;
+  message.number = number;
+  return message;
+}
+
+SnapshotMessage snapshot(Frame frame) {
+  SnapshotMessage message;
+  message.epoch = kEpoch;
+  message.frame = frame;
+  message.slot = static_cast<std::uint32_t>(frame % 4);
+  return message;
+}
+
+AckMessage ack(ClientId client, Frame applied) {
+  AckMessage message;
+  message.client = client;
+  message.applied = applied;
+  return message;
+}
+
+template <class M, class Port>
+std::vector<Received<M>> take(Port& port) {
+  std::vector<Received<M>> out;
+  port.take(out);
+  return out;
+}
+
+std::vector<Frame> frames(ClientPort& port) {
+  std::vector<Frame> out;
+  for (const auto& received : take<DeltaMessage>(port)) out.push_back(received.message.frame);
+  return out;
+}
+
+std::vector<Frame> range(Frame first, Frame last) {
+  std::vector<Frame> out;
+  for (Frame frame = first; frame <= last; ++frame) out.push_back(frame);
+  return out;
+}
+
+/// A server and a client that have found each other.
+struct Pair {
+  explicit Pair(const NetworkOptions& options, std::uint32_t delta_depth = 64)
+      : network(options),
+        server(std::move(*network.make_server("s", delta_depth))),
+        client(std::move(*network.make_client("s", delta_depth))) {
+    EXPECT_TRUE(server->write(session()));
+    EXPECT_TRUE(client->open_stream(session()));
+    EXPECT_TRUE(client->open_snapshots(session()));
+    run(100 * kMs);
+    EXPECT_TRUE(server->joined(client->self()));
+  }
+  void run(std::int64_t duration_ns) { network.advance_to(network.now_ns() + duration_ns); }
+  Network network;
+  std::unique_ptr<ServerPort> server;
+  std::unique_ptr<ClientPort> client;
+};
+
+TEST(Simulated, NothingArrivesBeforeTheDelayOfItsLink) {
+  NetworkOptions options;
+  options.link.delay_ns = 5 * kMs;
+  Pair pair(options);
+  ASSERT_TRUE(pair.server->write(delta(1)));
+  pair.run(5 * kMs - 1);
+  EXPECT_TRUE(frames(*pair.client).empty());
+  pair.run(1);
+  EXPECT_EQ(frames(*pair.client), range(1, 1));
+}
+
+TEST(Simulated, WritersReachOnlyReadersTheyAreMatchedWith) {
+  NetworkOptions options;
+  options.match_min_ns = options.match_max_ns = 10 * kMs;
+  Network network(options);
+  const auto server = std::move(*network.make_server("s"));
+  const auto client = std::move(*network.make_client("s"));
+  ASSERT_TRUE(client->open_stream(session()));
+  ASSERT_TRUE(server->write(delta(1)));
+  network.advance_to(10 * kMs - 1);
+  EXPECT_FALSE(server->alive(client->self()));
+  network.advance_to(10 * kMs);
+  EXPECT_TRUE(server->alive(client->self()));
+  EXPECT_FALSE(server->joined(client->self())) << "no snapshot reader yet";
+  ASSERT_TRUE(server->write(delta(2)));
+  ASSERT_TRUE(client->open_snapshots(session()));
+  network.advance_to(30 * kMs);
+  EXPECT_TRUE(server->joined(client->self()));
+  EXPECT_EQ(frames(*client), range(2, 2)) << "deltas are volatile";
+}
+
+TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
+  Network network(NetworkOptions{});
+  const auto server = std::move(*network.make_server("s"));
+  ASSERT_TRUE(server->write(session()));
+  for (std::uint64_t number = 1; number <= 300; ++number) ASSERT_TRUE(server->write(scheduled(number)));
+  for (Frame frame = 1; frame <= 6; ++frame) ASSERT_TRUE(server->write(snapshot(frame)));
+  const auto client = std::move(*network.make_client("s"));
+  ASSERT_TRUE(client->open_stream(session()));
+  ASSERT_TRUE(client->open_snapshots(session()));
+  network.advance_to(100 * kMs);
+  std::vector<Received<SessionMessage>> sessions;
+  client->take_sessions(sessions);
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].message, session());
+  EXPECT_EQ(sessions[0].from, server->self());
+  const auto inputs = take<ScheduledInputMessage>(*client);
+  ASSERT_EQ(inputs.size(), 256U);
+  EXPECT_EQ(inputs.front().message.number, 45U);
+  EXPECT_EQ(inputs.back().message.number, 300U);
+  const auto snapshots = take<SnapshotMessage>(*client);
+  ASSERT_EQ(snapshots.size(), 4U) << "one of each key";
+  EXPECT_EQ(snapshots.front().message.frame, 3U);
+}
+
+TEST(Simulated, DisposedSnapshotsAreNotHandedToLateReaders) {
+  Pair pair(NetworkOptions{});
+  ASSERT_TRUE(pair.server->write(snapshot(1)));
+  ASSERT_TRUE(pair.server->dispose_snapshots());
+  ASSERT_TRUE(pair.client->open_snapshots(session()));
+  pair.run(100 * kMs);
+  EXPECT_TRUE(take<SnapshotMessage>(*pair.client).empty());
+}
+
+TEST(Simulated, LostSamplesAreRepairedInOrderWhateverTheSeed) {
+  std::uint64_t repaired = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    NetworkOptions options;
+    options.seed = seed;
+    options.link = LinkModel{5 * kMs, 30 * kMs, 0.3, 20 * kMs, 0};
+    Pair pair(options, 1000);
+    std::vector<Frame> got;
+    for (Frame frame = 1; frame <= 100; ++frame) {
+      ASSERT_TRUE(pair.server->write(delta(frame)));
+      pair.run(33 * kMs);
+      for (const Frame taken : frames(*pair.client)) got.push_back(taken);
+    }
+    pair.run(10'000 * kMs);
+    for (const Frame taken : frames(*pair.client)) got.push_back(taken);
+    ASSERT_EQ(got, range(1, 100)) << "seed " << seed;
+    repaired += pair.network.counts().repaired;
+  }
+  EXPECT_GT(repaired, 0U);
+}
+
+TEST(Simulated, ALostSampleHoldsUpLaterOnesOfItsTopicOnly) {
+  NetworkOptions options;
+  options.link = LinkModel{kMs, 0, 0, 50 * kMs, 0};
+  Pair pair(options);
+  pair.network.set_link(pair.server->self(), pair.client->self(), LinkModel{kMs, 0, 1, 50 * kMs, 0});
+  ASSERT_TRUE(pair.server->write(delta(1)));
+  pair.network.set_link(pair.server->self(), pair.client->self(), LinkModel{kMs, 0, 0, 50 * kMs, 0});
+  ASSERT_TRUE(pair.server->write(delta(2)));
+  ASSERT_TRUE(pair.server->write(scheduled(1)));
+  pair.run(2 * kMs);
+  EXPECT_TRUE(frames(*pair.client).empty());
+  EXPECT_EQ(take<ScheduledInputMessage>(*pair.client).size(), 1U);
+  pair.run(50 * kMs);
+  EXPECT_EQ(frames(*pair.client), range(1, 2));
+}
+
+TEST(Simulated, TopicsOvertakeEachOtherButNotThemselves) {
+  bool input_first = false;
+  bool delta_first = false;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    NetworkOptions options;
+    options.seed = seed;
+    options.link.jitter_ns = 20 * kMs;
+    Pair pair(options);
+    ASSERT_TRUE(pair.server->write(scheduled(1)));
+    ASSERT_TRUE(pair.server->write(delta(1)));
+    for (int step = 0; step < 30; ++step) {
+      pair.run(kMs);
+      const bool has_delta = !frames(*pair.client).empty();
+      const bool has_input = !take<ScheduledInputMessage>(*pair.client).empty();
+      if (has_delta != has_input) {
+        (has_delta ? delta_first : input_first) = true;
+        break;
+      }
+    }
+  }
+  EXPECT_TRUE(input_first);
+  EXPECT_TRUE(delta_first);
+}
+
+TEST(Simulated, WhatKeepLastOverwroteBeforeItsRepairIsGone) {
+  NetworkOptions options;
+  options.link.repair_ns = 50 * kMs;
+  Pair pair(options, 4);
+  LinkModel lossy = options.link;
+  lossy.loss = 1;
+  pair.network.set_all_links(lossy);
+  for (Frame frame = 1; frame <= 10; ++frame) ASSERT_TRUE(pair.server->write(delta(frame)));
+  pair.network.set_all_links(options.link);
+  pair.run(1000 * kMs);
+  EXPECT_EQ(frames(*pair.client), range(7, 10));
+  EXPECT_EQ(pair.network.counts().overwritten, 6U);
+}
+
+TEST(Simulated, AReaderThatDoesNotTakeKeepsTheLastOfEachKey) {
+  Pair pair(NetworkOptions{}, 3);
+  for (Frame frame = 1; frame <= 10; ++frame) ASSERT_TRUE(pair.server->write(delta(frame)));
+  for (Frame applied = 1; applied <= 5; ++applied) {
+    ASSERT_TRUE(pair.client->write(ack(1, applied)));
+    ASSERT_TRUE(pair.client->write(ack(2, 10 * applied)));
+  }
+  pair.run(10 * kMs);
+  EXPECT_EQ(frames(*pair.client), range(8, 10));
+  const auto acks = take<AckMessage>(*pair.server);
+  ASSERT_EQ(acks.size(), 2U);
+  EXPECT_EQ(acks[0].message.applied, 5U);
+  EXPECT_EQ(acks[1].message.applied, 50U);
+}
+
+TEST(Simulated, TheLossModelCanDropForGood) {
+  NetworkOptions options;
+  options.link.loss = 0.5;
+  options.link.lost_for_good = 1;
+  Pair pair(NetworkOptions{});
+  pair.network.set_all_links(options.link);
+  for (Frame frame = 1; frame <= 100; ++frame) ASSERT_TRUE(pair.server->write(delta(frame)));
+  pair.run(1000 * kMs);
+  const std::vector<Frame> got = frames(*pair.client);
+  EXPECT_EQ(got.size() + pair.network.counts().lost_for_good, 100U);
+  EXPECT_GT(pair.network.counts().lost_for_good, 20U);
+  EXPECT_TRUE(std::is_sorted(got.begin(), got.end()));
+}
+
+TEST(Simulated, StatusIsBestEffortAndOnlyEverLost) {
+  Pair pair(NetworkOptions{});
+  LinkModel lossy;
+  lossy.loss = 1;
+  pair.network.set_all_links(lossy);
+  ClientStatusMessage status;
+  status.client = 1;
+  status.session = "s";
+  ASSERT_TRUE(pair.client->write(status));
+  pair.run(1000 * kMs);
+  EXPECT_EQ(pair.network.counts().repaired, 0U);
+}
+
+TEST(Simulated, AKilledClientIsNoticedAfterTheLeaseAndAClosedOneAtOnce) {
+  Pair pair(NetworkOptions{});
+  auto second = std::move(*pair.network.make_client("s"));
+  pair.run(100 * kMs);
+  const ParticipantId first_id = pair.client->self();
+  const ParticipantId second_id = second->self();
+  ASSERT_TRUE(pair.server->alive(second_id));
+  pair.network.kill(first_id);
+  second.reset();
+  EXPECT_FALSE(pair.server->alive(second_id));
+  pair.run(999 * kMs);
+  EXPECT_TRUE(pair.server->alive(first_id));
+  pair.run(kMs);
+  EXPECT_FALSE(pair.server->alive(first_id));
+  EXPECT_FALSE(pair.server->joined(first_id));
+  EXPECT_FALSE(pair.client->write(ack(1, 1)));
+}
+
+TEST(Simulated, ClientsNoticeTheEndOfAServerAndTheNextOne) {
+  Pair pair(NetworkOptions{});
+  EXPECT_TRUE(pair.client->server_alive());
+  pair.network.kill(pair.server->self());
+  const auto next = std::move(*pair.network.make_server("s"));
+  ASSERT_TRUE(next->write(session(kEpoch + 1)));
+  std::vector<Received<SessionMessage>> sessions;
+  pair.client->take_sessions(sessions);
+  sessions.clear();
+  pair.run(100 * kMs);
+  pair.client->take_sessions(sessions);
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].message.epoch, kEpoch + 1);
+  EXPECT_TRUE(pair.client->server_alive()) << "the lease of the first has not run out";
+  pair.run(1000 * kMs);
+  EXPECT_FALSE(pair.client->server_alive());
+  ASSERT_TRUE(pair.client->open_stream(session(kEpoch + 1)));
+  EXPECT_TRUE(pair.client->server_alive());
+}
+
+TEST(Simulated, AFrozenClientGetsAfterwardsWhatTheServerStillKeeps) {
+  Pair pair(NetworkOptions{}, 8);
+  pair.network.set_frozen(pair.client->self(), true);
+  for (Frame frame = 1; frame <= 20; ++frame) {
+    ASSERT_TRUE(pair.server->write(delta(frame)));
+    pair.run(100 * kMs);
+  }
+  EXPECT_FALSE(pair.server->alive(pair.client->self()));
+  pair.network.set_frozen(pair.client->self(), false);
+  EXPECT_TRUE(pair.server->alive(pair.client->self()));
+  pair.run(100 * kMs);
+  EXPECT_EQ(frames(*pair.client), range(13, 20));
+}
+
+TEST(Simulated, ACutLinkDeliversNothingUntilMended) {
+  Pair pair(NetworkOptions{});
+  const auto other = std::move(*pair.network.make_client("s"));
+  ASSERT_TRUE(other->open_stream(session()));
+  pair.run(100 * kMs);
+  pair.network.set_cut(pair.server->self(), pair.client->self(), true);
+  ASSERT_TRUE(pair.server->write(delta(1)));
+  ASSERT_TRUE(pair.client->write(ack(1, 1)));
+  pair.run(2000 * kMs);
+  EXPECT_TRUE(frames(*pair.client).empty());
+  EXPECT_TRUE(take<AckMessage>(*pair.server).empty());
+  EXPECT_FALSE(pair.client->server_alive());
+  EXPECT_EQ(frames(*other), range(1, 1));
+  EXPECT_TRUE(other->server_alive());
+  pair.network.set_cut(pair.server->self(), pair.client->self(), false);
+  pair.run(100 * kMs);
+  EXPECT_EQ(frames(*pair.client), range(1, 1));
+  EXPECT_EQ(take<AckMessage>(*pair.server).size(), 1U);
+  EXPECT_TRUE(pair.client->server_alive());
+}
+
+TEST(Simulated, AServerSeesOthersButNotItself) {
+  Network network(NetworkOptions{});
+  const auto first = std::move(*network.make_server("s"));
+  const auto second = std::move(*network.make_server("s"));
+  const auto elsewhere = std::move(*network.make_server("t"));
+  ASSERT_TRUE(first->write(session(1)));
+  ASSERT_TRUE(second->write(session(2)));
+  network.advance_to(100 * kMs);
+  std::vector<Received<SessionMessage>> sessions;
+  first->take_sessions(sessions);
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].from, second->self());
+  sessions.clear();
+  elsewhere->take_sessions(sessions);
+  EXPECT_TRUE(sessions.empty());
+}
+
+TEST(Simulated, SamplesThatBreakALimitAreDroppedAndCounted) {
+  Pair pair(NetworkOptions{});
+  DeltaMessage large = delta(1);
+  large.payload.resize(101);
+  ASSERT_TRUE(pair.server->write(large));
+  ASSERT_TRUE(pair.server->write(delta(2)));
+  ASSERT_TRUE(pair.client->write(ack(0, 1)));
+  pair.run(100 * kMs);
+  EXPECT_EQ(frames(*pair.client), range(2, 2));
+  EXPECT_EQ(pair.client->dropped(), 1U);
+  EXPECT_TRUE(take<AckMessage>(*pair.server).empty());
+  EXPECT_EQ(pair.server->dropped(), 1U);
+}
+
+TEST(Simulated, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
+  Pair pair(NetworkOptions{});
+  ASSERT_TRUE(pair.server->write(scheduled(1)));
+  ASSERT_TRUE(pair.server->write(delta(1)));
+  pair.run(100 * kMs);
+  ASSERT_TRUE(pair.client->open_stream(session(kEpoch + 1)));
+  pair.run(100 * kMs);
+  EXPECT_TRUE(frames(*pair.client).empty());
+  EXPECT_EQ(take<ScheduledInputMessage>(*pair.client).size(), 1U) << "kept by the server for new readers";
+}
+
+/// A busy session under every kind of trouble; what everybody received, as text.
+std::string busy_hour(std::uint64_t seed) {
+  NetworkOptions options;
+  options.seed = seed;
+  options.link = LinkModel{3 * kMs, 10 * kMs, 0.1, 15 * kMs, 0.05};
+  Network network(options);
+  const auto server = std::move(*network.make_server("s", 8));
+  std::vector<std::unique_ptr<ClientPort>> clients;
+  EXPECT_TRUE(server->write(session()));
+  std::string log;
+  for (Frame frame = 1; frame <= 120; ++frame) {
+    if (frame % 20 == 1) {
+      clients.push_back(std::move(*network.make_client("s", 8)));
+      EXPECT_TRUE(clients.back()->open_stream(session()));
+    }
+    if (frame == 50) network.set_frozen(clients[0]->self(), true);
+    if (frame == 60) network.set_frozen(clients[0]->self(), false);
+    EXPECT_TRUE(server->write(delta(frame)));
+    network.advance_to(static_cast<std::int64_t>(frame) * 33 * kMs);
+    for (std::size_t i = 0; i < clients.size(); ++i) {
+      if (i == 0 && frame >= 50 && frame < 60) continue;
+      for (const Frame got : frames(*clients[i])) {
+        log += std::to_string(i) + ':' + std::to_string(got) + '@' + std::to_string(frame) + ' ';
+        EXPECT_TRUE(clients[i]->write(ack(i + 1, got)));
+      }
+    }
+    for (const auto& received : take<AckMessage>(*server)) {
+      log += 'a' + std::to_string(received.message.client) + ':' + std::to_string(received.message.applied) +
+             ' ';
+    }
+  }
+  return log;
+}
+
+TEST(Simulated, TheSameSeedGivesTheSameDeliveriesAndAnotherDoesNot) {
+  const std::string first = busy_hour(1);
+  EXPECT_EQ(first, busy_hour(1));
+  EXPECT_NE(first, busy_hour(2));
+}
+
+}  // namespace
+}  // namespace tandem::transport::simulated
