@@ -118,4 +118,59 @@ inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
   return {std::move(*make_codec(codec, capacity, tables_for(codec))), capacity, parameters, kTypes};
 }
 
+/// What every state must hold, whatever bytes it came from; null or what is broken.
+inline const char* broken_invariant(const State& state) {
+  const auto within = [](std::int32_t value, std::int32_t limit) {
+    return -limit <= value && value <= limit;
+  };
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.alive()[slot] > 1) return "alive is neither 0 nor 1";
+    if (state.type()[slot] >= kTypes) return "type that the session does not list";
+    const bool dead = state.alive()[slot] == 0;
+    if (dead && (state.generation()[slot] != 0 || state.type()[slot] != 0)) return "dead slot is not zero";
+    for (std::size_t i = 0; i < kPositionChannels; ++i) {
+      const std::int32_t p = state.p(i)[slot];
+      const std::int32_t v = state.v(i)[slot];
+      const std::int32_t c = state.c(i)[slot];
+      if (dead && (p != 0 || v != 0 || c != 0)) return "dead slot is not zero";
+      if (!within(p, kPositionLimit) || !within(v, kVelocityLimit) || !within(c, kVelocityLimit))
+        return "limits";
+    }
+  }
+  return nullptr;
+}
+
+/// Flips, overwrites, cuts, extends or repeats some of the bytes.
+inline void mutate(Random& random, std::vector<std::byte>& bytes) {
+  for (std::uint64_t changes = 1 + random.below(4); changes > 0; --changes) {
+    const auto at = [&bytes, &random] { return static_cast<std::ptrdiff_t>(random.below(bytes.size())); };
+    const auto any = [&random] { return static_cast<std::byte>(random.below(256)); };
+    switch (bytes.empty() ? 4 : random.below(7)) {
+      case 0:
+        bytes[static_cast<std::size_t>(at())] ^= static_cast<std::byte>(1U << random.below(8));
+        break;
+      case 1:
+        bytes[static_cast<std::size_t>(at())] = any();
+        break;
+      case 2:
+        bytes.resize(static_cast<std::size_t>(at()));
+        break;
+      case 3:
+        bytes.erase(bytes.begin() + at());
+        break;
+      case 4:
+        for (std::uint64_t count = 1 + random.below(8); count > 0; --count) bytes.push_back(any());
+        break;
+      case 5:
+        bytes.insert(bytes.begin() + at(), any());
+        break;
+      default: {
+        const std::vector<std::byte> tail(bytes.begin() + at(), bytes.end());
+        bytes.insert(bytes.end(), tail.begin(), tail.end());
+        break;
+      }
+    }
+  }
+}
+
 }  // namespace tandem::synthetic

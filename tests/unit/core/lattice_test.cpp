@@ -20,7 +20,8 @@ TEST(State, ADeadSlotIsZeroInEveryColumn) {
 TEST(State, SettingABodyClampsToTheLattice) {
   State state(1);
   state.spawn(0, 0, 0, {{INT32_MAX, INT32_MIN, 0}, {INT32_MAX, INT32_MIN, 0}});
-  EXPECT_EQ(state.body(0), (BodyState{{kPositionLimit, -kPositionLimit, 0}, {kVelocityLimit, -kVelocityLimit, 0}}));
+  EXPECT_EQ(state.body(0),
+            (BodyState{{kPositionLimit, -kPositionLimit, 0}, {kVelocityLimit, -kVelocityLimit, 0}}));
 }
 
 TEST(State, DistanceIsExactAtTheCornersOfTheLattice) {
@@ -36,12 +37,12 @@ TEST(StateHasher, TheHashOfTwoBodiesIsTheOneOfThePublishedFormat) {
   const auto add = [&bytes](std::initializer_list<int> values) {
     for (const int value : values) bytes.push_back(static_cast<std::byte>(value));
   };
-  add({0, 1});                                                                         // alive
-  add({0, 1});                                                                         // generation
-  add({0, 0, 3, 0});                                                                   // type
+  add({0, 1});                                                                                  // alive
+  add({0, 1});                                                                                  // generation
+  add({0, 0, 3, 0});                                                                            // type
   add({0, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0xA0, 0x86, 1, 0});  // p
   add({0, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0, 0, 0xC0, 255, 255, 255, 0, 0, 0, 0, 0, 0, 0, 0});      // v
-  bytes.resize(bytes.size() + 24);                                                     // c
+  bytes.resize(bytes.size() + 24);                                                              // c
   EXPECT_EQ(StateHasher().hash(state), hash_bytes(bytes));
 }
 

@@ -24,7 +24,8 @@ void reference_step(State& s, const Drive& drive) {
       v -= share(v, drive.damping);
       s.v(i)[slot] = clamp(v, kVelocityLimit);
       s.c(i)[slot] = clamp(c, kVelocityLimit);
-      s.p(i)[slot] = clamp(std::int64_t{s.p(i)[slot]} + ((std::int64_t{s.v(i)[slot]} + 32) >> 6), kPositionLimit);
+      s.p(i)[slot] =
+          clamp(std::int64_t{s.p(i)[slot]} + ((std::int64_t{s.v(i)[slot]} + 32) >> 6), kPositionLimit);
     }
   }
 }

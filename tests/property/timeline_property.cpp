@@ -1,0 +1,208 @@
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <deque>
+#include <map>
+
+#include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+#include "tests/property/synthetic.hpp"
+
+// Any interleaving of simulated frames, scheduled inputs and deltas ends with the server's state, bit by bit.
+
+namespace tandem {
+namespace {
+
+using synthetic::Random;
+
+/// Ballistic, and each body is drawn to the next slot's: a correction of one spreads to its neighbours.
+class Chained final : public Predictor {
+ public:
+  explicit Chained(std::uint32_t capacity) : before_(capacity) {}
+  [[nodiscard]] std::string_view name() const override { return "chained"; }
+  void step(const State& from, State& to, const Drive& drive) override {
+    before_ = from;
+    ballistic_.step(from, to, drive);
+    for (Slot slot = 0; slot + 1 < to.capacity(); ++slot) {
+      if (to.alive()[slot] == 0 || to.alive()[slot + 1] == 0) continue;
+      for (std::size_t i = 0; i < kPositionChannels; ++i) {
+        const std::int64_t pull = (std::int64_t{before_.p(i)[slot + 1]} - before_.p(i)[slot]) >> 8U;
+        const std::int64_t limit = kVelocityLimit;
+        to.v(i)[slot] = static_cast<std::int32_t>(std::clamp(to.v(i)[slot] + pull, -limit, limit));
+      }
+    }
+  }
+  void step_slots(const State&, State&, const Drive&, std::span<const Slot>) override {
+    FAIL() << "bodies interact: all of them have to be simulated again";
+  }
+  [[nodiscard]] bool interacts() const override { return true; }
+
+ private:
+  State before_;
+  Ballistic ballistic_;
+};
+
+std::unique_ptr<Predictor> make(bool interacting, std::uint32_t capacity) {
+  if (interacting) return std::make_unique<Chained>(capacity);
+  return std::make_unique<Ballistic>();
+}
+
+struct Delta {
+  Frame frame;
+  std::uint64_t last_input;
+  std::uint64_t hash;
+  std::vector<std::byte> payload;
+};
+
+/// A server, what it has published, and one client.
+class Scenario {
+ public:
+  Scenario(Random& random, bool interacting, std::uint32_t lead)
+      : random_(random), interacting_(interacting) {
+    config_.capacity = static_cast<std::uint32_t>(1 + random.below(60));
+    config_.type_count = synthetic::kTypes;
+    config_.codec = codec_names()[random.below(5)];
+    config_.codec_tables = synthetic::tables_for(config_.codec);
+    config_.parameters = {200, 16, 64};
+    config_.max_lead = lead;
+    server_.emplace(*ServerTimeline::create(config_, 1, make(interacting, config_.capacity)));
+    client_.emplace(*ClientTimeline::create(config_, make(interacting, config_.capacity)));
+    reference_ = make(interacting, config_.capacity);
+    server_->start(random.below(1000), synthetic::random_state(random, config_.capacity), random_drive());
+  }
+
+  void join() {
+    std::vector<std::byte> snapshot;
+    server_->snapshot(snapshot);
+    const auto loaded = client_->load(snapshot, 1);
+    RC_ASSERT(loaded.has_value());
+    RC_ASSERT(client_->state(client_->applied()) == server_->state());
+    deltas_.clear();
+    // Late inputs that the snapshot counts may still be on their way, as may be later ones.
+    while (!inputs_.empty() && inputs_.front().number + 3 < server_->last_input()) inputs_.pop_front();
+  }
+
+  void server_frame() {
+    while (random_.one_in(3)) {
+      const ScheduledDrive input{server_->last_input() + 1,
+                                 server_->frame() + 1 + config_.max_lead + random_.below(3), random_drive()};
+      RC_ASSERT(server_->schedule(input).has_value());
+      inputs_.push_back(input);
+      all_inputs_[input.number] = input;
+    }
+    State target = synthetic::random_target(random_, server_->state(), 1 + random_.below(8));
+    const auto lifecycle =
+        synthetic::random_lifecycle(random_, server_->state(), target, 1 + random_.below(30));
+    if (random_.one_in(10))
+      server_->set_parameters({static_cast<std::int32_t>(50 + random_.below(500)), 8, 32});
+    const auto frame =
+        server_->advance(target, lifecycle, random_.one_in(2) ? kNoBudget : random_.below(400));
+    deltas_.push_back(
+        {frame.frame, frame.last_input, frame.hash, {frame.payload.begin(), frame.payload.end()}});
+  }
+
+  bool deliver_input() {
+    if (inputs_.empty()) return false;
+    // Mostly in order; sometimes the second overtakes the first.
+    const std::size_t at = inputs_.size() > 1 && random_.one_in(4) ? 1 : 0;
+    const ScheduledDrive input = inputs_[at];
+    inputs_.erase(inputs_.begin() + static_cast<std::ptrdiff_t>(at));
+    delivered_ = std::max(delivered_, input.number);
+    RC_ASSERT(client_->schedule(input).has_value());
+    if (random_.one_in(4)) RC_ASSERT(client_->schedule(input).has_value());
+    return true;
+  }
+
+  bool deliver_delta() {
+    if (deltas_.empty()) return false;
+    const Delta& delta = deltas_.front();
+    if (!client_->holds_inputs(delta.last_input)) return false;
+    const auto applied = client_->apply(delta.frame, delta.last_input, delta.hash, delta.payload);
+    RC_ASSERT(applied.has_value());
+    RC_ASSERT(client_->applied() == delta.frame);
+    deltas_.pop_front();
+    return true;
+  }
+
+  void client_frame() { client_->step(static_cast<std::uint32_t>(random_.below(6))); }
+
+  /// Where every input issued has arrived: what the client holds beyond its last delta is what a fresh
+  /// simulation of the agreed frame says.
+  void check_ahead() {
+    RC_ASSERT(client_->now() >= client_->applied());
+    RC_ASSERT(client_->now() <= client_->applied() + config_.max_lead);
+    if (!inputs_.empty()) return;
+    State state = client_->state(client_->applied());
+    Drive drive = client_->drive();
+    for (Frame frame = client_->applied() + 1; frame <= client_->now(); ++frame) {
+      for (const auto& [number, input] : all_inputs_) {
+        if (input.frame == frame) drive = input.drive;
+      }
+      reference_->step(state, state, drive);
+      RC_ASSERT(client_->state(frame) == state);
+    }
+  }
+
+  void drain() {
+    while (deliver_input()) check_ahead();
+    while (deliver_delta()) check_ahead();
+    RC_ASSERT(deltas_.empty());
+    RC_ASSERT(client_->state(client_->applied()) == server_->state());
+    RC_ASSERT(client_->hash() == server_->hash());
+  }
+
+ private:
+  Drive random_drive() {
+    return {{random_.value(1 << 16), random_.value(1 << 16), random_.value(1 << 16)},
+            static_cast<std::uint16_t>(random_.below(3000)),
+            static_cast<std::uint16_t>(random_.below(500))};
+  }
+
+  Random& random_;
+  bool interacting_;
+  TimelineConfig config_;
+  std::optional<ServerTimeline> server_;
+  std::optional<ClientTimeline> client_;
+  std::unique_ptr<Predictor> reference_;
+  std::deque<ScheduledDrive> inputs_;
+  std::map<std::uint64_t, ScheduledDrive> all_inputs_;
+  std::deque<Delta> deltas_;
+  std::uint64_t delivered_ = 0;
+};
+
+void any_interleaving(bool interacting) {
+  Random random(*rc::gen::arbitrary<std::uint64_t>());
+  Scenario scenario(random, interacting, static_cast<std::uint32_t>(random.below(5)));
+  for (std::uint64_t before = random.below(5); before > 0; --before) scenario.server_frame();
+  scenario.join();
+  for (int turn = 0; turn < 120; ++turn) {
+    switch (random.below(8)) {
+      case 0:
+      case 1:
+        scenario.server_frame();
+        break;
+      case 2:
+      case 3:
+        scenario.deliver_input();
+        break;
+      case 4:
+      case 5:
+        scenario.client_frame();
+        break;
+      case 6:
+        scenario.deliver_delta();
+        break;
+      default:
+        if (random.one_in(20)) scenario.join();
+        break;
+    }
+    scenario.check_ahead();
+  }
+  scenario.drain();
+}
+
+RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesDoNotInteract, ()) { any_interleaving(false); }
+RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesInteract, ()) { any_interleaving(true); }
+
+}  // namespace
+}  // namespace tandem

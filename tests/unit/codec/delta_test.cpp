@@ -1,0 +1,267 @@
+#include "sdk/core/codec/delta.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/property/synthetic.hpp"
+
+namespace tandem {
+namespace {
+
+using synthetic::make_delta;
+using Bytes = std::vector<std::byte>;
+
+constexpr CodecParameters kParameters{100, 10, 20};
+
+// Slots 0, 1, 2 alive, 3 dead.
+State three_of_four() {
+  State state(4);
+  for (Slot slot = 0; slot < 3; ++slot)
+    state.spawn(slot, 0, 0, {{static_cast<std::int32_t>(slot), 0, 0}, {}});
+  return state;
+}
+
+class Payload {
+ public:
+  Payload& section(std::uint16_t type, std::initializer_list<std::int64_t> u32_values) {
+    put(type);
+    put(static_cast<std::uint32_t>(4 * u32_values.size()));
+    for (const std::int64_t value : u32_values) put(static_cast<std::uint32_t>(value));
+    return *this;
+  }
+  Payload& record(LifecycleKind kind, Slot slot, TypeId type = 0, std::int32_t px = 0, std::int32_t vx = 0) {
+    Bytes body;
+    std::swap(body, bytes_);
+    put(slot);
+    put(static_cast<std::uint8_t>(kind));
+    if (kind == LifecycleKind::kSpawn) put(std::uint8_t{9});
+    if (kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTypeChange) put(type);
+    if (kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport) {
+      for (const std::int32_t value : {px, 0, 0, vx, 0, 0}) put(value);
+    }
+    records_.insert(records_.end(), bytes_.begin(), bytes_.end());
+    std::swap(body, bytes_);
+    return *this;
+  }
+  Payload& end_lifecycle() {
+    put(static_cast<std::uint16_t>(SectionType::kLifecycle));
+    put(static_cast<std::uint32_t>(records_.size()));
+    bytes_.insert(bytes_.end(), records_.begin(), records_.end());
+    records_.clear();
+    return *this;
+  }
+  [[nodiscard]] const Bytes& bytes() const { return bytes_; }
+
+ private:
+  template <class T>
+  void put(T value) {
+    Bytes memory(sizeof value);
+    ByteWriter(memory).put(value);
+    bytes_.insert(bytes_.end(), memory.begin(), memory.end());
+  }
+  Bytes bytes_, records_;
+};
+
+// Decodes into three_of_four(); a refusal must leave it alone.
+Result<State> decode(const Bytes& payload, std::string_view codec = "quantized") {
+  DeltaCodec delta = make_delta(codec, 4, kParameters);
+  State state = three_of_four();
+  const auto decoded = delta.decode(state, payload);
+  if (decoded) return state;
+  EXPECT_EQ(state, three_of_four());
+  EXPECT_EQ(delta.parameters(), kParameters);
+  EXPECT_TRUE(delta.touched().empty());
+  EXPECT_TRUE(delta.lifecycle().empty());
+  return tl::unexpected<Error>(decoded.error());
+}
+
+TEST(DeltaCodec, AnEmptyPayloadChangesNothing) {
+  const auto state = decode({});
+  ASSERT_TRUE(state);
+  EXPECT_EQ(*state, three_of_four());
+}
+
+TEST(DeltaCodec, TheFourRecordsDoWhatTheySay) {
+  const auto state = decode(Payload()
+                                .record(LifecycleKind::kDespawn, 0)
+                                .record(LifecycleKind::kTeleport, 1, 0, 50, 6)
+                                .record(LifecycleKind::kTypeChange, 2, 2)
+                                .record(LifecycleKind::kSpawn, 3, 1, 70)
+                                .end_lifecycle()
+                                .bytes());
+  ASSERT_TRUE(state) << state.error().message;
+  State expected = three_of_four();
+  expected.despawn(0);
+  expected.set_body(1, {{50, 0, 0}, {6, 0, 0}});
+  expected.type()[2] = 2;
+  expected.spawn(3, 9, 1, {{70, 0, 0}, {}});
+  EXPECT_EQ(*state, expected);
+}
+
+TEST(DeltaCodec, ASlotMayBeReusedWithinAFrame) {
+  EXPECT_TRUE(decode(
+      Payload().record(LifecycleKind::kDespawn, 1).record(LifecycleKind::kSpawn, 1).end_lifecycle().bytes()));
+}
+
+TEST(DeltaCodec, RecordsThatBreakTheRulesAreRefused) {
+  using K = LifecycleKind;
+  EXPECT_FALSE(decode(Payload().record(K::kSpawn, 0).end_lifecycle().bytes())) << "alive";
+  EXPECT_FALSE(decode(Payload().record(K::kDespawn, 3).end_lifecycle().bytes())) << "dead";
+  EXPECT_FALSE(decode(Payload().record(K::kTeleport, 3).end_lifecycle().bytes())) << "dead";
+  EXPECT_FALSE(decode(Payload().record(K::kTypeChange, 3).end_lifecycle().bytes())) << "dead";
+  EXPECT_FALSE(decode(Payload().record(K::kDespawn, 4).end_lifecycle().bytes())) << "beyond the capacity";
+  EXPECT_FALSE(decode(Payload().record(K::kTypeChange, 0, synthetic::kTypes).end_lifecycle().bytes()))
+      << "type";
+  EXPECT_FALSE(decode(Payload().record(K::kSpawn, 3, synthetic::kTypes).end_lifecycle().bytes())) << "type";
+  EXPECT_FALSE(decode(Payload().record(K::kTeleport, 0, 0, kPositionLimit + 1).end_lifecycle().bytes()))
+      << "p";
+  EXPECT_FALSE(decode(Payload().record(K::kTeleport, 0, 0, 0, -kVelocityLimit - 1).end_lifecycle().bytes()))
+      << "v";
+  EXPECT_FALSE(decode(Payload().record(K::kDespawn, 1).record(K::kDespawn, 0).end_lifecycle().bytes()))
+      << "order";
+  EXPECT_FALSE(decode(Payload().record(K::kDespawn, 1).record(K::kDespawn, 1).end_lifecycle().bytes()))
+      << "twice";
+  EXPECT_FALSE(decode(Payload().record(K::kTeleport, 1).record(K::kTypeChange, 1).end_lifecycle().bytes()))
+      << "pair";
+  EXPECT_FALSE(decode(Payload().record(static_cast<K>(4), 1).end_lifecycle().bytes())) << "kind";
+  EXPECT_FALSE(decode(Payload().end_lifecycle().bytes())) << "no record";
+}
+
+TEST(DeltaCodec, CorrectionsSeeTheSlotsAfterLifecycle) {
+  // Mask of slot 3, which this delta spawns at 70: one position step of 10 on x.
+  const std::int64_t mask_and_values = 0x08'01'0000;  // block 0, form 1, mask 0b1000
+  Payload spawned;
+  spawned.record(LifecycleKind::kSpawn, 3, 0, 70).end_lifecycle();
+  Bytes payload = spawned.bytes();
+  const Payload corrections =
+      Payload().section(static_cast<std::uint16_t>(SectionType::kCorrections), {mask_and_values, 1});
+  Bytes section = corrections.bytes();
+  section.resize(section.size() + 2);  // the last two velocity residuals
+  section[2] = std::byte{10};
+  payload.insert(payload.end(), section.begin(), section.end());
+  const auto state = decode(payload);
+  ASSERT_TRUE(state) << state.error().message;
+  EXPECT_EQ(state->p(0)[3], 80);
+  EXPECT_FALSE(decode(section)) << "slot 3 is dead without the spawn";
+}
+
+TEST(DeltaCodec, ParametersTravelWithTheDeltaThatUsesThemFirst) {
+  DeltaCodec server = make_delta("quantized", 4, kParameters);
+  DeltaCodec client = make_delta("quantized", 4, kParameters);
+  Bytes out(server.bound());
+  State agreed = three_of_four();
+  State held = agreed;
+  State target = agreed;
+  target.p(0)[0] = 1000;
+  const CodecParameters changed{50, 1, 1};
+  server.set_parameters(changed);
+  auto encoded = server.encode(agreed, target, {}, kNoBudget, out);
+  ASSERT_TRUE(client.decode(held, std::span(out).first(encoded.size_bytes)));
+  EXPECT_EQ(held, agreed);
+  EXPECT_EQ(held.p(0)[0], 127);
+  EXPECT_EQ(client.parameters(), changed);
+  const std::size_t with_parameters = encoded.size_bytes;
+  encoded = server.encode(agreed, target, {}, kNoBudget, out);
+  EXPECT_EQ(encoded.size_bytes, with_parameters - 18);
+  EXPECT_EQ(encoded.correction_bytes, encoded.size_bytes);
+}
+
+TEST(DeltaCodec, ParametersOutOfRangeAreRefused) {
+  const auto with = [](std::initializer_list<std::int64_t> values) {
+    return Payload().section(static_cast<std::uint16_t>(SectionType::kParameters), values).bytes();
+  };
+  EXPECT_TRUE(decode(with({1, 1, 1})));
+  EXPECT_FALSE(decode(with({0, 1, 1})));
+  EXPECT_FALSE(decode(with({1, -1, 1})));
+  EXPECT_FALSE(decode(with({1, 1, kMaxStep + 1})));
+  EXPECT_FALSE(decode(with({1, 1})));
+  EXPECT_FALSE(decode(with({1, 1, 1, 1})));
+}
+
+TEST(DeltaCodec, UnknownSectionsAreSkippedUnlessCritical) {
+  EXPECT_TRUE(decode(Payload().section(77, {1, 2, 3}).bytes()));
+  const auto refused = decode(Payload().section(77 | kCriticalSection, {1, 2, 3}).bytes());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
+}
+
+TEST(DeltaCodec, SectionsOutOfOrderOrRepeatedAreRefused) {
+  const auto parameters = static_cast<std::uint16_t>(SectionType::kParameters);
+  EXPECT_FALSE(decode(Payload().section(parameters, {1, 1, 1}).section(parameters, {1, 1, 1}).bytes()));
+  EXPECT_FALSE(decode(
+      Payload().section(parameters, {1, 1, 1}).record(LifecycleKind::kDespawn, 0).end_lifecycle().bytes()));
+}
+
+TEST(DeltaCodec, ABlockMayComeOnlyOnce) {
+  DeltaCodec server = make_delta("quantized", 4, kParameters);
+  Bytes out(server.bound());
+  State state = three_of_four();
+  State target = state;
+  target.p(0)[0] = 1000;
+  const auto encoded = server.encode(state, target, {}, kNoBudget, out);
+  Bytes payload(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(encoded.size_bytes));
+  EXPECT_TRUE(decode(payload));
+  payload.insert(payload.end(), payload.begin(), payload.end());
+  EXPECT_FALSE(decode(payload));
+}
+
+TEST(DeltaCodec, EveryTruncationAndExtensionOfADeltaIsRefused) {
+  for (const std::string_view name : codec_names()) {
+    SCOPED_TRACE(name);
+    DeltaCodec server = make_delta(name, 4, kParameters);
+    Bytes out(server.bound());
+    State state = three_of_four();
+    State target = state;
+    for (Slot slot = 0; slot < 2; ++slot) target.p(0)[slot] = 1000;
+    target.despawn(2);
+    const std::vector<LifecycleRecord> lifecycle{{LifecycleKind::kDespawn, 2, 0, 0, {}}};
+    server.set_parameters({99, 9, 9});
+    const auto encoded = server.encode(state, target, lifecycle, kNoBudget, out);
+    const std::vector<std::size_t> boundaries{0, 11, 11 + 18};  // between sections
+    for (std::size_t size = 0; size < encoded.size_bytes; ++size) {
+      const bool whole = std::find(boundaries.begin(), boundaries.end(), size) != boundaries.end();
+      EXPECT_EQ(decode(Bytes(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(size)), name).has_value(),
+                whole);
+    }
+    out.resize(encoded.size_bytes);
+    EXPECT_TRUE(decode(out, name));
+    out.push_back(std::byte{0});
+    EXPECT_FALSE(decode(out, name));
+  }
+}
+
+TEST(DeltaCodec, TouchedNamesEachSlotOfRecordsAndCorrectionsOnce) {
+  DeltaCodec server = make_delta("selective", 4, kParameters);
+  Bytes out(server.bound());
+  State state = three_of_four();
+  State target = state;
+  target.p(0)[2] = 5000;
+  target.p(0)[0] = 7000;
+  const LifecycleRecord spawn{LifecycleKind::kSpawn, 1, 1, 1, {{3, 3, 3}, {}}};
+  target.spawn(1, 1, 1, spawn.body);
+  target.p(0)[1] = 9000;
+  const std::vector<LifecycleRecord> lifecycle{{LifecycleKind::kDespawn, 1, 0, 0, {}}, spawn};
+  server.encode(state, target, lifecycle, kNoBudget, out);
+  EXPECT_EQ(std::vector<Slot>(server.touched().begin(), server.touched().end()),
+            (std::vector<Slot>{0, 1, 2}));
+  EXPECT_EQ(server.lifecycle().size(), 2U);
+  EXPECT_EQ(state, target);
+}
+
+TEST(DeltaCodec, StatisticsSeeWhatIsCorrected) {
+  DeltaCodec server = make_delta("selective", 4, kParameters);
+  Bytes out(server.bound());
+  State state = three_of_four();
+  State target = state;
+  target.p(0)[0] = 5000;
+  CodecStatistics statistics;
+  server.set_statistics(&statistics);
+  server.encode(state, target, {}, kNoBudget, out);
+  server.set_statistics(nullptr);
+  server.encode(state, three_of_four(), {}, kNoBudget, out);
+  EXPECT_EQ(statistics.frames, 1U);
+  EXPECT_EQ(statistics.bodies, 1U);
+  EXPECT_EQ(statistics.largest_position, 5000U);
+}
+
+}  // namespace
+}  // namespace tandem

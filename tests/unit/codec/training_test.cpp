@@ -1,0 +1,50 @@
+#include "sdk/core/codec/training.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tandem {
+namespace {
+
+TEST(Training, RangesAreATenthAboveTheLargestResidual) {
+  CodecStatistics statistics;
+  statistics.largest_position = 127000;
+  statistics.largest_velocity = 1270;
+  const CodecParameters parameters = trained_parameters(statistics, 50);
+  EXPECT_EQ(parameters.threshold, 50);
+  EXPECT_EQ(parameters.position_step, 1100);
+  EXPECT_EQ(parameters.velocity_step, 11);
+}
+
+TEST(Training, WithoutAResidualTheStepsAreOne) {
+  const CodecParameters parameters = trained_parameters({}, 50);
+  EXPECT_EQ(parameters.position_step, 1);
+  EXPECT_EQ(parameters.velocity_step, 1);
+}
+
+TEST(Training, OnlyBodiesBeyondTheThresholdCount) {
+  State predicted(3);
+  for (Slot slot = 0; slot < 3; ++slot) predicted.spawn(slot, 0, 0, {});
+  State target = predicted;
+  target.p(0)[0] = 100;  // at the threshold, not beyond it
+  target.v(0)[0] = 9999;
+  target.p(1)[2] = -101;
+  target.v(2)[2] = 40;
+  CodecStatistics statistics;
+  statistics.observe(predicted, target, {100, 10, 20});
+  EXPECT_EQ(statistics.bodies, 1U);
+  EXPECT_EQ(statistics.largest_position, 101U);
+  EXPECT_EQ(statistics.largest_velocity, 40U);
+  EXPECT_EQ(statistics.position_counts[static_cast<std::uint8_t>(-10)], 1U);
+  EXPECT_EQ(statistics.position_counts[0], 2U);
+  EXPECT_EQ(statistics.velocity_counts[2], 1U);
+}
+
+TEST(Training, TablesFitTheCodecThatReadsThem) {
+  EXPECT_TRUE(make_codec("entropy", 10, default_code_tables()));
+  CodecStatistics statistics;
+  statistics.position_counts[0] = 1000000;
+  EXPECT_TRUE(make_codec("limited", 10, trained_tables(statistics)));
+}
+
+}  // namespace
+}  // namespace tandem

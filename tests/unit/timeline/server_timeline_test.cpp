@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+
+#include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/timeline/snapshot.hpp"
+#include "tests/unit/timeline/session.hpp"
+
+namespace tandem {
+namespace {
+
+using namespace synthetic;
+
+TEST(ServerTimeline, RefusesConfigurationsThatMakeNoSession) {
+  const auto code = [](const TimelineConfig& config) {
+    return ServerTimeline::create(config, 1).error().code;
+  };
+  TimelineConfig config = config_for("none", 10);
+  config.codec = "zip";
+  EXPECT_EQ(code(config), ErrorCode::kUnsupported);
+  config = config_for("none", 10);
+  config.predictor = "oracle";
+  EXPECT_EQ(code(config), ErrorCode::kUnsupported);
+  EXPECT_EQ(code(config_for("none", 0)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(config_for("none", kMaxCapacity + 1)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(config_for("none", 10, kMaxLead + 1)), ErrorCode::kInvalidArgument);
+  config = config_for("none", 10);
+  config.parameters.threshold = 0;
+  EXPECT_EQ(code(config), ErrorCode::kInvalidArgument);
+  config = config_for("none", 10);
+  config.type_count = 0;
+  EXPECT_EQ(code(config), ErrorCode::kInvalidArgument);
+}
+
+TEST(ServerTimeline, AFrameThatTheTargetPredictsCostsNothing) {
+  Random random(1);
+  const State start = random_state(random, 50);
+  const Drive drive{{0, -640, 0}, 10, 0};
+  auto server = server_of(config_for("entropy", 50));
+  server.start(7, start, drive);
+  State target(50);
+  Ballistic().step(start, target, drive);
+  const auto frame = server.advance(target, {});
+  EXPECT_EQ(frame.frame, 8U);
+  EXPECT_EQ(frame.last_input, 0U);
+  EXPECT_TRUE(frame.payload.empty());
+  EXPECT_EQ(server.state(), target);
+  EXPECT_EQ(frame.hash, StateHasher().hash(target));
+}
+
+TEST(ServerTimeline, AScheduledDriveActsInTheStepThatProducesItsFrame) {
+  auto server = server_of(config_for("entropy", 1));
+  State state(1);
+  state.spawn(0, 0, 0, {});
+  server.start(0, state, Drive{});
+  ASSERT_TRUE(server.schedule({1, 2, Drive{{640, 0, 0}, 0, 0}}));
+  EXPECT_EQ(server.advance(state, {}).last_input, 1U);
+  EXPECT_EQ(server.drive().gravity[0], 0);
+  server.advance(state, {});
+  EXPECT_EQ(server.drive().gravity[0], 640);
+  EXPECT_EQ(server.state().p(0)[0], 10);
+  server.advance(state, {});
+  EXPECT_EQ(server.state().p(0)[0], 30) << "in force from then on";
+}
+
+TEST(ServerTimeline, InputsAreNumberedWithoutGapsAndLieInTheFuture) {
+  auto server = server_of(config_for("entropy", 1));
+  server.start(5, State(1), Drive{});
+  EXPECT_EQ(server.schedule({2, 9, {}}).error().code, ErrorCode::kOutOfOrder);
+  EXPECT_EQ(server.schedule({1, 5, {}}).error().code, ErrorCode::kOutOfOrder);
+  EXPECT_EQ(server.schedule({1, 6, Drive{{INT32_MIN, 0, 0}, 0, 0}}).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_TRUE(server.schedule({1, 6, {}}));
+  EXPECT_EQ(server.schedule({1, 7, {}}).error().code, ErrorCode::kOutOfOrder);
+}
+
+TEST(ServerTimeline, TimesAreMeasuredByTheClockItIsGiven) {
+  auto server = server_of(config_for("entropy", 1));
+  server.start(0, State(1), Drive{});
+  EXPECT_EQ(server.advance(State(1), {}).predict_ms, 0);
+  server.set_clock([] {
+    static std::int64_t now_ns = 0;
+    return now_ns += 1'000'000;
+  });
+  const auto frame = server.advance(State(1), {});
+  EXPECT_DOUBLE_EQ(frame.predict_ms, 1);
+  EXPECT_DOUBLE_EQ(frame.encode_ms, 1);
+  EXPECT_DOUBLE_EQ(frame.hash_ms, 1);
+}
+
+TEST(ServerTimeline, NoPayloadOrSnapshotExceedsItsBound) {
+  Random random(4);
+  for (const std::string_view codec : codec_names()) {
+    auto server = server_of(config_for(codec, 70));
+    server.start(0, random_state(random, 70, 0), Drive{});
+    State target = random_state(random, 70, 0);
+    std::vector<LifecycleRecord> lifecycle;
+    for (Slot slot = 0; slot < 70; ++slot) {
+      lifecycle.push_back({LifecycleKind::kDespawn, slot, 0, 0, {}});
+      lifecycle.push_back({LifecycleKind::kSpawn, slot, 0, 0, random_body(random)});
+    }
+    server.set_parameters({1, 1, 1});
+    EXPECT_LE(server.advance(target, lifecycle).payload.size(), server.payload_bound());
+    EXPECT_LE(snapshot_of(server).size(), server.snapshot_bound());
+  }
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,136 @@
+#include "sdk/core/timeline/snapshot.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/timeline/session.hpp"
+
+namespace tandem {
+namespace {
+
+using namespace synthetic;
+
+std::unique_ptr<Codec> codec_for(std::uint32_t capacity) {
+  return std::move(*make_codec("selective", capacity, {}));
+}
+
+std::vector<std::byte> write(const Snapshot& snapshot, const State& state) {
+  std::vector<std::byte> bytes(snapshot_bytes_bound(state.capacity(), 0));
+  ByteWriter out(bytes);
+  write_snapshot(snapshot, state, *codec_for(state.capacity()), out);
+  EXPECT_FALSE(out.overflow());
+  bytes.resize(out.size());
+  return bytes;
+}
+
+Snapshot example() {
+  Snapshot snapshot;
+  snapshot.epoch = kEpoch;
+  snapshot.frame = 1234567890123;
+  snapshot.last_input = 9;
+  snapshot.drive = {{1, -2, 3}, 4, 5};
+  snapshot.parameters = {100, 10, 20};
+  snapshot.hash = 0xFEDCBA9876543210U;
+  snapshot.pending = {{8, snapshot.frame + 1, {{5, 5, 5}, 1, 2}}, {9, snapshot.frame + 2, {{6, 6, 6}, 1, 2}}};
+  return snapshot;
+}
+
+TEST(Snapshot, ReadsBackWhatWasWritten) {
+  Random random(6);
+  for (const std::uint32_t capacity : {1U, 7U, 64U, 65U, 1000U}) {
+    State state = random_state(random, capacity);
+    for (Slot slot = 0; slot < capacity; ++slot) {
+      if (state.alive()[slot] != 0) state.c(1)[slot] = random.value(kVelocityLimit);
+    }
+    State loaded(capacity);
+    const auto codec = codec_for(capacity);
+    const auto read = read_snapshot(write(example(), state), kTypes, loaded, *codec);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(loaded, state);
+    EXPECT_EQ(read->epoch, example().epoch);
+    EXPECT_EQ(read->frame, example().frame);
+    EXPECT_EQ(read->last_input, example().last_input);
+    EXPECT_EQ(read->drive, example().drive);
+    EXPECT_EQ(read->parameters, example().parameters);
+    EXPECT_EQ(read->hash, example().hash);
+    EXPECT_EQ(read->pending, example().pending);
+  }
+}
+
+TEST(Snapshot, CostsAtMostTwentyBytesABodyInAWorldOf23BitPositions) {
+  Random random(7);
+  State state(10000);
+  for (Slot slot = 0; slot < 10000; ++slot) {
+    BodyState body;
+    for (std::int32_t& p : body.p) p = random.even(1 << 22);
+    for (std::int32_t& v : body.v) v = random.even(1 << 19);
+    state.spawn(slot, 0, static_cast<TypeId>(random.below(kTypes)), body);
+  }
+  EXPECT_LE(write(example(), state).size(), 20U * 10000U);
+}
+
+TEST(Snapshot, DeadSlotsCostABit) { EXPECT_LE(write({}, State(80000)).size(), 10000U + 100U); }
+
+TEST(Snapshot, ValuesThatNoStateMayHoldAreRefused) {
+  const auto refused = [](const Snapshot& snapshot, const State& state, TypeId types = kTypes) {
+    State loaded(state.capacity());
+    const auto codec = codec_for(state.capacity());
+    return !read_snapshot(write(snapshot, state), types, loaded, *codec).has_value();
+  };
+  State state(3);
+  state.spawn(1, 0, 2, {});
+  EXPECT_FALSE(refused(example(), state));
+  EXPECT_TRUE(refused(example(), state, 2)) << "type";
+  State broken = state;
+  broken.p(0)[1] = kPositionLimit + 1;
+  EXPECT_TRUE(refused(example(), broken));
+  broken = state;
+  broken.v(2)[1] = -kVelocityLimit - 1;
+  EXPECT_TRUE(refused(example(), broken));
+  broken = state;
+  broken.c(2)[1] = kVelocityLimit + 1;
+  EXPECT_TRUE(refused(example(), broken));
+
+  Snapshot snapshot = example();
+  snapshot.parameters.position_step = 0;
+  EXPECT_TRUE(refused(snapshot, state));
+  snapshot = example();
+  snapshot.drive.gravity[0] = INT32_MAX;
+  EXPECT_TRUE(refused(snapshot, state));
+  snapshot = example();
+  snapshot.frame = UINT64_MAX;
+  EXPECT_TRUE(refused(snapshot, state));
+  snapshot = example();
+  std::swap(snapshot.pending[0], snapshot.pending[1]);
+  EXPECT_TRUE(refused(snapshot, state)) << "inputs ascend";
+  snapshot = example();
+  snapshot.pending[1].number = 10;
+  EXPECT_TRUE(refused(snapshot, state)) << "not issued yet";
+  snapshot = example();
+  snapshot.pending[0].frame = snapshot.frame;
+  EXPECT_TRUE(refused(snapshot, state)) << "has acted already";
+}
+
+TEST(Snapshot, OfAnotherCapacityOrVersionIsRefused) {
+  State state(3);
+  State other(4);
+  auto bytes = write(example(), state);
+  EXPECT_EQ(read_snapshot(bytes, kTypes, other, *codec_for(4)).error().code, ErrorCode::kMalformed);
+  bytes[4] = std::byte{2};
+  EXPECT_EQ(read_snapshot(bytes, kTypes, state, *codec_for(3)).error().code, ErrorCode::kUnsupported);
+}
+
+TEST(Snapshot, TheHashOfAClientsStateIsChecked) {
+  auto server = server_of(config_for("selective", 3));
+  auto client = client_of(config_for("selective", 3));
+  State state(3);
+  state.spawn(1, 0, 0, {{1, 2, 3}, {}});
+  server.start(0, state, {});
+  auto bytes = snapshot_of(server);
+  EXPECT_TRUE(client.load(bytes, kEpoch));
+  bytes[58] ^= std::byte{1};  // a byte of the hash
+  EXPECT_EQ(client.load(bytes, kEpoch).error().code, ErrorCode::kMismatch);
+  EXPECT_FALSE(client.playing());
+}
+
+}  // namespace
+}  // namespace tandem
