@@ -1,0 +1,200 @@
+#include "services/scenes/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/engine/particles/particles.hpp"
+#include "services/scenes/convert.hpp"
+#include "services/scenes/directory.hpp"
+#include "services/scenes/random.hpp"
+#include "services/scenes/scene_checks.hpp"
+#include "services/scenes/start_block.hpp"
+
+namespace tandem::scenes {
+namespace {
+
+using engine::Vec3;
+using engine::Vec3f;
+
+Vec3f to_float(const Vec3& v) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+Vec3f to_float(const idl::Vec3& v) { return to_float(to_vec3(v)); }
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+engine::Material to_material(const idl::Material& m) {
+  return {static_cast<float>(m.spring()), static_cast<float>(m.damping()), static_cast<float>(m.shear())};
+}
+
+engine::Plane to_plane(const idl::Plane& plane) {
+  const Vec3 normal = normalised(to_vec3(plane.normal()), {0, 1, 0});
+  return {to_float(normal), static_cast<float>(dot(normal, to_vec3(plane.through())))};
+}
+
+engine::Box to_box(const idl::Box& box) {
+  std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  for (const idl::Turn& turn : box.turns()) {
+    const double length = std::sqrt(turn.rise() * turn.rise() + turn.run() * turn.run());
+    const double sine = turn.rise() / length;
+    const double cosine = turn.run() / length;
+    const std::size_t about = turn.axis() == "x" ? 0 : turn.axis() == "y" ? 1 : 2;
+    const std::size_t b = (about + 1) % 3;
+    const std::size_t c = (about + 2) % 3;
+    for (Vec3& axis : axes) {
+      const double old_b = axis[b];
+      axis[b] = cosine * old_b - sine * axis[c];
+      axis[c] = sine * old_b + cosine * axis[c];
+    }
+  }
+  engine::Box result;
+  result.centre = to_float(box.centre());
+  const Vec3 size = to_vec3(box.size());
+  result.half = to_float(Vec3{size[0] / 2, size[1] / 2, size[2] / 2});
+  for (std::size_t i = 0; i < 3; ++i) result.axes[i] = to_float(axes[i]);
+  return result;
+}
+
+std::uint16_t type_named(const Scene& scene, const std::string& name) {
+  const auto found = std::find_if(scene.types.begin(), scene.types.end(),
+                                  [&](const BodyType& type) { return type.name == name; });
+  return static_cast<std::uint16_t>(found - scene.types.begin());
+}
+
+engine::Region to_region(const Scene& scene, const idl::Region& region) {
+  engine::Region result;
+  result.low = to_float(region.region().low());
+  result.high = to_float(region.region().high());
+  if (region.action_case() == idl::Region::kTeleportBy) {
+    result.action = engine::Region::Action::kTeleport;
+    result.offset = to_float(region.teleport_by());
+  } else if (region.action_case() == idl::Region::kSetType) {
+    result.action = engine::Region::Action::kSetType;
+    result.type = type_named(scene, region.set_type());
+  }
+  return result;
+}
+
+void read_types(const idl::Scene& file, Scene& scene) {
+  for (const idl::BodyType& type : file.types()) {
+    BodyType read{type.name(), type.radius_m(), type.mass_kg(), 0, type.share()};
+    (void)read_colour(type.colour(), read.colour_rgba);  // checked before
+    scene.types.push_back(read);
+    scene.world.types.push_back({static_cast<float>(type.radius_m()), static_cast<float>(type.mass_kg())});
+  }
+  scene.smallest_radius_m =
+      std::min_element(scene.types.begin(), scene.types.end(), [](const BodyType& a, const BodyType& b) {
+        return a.radius_m < b.radius_m;
+      })->radius_m;
+  scene.threshold_m = file.threshold_radii() * scene.smallest_radius_m;
+}
+
+void read_world(const idl::Scene& file, Scene& scene) {
+  engine::World& world = scene.world;
+  world.dt_s = static_cast<float>(file.dt_s());
+  world.substeps = std::max(file.substeps(), 1U);
+  world.gravity = to_float(file.gravity());
+  world.damping_per_s = static_cast<float>(file.damping_per_s());
+  world.low = to_float(file.bounds().low());
+  world.high = to_float(file.bounds().high());
+  world.pair = to_material(file.pair());
+  world.wall = file.has_wall() ? to_material(file.wall()) : world.pair;
+  for (const idl::Plane& plane : file.planes()) world.planes.push_back(to_plane(plane));
+  for (const idl::Box& box : file.boxes()) world.boxes.push_back(to_box(box));
+  for (const idl::Sphere& sphere : file.spheres()) {
+    world.balls.push_back({to_float(sphere.centre()), static_cast<float>(sphere.radius_m())});
+  }
+  for (const idl::Emitter& emitter : file.emitters()) {
+    world.emitters.push_back({to_float(emitter.region().low()), to_float(emitter.region().high()),
+                              to_float(emitter.velocity()), emitter.rate_per_s(),
+                              type_named(scene, emitter.type())});
+  }
+  for (const idl::Region& region : file.regions()) world.regions.push_back(to_region(scene, region));
+  const double gravity = std::sqrt(dot(scene.gravity, scene.gravity));
+  world.max_gravity = file.max_gravity() > 0 ? file.max_gravity() : 10 * std::max(gravity, 1.0);
+  world.max_push = file.max_push() > 0 ? file.max_push() : 100 * scene.smallest_radius_m;
+  for (const idl::Vec3& corner : {file.bounds().low(), file.bounds().high()}) {
+    for (const double v : to_vec3(corner)) scene.extent_m = std::max(scene.extent_m, std::fabs(v));
+  }
+}
+
+void read_script(const idl::Script& script, Scene& scene) {
+  for (const idl::InputEvent& event : script.events()) {
+    scene.events.push_back({to_frame(event, scene.dt_s), event.user(), to_input(event)});
+  }
+  for (const idl::Tilting& t : script.tilting()) {
+    scene.tilting.push_back({t.start_s(), t.period_s(), t.period_jitter(), t.spread(), t.swing_s(),
+                             t.send_every_s(), t.strength() > 0 ? t.strength() : 1});
+  }
+  for (const idl::Poking& p : script.poking()) {
+    scene.poking.push_back({p.start_s(), p.period_s(), p.period_jitter(), to_vec3(p.region().low()),
+                            to_vec3(p.region().high()), p.radius_m(), p.speed_m_per_s()});
+  }
+}
+
+Scene to_scene(const idl::Scene& file, const std::string& path) {
+  Scene scene;
+  scene.name = scene_name_of(path);
+  scene.path = path;
+  scene.number = file.number();
+  scene.description = file.description();
+  idl::Scene drawn = file;
+  drawn.clear_script();
+  google::protobuf::TextFormat::PrintToString(drawn, &scene.text);
+  scene.dt_s = file.dt_s();
+  scene.damping_per_s = file.damping_per_s();
+  scene.gravity = to_vec3(file.gravity());
+  scene.users = std::max(file.users(), 1U);
+  read_types(file, scene);
+  read_world(file, scene);
+  if (file.has_start()) {
+    scene.has_start = true;
+    scene.start = {to_vec3(file.start().base()), to_vec3(file.start().proportions()),
+                   to_vec3(file.start().velocity()), file.start().spacing(), file.start().jitter()};
+  }
+  read_script(file.script(), scene);
+  return scene;
+}
+
+Result<Scene> read_scene(const std::string& path) {
+  idl::Scene file;
+  google::protobuf::TextFormat::ParseInfoTree lines;
+  if (auto read = read_text_file(path, file, lines); !read) return tl::unexpected(read.error());
+  Findings findings{path, {}};
+  check_scene(Node(file, &lines, "", 1, findings), file);
+  if (findings.first) return tl::unexpected(*findings.first);
+  return load_trained(path).transform([&](std::vector<TrainedTable> tables) {
+    Scene scene = to_scene(file, path);
+    scene.trained = std::move(tables);
+    return scene;
+  });
+}
+
+}  // namespace
+
+Result<Scene> load_scene(std::string_view name_or_path) {
+  return find_scene_file(name_or_path).and_then(read_scene);
+}
+
+Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
+  if (bodies == 0 || bodies > kMaxBodies) {
+    return fail(ErrorCode::kInvalidArgument, "number of bodies must be 1 to " + std::to_string(kMaxBodies) +
+                                                 ", not " + std::to_string(bodies));
+  }
+  engine::World world = scene.world;
+  world.capacity = bodies;
+  world.seed = seed;
+  if (scene.has_start) world.start = fill_block(scene, bodies, seed);
+  return world;
+}
+
+Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene, std::uint32_t bodies,
+                                                            std::uint64_t seed, std::uint32_t threads) {
+  auto made = make_world(scene, bodies, seed).and_then([&](const engine::World& world) {
+    return engine::make_particles(world, threads);
+  });
+  if (made) return made;
+  return fail(made.error().code,
+              "scene " + scene.name + " with " + std::to_string(bodies) + " bodies: " + made.error().message);
+}
+
+}  // namespace tandem::scenes

@@ -1,0 +1,91 @@
+#pragma once
+// Scenes as the services see them: plain values, read from protobuf text.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "services/engine/particles/world.hpp"
+#include "services/engine/simulation.hpp"
+#include "services/scenes/script.hpp"
+#include "services/scenes/trained.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::scenes {
+
+inline constexpr std::uint32_t kMaxBodies = 1U << 20U;
+inline constexpr std::uint32_t kMaxUsers = 64;
+
+struct BodyType {
+  std::string name;
+  double radius_m = 0;
+  double mass_kg = 0;
+  std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
+  std::uint32_t share = 0;        ///< of the start block, relative to the others
+};
+
+/// A block of bodies; see StartBlock in idl/scene.proto.
+struct StartBlock {
+  engine::Vec3 base{}, proportions{1, 1, 1}, velocity{};
+  double spacing = 1, jitter = 0;
+};
+
+/// See Tilting in idl/scene.proto.
+struct Tilting {
+  double start_s = 0, period_s = 1, period_jitter = 0, spread = 0, swing_s = 0, send_every_s = 0,
+         strength = 1;
+};
+
+/// See Poking in idl/scene.proto.
+struct Poking {
+  double start_s = 0, period_s = 1, period_jitter = 0;
+  engine::Vec3 low{}, high{};
+  double radius_m = 0, speed_m_per_s = 0;
+};
+
+struct Scene {
+  std::string name;
+  std::string path;
+  std::uint32_t number = 0;  ///< in the paper's tables; 0: none
+  std::string description;
+  std::string text;  ///< the scene without its script as protobuf text, for clients that draw it
+  double dt_s = 0;
+  double damping_per_s = 0;
+  engine::Vec3 gravity{};
+  double smallest_radius_m = 0;
+  double threshold_m = 0;  ///< error threshold
+  double extent_m = 0;     ///< largest |coordinate| within the bounds
+  std::uint32_t users = 1;
+  std::vector<BodyType> types;
+  std::vector<TrainedTable> trained;
+
+  engine::World world;     ///< all but capacity, seed and start
+  bool has_start = false;  ///< else all slots start empty
+  StartBlock start;
+  std::vector<ScriptedInput> events;
+  std::vector<Tilting> tilting;
+  std::vector<Poking> poking;
+};
+
+/// Names of the scenes that load_scene() finds, sorted.
+[[nodiscard]] std::vector<std::string> scene_names();
+
+/// Loads a scene by name, or by path when `name_or_path` holds a '/' or ends in ".textproto". Checks
+/// everything. Errors: kInvalidArgument for an unknown name (lists the known ones), kIo, kMalformed with
+/// file, line and field.
+[[nodiscard]] Result<Scene> load_scene(std::string_view name_or_path);
+
+/// The scene's simulation with `bodies` slots at frame 0. The number of bodies changes how far the scene is
+/// filled, nothing else. Errors: kInvalidArgument (bodies 0, above the limit or more than the scene's bounds
+/// hold; threads).
+[[nodiscard]] Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene,
+                                                                          std::uint32_t bodies,
+                                                                          std::uint64_t seed,
+                                                                          std::uint32_t threads);
+
+/// The world make_simulation() runs, for tests and tools. Errors: kInvalidArgument for the number of bodies.
+[[nodiscard]] Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+
+}  // namespace tandem::scenes

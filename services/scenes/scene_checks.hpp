@@ -1,0 +1,18 @@
+#pragma once
+// What a scene file must fulfil beyond its schema. Internal to scenes.
+
+#include <scene.pb.h>
+
+#include "services/scenes/text_file.hpp"
+
+namespace tandem::scenes {
+
+/// Notes in `root`'s findings the first rule that `scene` breaks.
+void check_scene(const Node& root, const idl::Scene& scene);
+/// The rules of one input event.
+void check_event(const Node& node, const idl::InputEvent& event);
+
+/// 0xRRGGBBAA of "#RRGGBB"; false for anything else. Empty means grey.
+[[nodiscard]] bool read_colour(const std::string& text, std::uint32_t& rgba);
+
+}  // namespace tandem::scenes

@@ -1,0 +1,151 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "services/scenes/scene.hpp"
+#include "tests/unit/scenes/temporary.hpp"
+
+namespace tandem::scenes {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Loads the small scene with a line in front; returns the error.
+std::string refusal(const std::string& line) {
+  const TemporaryFolder folder;
+  const auto scene = load_scene(folder.write("bad.textproto", small_scene(line)));
+  return scene ? "accepted" : scene.error().message;
+}
+
+TEST(SceneFiles, TheSmallSceneIsFine) { EXPECT_EQ(refusal(""), "accepted"); }
+
+TEST(SceneFiles, AnUnknownFieldIsNamedWithFileAndLine) {
+  const std::string message = refusal("# a comment\n\ngravitas { x: 1 }");
+  EXPECT_THAT(message, HasSubstr("bad.textproto:3: "));
+  EXPECT_THAT(message, HasSubstr("gravitas"));
+}
+
+TEST(SceneFiles, AValueOfTheWrongTypeIsNamedWithItsField) {
+  const std::string message = refusal("users: 1\nmax_push: fast");
+  EXPECT_THAT(message, HasSubstr("bad.textproto:2: "));
+  EXPECT_THAT(message, HasSubstr("field \"max_push\""));
+}
+
+TEST(SceneFiles, ABrokenRuleIsNamedWithTheFieldsPathAndLine) {
+  const std::string message = refusal("users: 2\ntypes {\n  name: \"flat\"\n  radius_m: 0\n  mass_kg: 1\n}");
+  EXPECT_THAT(message, HasSubstr("bad.textproto:4: "));
+  EXPECT_THAT(message, HasSubstr("field \"types[0].radius_m\" must be above 0"));
+}
+
+TEST(SceneFiles, EveryRuleRefusesWhatBreaksIt) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"planes { normal { } }", "planes[0].normal"},
+      {"planes { normal { y: nan } }", "planes[0].normal.y"},
+      {"planes { through { x: inf } normal { y: 1 } }", "planes[0].through.x"},
+      {"boxes { size { x: 1 y: 1 } }", "boxes[0].size"},
+      {"boxes { size { x: 1 y: 1 z: 1 } turns { axis: \"w\" run: 1 } }", "boxes[0].turns[0].axis"},
+      {"boxes { size { x: 1 y: 1 z: 1 } turns { axis: \"x\" } }", "boxes[0].turns[0].run"},
+      {"spheres { radius_m: -1 }", "spheres[0].radius_m"},
+      {"substeps: 65", "substeps"},
+      {"users: 65", "users"},
+      {"damping_per_s: 25", "damping_per_s"},
+      {"wall { spring: -1 }", "wall.spring"},
+      {"max_gravity: 1e7", "max_gravity"},
+      {"types { radius_m: 1 mass_kg: 1 }", "types[0].name"},
+      {"types { name: \"b\" radius_m: 1 mass_kg: 1 colour: \"red\" }", "types[0].colour"},
+      {"emitters { rate_per_s: 5 type: \"cube\" }", "emitters[0].type"},
+      {"emitters { rate_per_s: -5 type: \"ball\" }", "emitters[0].rate_per_s"},
+      {"emitters { region { high { y: 41 } } rate_per_s: 5 type: \"ball\" }", "emitters[0].region"},
+      {"regions { }", "regions[0]"},
+      {"regions { remove: false }", "regions[0].remove"},
+      {"regions { set_type: \"cube\" }", "regions[0].set_type"},
+      {"regions { region { low { x: 1 } } remove: true }", "regions[0].region"},
+      {"script { events { gravity { } } }", "script.events[0]"},
+      {"script { events { time_s: 1 } }", "script.events[0]"},
+      {"script { events { frame: 0 gravity { } } }", "script.events[0].frame"},
+      {"script { events { time_s: -1 gravity { } } }", "script.events[0].time_s"},
+      {"script { events { frame: 1 push { } } }", "script.events[0].push.radius_m"},
+      {"script { events { frame: 1 gravity { } user: 64 } }", "script.events[0].user"},
+      {"script { tilting { } }", "script.tilting[0].period_s"},
+      {"script { tilting { period_s: 1 swing_s: 2 } }", "script.tilting[0].swing_s"},
+      {"script { tilting { period_s: 1 period_jitter: 1 } }", "script.tilting[0].period_jitter"},
+      {"script { poking { period_s: 1 } }", "script.poking[0].radius_m"},
+  };
+  for (const auto& [line, field] : cases) {
+    const std::string message = refusal(line);
+    EXPECT_THAT(message, HasSubstr("bad.textproto:1: ")) << line;
+    EXPECT_THAT(message, HasSubstr(field + "\"")) << line;
+  }
+}
+
+TEST(SceneFiles, WhatIsMissingIsNamed) {
+  const TemporaryFolder folder;
+  const auto scene = load_scene(folder.write("empty.textproto", ""));
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().message, HasSubstr("empty.textproto:1: field \"dt_s\""));
+}
+
+TEST(SceneFiles, AFileThatIsNotThereOrNoFileIsRefused) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(load_scene(folder.path() + "/none.textproto").error().code, ErrorCode::kIo);
+  EXPECT_EQ(load_scene(folder.path() + "/").error().code, ErrorCode::kIo);
+}
+
+TEST(SceneFiles, BinaryRubbishIsRefused) {
+  const TemporaryFolder folder;
+  std::string rubbish;
+  for (int i = 0; i < 4096; ++i) rubbish.push_back(static_cast<char>(i * 37 % 251));
+  const auto scene = load_scene(folder.write("rubbish.textproto", rubbish));
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::kMalformed);
+}
+
+TEST(TrainedTables, SurviveARoundTripAndReplaceTheirEquals) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("s.textproto", small_scene("# kept as it is"));
+  const TrainedTable a{1000, 0.1, 0.25, 3.5, {1, 2, 3, 3}, {2, 2, 2, 2}};
+  const TrainedTable b{1000, 0.05, 0.2, 3.25, {}, {}};
+  TrainedTable better = a;
+  better.position_range_m = 1.0 / 3;
+  ASSERT_TRUE(save_trained(path, a));
+  ASSERT_TRUE(save_trained(path, b));
+  ASSERT_TRUE(save_trained(path, better));
+  const auto scene = load_scene(path);
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_THAT(scene->trained, ::testing::ElementsAre(better, b));
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  EXPECT_EQ(text.str(), small_scene("# kept as it is"));
+}
+
+TEST(TrainedTables, AreFoundExactlyOrNearest) {
+  const std::vector<TrainedTable> tables{
+      {1000, 0.1, 1, 1, {}, {}}, {10000, 0.1, 2, 1, {}, {}}, {10000, 0.2, 3, 1, {}, {}}};
+  EXPECT_EQ(find_table(tables, 10000, 0.1)->position_range_m, 2);
+  EXPECT_EQ(find_table(tables, 10000, 0.3), nullptr);
+  EXPECT_EQ(find_table(tables, 5000, 0.1), nullptr);
+  EXPECT_EQ(nearest_table(tables, 5000, 0.11)->position_range_m, 2);
+  EXPECT_EQ(nearest_table(tables, 1, 0.5)->position_range_m, 3);
+  EXPECT_EQ(nearest_table({}, 1, 0.5), nullptr);
+}
+
+TEST(TrainedTables, ThatAreMalformedNameFileLineAndField) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("s.textproto", small_scene());
+  (void)folder.write("s.trained.textproto",
+                     "tables {\n  bodies: 5\n  threshold_m: 1\n  position_code_lengths: [1, 65]\n}");
+  const auto scene = load_scene(path);
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().message,
+              HasSubstr("s.trained.textproto:4: field \"tables[0].position_code_lengths[1]\""));
+}
+
+TEST(TrainedTables, ThatCannotBeWrittenSaySo) {
+  const auto saved = save_trained("/nonexistent/folder/s.textproto", {1, 1, 1, 1, {}, {}});
+  ASSERT_FALSE(saved);
+  EXPECT_EQ(saved.error().code, ErrorCode::kIo);
+}
+
+}  // namespace
+}  // namespace tandem::scenes

@@ -1,0 +1,176 @@
+#include "services/scenes/scene.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "tests/unit/scenes/temporary.hpp"
+
+namespace tandem::scenes {
+namespace {
+
+using ::testing::HasSubstr;
+
+class EveryScene : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(EveryScene, LoadsAndKeepsItsBodiesInPlayUnderItsScript) {
+  const auto scene = load_scene(GetParam());
+  ASSERT_TRUE(scene) << scene.error().message;
+  auto made = make_simulation(*scene, 600, 7, 1);
+  ASSERT_TRUE(made) << made.error().message;
+  engine::Simulation& simulation = **made;
+  const auto inputs = scripted_inputs(*scene, 7, 0, 300);
+  EXPECT_FALSE(inputs.empty());
+  std::size_t next = 0;
+  std::size_t collisions = 0;
+  for (std::uint64_t frame = 1; frame <= 300; ++frame) {
+    for (; next < inputs.size() && inputs[next].frame == frame; ++next) {
+      ASSERT_NE(simulation.classify(inputs[next].input).effect, engine::Classification::Effect::kRefused);
+      simulation.apply(inputs[next].input);
+    }
+    simulation.step();
+    collisions += simulation.colliding();
+    ASSERT_TRUE(!scene->has_start || simulation.events().empty()) << "a body left in frame " << frame;
+  }
+  EXPECT_GT(collisions, 0U);
+  for (std::uint32_t slot = 0; slot < 600; ++slot) {
+    if (simulation.bodies().alive[slot] == 0) continue;
+    for (const auto& column : simulation.bodies().position)
+      EXPECT_LE(std::fabs(column[slot]), scene->extent_m);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, EveryScene,
+                         ::testing::Values("half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3",
+                                           "emitter"),
+                         [](const auto& test) { return test.param; });
+
+TEST(Scenes, ThePapersFiveAreThereWithTheirNumbersAndUsers) {
+  const std::vector<std::string> names{"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"};
+  const std::vector<std::uint32_t> users{1, 1, 1, 2, 3};
+  EXPECT_THAT(scene_names(), ::testing::IsSupersetOf(names));
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const auto scene = load_scene(names[i]);
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(scene->number, i + 1);
+    EXPECT_EQ(scene->users, users[i]);
+    EXPECT_DOUBLE_EQ(scene->dt_s, 1.0 / 30);
+    EXPECT_EQ(scene->name, names[i]);
+    EXPECT_THAT(scene->text, HasSubstr("planes"));
+    EXPECT_THAT(scene->text, ::testing::Not(HasSubstr("tilting")));
+  }
+}
+
+TEST(Scenes, HoldTheNumbersOfBodiesOfThePaper) {
+  for (const char* name : {"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"}) {
+    const auto scene = load_scene(name);
+    ASSERT_TRUE(scene);
+    for (const std::uint32_t bodies : {1U, 5000U, 10000U, 20000U}) {
+      const auto made = make_simulation(*scene, bodies, 1, 1);
+      ASSERT_TRUE(made) << made.error().message;
+      EXPECT_EQ((*made)->capacity(), bodies);
+    }
+  }
+}
+
+TEST(Scenes, AnUnknownNameListsTheKnownOnes) {
+  const auto scene = load_scene("quarter_pipe");
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(scene.error().message, HasSubstr("quarter_pipe"));
+  EXPECT_THAT(scene.error().message,
+              HasSubstr("cube, emitter, four_cubes, half_pipe, half_pipe_2, half_pipe_3"));
+}
+
+TEST(Scenes, NoBodiesOrTooManyAreRefused) {
+  const auto scene = load_scene("cube");
+  ASSERT_TRUE(scene);
+  for (const std::uint32_t bodies : {0U, (1U << 20U) + 1, UINT32_MAX}) {
+    const auto made = make_simulation(*scene, bodies, 1, 1);
+    ASSERT_FALSE(made);
+    EXPECT_THAT(made.error().message, HasSubstr("1 to 1048576"));
+  }
+}
+
+TEST(Scenes, MoreBodiesThanTheBoundsHoldAreRefused) {
+  const TemporaryFolder folder;
+  const auto scene = load_scene(folder.write("small.textproto", small_scene()));
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto made = make_simulation(*scene, 1000000, 1, 1);
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("outside the bounds"));
+}
+
+TEST(Scenes, TheFillGrowsWithTheNumberOfBodiesAndRepeatsForASeed) {
+  const auto scene = load_scene("half_pipe");
+  ASSERT_TRUE(scene);
+  const auto a = make_world(*scene, 2000, 5);
+  const auto b = make_world(*scene, 2000, 5);
+  const auto other = make_world(*scene, 2000, 6);
+  const auto larger = make_world(*scene, 16000, 5);
+  ASSERT_TRUE(a && b && other && larger);
+  ASSERT_EQ(a->start.size(), 2000U);
+  const auto height = [](const engine::World& world) {
+    float low = 1e9F;
+    float high = -1e9F;
+    for (const auto& body : world.start) {
+      low = std::min(low, body.position[1]);
+      high = std::max(high, body.position[1]);
+    }
+    return high - low;
+  };
+  bool differs = false;
+  for (std::size_t i = 0; i < 2000; ++i) {
+    EXPECT_EQ(a->start[i].position, b->start[i].position);
+    differs = differs || a->start[i].position != other->start[i].position;
+  }
+  EXPECT_TRUE(differs);
+  EXPECT_NEAR(height(*larger) / height(*a), 2, 0.3);
+  EXPECT_EQ(larger->pair.spring, a->pair.spring);
+}
+
+TEST(Scenes, NoTwoBodiesOfABlockTouchAtTheStart) {
+  const auto scene = load_scene("four_cubes");
+  ASSERT_TRUE(scene);
+  const auto world = make_world(*scene, 500, 3);
+  ASSERT_TRUE(world);
+  for (std::size_t i = 0; i < 500; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      float squared = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float d = world->start[i].position[k] - world->start[j].position[k];
+        squared += d * d;
+      }
+      ASSERT_GE(squared, 1.0F);
+    }
+  }
+}
+
+TEST(Scenes, APathOrAnotherFolderIsReadInsteadOfTheShippedOnes) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("mine.textproto", small_scene());
+  EXPECT_TRUE(load_scene(path));
+  EXPECT_FALSE(load_scene("mine"));
+  ASSERT_EQ(setenv("TANDEM_SCENE_DIR", folder.path().c_str(), 1), 0);
+  EXPECT_TRUE(load_scene("mine"));
+  EXPECT_THAT(scene_names(), ::testing::ElementsAre("mine"));
+  EXPECT_FALSE(load_scene("cube"));
+  unsetenv("TANDEM_SCENE_DIR");
+}
+
+TEST(Scenes, BoxesTurnByTheirTangent) {
+  const TemporaryFolder folder;
+  const auto scene = load_scene(
+      folder.write("turned.textproto", small_scene("boxes { size { x: 2 y: 4 z: 6 } turns { axis: \"z\" "
+                                                   "rise: 3 run: 4 } turns { axis: \"y\" rise: 1 } }")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  const engine::Box& box = scene->world.boxes.at(0);
+  EXPECT_EQ(box.half, (engine::Vec3f{1, 2, 3}));
+  EXPECT_EQ(box.axes[0], (engine::Vec3f{0, 0.6F, -0.8F}));  // x: (0.8, 0.6, 0), then x goes to -z
+  EXPECT_EQ(box.axes[1], (engine::Vec3f{0, 0.8F, 0.6F}));
+  EXPECT_EQ(box.axes[2], (engine::Vec3f{1, 0, 0}));
+}
+
+}  // namespace
+}  // namespace tandem::scenes
