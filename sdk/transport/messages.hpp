@@ -1,6 +1,6 @@
 #pragma once
-// What travels on the topics, as plain structs. The DDS types are generated from idl/tandem.idl and stay in dds/.
-// Field meanings, ranges and QoS: idl/PROTOCOL.md.
+// What travels on the topics, as plain structs. The DDS types are generated from idl/tandem.idl and stay in
+// dds/. Field meanings, ranges and QoS: idl/PROTOCOL.md.
 
 #include <array>
 #include <compare>
@@ -14,17 +14,17 @@ namespace tandem::transport {
 
 /// Why a server answered as it did; in Reply.reason and, for inputs, in a ReplyEntry's code.
 enum class Reason : std::uint32_t {
-  kNone = 0,            ///< all well, or the input was applied
-  kObserver = 1,        ///< observers may not send input
-  kDemoted = 2,         ///< caused more suspension than stall_timeout within 10 s
-  kInvalid = 3,         ///< not finite, out of range, or of an unknown kind
+  kNone = 0,      ///< all well, or the input was applied
+  kObserver = 1,  ///< observers may not send input
+  kDemoted = 2,   ///< caused more suspension than stall_timeout within 10 s
+  kInvalid = 3,   ///< not finite, out of range, or of an unknown kind
   kRateLimited = 4,
   kStaleEpoch = 5,
-  kDuplicate = 6,       ///< a number already handled, or lower than one
-  kNotPlaying = 7,      ///< the client has not finished joining
-  kForeignClient = 8,   ///< the client id belongs to another DDS participant
+  kDuplicate = 6,      ///< a number already handled, or lower than one
+  kNotPlaying = 7,     ///< the client has not finished joining
+  kForeignClient = 8,  ///< the client id belongs to another DDS participant
   kProtocolVersion = 9,
-  kFull = 10,           ///< the server's client limit is reached
+  kFull = 10,  ///< the server's client limit is reached
 };
 
 // After Reason, or g++ 12 warns that its enumerator shadows this.
@@ -40,29 +40,29 @@ struct ParticipantId {
 
 struct BodyType {
   std::string name;
-  float radius = 0;                ///< scene units
-  std::uint32_t colour_rgba = 0;   ///< 0xRRGGBBAA
+  float radius = 0;               ///< scene units
+  std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
   bool operator==(const BodyType&) const = default;
 };
 
 struct SessionMessage {
-  std::string session;             ///< key; no wildcard characters, 1..64 bytes of [A-Za-z0-9._-]
-  Epoch epoch = 0;                 ///< ms of wall clock at the server's start
+  std::string session;  ///< key; no wildcard characters, 1..64 bytes of [A-Za-z0-9._-]
+  Epoch epoch = 0;      ///< ms of wall clock at the server's start
   std::uint32_t protocol_version = kProtocolVersion;
-  std::uint64_t layout_hash = 0;   ///< XXH3-64 of the canonical layout text; see layout_hash() below
+  std::uint64_t layout_hash = 0;  ///< XXH3-64 of the canonical layout text; see layout_hash() below
   std::uint32_t capacity = 0;
   double frame_rate_hz = 30;
-  double lattice_unit = 0;         ///< scene units per lattice unit
-  std::uint32_t lead = 1;          ///< A, 0 or 1
+  double lattice_unit = 0;  ///< scene units per lattice unit
+  std::uint32_t lead = 1;   ///< A, 0 or 1
   std::uint32_t window_ceiling = 24;
-  std::uint32_t max_delta_bytes = 0;     ///< of a whole payload
+  std::uint32_t max_delta_bytes = 0;  ///< of a whole payload
   std::uint32_t max_snapshot_bytes = 0;
   std::string codec;
   std::int32_t threshold = 0, position_step = 1, velocity_step = 1;  ///< CodecParameters at frame 0
   std::string predictor;
-  std::uint32_t client_cost_ns = 0;      ///< client cost class: estimated ns per body and frame on one desktop core
-  std::string scene;               ///< name
-  std::string scene_description;   ///< the geometry as protobuf text (idl/scene.proto), for drawing
+  std::uint32_t client_cost_ns = 0;  ///< client cost class: ns per body and frame on one desktop core
+  std::string scene;                 ///< name
+  std::string scene_description;     ///< the geometry as protobuf text (idl/scene.proto), for drawing
   std::vector<std::int32_t> predictor_constants;
   std::vector<BodyType> types;
   Bytes codec_tables;
@@ -73,8 +73,8 @@ struct DeltaMessage {
   Epoch epoch = 0;
   Frame frame = 0;
   std::uint32_t part = 0, parts = 1;
-  std::uint64_t last_input = 0;    ///< number of the last scheduled input issued before this delta
-  std::int64_t server_time_ns = 0; ///< wall clock at publication
+  std::uint64_t last_input = 0;     ///< number of the last scheduled input issued before this delta
+  std::int64_t server_time_ns = 0;  ///< wall clock at publication
   std::uint64_t hash = 0;
   Bytes payload;
   bool operator==(const DeltaMessage&) const = default;
@@ -119,18 +119,18 @@ struct ReplyMessage {
   Epoch epoch = 0;
   Role role = Role::kObserver;
   Phase phase = Phase::kJoining;
-  std::uint32_t reason = 0;         ///< Reason
-  std::uint64_t highest_input = 0;  ///< highest input number handled
-  std::int64_t client_clock_ns = 0; ///< echo of the client's clock from its last acknowledgement
+  std::uint32_t reason = 0;          ///< Reason
+  std::uint64_t highest_input = 0;   ///< highest input number handled
+  std::int64_t client_clock_ns = 0;  ///< echo of the client's clock from its last acknowledgement
   std::int64_t server_time_ns = 0;
   std::vector<ReplyEntry> entries;  ///< the last 32 at most, oldest first
   bool operator==(const ReplyMessage&) const = default;
 };
 
 enum class InputKind : std::uint32_t {
-  kGravity = 1,      ///< values: x, y, z in scene units / s^2 (scheduled)
-  kPush = 2,         ///< values: centre x, y, z; radius; velocity change x, y, z (immediate)
-  kApplication = 16, ///< bytes for the engine (immediate)
+  kGravity = 1,       ///< values: x, y, z in scene units / s^2 (scheduled)
+  kPush = 2,          ///< values: centre x, y, z; radius; velocity change x, y, z (immediate)
+  kApplication = 16,  ///< bytes for the engine (immediate)
 };
 
 struct InputMessage {
@@ -138,7 +138,7 @@ struct InputMessage {
   Epoch epoch = 0;
   std::uint64_t number = 0;  ///< starts at 1 in each epoch; gaps are legal
   Frame client_frame = 0;
-  std::uint32_t kind = 0;    ///< InputKind
+  std::uint32_t kind = 0;      ///< InputKind
   std::vector<double> values;  ///< at most 16
   Bytes bytes;                 ///< at most 1024
   bool operator==(const InputMessage&) const = default;
@@ -152,8 +152,8 @@ struct AckMessage {
   Frame applied = 0;
   Frame simulated = 0;
   Role role_wanted = Role::kObserver;
-  std::int64_t clock_ns = 0;        ///< the client's steady clock
-  std::uint32_t join_attempt = 0;   ///< counts the times this client asked for a snapshot; a new value asks again
+  std::int64_t clock_ns = 0;       ///< the client's steady clock
+  std::uint32_t join_attempt = 0;  ///< counts this client's requests for a snapshot; a new value asks again
   bool operator==(const AckMessage&) const = default;
 };
 
@@ -161,7 +161,8 @@ struct ServerStatusMessage {
   std::string session;  ///< key
   Epoch epoch = 0;
   Frame frame = 0;
-  double uptime_s = 0, frame_rate_hz = 0, mbit_per_s = 0, raw_mbit_per_s = 0, frame_ms_p50 = 0, frame_ms_p99 = 0;
+  double uptime_s = 0, frame_rate_hz = 0, mbit_per_s = 0, raw_mbit_per_s = 0, frame_ms_p50 = 0,
+         frame_ms_p99 = 0;
   double corrected_per_frame = 0;
   std::uint32_t bodies = 0, participants = 0, observers = 0, window = 0;
   std::uint64_t payload_bytes = 0, stalls = 0, suspended_ms = 0, refused_inputs = 0, refused_messages = 0,

@@ -20,9 +20,9 @@ struct Received {
 
 /// A server's endpoints in one session (one DDS partition).
 ///
-/// Thread-safety: writes may come from one thread (the publisher) while takes come from another; each of the two
-/// groups is called from one thread only. Takes append to `out`, never block, and drop samples that break a size
-/// limit, counting them in `dropped()`.
+/// Thread-safety: writes may come from one thread (the publisher) while takes come from another; each of the
+/// two groups is called from one thread only. Takes append to `out`, never block, and drop samples that break
+/// a size limit, counting them in `dropped()`.
 class ServerPort {
  public:
   virtual ~ServerPort() = default;
@@ -90,9 +90,9 @@ class ClientPort {
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
 [[nodiscard]] Result<void> check_session_name(const std::string& name);
 
-/// XXH3-64 over everything of the session that decides how bytes are read and stepped: version, capacity, codec and
-/// its tables and parameters, predictor and its constants, lead, lattice unit, type count. A client that computes
-/// another value refuses the session.
+/// XXH3-64 over everything of the session that decides how bytes are read and stepped: version, capacity,
+/// codec and its tables and parameters, predictor and its constants, lead, lattice unit, type count. A client
+/// that computes another value refuses the session.
 [[nodiscard]] std::uint64_t layout_hash(const SessionMessage& session);
 
 }  // namespace tandem::transport

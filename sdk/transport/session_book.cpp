@@ -18,7 +18,7 @@ void SessionBook::put(std::uint64_t writer, Received<SessionMessage> announcemen
 
 void SessionBook::update(const StateOf& state_of) {
   std::erase_if(entries_, [&](Entry& entry) {
-    const WriterState state = state_of(entry.writer);
+    const WriterState state = state_of(entry.writer, entry.announcement.from);
     entry.live = state == WriterState::kLive;
     return state == WriterState::kGone;
   });

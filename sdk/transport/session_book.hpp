@@ -18,7 +18,7 @@ enum class WriterState : std::uint8_t { kLive, kSilent, kGone };
 /// thread-safe.
 class SessionBook {
  public:
-  using StateOf = std::function<WriterState(std::uint64_t writer)>;
+  using StateOf = std::function<WriterState(std::uint64_t writer, const ParticipantId& participant)>;
 
   /// `writer` is any id that a transport never reuses.
   void put(std::uint64_t writer, Received<SessionMessage> announcement);

@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/dds/node.hpp"
+#include "sdk/transport/dds/announcements.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -15,7 +15,7 @@ class DdsClientPort final : public ClientPort {
  public:
   struct Endpoints {
     Node node;
-    Reader<SessionMessage> sessions;
+    dds::Announcements servers;
     Writer<AckMessage> ack;
     Writer<InputMessage> input;
     Writer<ClientStatusMessage> status;
@@ -28,11 +28,12 @@ class DdsClientPort final : public ClientPort {
 
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
     refresh();
-    book_.take_current(out);
+    endpoints_.servers.book().take_current(out);
   }
   [[nodiscard]] bool server_alive() override {
     refresh();
-    return epoch_ ? book_.epoch_live(*epoch_) : book_.any_live();
+    const SessionBook& book = endpoints_.servers.book();
+    return epoch_ ? book.epoch_live(*epoch_) : book.any_live();
   }
 
   Result<void> open_stream(const SessionMessage& session) override {
@@ -91,14 +92,10 @@ class DdsClientPort final : public ClientPort {
   };
 
   void refresh() {
-    endpoints_.sessions.take(limits_, dropped_, [this](auto writer, Received<SessionMessage>&& announcement) {
-      if (announcement.message.session == options_.session) {
-        book_.put(writer, std::move(announcement));
-      } else {
-        ++dropped_;
-      }
+    endpoints_.servers.refresh(options_.session, dropped_, [this](const ParticipantId& server) {
+      return stream_ && (stream_->delta.alive(server) || stream_->reply.alive(server));
     });
-    book_.update([this](std::uint64_t writer) { return endpoints_.sessions.state(writer); });
+    endpoints_.servers.statuses().clear();
   }
 
   Endpoints endpoints_;
@@ -107,7 +104,6 @@ class DdsClientPort final : public ClientPort {
   std::optional<Reader<SnapshotMessage>> snapshots_;
   std::optional<Epoch> epoch_;  // of the open stream
   Limits limits_;
-  SessionBook book_;
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
@@ -123,10 +119,10 @@ Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& optio
   if (!input) return tl::unexpected(input.error());
   auto status = node->writer<ClientStatusMessage>("client status");
   if (!status) return tl::unexpected(status.error());
-  auto sessions = node->reader<SessionMessage>("sessions");
-  if (!sessions) return tl::unexpected(sessions.error());
+  auto servers = dds::Announcements::create(*node, true);
+  if (!servers) return tl::unexpected(servers.error());
   return std::make_unique<DdsClientPort>(
-      DdsClientPort::Endpoints{std::move(*node), std::move(*sessions), std::move(*ack), std::move(*input),
+      DdsClientPort::Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(*input),
                                std::move(*status)},
       options);
 }

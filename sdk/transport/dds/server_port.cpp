@@ -1,7 +1,7 @@
 #include <array>
 #include <utility>
 
-#include "sdk/transport/dds/node.hpp"
+#include "sdk/transport/dds/announcements.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -20,7 +20,7 @@ class DdsServerPort final : public ServerPort {
     Writer<SnapshotMessage> snapshot;
     Writer<ReplyMessage> reply;
     Writer<ServerStatusMessage> status;
-    Reader<SessionMessage> others;
+    dds::Announcements others;
     Reader<InputMessage> input;
     Reader<AckMessage> ack;
   };
@@ -31,15 +31,8 @@ class DdsServerPort final : public ServerPort {
   [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
 
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
-    endpoints_.others.take(limits_, dropped_, [this](auto writer, Received<SessionMessage>&& announcement) {
-      if (announcement.message.session == session_) {
-        others_.put(writer, std::move(announcement));
-      } else {
-        ++dropped_;
-      }
-    });
-    others_.update([this](std::uint64_t writer) { return endpoints_.others.state(writer); });
-    others_.list_live(out);
+    endpoints_.others.refresh(session_, dropped_, [](const ParticipantId&) { return false; });
+    endpoints_.others.book().list_live(out);
   }
 
   Result<void> write(const SessionMessage& message) override { return endpoints_.session.write(message); }
@@ -78,7 +71,7 @@ class DdsServerPort final : public ServerPort {
            reads(endpoints_.snapshot.get(), participant);
   }
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
-    return endpoints_.ack.alive(participant);
+    return endpoints_.ack.alive(participant) || endpoints_.input.alive(participant);
   }
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
   void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
@@ -108,7 +101,6 @@ class DdsServerPort final : public ServerPort {
   Endpoints endpoints_;
   std::string session_;
   Limits limits_;
-  SessionBook others_;
   std::array<bool, kSnapshotSlots> published_{};
   std::atomic<std::uint64_t> dropped_ = 0;
 };
@@ -126,8 +118,7 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   auto snapshot = node->writer<SnapshotMessage>("snapshots");
   auto reply = node->writer<ReplyMessage>("replies");
   auto status = node->writer<ServerStatusMessage>("server status");
-  auto others =
-      node->reader<SessionMessage>("other servers", dds::Topic<SessionMessage>::kQos.reader_depth, true);
+  auto others = dds::Announcements::create(*node, false);
   auto input = node->reader<InputMessage>("inputs");
   auto ack = node->reader<AckMessage>("acknowledgements");
   const Error* failed = nullptr;

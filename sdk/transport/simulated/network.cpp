@@ -61,7 +61,9 @@ class Member {
         ++dropped_;
       }
     });
-    book.update([&](std::uint64_t from) { return fabric_->state(self_, static_cast<Fabric::Index>(from)); });
+    book.update([&](std::uint64_t from, const ParticipantId& /*participant*/) {
+      return fabric_->state(self_, static_cast<Fabric::Index>(from));
+    });
   }
 
  private:

@@ -17,7 +17,7 @@ Received<SessionMessage> announcement(Epoch epoch) {
 class Book : public ::testing::Test {
  protected:
   void update() {
-    book_.update([this](std::uint64_t writer) { return states_.at(writer); });
+    book_.update([this](std::uint64_t writer, const ParticipantId&) { return states_.at(writer); });
   }
   std::vector<Epoch> current() {
     update();
@@ -132,7 +132,8 @@ TEST(LayoutHash, OfAFixedSessionIsAFixedNumber) {
   session.threshold = 100;
   session.predictor = "ballistic";
   session.types.resize(2);
-  EXPECT_EQ(layout_hash(session), 0xf2d62373ce44cb3cULL) << "part of the protocol: old clients would refuse the session";
+  EXPECT_EQ(layout_hash(session), 0xf2d62373ce44cb3cULL)
+      << "part of the protocol: old clients would refuse the session";
 }
 
 }  // namespace

@@ -1,0 +1,65 @@
+#pragma once
+// Which servers there are, and which of them live.
+
+#include <atomic>
+#include <string>
+#include <utility>
+
+#include "sdk/transport/dds/node.hpp"
+#include "sdk/transport/session_book.hpp"
+
+namespace tandem::transport::dds {
+
+/// Readers of TandemSession and, as a sign of life, of TandemServerStatus.
+///
+/// Cyclone DDS declares all writers of a silent participant dead, but each of them alive again only with its
+/// next sample. A session is announced once, so a server lives as long as any of its writers does.
+class Announcements {
+ public:
+  /// `own`: hears the participant of `node` itself, too.
+  static Result<Announcements> create(Node& node, bool own) {
+    auto sessions = node.reader<SessionMessage>("sessions", Topic<SessionMessage>::kQos.reader_depth, !own);
+    if (!sessions) return tl::unexpected(sessions.error());
+    auto status = node.reader<ServerStatusMessage>("server status", 1, !own);
+    if (!status) return tl::unexpected(status.error());
+    return Announcements(std::move(*sessions), std::move(*status));
+  }
+
+  /// Takes what came. `name` is the session's, empty for all; others are counted in `dropped`.
+  /// `alive(participant)` may know of further signs of life.
+  template <class Alive>
+  void refresh(const std::string& name, std::atomic<std::uint64_t>& dropped, Alive&& alive) {
+    sessions_.take(Limits{}, dropped, [&](dds_instance_handle_t writer, Received<SessionMessage>&& received) {
+      if (name.empty() || received.message.session == name) {
+        book_.put(writer, std::move(received));
+      } else {
+        ++dropped;
+      }
+    });
+    status_.take(Limits{}, dropped, statuses_);
+    if (statuses_.size() > kMaxStatuses) statuses_.erase(statuses_.begin(), statuses_.end() - kMaxStatuses);
+    book_.update([&](dds_instance_handle_t writer, const ParticipantId& participant) {
+      const WriterState state = sessions_.state(writer);
+      const bool revived =
+          state == WriterState::kSilent && (status_.alive(participant) || alive(participant));
+      return revived ? WriterState::kLive : state;
+    });
+  }
+
+  [[nodiscard]] SessionBook& book() { return book_; }
+  /// The newest status samples that nobody took from here.
+  [[nodiscard]] std::vector<Received<ServerStatusMessage>>& statuses() { return statuses_; }
+
+ private:
+  static constexpr std::ptrdiff_t kMaxStatuses = 256;
+
+  Announcements(Reader<SessionMessage> sessions, Reader<ServerStatusMessage> status)
+      : sessions_(std::move(sessions)), status_(std::move(status)) {}
+
+  Reader<SessionMessage> sessions_;
+  Reader<ServerStatusMessage> status_;
+  std::vector<Received<ServerStatusMessage>> statuses_;
+  SessionBook book_;
+};
+
+}  // namespace tandem::transport::dds
