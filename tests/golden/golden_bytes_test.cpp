@@ -1,0 +1,184 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "tests/property/synthetic.hpp"
+
+// Bytes of every codec on a small state. They change only with the protocol version.
+
+namespace tandem {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+std::string to_text(std::span<const std::byte> bytes) {
+  std::string text;
+  for (const std::byte byte : bytes) {
+    static constexpr char kDigits[] = "0123456789abcdef";
+    text += kDigits[std::to_integer<unsigned>(byte) >> 4U];
+    text += kDigits[std::to_integer<unsigned>(byte) & 15U];
+  }
+  return text;
+}
+
+// Hex with spaces wherever they help.
+Bytes from_text(std::string_view text) {
+  Bytes bytes;
+  std::string digits;
+  for (const char c : text) {
+    if (c != ' ') digits += c;
+  }
+  for (std::size_t i = 0; i + 1 < digits.size(); i += 2) {
+    bytes.push_back(static_cast<std::byte>(std::stoi(digits.substr(i, 2), nullptr, 16)));
+  }
+  return bytes;
+}
+
+constexpr CodecParameters kParameters{100, 10, 20};
+
+// Twenty slots, of which 4 and 19 are dead.
+State predicted() {
+  State state(20);
+  for (Slot slot = 0; slot < 19; ++slot) {
+    if (slot != 4) state.spawn(slot, 0, 0, {{1000 * static_cast<std::int32_t>(slot), 0, -5}, {64, -64, 0}});
+  }
+  return state;
+}
+
+// Slots 3 and 7 are off: 3 by (150, 0, -2000) and v (0, 40, 0), 7 by (0, -130, 0).
+State target() {
+  State state = predicted();
+  state.set_body(3, {{3150, 0, -2005}, {64, -24, 0}});
+  state.set_body(7, {{7000, -130, -5}, {64, -64, 0}});
+  return state;
+}
+
+// Encodes with `codec`, expects the bytes, and decodes these bytes to the same state.
+void expect_bytes(std::string_view codec, std::string_view hex, const State& from, const State& to,
+                  std::span<const LifecycleRecord> lifecycle = {}, const CodecParameters* changed = nullptr,
+                  std::size_t budget = kNoBudget) {
+  SCOPED_TRACE(codec);
+  DeltaCodec server = synthetic::make_delta(codec, from.capacity(), kParameters);
+  DeltaCodec client = synthetic::make_delta(codec, from.capacity(), kParameters);
+  if (changed != nullptr) server.set_parameters(*changed);
+  Bytes out(server.bound());
+  State agreed = from;
+  out.resize(server.encode(agreed, to, lifecycle, budget, out).size_bytes);
+  EXPECT_EQ(to_text(out), to_text(from_text(hex)));
+  State held = from;
+  const auto decoded = client.decode(held, from_text(hex));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_EQ(held, agreed);
+}
+
+TEST(GoldenBytes, OfNone) {
+  State two(2);
+  two.spawn(1, 0, 0, {{1, -1, 256}, {64, 0, -2}});
+  State moved = two;
+  moved.set_body(1, {{2, -1, 256}, {64, 0, -2}});
+  expect_bytes("none", "0380 1b000000 0000 02 02000000 ffffffff 00010000 40000000 00000000 feffffff", two,
+               moved);
+}
+
+TEST(GoldenBytes, OfSelective) {
+  expect_bytes("selective",
+               "0380 36000000 0000 01 880000"
+               "4e0c0000 00000000 2bf8ffff 40000000 e8ffffff 00000000"
+               "581b0000 7effffff fbffffff 40000000 c0ffffff 00000000",
+               predicted(), target());
+}
+
+TEST(GoldenBytes, OfQuantized) {
+  // -2000 is beyond 127 steps of 10.
+  expect_bytes("quantized", "0380 12000000 0000 01 880000 0f0081 000200 00f300 000000", predicted(),
+               target());
+}
+
+TEST(GoldenBytes, OfEntropy) {
+  expect_bytes("entropy", "0380 0e000000 0000 01 880000 e51fee8603a80000", predicted(), target());
+}
+
+TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger error goes.
+  expect_bytes("limited", "0380 0b000000 0000 01 080000 e51fee8600", predicted(), target(), {}, nullptr, 18);
+}
+
+TEST(GoldenBytes, OfLifecycleAndParameters) {
+  State to = predicted();
+  to.despawn(2);
+  to.spawn(4, 9, 2, {{1, 2, 3}, {4, 5, 6}});
+  to.set_body(5, {{-1, -2, -3}, {0, 0, 0}});
+  to.type()[6] = 1;
+  const std::vector<LifecycleRecord> records{{LifecycleKind::kDespawn, 2, 0, 0, {}},
+                                             {LifecycleKind::kSpawn, 4, 9, 2, {{1, 2, 3}, {4, 5, 6}}},
+                                             {LifecycleKind::kTeleport, 5, 0, 0, {{-1, -2, -3}, {0, 0, 0}}},
+                                             {LifecycleKind::kTypeChange, 6, 0, 1, {}}};
+  const CodecParameters changed{200, 5, 7};
+  expect_bytes("quantized",
+               "0180 49000000"
+               "02000000 00"
+               "04000000 01 09 0200 01000000 02000000 03000000 04000000 05000000 06000000"
+               "05000000 02 ffffffff feffffff fdffffff 00000000 00000000 00000000"
+               "06000000 03 0100"
+               "0280 0c000000 c8000000 05000000 07000000",
+               predicted(), to, records, &changed);
+}
+
+TEST(GoldenBytes, ThatNoEncoderOfOursWritesAreDecodedToo) {
+  // A list where the mask is shorter, a section of an unknown type that is not critical, and q = -128.
+  DeltaCodec client = synthetic::make_delta("quantized", 20, kParameters);
+  State state = predicted();
+  const auto decoded =
+      client.decode(state, from_text("0700 03000000 aabbcc"
+                                     "0380 15000000 0000 00 0200 0300 0700 800000 000000 000000 000001"));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  State expected = predicted();
+  expected.p(0)[3] -= 1280;
+  expected.v(2)[7] += 20;
+  EXPECT_EQ(state, expected);
+}
+
+TEST(GoldenBytes, OfASnapshot) {
+  TimelineConfig config;
+  config.capacity = 9;
+  config.type_count = synthetic::kTypes;
+  config.codec = "quantized";
+  config.parameters = kParameters;
+  config.predictor = "ballistic";
+  auto server = *ServerTimeline::create(config, 0x0102);
+  State state(9);
+  state.spawn(1, 5, 0, {{-1, 100, 7}, {64, 0, 0}});
+  state.spawn(8, 6, 2, {{2, 100, 8}, {64, 0, 0}});
+  server.start(3, state, Drive{{0, -640, 0}, 10, 0});
+  ASSERT_TRUE(server.schedule({1, 5, Drive{{1, 2, 3}, 4, 5}}));
+  Bytes bytes;
+  server.snapshot(bytes);
+  const std::string_view golden =
+      "54445350 0100 0201000000000000 0300000000000000 0100000000000000"
+      "00000000 80fdffff 00000000 0a00 0000"
+      "64000000 0a000000 14000000"
+      "164114a8e0917823"
+      "09000000 02000000 0100"
+      "0100000000000000 0500000000000000 01000000 02000000 03000000 0400 0500"
+      "0201"
+      "01 05000000 40"
+      "02 00000000 20"
+      "02 ffffffff 30"
+      "00 64000000"
+      "01 07000000 40"
+      "00 40000000  00 00000000  00 00000000"
+      "00 00000000  00 00000000  00 00000000"
+      "00000000";
+  EXPECT_EQ(to_text(bytes), to_text(from_text(golden)));
+  auto client = *ClientTimeline::create(config);
+  const auto loaded = client.load(from_text(golden), 0x0102);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(client.state(3), state);
+}
+
+TEST(GoldenBytes, OfTheDefaultCodeTables) {
+  EXPECT_EQ(to_hex(hash_bytes(default_code_tables())), "fe41058991578c63");
+}
+
+}  // namespace
+}  // namespace tandem
