@@ -19,7 +19,7 @@ namespace tandem::tool {
 struct TrajectoryInfo {
   double dt_s = 0;           ///< > 0
   double damping_per_s = 0;  ///< >= 0
-  double radius = 0;         ///< > 0, of the largest body
+  double radius = 0;         ///< > 0, of the smallest body
   double threshold = 0;      ///< > 0, the error that a codec may leave
   /// gravity[f] is in force in the step that produces frame f; gravity[0] is what holds at the start.
   std::vector<engine::Vec3> gravity;

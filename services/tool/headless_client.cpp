@@ -1,0 +1,243 @@
+#include "services/tool/headless_client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cinttypes>
+
+#include "sdk/client/api/client_id.hpp"
+#include "sdk/client/api/clock.hpp"
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "services/scenes/script.hpp"
+
+namespace tandem::tool {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kTellWaitingNs = 2 * kSecondNs;
+// More than a second of deltas, even in parts: a busy machine may keep this process waiting.
+constexpr std::uint32_t kDeltaDepth = 512;
+
+}  // namespace
+
+Result<std::unique_ptr<HeadlessClient>> HeadlessClient::create(const HeadlessOptions& options) {
+  std::unique_ptr<HeadlessClient> made(new HeadlessClient(options));
+  if (auto opened = made->open(); !opened) return tl::unexpected<Error>(opened.error());
+  return made;
+}
+
+HeadlessClient::~HeadlessClient() = default;
+
+Result<void> HeadlessClient::open() {
+  if (!options_.input_script.empty()) {
+    // Read now, so that a mistake in it is known at once; frames are settled when the session's rate is
+    // known.
+    if (auto loaded = load_script(1.0 / 30); !loaded) return loaded;
+  }
+  if (!options_.hash_log.empty()) {
+    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
+    if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
+  }
+  if (!options_.capture.empty()) {
+    auto capture = CaptureFile::create(options_.capture);
+    if (!capture) return tl::unexpected<Error>(capture.error());
+    capture_.emplace(std::move(*capture));
+  }
+  client::CoreOptions core;
+  core.session = options_.session;
+  core.id = client::random_client_id();
+  core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
+  core.lead = options_.lead;
+  core.measure_ns = client::steady_ns;
+  core.log = [this](LogLevel, std::string_view line) { tell(std::string(line)); };
+  transport::DdsOptions dds;
+  dds.domain = options_.domain;
+  dds.session = options_.session;
+  dds.client = core.id;
+  dds.delta_depth = kDeltaDepth;
+  auto port = transport::make_dds_client_port(dds);
+  if (!port) return tl::unexpected<Error>(port.error());
+  port_ = std::move(*port);
+  core_ = std::make_unique<client::ClientCore>(std::move(core), *port_, this);
+  return {};
+}
+
+Result<void> HeadlessClient::load_script(double dt_s) {
+  auto loaded = scenes::load_input_script(options_.input_script, dt_s);
+  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  script_.clear();
+  for (auto& event : *loaded) {
+    script_.push_back({event.frame, static_cast<transport::InputKind>(event.input.kind),
+                       std::move(event.input.values), std::move(event.input.bytes)});
+  }
+  return {};
+}
+
+void HeadlessClient::run(const std::atomic<bool>& stop) {
+  started_ns_ = client::steady_ns();
+  told_ns_ = live_ns_ = started_ns_;
+  while (!stop) {
+    const client::Now now = client::now();
+    const std::int64_t due_ns = core_->poll(now);
+    const client::Statistics& figures = core_->statistics();
+    send_script(now);
+    tell_waiting(now);
+    tell_live(now);
+    const auto over = [&](std::int64_t since_ns, const std::optional<double>& limit_s) {
+      return limit_s && static_cast<double>(now.steady_ns - since_ns) / 1e9 >= *limit_s;
+    };
+    if (figures.frames_applied == 0) {
+      if (over(started_ns_, options_.timeout_s)) break;
+    } else if (over(figures.first_applied_ns, options_.seconds)) {
+      break;
+    }
+    const std::int64_t wait_ns = due_ns - client::steady_ns();
+    if (wait_ns > 0) port_->wait(std::chrono::nanoseconds(wait_ns));
+  }
+  finish();
+}
+
+void HeadlessClient::finish() {
+  if (core_->statistics().frames_applied == 0) {
+    const std::string reason = core_->status(client::now()).reason;
+    failure_ = fmt::format("never played in session '{}' on domain {}{}", options_.session, options_.domain,
+                           reason.empty() ? ": no server found or no frame came" : ": " + reason);
+  }
+  if (hash_log_) {
+    const bool written = std::ferror(hash_log_.get()) == 0 && std::fflush(hash_log_.get()) == 0;
+    if (!written) failure_ = "could not write all of the hash log " + options_.hash_log;
+  }
+  if (capture_) {
+    if (auto committed = capture_->commit(); !committed) failure_ = committed.error().message;
+  }
+  if (!failure_.empty()) fmt::print(stderr, "tandem join: {}{}\n", options_.name, failure_);
+}
+
+void HeadlessClient::on_session(const transport::SessionMessage& session) {
+  if (session_ns_ == 0) {
+    session_ns_ = client::steady_ns();
+    if (!options_.input_script.empty() && session.frame_rate_hz > 0) {
+      if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
+    }
+  }
+  if (capture_) capture_->add(session);
+}
+
+void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
+  if (capture_) capture_->add(snapshot);
+}
+
+void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
+  if (capture_) capture_->add(input);
+}
+
+void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
+  last_frame_ = delta.frame;
+  last_hash_ = delta.hash;
+  if (!first_join_ms_) first_join_ms_ = static_cast<double>(core_->statistics().join_ns) / 1e6;
+  if (hash_log_) {
+    std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch, delta.frame,
+                 to_hex(delta.hash).c_str());
+  }
+  if (capture_) capture_->add(epoch, delta);
+}
+
+void HeadlessClient::send_script(client::Now now) {
+  // An event of frame n is due when the n-th frame has been applied; while joining again, it waits.
+  while (script_at_ < script_.size() && core_->phase() == ClientPhase::kPlaying &&
+         core_->statistics().frames_applied >= script_[script_at_].after) {
+    ScriptEntry& entry = script_[script_at_++];
+    const auto sent = core_->send(entry.kind, std::move(entry.values), std::move(entry.bytes), now);
+    if (!sent) tell("input not sent: " + sent.error().message);
+  }
+}
+
+void HeadlessClient::tell_waiting(client::Now now) {
+  const ClientPhase phase = core_->phase();
+  if (phase == ClientPhase::kPlaying || now.steady_ns - told_ns_ < kTellWaitingNs) return;
+  told_ns_ = now.steady_ns;
+  const double waited_s = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
+  if (phase == ClientPhase::kSearching) {
+    tell(fmt::format("waiting for a server of session '{}' on domain {} ({:.0f} s)", options_.session,
+                     options_.domain, waited_s));
+  } else {
+    tell(fmt::format("waiting to join session '{}' ({:.0f} s)", options_.session, waited_s));
+  }
+}
+
+void HeadlessClient::tell_live(client::Now now) {
+  if (!options_.live || now.steady_ns - live_ns_ < kSecondNs) return;
+  const double span_s = static_cast<double>(now.steady_ns - live_ns_) / 1e9;
+  const client::Statistics& figures = core_->statistics();
+  const auto bytes = static_cast<double>(figures.payload_bytes - live_bytes_);
+  static constexpr const char* kPhases[] = {"searching", "refused", "joining", "playing"};
+  nlohmann::ordered_json line;
+  line["seconds"] = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
+  line["phase"] = kPhases[static_cast<std::size_t>(core_->phase())];
+  line["frame"] = last_frame_;
+  line["frames_per_s"] = static_cast<double>(figures.frames_applied - live_frames_) / span_s;
+  line["mbit_per_s"] = bytes * 8 / (1U << 20U) / span_s;
+  line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
+  line["resyncs"] = figures.resyncs;
+  fmt::print(stderr, "{}{}\n", options_.name, line.dump());
+  live_ns_ = now.steady_ns;
+  live_bytes_ = figures.payload_bytes;
+  live_frames_ = figures.frames_applied;
+}
+
+void HeadlessClient::tell(const std::string& line) const {
+  if (!options_.quiet) fmt::print(stderr, "tandem join: {}{}\n", options_.name, line);
+}
+
+bool HeadlessClient::succeeded() const {
+  return failure_.empty() && core_->statistics().frames_applied > 0 &&
+         core_->statistics().hash_mismatches == 0;
+}
+
+nlohmann::ordered_json HeadlessClient::report() const {
+  const client::Statistics& figures = core_->statistics();
+  const auto pair = [](const client::Quantiles& q) {
+    return nlohmann::ordered_json{{"p50", q.at_ms(0.5)}, {"p99", q.at_ms(0.99)}};
+  };
+  nlohmann::ordered_json out;
+  out["frames_applied"] = figures.frames_applied;
+  out["resyncs"] = figures.resyncs;
+  out["hash_mismatches"] = figures.hash_mismatches;
+  out["payload_bytes"] = figures.payload_bytes;
+  out["mbit_per_s"] = figures.mbit_per_s();
+  out["latency_ms"] = pair(figures.latency);
+  out["input_latency_ms"] = pair(figures.input_latency);
+  out["client_ms"] = pair(figures.frame_cost);
+  out["join_ms"] = first_join_ms_ ? nlohmann::ordered_json(*first_join_ms_) : nlohmann::ordered_json(nullptr);
+  out["inputs_sent"] = figures.inputs_sent;
+  out["inputs_refused"] = figures.inputs_refused;
+  out["last_frame"] = last_frame_;
+  out["state_hash"] = to_hex(last_hash_);
+  const ClientStatus status = core_->status(client::now());
+  out["client"] = to_hex(status.client_id);
+  out["role"] = status.role == ClientRole::kParticipant ? "participant" : "observer";
+  out["lead"] = status.lead;
+  out["epochs"] = figures.epochs;
+  out["discovery_ms"] = session_ns_ != 0 ? static_cast<double>(session_ns_ - started_ns_) / 1e6 : 0.0;
+  out["inputs_acted"] = figures.inputs_acted;
+  out["inputs_unknown"] = figures.inputs_unknown;
+  out["refused_messages"] = status.refused_messages;
+  out["queue_high_water"] = figures.queue_high_water;
+  return out;
+}
+
+std::string HeadlessClient::summary() const {
+  const client::Statistics& figures = core_->statistics();
+  return fmt::format(
+      "{}{} frames, last {} with hash {}, {:.3f} Mbit/s; latency {:.2f} / {:.2f} ms, client {:.3f} / {:.3f} "
+      "ms (p50 / "
+      "p99); joined in {:.0f} ms; {} resyncs, {} mismatches; inputs: {} sent, {} refused\n",
+      options_.name, figures.frames_applied, last_frame_, to_hex(last_hash_), figures.mbit_per_s(),
+      figures.latency.at_ms(0.5), figures.latency.at_ms(0.99), figures.frame_cost.at_ms(0.5),
+      figures.frame_cost.at_ms(0.99), first_join_ms_.value_or(0), figures.resyncs, figures.hash_mismatches,
+      figures.inputs_sent, figures.inputs_refused);
+}
+
+}  // namespace tandem::tool

@@ -1,0 +1,92 @@
+#pragma once
+// One client of `tandem join`: plays for a while, writes logs, sends scripted inputs.
+
+#include <atomic>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sdk/client/client_core.hpp"
+#include "services/tool/capture.hpp"
+
+namespace tandem::tool {
+
+struct HeadlessOptions {
+  std::uint32_t domain = 0;
+  std::string session = "default";
+  bool observe = false;
+  std::uint32_t lead = 1;
+  std::optional<double> timeout_s;              ///< until the first applied frame; empty: waits for ever
+  std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
+  std::string hash_log, capture, input_script;  ///< paths; empty: none
+  bool live = false;                            ///< a JSON line a second on stderr
+  bool quiet = false;                           ///< no lines for humans on stderr
+  std::string name;                             ///< in front of lines for humans; may be empty
+};
+
+/// Runs in one thread of the caller's.
+class HeadlessClient final : public client::CoreListener {
+ public:
+  /// Opens its files and joins the DDS domain. Errors: kIo, kMalformed (script), kInvalidArgument,
+  /// kTransport.
+  static Result<std::unique_ptr<HeadlessClient>> create(const HeadlessOptions& options);
+  ~HeadlessClient() override;
+  HeadlessClient(const HeadlessClient&) = delete;
+  HeadlessClient& operator=(const HeadlessClient&) = delete;
+
+  /// Plays until its time is over or `stop` is set.
+  void run(const std::atomic<bool>& stop);
+  /// True when it played, with no hash mismatch, and all files are written.
+  [[nodiscard]] bool succeeded() const;
+  /// The JSON object of the result, valid after run().
+  [[nodiscard]] nlohmann::ordered_json report() const;
+  /// The same in a few lines for humans.
+  [[nodiscard]] std::string summary() const;
+
+ private:
+  struct Closer {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  struct ScriptEntry {
+    Frame after = 0;  ///< frames applied before it is sent
+    transport::InputKind kind = transport::InputKind::kGravity;
+    std::vector<double> values;
+    transport::Bytes bytes;
+  };
+
+  explicit HeadlessClient(HeadlessOptions options) : options_(std::move(options)) {}
+  Result<void> open();
+  Result<void> load_script(double dt_s);
+  void on_session(const transport::SessionMessage& session) override;
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override;
+  void on_scheduled(const transport::ScheduledInputMessage& input) override;
+  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
+  void send_script(client::Now now);
+  void tell_waiting(client::Now now);
+  void tell_live(client::Now now);
+  void tell(const std::string& line) const;
+  void finish();
+
+  HeadlessOptions options_;
+  std::unique_ptr<transport::ClientPort> port_;
+  std::unique_ptr<client::ClientCore> core_;
+  std::unique_ptr<std::FILE, Closer> hash_log_;
+  std::optional<CaptureFile> capture_;
+  std::vector<ScriptEntry> script_;
+  std::size_t script_at_ = 0;
+
+  std::int64_t started_ns_ = 0;
+  std::int64_t session_ns_ = 0;  ///< when the first session was learned
+  std::int64_t told_ns_ = 0, live_ns_ = 0;
+  std::uint64_t live_bytes_ = 0, live_frames_ = 0;
+  Frame last_frame_ = 0;
+  std::uint64_t last_hash_ = 0;
+  std::optional<double> first_join_ms_;
+  std::string failure_;
+};
+
+}  // namespace tandem::tool

@@ -1,0 +1,114 @@
+// `tandem join`: headless clients, for tests, measurements and as load.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "sdk/transport/port.hpp"
+#include "services/tool/commands.hpp"
+#include "services/tool/headless_client.hpp"
+
+namespace tandem::tool {
+namespace {
+
+constexpr std::uint32_t kMaxCount = 100;  // DDS participants that fit into one domain of one host, roughly
+
+struct JoinOptions {
+  HeadlessOptions client;
+  std::uint32_t count = 1;
+  bool json = false;
+};
+
+std::atomic<bool> stopped = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+std::string with_suffix(const std::string& path, std::uint32_t index) {
+  return path.empty() ? path : path + "." + std::to_string(index);
+}
+
+int run_join(const JoinOptions& options) {
+  std::signal(SIGINT, [](int) { stopped = true; });
+  std::signal(SIGTERM, [](int) { stopped = true; });
+  std::vector<std::unique_ptr<HeadlessClient>> clients;
+  for (std::uint32_t i = 0; i < options.count; ++i) {
+    HeadlessOptions one = options.client;
+    if (options.count > 1) {
+      one.hash_log = with_suffix(one.hash_log, i);
+      one.capture = with_suffix(one.capture, i);
+      one.name = fmt::format("[{}] ", i);
+    }
+    auto client = HeadlessClient::create(one);
+    if (!client) {
+      fmt::print(stderr, "tandem join: {}\n", client.error().message);
+      return 1;
+    }
+    clients.push_back(std::move(*client));
+  }
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 1; i < clients.size(); ++i) {
+      threads.emplace_back([&client = *clients[i]] { client.run(stopped); });
+    }
+    clients[0]->run(stopped);
+  }
+  if (options.json) {
+    nlohmann::ordered_json out;
+    if (options.count == 1) {
+      out = clients[0]->report();
+    } else {
+      for (const auto& client : clients) out["clients"].push_back(client->report());
+    }
+    fmt::print("{}\n", out.dump());
+  } else {
+    for (const auto& client : clients) fmt::print("{}", client->summary());
+  }
+  const bool good = std::all_of(clients.begin(), clients.end(), [](const auto& c) { return c->succeeded(); });
+  return good && std::fflush(stdout) == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_join(CLI::App& app, Run& run) {
+  CLI::App* command = app.add_subcommand("join", "Joins a session as a client without a picture.");
+  const auto options = std::make_shared<JoinOptions>();
+  HeadlessOptions& client = options->client;
+  command->add_option("--domain", client.domain, "DDS domain")
+      ->check(CLI::Range(0, 230))
+      ->capture_default_str();
+  command->add_option("--session", client.session, "Session name")
+      ->check([](const std::string& name) {
+        const auto ok = transport::check_session_name(name);
+        return ok ? std::string() : ok.error().message;
+      })
+      ->capture_default_str();
+  command->add_flag("--observe", client.observe, "Only watch: the server does not wait for this client");
+  command
+      ->add_option("--count", options->count, "Clients in this process; log files get the suffix .0, .1, ...")
+      ->check(CLI::Range(1U, kMaxCount))
+      ->capture_default_str();
+  command->add_option("--input-script", client.input_script, "Inputs to send, as protobuf text (InputScript)")
+      ->check(CLI::ExistingFile);
+  command->add_option("--lead", client.lead, "Frames to simulate beyond the last delta")
+      ->check(CLI::Range(0, 1))
+      ->capture_default_str();
+  command
+      ->add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--hash-log", client.hash_log,
+                      "Write a line `epoch,frame,hash` for every applied frame");
+  command->add_option("--capture", client.capture, "Write what was received and applied (idl/CAPTURE.md)");
+  command
+      ->add_option("--seconds", client.seconds,
+                   "How long, from the first applied frame (default: until stopped)")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--live", client.live, "A JSON line a second on stderr");
+  command->add_flag("--json", options->json, "Print the result as one JSON object");
+  command->footer("Exit 1 on any hash mismatch, or when it never played.");
+  command->callback([options, &run] { run = [options] { return run_join(*options); }; });
+}
+
+}  // namespace tandem::tool

@@ -1,0 +1,71 @@
+#include "services/tool/train.hpp"
+
+#include <algorithm>
+
+#include "sdk/core/codec/training.hpp"
+
+namespace tandem::tool {
+namespace {
+
+constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
+
+/// One pass of `codec` over the source; what it corrected.
+Result<CodecStatistics> observe(Source& source, const scenes::TrainedTable& table, const std::string& codec,
+                                const std::string& predictor, std::uint64_t frames,
+                                const std::function<void(Frame)>& progress) {
+  auto run = make_run(source, table, predictor, frames);
+  if (!run) return tl::unexpected(run.error());
+  run->timeline.codec = codec;
+  auto replay = Replay::create(*source.simulation, source.script, source.lattice, source.type_count);
+  if (!replay) return tl::unexpected(replay.error());
+  auto timeline = ServerTimeline::create(run->timeline, 1);
+  if (!timeline) return tl::unexpected(timeline.error());
+  CodecStatistics statistics;
+  timeline->start(0, replay->target(), replay->start_drive());
+  timeline->set_statistics(&statistics);
+  for (Frame frame = 1; frame <= frames; ++frame) {
+    if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
+    for (const ScheduledDrive& input : replay->scheduled()) {
+      if (auto scheduled = timeline->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
+    }
+    timeline->advance(replay->target(), replay->lifecycle());
+    progress(frame);
+  }
+  return statistics;
+}
+
+std::vector<std::uint8_t> lengths(std::span<const std::byte> tables, std::size_t first) {
+  std::vector<std::uint8_t> result;
+  for (const std::byte length : tables.subspan(first, kSymbols))
+    result.push_back(std::to_integer<std::uint8_t>(length));
+  return result;
+}
+
+}  // namespace
+
+Result<scenes::TrainedTable> train(const std::function<Result<Source>()>& make, const std::string& predictor,
+                                   std::uint64_t frames, const std::function<void(Frame)>& progress) {
+  auto first = make();
+  if (!first) return tl::unexpected(first.error());
+  scenes::TrainedTable table;
+  table.bodies = first->simulation->capacity();
+  table.threshold_m = first->threshold;
+  const auto ranges = observe(*first, table, "selective", predictor, frames, progress);
+  if (!ranges) return tl::unexpected(ranges.error());
+  // A run without any correction still needs a range; one unit is the least there is.
+  table.position_range_m = kMargin * std::max(1U, ranges->largest_position) / first->lattice.position_scale();
+  table.velocity_range_m_per_s =
+      kMargin * std::max(1U, ranges->largest_velocity) / first->lattice.velocity_scale();
+
+  auto second = make();
+  if (!second) return tl::unexpected(second.error());
+  const auto counts =
+      observe(*second, table, "quantized", predictor, frames, [&](Frame frame) { progress(frames + frame); });
+  if (!counts) return tl::unexpected(counts.error());
+  const std::vector<std::byte> tables = trained_tables(*counts);
+  table.position_code_lengths = lengths(tables, 0);
+  table.velocity_code_lengths = lengths(tables, kSymbols);
+  return table;
+}
+
+}  // namespace tandem::tool
