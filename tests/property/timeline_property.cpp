@@ -61,7 +61,7 @@ class Scenario {
       : random_(random), interacting_(interacting) {
     config_.capacity = static_cast<std::uint32_t>(1 + random.below(60));
     config_.type_count = synthetic::kTypes;
-    config_.codec = codec_names()[random.below(5)];
+    config_.codec = codec_names()[random.below(codec_names().size())];
     config_.codec_tables = synthetic::tables_for(config_.codec);
     config_.parameters = {200, 16, 64};
     config_.max_lead = lead;

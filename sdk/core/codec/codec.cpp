@@ -5,11 +5,15 @@
 
 #include "sdk/core/codec/absolute_coding.hpp"
 #include "sdk/core/codec/residual_coding.hpp"
+#include "sdk/core/codec/tracker.hpp"
 
 namespace tandem {
 namespace {
 
-constexpr std::array<std::string_view, 5> kNames{"none", "selective", "quantized", "entropy", "limited"};
+constexpr std::array<std::string_view, 6> kNames{"none",    "selective", "quantized",
+                                                 "entropy", "limited",   "tracker"};
+// 0.6 % a frame: a push is forgotten in seconds, support by other bodies is learned anew all the time.
+constexpr std::uint16_t kTrackerDecay = 393;
 
 Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
   CodeLengths lengths{};
@@ -22,6 +26,8 @@ Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
 }  // namespace
 
 std::span<const std::string_view> codec_names() { return kNames; }
+
+std::uint16_t recommended_decay(std::string_view name) { return name == "tracker" ? kTrackerDecay : 0; }
 
 Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
                                           std::span<const std::byte> tables) {
@@ -54,6 +60,7 @@ Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t c
     return std::make_unique<BlockCodec<AbsoluteCoding<false>>>(name, capacity,
                                                                AbsoluteCoding<false>(capacity));
   }
+  if (name == "tracker") return std::make_unique<Tracker>(capacity);
   using Coding = ResidualCoding<PlainResiduals>;
   return std::make_unique<BlockCodec<Coding>>(name, capacity, Coding(capacity, PlainResiduals{}));
 }

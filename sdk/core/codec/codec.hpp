@@ -46,11 +46,17 @@ class Codec {
   /// Most bytes encode() can write for this session's capacity.
   [[nodiscard]] virtual std::size_t bound() const = 0;
 
+  /// The frame to come: `predicted` stays valid until the end of encode() or apply(); `slots` (ascending,
+  /// each once) are those that lifecycle records spawned, despawned or teleported in it. Comes before
+  /// encode() and before the first parse(); a decoder's `predicted` does not have the records applied yet, so
+  /// that bodies of `slots` must not be read from it. Changes no state. For codecs that remember bodies.
+  virtual void renew(const State& /*predicted*/, std::span<const Slot> /*slots*/) {}
+
   /// Writes correction sections that move `state` (predicted) towards `target`, and moves it.
   /// `target` has the same alive slots. Never writes more than `budget` bytes, section headers included, nor
   /// beyond the end of `out`; where that binds, the largest errors go first, ties by slot, up to the first
-  /// body that does not fit. Any codec obeys a budget; by name, only `limited` is meant to have one. Returns
-  /// the number of corrected bodies.
+  /// body that does not fit (`tracker`: see tracker.hpp). Any codec obeys a budget; by name, only `limited`
+  /// is meant to have one. Returns the number of corrected bodies.
   virtual std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
                                std::size_t budget, ByteWriter& out) = 0;
 
@@ -84,8 +90,11 @@ class Codec {
 [[nodiscard]] Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
                                                         std::span<const std::byte> tables);
 
-/// The names make_codec() knows, in the order of the paper's table 5.1.
+/// The names make_codec() knows: those of the paper's table 5.1 in its order, then ours.
 [[nodiscard]] std::span<const std::string_view> codec_names();
+
+/// Drive::decay that suits a codec: how fast the learned acceleration c fades. 0 for codecs that learn none.
+[[nodiscard]] std::uint16_t recommended_decay(std::string_view name);
 
 /// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
 inline constexpr std::size_t kPaperBudgetBytes = 6553;

@@ -41,18 +41,30 @@ struct DeltaCodec::Impl {
   std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
   std::vector<Slot> merged;         // touched slots; used only where lifecycle adds to the corrected ones
   std::span<const Slot> touched;
+  std::vector<Slot> renewed;  // slots of lifecycle records that brought or ended a body
 
   // Where a section belongs among the others: lifecycle, parameters, corrections.
   struct Parsed {
     int stage = 0;
     CodecParameters parameters;
     std::span<const std::uint8_t> alive;
+    bool renewed = false;  // the codec knows of the frame
   };
   Result<void> parse(std::span<const std::byte> payload, const State& state, Parsed& parsed);
   Result<void> parse_section(std::uint16_t type, std::span<const std::byte> body, const State& state,
                              Parsed& parsed);
+  void renew(const State& state);
   void merge_touched();
 };
+
+void DeltaCodec::Impl::renew(const State& state) {
+  renewed.clear();
+  for (const LifecycleRecord& record : lifecycle) {
+    if (record.kind == LifecycleKind::kTypeChange) continue;
+    if (renewed.empty() || renewed.back() != record.slot) renewed.push_back(record.slot);
+  }
+  codec->renew(state, renewed);
+}
 
 Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const std::byte> body,
                                              const State& state, Parsed& parsed) {
@@ -82,6 +94,8 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const
     }
     case SectionType::kCorrections:
       if (!enter(3)) break;
+      if (!parsed.renewed) renew(state);
+      parsed.renewed = true;
       return codec->parse(body, parsed.alive, parsed.parameters);
     default:
       if ((type & kCriticalSection) == 0) return {};
@@ -118,6 +132,7 @@ DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
   impl_->lifecycle.reserve(std::min<std::size_t>(capacity, 1024));
   impl_->alive.resize(capacity);
   impl_->merged.reserve(capacity);
+  impl_->renewed.reserve(capacity);
 }
 DeltaCodec::DeltaCodec(DeltaCodec&&) noexcept = default;
 DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
@@ -157,6 +172,7 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   if (impl_->statistics != nullptr) impl_->statistics->observe(state, target, impl_->parameters);
   Encoded encoded;
   const std::size_t before = writer.size();
+  impl_->renew(state);
   encoded.corrected = impl_->codec->encode(state, target, impl_->parameters, budget, writer);
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
@@ -185,6 +201,7 @@ Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const S
     if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated section");
     if (auto section = parse_section(type, body, state, parsed); !section) return section;
   }
+  if (!parsed.renewed) renew(state);
   return {};
 }
 
@@ -193,7 +210,7 @@ Result<void> DeltaCodec::decode(State& state, std::span<const std::byte> payload
   impl_->lifecycle.clear();
   impl_->codec->begin();
   impl_->touched = {};
-  Impl::Parsed parsed{0, impl_->parameters, state.alive()};
+  Impl::Parsed parsed{0, impl_->parameters, state.alive(), false};
   if (auto result = impl_->parse(payload, state, parsed); !result) {
     impl_->lifecycle.clear();
     return result;

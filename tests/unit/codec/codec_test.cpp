@@ -36,10 +36,11 @@ std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capacity) {
   return std::move(*make_codec(name, capacity, tables_for(name)));
 }
 
-TEST(MakeCodec, KnowsTheNamesOfThePaperInItsOrder) {
+TEST(MakeCodec, KnowsTheNamesOfThePaperInItsOrderAndOurs) {
   const auto names = codec_names();
-  EXPECT_EQ(std::vector<std::string_view>(names.begin(), names.end()),
-            (std::vector<std::string_view>{"none", "selective", "quantized", "entropy", "limited"}));
+  EXPECT_EQ(
+      std::vector<std::string_view>(names.begin(), names.end()),
+      (std::vector<std::string_view>{"none", "selective", "quantized", "entropy", "limited", "tracker"}));
   for (const std::string_view name : names) EXPECT_EQ(codec_of(name, 5)->name(), name);
 }
 

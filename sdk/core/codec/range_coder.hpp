@@ -1,0 +1,167 @@
+#pragma once
+// Binary range coder: one decision at a time, each with a 16-bit probability (G. N. N. Martin 1979; carries
+// are carried into bytes already written, as in LZMA). Integers only; bytes in idl/PROTOCOL.md.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace tandem {
+
+/// A probability of 1 that adapts: mean of a fast and a slow running average, both faster while young.
+class AdaptiveBit {
+ public:
+  /// Decisions seen, saturating; what it may hold at most.
+  static constexpr std::uint8_t kMostSeen = 31;
+  /// Least and most probability, so that no decision costs more than 11 bits.
+  static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
+
+  /// Of 1, in 1/65536: kLeast .. kMost.
+  [[nodiscard]] std::uint32_t p1() const {
+    const std::uint32_t p = (std::uint32_t{fast} + slow) >> 1U;
+    return p < kLeast ? kLeast : (p > kMost ? kMost : p);
+  }
+  void update(bool bit) {
+    static constexpr std::uint8_t kShift[kMostSeen + 1] = {1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5,
+                                                           5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5};
+    const unsigned fast_shift = kShift[seen];
+    const unsigned slow_shift = seen < kMostSeen ? fast_shift : 8U;
+    if (seen < kMostSeen) ++seen;
+    if (bit) {
+      fast = static_cast<std::uint16_t>(fast + ((65535U - fast) >> fast_shift));
+      slow = static_cast<std::uint16_t>(slow + ((65535U - slow) >> slow_shift));
+    } else {
+      fast = static_cast<std::uint16_t>(fast - (fast >> fast_shift));
+      slow = static_cast<std::uint16_t>(slow - (slow >> slow_shift));
+    }
+  }
+
+  std::uint16_t fast = 32768, slow = 32768;
+  std::uint8_t seen = 0;
+};
+
+/// Writes decisions into caller memory. Past its end nothing is written and overflow() is set.
+class RangeEncoder {
+ public:
+  explicit RangeEncoder(std::span<std::byte> out)
+      : begin_(out.data()), at_(out.data()), end_(out.data() + out.size()) {}
+
+  /// `p1`: probability of 1 in 1/65536, in 1 .. 65535.
+  void put(bool bit, std::uint32_t p1) {
+    const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
+    if (bit) {
+      range_ = bound;
+    } else {
+      low_ += bound;
+      if (low_ < bound) carry();
+      range_ -= bound;
+    }
+    while (range_ < kLeastRange) {
+      emit(static_cast<std::byte>(low_ >> 24U));
+      low_ <<= 8U;
+      range_ <<= 8U;
+    }
+  }
+  /// Codes with the model's probability and teaches it.
+  bool code(bool bit, AdaptiveBit& model) {
+    put(bit, model.p1());
+    model.update(bit);
+    return bit;
+  }
+  bool code_even(bool bit) {
+    put(bit, 32768);
+    return bit;
+  }
+
+  /// Fewest bytes that decode to what was put, zeros at the end left out. Returns the size.
+  std::size_t finish() {
+    for (unsigned bytes = 0; bytes <= 4; ++bytes) {
+      const std::uint64_t mask = std::uint64_t{0xFFFFFFFFU} >> (8U * bytes);
+      const std::uint64_t value = (low_ + mask) & ~mask;
+      if (value - low_ >= range_) continue;
+      if ((value >> 32U) != 0) carry();
+      for (unsigned i = 0; i < bytes; ++i) emit(static_cast<std::byte>(value >> (24U - 8U * i)));
+      break;
+    }
+    while (at_ != begin_ && at_[-1] == std::byte{0}) --at_;
+    return static_cast<std::size_t>(at_ - begin_);
+  }
+  [[nodiscard]] bool overflow() const { return overflow_; }
+
+ private:
+  static constexpr std::uint32_t kLeastRange = 1U << 24U;
+
+  void emit(std::byte byte) {
+    if (at_ == end_) {
+      overflow_ = true;
+      return;
+    }
+    *at_++ = byte;
+  }
+  // What was written plus range is below 1, so a carry always finds a byte that is not 0xFF.
+  void carry() {
+    if (overflow_) return;
+    std::byte* at = at_;
+    while (at != begin_) {
+      --at;
+      *at = static_cast<std::byte>(std::to_integer<unsigned>(*at) + 1U);
+      if (*at != std::byte{0}) return;
+    }
+  }
+
+  std::byte* begin_;
+  std::byte* at_;
+  std::byte* end_;
+  std::uint32_t low_ = 0;
+  std::uint32_t range_ = 0xFFFFFFFFU;
+  bool overflow_ = false;
+};
+
+/// Reads decisions from untrusted bytes; past their end it reads zeros. Never fails: whether the bytes were
+/// meant so is the caller's to check, with at_end() last.
+class RangeDecoder {
+ public:
+  explicit RangeDecoder(std::span<const std::byte> in) : at_(in.data()), end_(in.data() + in.size()) {
+    if (!in.empty() && in.back() == std::byte{0}) padded_ = true;
+    for (int i = 0; i < 4; ++i) code_ = (code_ << 8U) | next();
+  }
+
+  bool get(std::uint32_t p1) {
+    const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
+    const bool bit = code_ < bound;
+    if (bit) {
+      range_ = bound;
+    } else {
+      code_ -= bound;
+      range_ -= bound;
+    }
+    while (range_ < kLeastRange) {
+      code_ = (code_ << 8U) | next();
+      range_ <<= 8U;
+    }
+    return bit;
+  }
+  /// The argument is what an encoder would code: so that one text describes both sides.
+  bool code(bool /*bit*/, AdaptiveBit& model) {
+    const bool bit = get(model.p1());
+    model.update(bit);
+    return bit;
+  }
+  bool code_even(bool /*bit*/) { return get(32768); }
+
+  /// True when every byte was used and the last one is not a zero that could have been left out.
+  [[nodiscard]] bool at_end() const { return at_ == end_ && !padded_; }
+
+ private:
+  static constexpr std::uint32_t kLeastRange = 1U << 24U;
+
+  std::uint32_t next() { return at_ == end_ ? 0U : std::to_integer<std::uint32_t>(*at_++); }
+
+  const std::byte* at_;
+  const std::byte* end_;
+  std::uint32_t code_ = 0;
+  std::uint32_t range_ = 0xFFFFFFFFU;
+  bool padded_ = false;
+};
+
+}  // namespace tandem

@@ -1,0 +1,83 @@
+#pragma once
+// The tracker codec's filter: what a correction of a body's position does to its p, v and c. Both sides run
+// it, so it is integers to the last bit; idl/PROTOCOL.md, "Tracker", has the same formulas.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem {
+
+/// Position correction of a body in steps along each axis. Not all zero.
+using TrackerSteps = std::array<std::int32_t, 3>;
+inline constexpr std::int32_t kMostTrackerSteps = INT32_MAX;
+
+/// Frames since a body's last correction count up to this.
+inline constexpr std::uint32_t kMostAge = 255;
+
+/// What the codec remembers of a body besides p, v and c. All zero for a new body and for a dead slot.
+struct TrackerBody {
+  std::uint8_t age = 0;                ///< frames since the last correction, 0 .. kMostAge - 1
+  std::uint8_t interval = 0;           ///< k of the last correction, 0: none yet
+  std::array<std::int8_t, 3> steps{};  ///< of the last correction, saturated at +-127
+};
+
+/// Steps to lattice units for one threshold e.
+class TrackerSteppings {
+ public:
+  explicit TrackerSteppings(std::int32_t threshold) {
+    const auto share = [threshold](std::int64_t of_65536) {
+      return static_cast<std::int32_t>(std::max<std::int64_t>(1, (threshold * of_65536) >> 16));
+    };
+    step_ = share(kStep);
+    for (std::size_t i = 0; i < kSmall.size(); ++i) small_[i] = share(kSmall[i]);
+  }
+
+  /// Lattice units of a correction, |each| <= 2^31.
+  [[nodiscard]] std::array<std::int64_t, 3> distance(const TrackerSteps& steps) const {
+    const std::int64_t one = unit(steps, small_, step_);
+    std::array<std::int64_t, 3> d{};
+    for (std::size_t i = 0; i < 3; ++i) d[i] = std::clamp(steps[i] * one, -kMostDistance, kMostDistance);
+    return d;
+  }
+  [[nodiscard]] std::int32_t step() const { return step_; }
+
+  /// The same in 1/256 of the threshold; steps within +-127.
+  [[nodiscard]] static std::array<std::int32_t, 3> relative(const TrackerSteps& steps) {
+    static constexpr std::array<std::int32_t, 3> kRelative{kSmall[0] >> 8, kSmall[1] >> 8, kSmall[2] >> 8};
+    const auto one = static_cast<std::int32_t>(unit(steps, kRelative, kStep >> 8));
+    return {steps[0] * one, steps[1] * one, steps[2] * one};
+  }
+
+ private:
+  static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
+  // In 1/65536 of the threshold. A step of 0.95 keeps the worst rounding error, sqrt(3)/2 steps, inside the
+  // error ball.
+  static constexpr std::int32_t kStep = 62259;
+  // Where all |steps| <= 1 and 1, 2 or 3 of them are not zero: such corrections are a little longer than the
+  // threshold, so their points lie at 0.92, 0.69 * sqrt(2), 0.59 * sqrt(3) of it.
+  static constexpr std::array<std::int32_t, 3> kSmall{60293, 45220, 38666};
+
+  static std::int64_t unit(const TrackerSteps& steps, const std::array<std::int32_t, 3>& small,
+                           std::int32_t step) {
+    std::size_t moved = 0;
+    for (const std::int32_t s : steps) {
+      if (s < -1 || s > 1) return step;
+      moved += static_cast<std::size_t>(s != 0);
+    }
+    return moved == 0 ? 0 : small[moved - 1];
+  }
+
+  std::int32_t step_ = 1;
+  std::array<std::int32_t, 3> small_{1, 1, 1};
+};
+
+/// Corrects a body by `steps` and updates what is remembered of it:
+///   k = min(age + 1, 255);  d = distance(steps);  u = clamp(d . d_last / e^2, -1, 1)
+///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2)
+void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
+                  std::int32_t threshold, TrackerBody& body);
+
+}  // namespace tandem

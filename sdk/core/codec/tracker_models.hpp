@@ -1,0 +1,117 @@
+#pragma once
+// The tracker codec's probabilities: which decisions a block codes, each in which context. One text for the
+// encoder, the decoder and the encoder's estimate of costs.
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "sdk/core/codec/range_coder.hpp"
+#include "sdk/core/codec/tracker_filter.hpp"
+
+namespace tandem {
+
+/// What the contexts of one body see of it, on both sides the same.
+struct TrackerContext {
+  std::uint32_t zero = 0;                     ///< part of the index of "is this axis untouched"
+  std::uint32_t magnitude = 0;                ///< part of the index of "is it longer"
+  std::array<std::uint32_t, 3> sign{};        ///< index per axis
+  std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
+};
+
+/// Adaptive probabilities of one block. Plain data: copied to try things, saved in snapshots.
+struct TrackerModels {
+  static constexpr std::uint32_t kAges = 15, kShortAges = 5, kIntervals = 4, kUnary = 14;
+
+  std::array<AdaptiveBit, kAges * kAges * 2> flag;
+  std::array<AdaptiveBit, 3 * kShortAges * kIntervals * 3 * 2> zero;
+  std::array<AdaptiveBit, 3 * 3 * 3 * 3 * kIntervals> sign;
+  std::array<AdaptiveBit, kIntervals * 3 * kUnary> magnitude;
+  std::array<AdaptiveBit, 32> escape;
+
+  /// Calls f(AdaptiveBit&) for every probability, in the order of snapshots.
+  template <class Models, class F>
+  static void for_each(Models& models, F&& f) {
+    for (auto& bit : models.flag) f(bit);
+    for (auto& bit : models.zero) f(bit);
+    for (auto& bit : models.sign) f(bit);
+    for (auto& bit : models.magnitude) f(bit);
+    for (auto& bit : models.escape) f(bit);
+  }
+  static constexpr std::size_t kCount = kAges * kAges * 2 + 3 * kShortAges * kIntervals * 3 * 2 +
+                                        81 * kIntervals + kIntervals * 3 * kUnary + 32;
+};
+
+/// Buckets of frame counts 0 .. 255; see tracker_models.cpp.
+extern const std::array<std::uint8_t, 256> kTrackerAgeBuckets;
+
+/// Index of the flag by age and by the interval before; add 1 where the body coded before it was corrected.
+[[nodiscard]] inline std::uint32_t flag_context(std::uint8_t age, std::uint8_t interval) {
+  return (kTrackerAgeBuckets[age + 1U] * TrackerModels::kAges + kTrackerAgeBuckets[interval]) * 2U;
+}
+
+/// The rest of a corrected body's context. `v`, `c`: of its predicted state; zero for a body renewed in this
+/// frame.
+[[nodiscard]] TrackerContext value_context(const TrackerBody& body, const Vec3i& v, const Vec3i& c,
+                                           std::int32_t threshold);
+
+/// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
+/// returning the bit; for a decoder the argument means nothing and `steps` is filled. False: a decoder read
+/// steps beyond kMostTrackerSteps.
+template <class Coder, class Models>
+bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps);
+
+/// Most bits code_steps() takes.
+inline constexpr std::size_t kMostStepsBits = 3 * (2 * 11 + (TrackerModels::kUnary + 31) * 11 + 31);
+
+namespace tracker_detail {
+
+// x >= 0 as the number of bits of x + 1, in unary, then those bits without the first.
+template <class Coder, class Models>
+bool code_escape(Coder& coder, Models& models, std::uint32_t& x) {
+  const std::uint64_t wanted = std::uint64_t{x} + 1;
+  unsigned bits = 0;
+  while (bits < 31 && coder.code((wanted >> (bits + 1)) != 0, models.escape[bits])) ++bits;
+  std::uint64_t value = 1;
+  for (unsigned i = bits; i-- > 0;) {
+    value = value << 1U | static_cast<std::uint64_t>(coder.code_even(((wanted >> i) & 1U) != 0));
+  }
+  x = static_cast<std::uint32_t>(value - 1);
+  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - TrackerModels::kUnary - 1;
+}
+
+}  // namespace tracker_detail
+
+template <class Coder, class Models>
+bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps) {
+  std::uint32_t moved = 0;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const bool is_last_hope = axis == 2 && moved == 0;
+    const std::int32_t wanted = steps[axis];
+    if (!is_last_hope) {
+      const std::uint32_t at =
+          ((axis * TrackerModels::kShortAges * TrackerModels::kIntervals + context.zero) * 3 + moved) * 2 +
+          context.moved_last[axis];
+      if (!coder.code(wanted != 0, models.zero[at])) {
+        steps[axis] = 0;
+        continue;
+      }
+    }
+    ++moved;
+    const bool negative = coder.code(wanted < 0, models.sign[context.sign[axis]]);
+    const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
+    const std::uint32_t base = (context.magnitude * 3 + moved - 1) * TrackerModels::kUnary;
+    std::uint32_t size = 1;
+    while (size <= TrackerModels::kUnary && coder.code(length > size, models.magnitude[base + size - 1]))
+      ++size;
+    if (size > TrackerModels::kUnary) {
+      std::uint32_t beyond = length > TrackerModels::kUnary ? length - TrackerModels::kUnary - 1 : 0;
+      if (!tracker_detail::code_escape(coder, models, beyond)) return false;
+      size = TrackerModels::kUnary + 1 + beyond;
+    }
+    steps[axis] = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
+  }
+  return true;
+}
+
+}  // namespace tandem

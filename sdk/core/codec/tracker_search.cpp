@@ -1,0 +1,245 @@
+#include "sdk/core/codec/tracker_search.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/codec/residual.hpp"
+
+namespace tandem {
+namespace {
+
+// A body within the threshold but beyond this share of it (1/256) goes early if the model expects it anyway.
+constexpr std::int64_t kEarlyShare = 218;
+constexpr std::uint32_t kEarlyProbability = 39322;
+// Bits that an error of one threshold is worth.
+constexpr std::uint64_t kErrorWorth = 16;
+constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + 2;
+// A tried number of bodies this close (1/64) to the largest that fits is good enough.
+constexpr std::uint32_t kTryPrecision = 64;
+
+// log2(x / 2^12) in 1/256 bits, x in 1 .. 2^12, by repeated squaring: the same with every compiler.
+constexpr std::uint32_t bits_256(std::uint32_t x) {
+  const auto whole = static_cast<std::uint32_t>(std::bit_width(x)) - 1U;
+  std::uint64_t mantissa = (std::uint64_t{x} << 32U) >> whole;  // 1 .. 2 in 32.32
+  std::uint32_t log = whole << 8U;
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    mantissa = (mantissa >> 2U) * (mantissa >> 2U) >> 28U;
+    if (mantissa >= std::uint64_t{2} << 32U) {
+      mantissa >>= 1U;
+      log |= 128U >> i;
+    }
+  }
+  return (12U << 8U) - log;
+}
+constexpr auto kBits = [] {
+  std::array<std::uint16_t, 4096> table{};
+  for (std::uint32_t i = 0; i < 4096; ++i) table[i] = static_cast<std::uint16_t>(bits_256(i == 0 ? 1 : i));
+  return table;
+}();
+
+// Adds up what decisions would cost, in 1/256 bits.
+struct CostCoder {
+  std::uint32_t cost = 0;
+  bool code(bool bit, const AdaptiveBit& model) {
+    const std::uint32_t p1 = model.p1() >> 4U;
+    cost += kBits[bit ? p1 : 4095U - p1];
+    return bit;
+  }
+  bool code_even(bool bit) {
+    cost += 256;
+    return bit;
+  }
+};
+
+std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
+  const std::uint64_t unit = static_cast<std::uint64_t>(step);
+  const std::uint64_t steps = (magnitude(to, from) + unit / 2) / unit;
+  const auto q = static_cast<std::int32_t>(std::min<std::uint64_t>(steps, kMostTrackerSteps - 1));
+  return to < from ? -q : q;
+}
+
+// 27 neighbours; the middle one first, because it is the fallback.
+constexpr std::array<std::array<std::int8_t, 3>, 27> kAround = [] {
+  std::array<std::array<std::int8_t, 3>, 27> around{};
+  for (std::size_t i = 0; i < 27; ++i) {
+    const std::size_t at = (i + 13) % 27;
+    around[i] = {static_cast<std::int8_t>(static_cast<int>(at % 3) - 1),
+                 static_cast<std::int8_t>(static_cast<int>(at / 3 % 3) - 1),
+                 static_cast<std::int8_t>(static_cast<int>(at / 9) - 1)};
+  }
+  return around;
+}();
+
+}  // namespace
+
+bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
+                  std::int32_t threshold, const TrackerModels& models, const TrackerContext& context,
+                  TrackerSteps& steps) {
+  std::array<std::int64_t, 3> d{};
+  TrackerSteps middle{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    d[i] = std::int64_t{to[i]} - from[i];
+    middle[i] = nearest(from[i], to[i], steppings.step());
+  }
+  const auto limit = static_cast<std::uint64_t>(threshold) * static_cast<std::uint64_t>(threshold);
+  // error^2 / threshold^2 without a division for each: both shifted to 24 bits, then times a reciprocal.
+  const auto shift = static_cast<unsigned>(std::max(0, static_cast<int>(std::bit_width(limit)) - 24));
+  const std::uint64_t worth = (kErrorWorth * 256U << 24U) / (limit >> shift);
+
+  std::uint64_t best = UINT64_MAX;
+  steps = middle;
+  for (const auto& offset : kAround) {
+    TrackerSteps tried{};
+    for (std::size_t i = 0; i < 3; ++i) tried[i] = middle[i] + offset[i];
+    if (tried == TrackerSteps{}) continue;
+    const auto moved = steppings.distance(tried);
+    std::uint64_t error = 0;
+    bool inside = true;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::int64_t off = d[i] - moved[i];
+      inside &= -threshold <= off && off <= threshold;
+      if (inside) error += static_cast<std::uint64_t>(off * off);
+    }
+    if (!inside || error > limit) continue;
+    CostCoder coder;
+    code_steps(coder, models, context, tried);
+    const std::uint64_t cost = coder.cost + (((error >> shift) * worth) >> 24U);
+    if (cost < best) {
+      best = cost;
+      steps = tried;
+    }
+  }
+  return best != UINT64_MAX;
+}
+
+TrackerSearch::TrackerSearch(std::uint32_t capacity)
+    : waiting_(capacity), waiting_next_(capacity), marks_(kBlockSlots) {
+  candidates_.reserve(capacity);
+  order_.reserve(capacity);
+}
+
+void TrackerSearch::encode(Tracker& tracker, const State& target, std::int32_t threshold, std::size_t budget,
+                           ByteWriter& out) {
+  threshold_ = threshold;
+  scan(*tracker.predicted_, target, threshold);
+  const std::span<std::byte> room = out.rest().first(budget);
+  std::size_t size_bytes = 0;
+  if (!write(tracker, target, must_, true, room, size_bytes)) {
+    rank();
+    std::uint32_t fits = 0;
+    std::uint32_t too_many = must_ + 1;
+    std::uint32_t tried = must_ + 1;
+    while (too_many - fits > 1 + fits / kTryPrecision) {
+      tried = fits + (too_many - fits) / 2;
+      (write(tracker, target, tried, false, room, size_bytes) ? fits : too_many) = tried;
+    }
+    if (tried != fits) write(tracker, target, fits, false, room, size_bytes);
+  }
+  out.advance(size_bytes);
+  remember_waiting(tracker);
+}
+
+void TrackerSearch::scan(const State& predicted, const State& target, std::int32_t threshold) {
+  candidates_.clear();
+  must_ = 0;
+  const auto limit = static_cast<std::uint64_t>(threshold) * static_cast<std::uint64_t>(threshold);
+  const auto early = static_cast<std::int32_t>((threshold * kEarlyShare) >> 8);
+  for (std::uint32_t b = 0; b < block_count(predicted.capacity()); ++b) {
+    for_each_beyond(predicted, target, block_at(b, predicted.capacity()), early,
+                    std::span<std::uint8_t, kBlockSlots>(marks_.data(), kBlockSlots),
+                    [&](Slot slot, std::uint64_t error) {
+                      const bool must = error > limit;
+                      candidates_.push_back({error, slot, 0, must});
+                      must_ += static_cast<std::uint32_t>(must);
+                    });
+  }
+}
+
+void TrackerSearch::rank() {
+  order_.clear();
+  for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
+    if (candidates_[i].must) order_.push_back(i);
+  }
+  const auto urgency = [this](std::uint32_t i) {
+    constexpr std::uint64_t kMostError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
+    const std::uint64_t waited = waiting_[candidates_[i].slot];
+    return std::min(candidates_[i].error, kMostError) * (waited + 1) * (waited + 1);
+  };
+  std::sort(order_.begin(), order_.end(), [&urgency](std::uint32_t a, std::uint32_t b) {
+    const std::uint64_t of_a = urgency(a);
+    const std::uint64_t of_b = urgency(b);
+    return of_a != of_b ? of_a > of_b : a < b;
+  });
+  for (std::uint32_t r = 0; r < order_.size(); ++r) candidates_[order_[r]].rank = r;
+}
+
+bool TrackerSearch::write(Tracker& tracker, const State& target, std::uint32_t limit, bool early,
+                          std::span<std::byte> out, std::size_t& size_bytes) {
+  tracker.count_ = 0;
+  std::fill(tracker.worked_.begin(), tracker.worked_.end(), std::uint8_t{0});
+  size_bytes = 0;
+  std::size_t at = 0;
+  for (std::uint32_t b = 0; b < block_count(tracker.capacity_); ++b) {
+    if (!write_block(tracker, target, block_at(b, tracker.capacity_), at, limit, early, out, size_bytes)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool TrackerSearch::write_block(Tracker& tracker, const State& target, const Block& block, std::size_t& at,
+                                std::uint32_t limit, bool early, std::span<std::byte> out,
+                                std::size_t& size_bytes) {
+  const State& predicted = *tracker.predicted_;
+  TrackerModels& models = tracker.work_[block.index];
+  models = tracker.models_[block.index];
+  const TrackerSteppings steppings(threshold_);
+  const std::span<std::byte> rest = out.subspan(size_bytes);
+  const std::size_t header = std::min(kHeaderBytes, rest.size());
+  RangeEncoder coder(rest.subspan(header));
+  const std::size_t first = tracker.count_;
+  bool previous = false;
+  tracker.for_each_body(block, predicted.alive(), [&](Slot slot, bool renewed, std::uint32_t flag) {
+    AdaptiveBit& model = models.flag[flag + static_cast<std::uint32_t>(previous)];
+    previous = false;
+    TrackerSteps steps{};
+    TrackerContext context;
+    if (at < candidates_.size() && candidates_[at].slot == slot) {
+      const Candidate& candidate = candidates_[at++];
+      if (candidate.must ? candidate.rank < limit : early && model.p1() > kEarlyProbability) {
+        context = tracker.context(slot, renewed, threshold_);
+        const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, threshold_,
+                                         models, context, steps);
+        previous = inside || (candidate.must && steps != TrackerSteps{});
+      }
+    }
+    coder.code(previous, model);
+    if (!previous) return;
+    code_steps(coder, models, context, steps);
+    tracker.corrected_[tracker.count_] = slot;
+    tracker.steps_[tracker.count_++] = steps;
+  });
+  if (tracker.count_ == first) return true;
+  const std::size_t coded = coder.finish();
+  if (coder.overflow() || rest.size() < kHeaderBytes) return false;
+  ByteWriter head(rest.first(kHeaderBytes));
+  head.put(static_cast<std::uint16_t>(SectionType::kCorrections));
+  head.put(static_cast<std::uint32_t>(coded + 2));
+  head.put(static_cast<std::uint16_t>(block.index));
+  size_bytes += kHeaderBytes + coded;
+  tracker.worked_[block.index] = 1;
+  return true;
+}
+
+void TrackerSearch::remember_waiting(const Tracker& tracker) {
+  std::fill(waiting_next_.begin(), waiting_next_.end(), std::uint8_t{0});
+  for (const Candidate& candidate : candidates_) {
+    if (!candidate.must) continue;
+    waiting_next_[candidate.slot] = static_cast<std::uint8_t>(std::min(waiting_[candidate.slot] + 1, 255));
+  }
+  for (const Slot slot : tracker.corrected()) waiting_next_[slot] = 0;
+  waiting_.swap(waiting_next_);
+}
+
+}  // namespace tandem

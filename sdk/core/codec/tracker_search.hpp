@@ -1,0 +1,55 @@
+#pragma once
+// The tracker's encoder: which bodies to correct and by which of the points inside the error ball. Nothing
+// here is on the wire.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/tracker.hpp"
+
+namespace tandem {
+
+class TrackerSearch {
+ public:
+  explicit TrackerSearch(std::uint32_t capacity);
+
+  /// Writes at most `budget` bytes of sections; leaves bodies, steps and coder states in `tracker` as parse()
+  /// would.
+  void encode(Tracker& tracker, const State& target, std::int32_t threshold, std::size_t budget,
+              ByteWriter& out);
+
+ private:
+  struct Candidate {
+    std::uint64_t error = 0;  // squared
+    Slot slot = 0;
+    std::uint32_t rank = 0;  // among those that must go, the most urgent first
+    bool must = false;       // beyond the threshold
+  };
+
+  void scan(const State& predicted, const State& target, std::int32_t threshold);
+  void rank();
+  /// Sections of all blocks with the bodies of rank < limit, and early ones if `early`. False: beyond budget.
+  bool write(Tracker& tracker, const State& target, std::uint32_t limit, bool early, std::span<std::byte> out,
+             std::size_t& size_bytes);
+  bool write_block(Tracker& tracker, const State& target, const Block& block, std::size_t& at,
+                   std::uint32_t limit, bool early, std::span<std::byte> out, std::size_t& size_bytes);
+  void remember_waiting(const Tracker& tracker);
+
+  std::vector<Candidate> candidates_;  // ascending by slot
+  std::vector<std::uint32_t> order_;
+  std::vector<std::uint8_t> waiting_;  // frames that a body was beyond the threshold and not corrected
+  std::vector<std::uint8_t> waiting_next_;
+  std::vector<std::uint8_t> marks_;
+  std::uint32_t must_ = 0;
+  std::int32_t threshold_ = 1;
+};
+
+/// Steps that correct `d` (lattice units) at least cost: of the 27 around the nearest that leave an error of
+/// at most the threshold, the one with the least bits + 16 * (error / threshold)^2. False: none does; `steps`
+/// is then the nearest.
+bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
+                  std::int32_t threshold, const TrackerModels& models, const TrackerContext& context,
+                  TrackerSteps& steps);
+
+}  // namespace tandem

@@ -1,0 +1,89 @@
+#include "sdk/core/codec/tracker_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include "sdk/core/codec/tracker_search.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::int32_t kThreshold = 4096;
+
+State one_body() {
+  State state(1);
+  state.spawn(0, 0, 0, {});
+  return state;
+}
+
+TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
+  State state = one_body();
+  TrackerBody body;
+  body.age = 9;
+  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, body);
+  const std::int32_t d = 2 * 3891;  // 0.95 * 4096, down
+  EXPECT_EQ(state.p(0)[0], d);
+  EXPECT_NEAR(state.v(0)[0], 64 * 0.65 * d / 10, 8);
+  EXPECT_NEAR(state.c(0)[0], 64 * 0.65 * 0.2 * d / 100, 2);
+  EXPECT_EQ(state.p(1)[0], 0);
+  EXPECT_EQ(state.v(1)[0], 0);
+  EXPECT_EQ(body.age, 0);
+  EXPECT_EQ(body.interval, 10);
+  EXPECT_EQ(body.steps, (std::array<std::int8_t, 3>{2, 0, 0}));
+}
+
+TEST(TrackerFilter, BelievesCorrectionsThatKeepTheirDirectionMore) {
+  const auto velocity_after = [](std::int8_t last) {
+    State state = one_body();
+    TrackerBody body{9, 5, {last, 0, 0}};
+    correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, body);
+    return state.v(0)[0];
+  };
+  EXPECT_NEAR(velocity_after(2), 1.5 * velocity_after(0), 4);
+  EXPECT_NEAR(velocity_after(-2), 0.5 * velocity_after(0), 4);
+}
+
+TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
+  for (const std::int32_t sign : {-1, 1}) {
+    State state = one_body();
+    TrackerBody body;
+    for (int i = 0; i < 20; ++i) {
+      const std::int32_t far = sign * kMostTrackerSteps;
+      correct_body(state, 0, {far, far, far}, TrackerSteppings(kPositionLimit), kPositionLimit, body);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(state.p(i)[0], sign * kPositionLimit);
+      EXPECT_EQ(state.v(i)[0], sign * kVelocityLimit);
+      EXPECT_EQ(std::abs(state.c(i)[0]), kVelocityLimit);
+    }
+  }
+}
+
+TEST(TrackerFilter, SmallStepsAreShorterTheMoreAxesMove) {
+  const TrackerSteppings steppings(1000);
+  EXPECT_EQ(steppings.distance({1, 0, 0}), (std::array<std::int64_t, 3>{919, 0, 0}));
+  EXPECT_EQ(steppings.distance({0, -1, 1}), (std::array<std::int64_t, 3>{0, -690, 690}));
+  EXPECT_EQ(steppings.distance({1, 1, -1}), (std::array<std::int64_t, 3>{589, 589, -589}));
+  EXPECT_EQ(steppings.distance({2, 1, 0}), (std::array<std::int64_t, 3>{1898, 949, 0}));
+  EXPECT_EQ(steppings.distance({0, 0, 0}), (std::array<std::int64_t, 3>{0, 0, 0}));
+}
+
+TEST(TrackerSearch, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
+  const TrackerModels models;
+  for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11}) {
+    const TrackerSteppings steppings(threshold);
+    const std::int32_t reach = 3 * threshold + 2;
+    for (std::int32_t x = -reach; x <= reach; ++x) {
+      for (std::int32_t y = 0; y <= reach; ++y) {
+        for (std::int32_t z = 0; z <= y; ++z) {
+          if (x * x + y * y + z * z <= threshold * threshold) continue;
+          TrackerSteps steps{};
+          ASSERT_TRUE(choose_steps({}, {x, y, z}, steppings, threshold, models, {}, steps))
+              << threshold << ": " << x << " " << y << " " << z;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,162 @@
+#include "sdk/core/codec/range_coder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/tracker_models.hpp"
+
+namespace tandem {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+struct Decision {
+  bool bit;
+  std::uint32_t p1;
+};
+
+std::vector<Decision> random_decisions(std::uint64_t seed, std::size_t count) {
+  std::mt19937_64 random(seed);
+  std::vector<Decision> decisions;
+  for (std::size_t i = 0; i < count; ++i) {
+    // Every order of magnitude of rarity, on both sides.
+    std::uint32_t p1 = std::max<std::uint32_t>(1, 65535U >> (random() % 16U));
+    if (random() % 2 == 0) p1 = 65536 - p1;
+    decisions.push_back({random() % 65536U < p1, p1});
+  }
+  return decisions;
+}
+
+double ideal_bits(const std::vector<Decision>& decisions) {
+  double bits = 0;
+  for (const Decision& d : decisions) bits -= std::log2((d.bit ? d.p1 : 65536 - d.p1) / 65536.0);
+  return bits;
+}
+
+Bytes encode(const std::vector<Decision>& decisions) {
+  Bytes out(8 * decisions.size() + 8);
+  RangeEncoder encoder(out);
+  for (const Decision& d : decisions) encoder.put(d.bit, d.p1);
+  out.resize(encoder.finish());
+  EXPECT_FALSE(encoder.overflow());
+  return out;
+}
+
+TEST(RangeCoder, DecodesWhatWasEncoded) {
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    const auto decisions = random_decisions(seed, seed * 7);
+    const Bytes bytes = encode(decisions);
+    RangeDecoder decoder(bytes);
+    for (const Decision& d : decisions) ASSERT_EQ(decoder.get(d.p1), d.bit);
+    EXPECT_TRUE(decoder.at_end());
+  }
+}
+
+TEST(RangeCoder, StaysWithinOnePercentOfTheIdealLength) {
+  const auto decisions = random_decisions(1, 200'000);
+  const double ideal = ideal_bits(decisions);
+  const double real = 8.0 * static_cast<double>(encode(decisions).size());
+  EXPECT_GE(real + 0.01, ideal);
+  EXPECT_LT(real, 1.001 * ideal + 16);
+}
+
+TEST(RangeCoder, LikelyDecisionsAndNoneAtAllTakeNoBytes) {
+  EXPECT_TRUE(encode({}).empty());
+  EXPECT_TRUE(encode(std::vector<Decision>(20, {true, 65504})).empty());
+}
+
+TEST(RangeCoder, CarriesThroughRunsOfFullBytes) {
+  // A long run just below a boundary, then a decision that pushes low over it.
+  for (std::size_t run = 1; run < 60; ++run) {
+    std::vector<Decision> decisions(run, {false, 1});
+    decisions.push_back({false, 65535});
+    decisions.push_back({false, 65535});
+    decisions.push_back({true, 1});
+    const Bytes bytes = encode(decisions);
+    RangeDecoder decoder(bytes);
+    for (const Decision& d : decisions) ASSERT_EQ(decoder.get(d.p1), d.bit) << run;
+    EXPECT_TRUE(decoder.at_end());
+  }
+}
+
+TEST(RangeCoder, NeverWritesBeyondItsMemory) {
+  const auto decisions = random_decisions(2, 1000);
+  const Bytes whole = encode(decisions);
+  for (std::size_t size = 0; size < whole.size() + 3; ++size) {
+    Bytes out(size + 1, std::byte{0xA5});
+    RangeEncoder encoder{std::span(out).first(size)};
+    for (const Decision& d : decisions) encoder.put(d.bit, d.p1);
+    const std::size_t written = encoder.finish();
+    EXPECT_EQ(out.back(), std::byte{0xA5});
+    if (!encoder.overflow()) {
+      EXPECT_EQ(Bytes(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(written)), whole);
+    } else {
+      EXPECT_LT(size, whole.size() + 4);
+    }
+  }
+}
+
+TEST(RangeCoder, TheDecoderReadsZerosBeyondItsBytesAndSeesLeftOnes) {
+  RangeDecoder nothing{{}};
+  for (int i = 0; i < 100'000; ++i) nothing.get(1 + static_cast<std::uint32_t>(i) % 65535U);
+  EXPECT_TRUE(nothing.at_end());
+  const Bytes more(100, std::byte{1});
+  RangeDecoder early(more);
+  early.get(32768);
+  EXPECT_FALSE(early.at_end());
+  // A zero at the end could have been left out, so nobody wrote it.
+  const Bytes padded{std::byte{7}, std::byte{0}};
+  EXPECT_FALSE(RangeDecoder(padded).at_end());
+}
+
+TEST(AdaptiveBit, LearnsItsDecisionsAndStaysInItsRange) {
+  AdaptiveBit always;
+  AdaptiveBit never;
+  AdaptiveBit quarter;
+  std::mt19937_64 random(3);
+  for (int i = 0; i < 20'000; ++i) {
+    always.update(true);
+    never.update(false);
+    quarter.update(random() % 4 == 0);
+  }
+  EXPECT_GT(always.p1(), 65'200U);
+  EXPECT_LE(always.p1(), AdaptiveBit::kMost);
+  EXPECT_LT(never.p1(), 400U);
+  EXPECT_GE(never.p1(), AdaptiveBit::kLeast);
+  EXPECT_NEAR(quarter.p1(), 16384, 6000);
+}
+
+TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
+  std::mt19937_64 random(4);
+  std::vector<TrackerSteps> all{
+      {0, 0, 1}, {kMostTrackerSteps, -kMostTrackerSteps, kMostTrackerSteps}, {14, 15, 16}};
+  for (int i = 0; i < 2000; ++i) {
+    TrackerSteps steps{};
+    for (std::int32_t& s : steps) s = static_cast<std::int32_t>(random() & 0xFFFFFFFFU) >> (random() % 32U);
+    for (std::int32_t& s : steps) s = std::clamp(s, -kMostTrackerSteps, kMostTrackerSteps);
+    if (steps != TrackerSteps{}) all.push_back(steps);
+  }
+  Bytes out(all.size() * (kMostStepsBits / 8 + 1));
+  TrackerModels models;
+  RangeEncoder encoder(out);
+  for (TrackerSteps steps : all) code_steps(encoder, models, {}, steps);
+  out.resize(encoder.finish());
+  ASSERT_FALSE(encoder.overflow());
+  TrackerModels learned;
+  RangeDecoder decoder(out);
+  for (const TrackerSteps& expected : all) {
+    TrackerSteps steps{};
+    ASSERT_TRUE(code_steps(decoder, learned, {}, steps));
+    ASSERT_EQ(steps, expected);
+  }
+  EXPECT_TRUE(decoder.at_end());
+}
+
+}  // namespace
+}  // namespace tandem
