@@ -30,17 +30,15 @@ Domains& domains() {
 
 // Reasons and effects: idl/PROTOCOL.md, "Cyclone DDS configuration".
 std::string defaults() {
-  return "<CycloneDDS><Domain id=\"any\">"
-         "<Discovery><SPDPInterval>1s</SPDPInterval><MaxAutoParticipantIndex>100</MaxAutoParticipantIndex></"
-         "Discovery>"
-         "<Internal>"
-         "<Watermarks><WhcLow>1 GB</WhcLow><WhcHigh>1 GB</WhcHigh><WhcHighInit>1 GB</WhcHighInit>"
-         "<WhcAdaptive>false</WhcAdaptive></Watermarks>"
-         "<NackDelay>10ms</NackDelay><HeartbeatInterval>20ms</HeartbeatInterval>"
+  return "<CycloneDDS><Domain id=\"any\"><Discovery>"
+         "<SPDPInterval>1s</SPDPInterval>"
+         "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
+         "</Discovery><Internal>"
+         "<NackDelay>10ms</NackDelay>"
+         "<HeartbeatInterval>20ms</HeartbeatInterval>"
          "<MaxSampleSize>" +
          std::to_string(kMaxSampleBytes + (1U << 20U)) +
-         " B</MaxSampleSize>"
-         "</Internal></Domain></CycloneDDS>";
+         " B</MaxSampleSize></Internal></Domain></CycloneDDS>";
 }
 
 }  // namespace

@@ -5,7 +5,8 @@
 namespace tandem::transport::dds {
 namespace {
 
-// A full history blocks no writer (see domain.cpp), so this is only how often a write looks at its stop flag.
+// Cyclone DDS never blocks a keep-last writer for its history; should a network do so, this is how often a
+// write looks at its stop flag.
 constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
 
 }  // namespace
