@@ -80,7 +80,8 @@ int Node::line_of(const pb::FieldDescriptor* field, int index) const {
   if (lines_ == nullptr || field == nullptr) return line_;
   if (field->is_repeated() && index < 0) return line_;
   int line = lines_->GetLocation(field, index).line;
-  if (line < 0 && index > 0) line = lines_->GetLocation(field, 0).line;  // a list in brackets has only one place
+  if (line < 0 && index > 0)
+    line = lines_->GetLocation(field, 0).line;  // a list in brackets has only one place
   return line < 0 ? line_ : line + 1;
 }
 

@@ -79,36 +79,38 @@ void add_touches(const Shapes& shapes, const Material& material, const Record& b
   }
 }
 
-// Adds the contacts of records[self] with its neighbours. Two passes, because the first has no branch to
-// mispredict.
-void add_neighbours(const Material& material, std::span<const Record> records, std::uint32_t self,
-                    const Neighbourhood& around, Contact& sum) {
-  std::uint32_t near[kMaxCandidates];
-  const Record body = records[self];
-  std::uint32_t count = 0;
-  std::uint32_t allowed = kMaxCandidates;
-  for (std::uint32_t r = 0; r < around.count; ++r) {
-    const std::uint32_t begin = around.runs[r].begin;
-    const std::uint32_t end = begin + std::min(allowed, around.runs[r].end - begin);
-    for (std::uint32_t j = begin; j < end; ++j) {
-      const Float3 d = position(records[j]) - position(body);
-      const float reach = body.radius + records[j].radius;
-      near[count] = j;
-      count += static_cast<std::uint32_t>(dot(d, d) < reach * reach);
+// The partners of one body among a range of records, at most all of the grid's neighbourhood.
+class Partners {
+ public:
+  // Collects the bodies of [from, to) around `self` that may touch it. No branch in the loop to mispredict.
+  void collect(std::span<const Record> records, const Neighbourhood& around, const Record& self,
+               std::uint32_t from, std::uint32_t to) {
+    count_ = 0;
+    for (std::uint32_t r = 0; r < around.count; ++r) {
+      const std::uint32_t end = std::min(around.runs[r].end, to);
+      for (std::uint32_t j = std::max(around.runs[r].begin, from); j < end; ++j) {
+        const Float3 d = position(records[j]) - position(self);
+        const float reach = self.radius + records[j].radius;
+        places_[count_] = j;
+        count_ += static_cast<std::uint32_t>(dot(d, d) < reach * reach);
+      }
     }
-    allowed -= end - begin;
   }
-  for (std::uint32_t k = 0; k < count; ++k) {
-    const std::uint32_t j = near[k];
-    if (j == self) continue;
-    const Float3 d = position(records[j]) - position(body);
-    const float distance = std::sqrt(dot(d, d));
-    // Two bodies in one point part along y, the earlier one downwards.
-    const Float3 n = distance > 0 ? (1.0F / distance) * d : Float3{0, j > self ? 1.0F : -1.0F, 0};
-    const float overlap = body.radius + records[j].radius - distance;
-    sum.force = sum.force + penalty(material, overlap, n, velocity(records[j]) - velocity(body));
-    sum.touching = true;
-  }
+  [[nodiscard]] std::span<const std::uint32_t> places() const { return {places_.data(), count_}; }
+
+ private:
+  std::array<std::uint32_t, kMaxNeighbours + 1> places_{};  // one more, for the write before the count
+  std::uint32_t count_ = 0;
+};
+
+// Force of `other` on `self`, which lies before it; the other one's is its negative, to the bit.
+inline Float3 pair_force(const Material& material, const Record& self, const Record& other) {
+  const Float3 d = position(other) - position(self);
+  const float distance = std::sqrt(dot(d, d));
+  // Two bodies in one point part along y, the earlier one downwards.
+  const Float3 n = distance > 0 ? (1.0F / distance) * d : Float3{0, 1, 0};
+  const float overlap = self.radius + other.radius - distance;
+  return penalty(material, overlap, n, velocity(other) - velocity(self));
 }
 
 }  // namespace
@@ -122,20 +124,42 @@ Contact scene_contact(const World& world, const Record& body) {
 }
 
 void sum_contacts(const World& world, const Grid& grid, std::uint32_t begin, std::uint32_t end,
-                  std::span<Contact> contacts) {
+                  std::span<Contact> sums) {
   const std::span<const Record> records = grid.sorted();
-  Neighbourhood near;
-  std::uint32_t near_cell = UINT32_MAX;
-  for (std::uint32_t i = begin; i < end; ++i) {
-    const Record& body = records[i];
+  const std::uint32_t last = grid.in_cells();
+  for (std::uint32_t i = begin; i < end; ++i) sums[i] = scene_contact(world, records[i]);
+
+  Partners partners;
+  Neighbourhood around;
+  std::uint32_t around_cell = UINT32_MAX;
+  const auto look_around = [&](const Record& body, bool later_only) {
     const std::uint32_t cell = grid.cell_of(body.x, body.y, body.z);
-    if (cell != near_cell) {
-      near = grid.neighbourhood(cell);
-      near_cell = cell;
+    if (cell != around_cell) around = grid.neighbourhood(cell, later_only);
+    around_cell = cell;
+  };
+  // Partners before the range first: they have the lowest places.
+  for (std::uint32_t i = begin; begin > 0 && i < std::min(end, last); ++i) {
+    look_around(records[i], false);
+    partners.collect(records, around, records[i], 0, begin);
+    for (const std::uint32_t j : partners.places()) {
+      sums[i].force = sums[i].force - pair_force(world.pair, records[j], records[i]);
+      sums[i].touching = true;
     }
-    Contact sum = scene_contact(world, body);
-    add_neighbours(world.pair, records, i, near, sum);
-    contacts[body.slot] = sum;
+  }
+  around_cell = UINT32_MAX;
+  for (std::uint32_t i = begin; i < std::min(end, last); ++i) {
+    look_around(records[i], true);
+    partners.collect(records, around, records[i], i + 1, last);
+    Contact sum = sums[i];
+    for (const std::uint32_t j : partners.places()) {
+      const Float3 force = pair_force(world.pair, records[i], records[j]);
+      sum.force = sum.force + force;
+      sum.touching = true;
+      if (j >= end) continue;
+      sums[j].force = sums[j].force - force;
+      sums[j].touching = true;
+    }
+    sums[i] = sum;
   }
 }
 

@@ -15,13 +15,12 @@ struct Contact {
   bool touching = false;
 };
 
-/// A body looks at no more others than this, in the order of the cells around it: what keeps a step bounded
-/// when everything is in one place. In a deep pile of equal spheres it has about 40 to look at.
-inline constexpr std::uint32_t kMaxCandidates = 1024;
-
-/// Forces on the sorted records [begin, end), each written to `contacts[record.slot]`.
+/// Forces on the sorted records [begin, end), into `sums` by their place there. A pair within the range is
+/// computed once, a pair across its border by both sides; either way a body's forces are added in the order
+/// scene, then partners by ascending place, so that how records are cut into ranges changes no bit. Touches
+/// only its own range of `sums`.
 void sum_contacts(const World& world, const Grid& grid, std::uint32_t begin, std::uint32_t end,
-                  std::span<Contact> contacts);
+                  std::span<Contact> sums);
 
 /// Force of the static geometry on one body.
 [[nodiscard]] Contact scene_contact(const World& world, const Record& body);

@@ -10,6 +10,8 @@ constexpr std::uint32_t kMaxBits = 10;
 constexpr std::uint32_t kCellsPerBody =
     4;  // more makes clearing the table cost more than the folded cells save
 
+constexpr std::uint32_t kNoCell = UINT32_MAX;
+
 }  // namespace
 
 Grid::Grid(const Vec3f& low, const Vec3f& high, float cell_width, std::uint32_t capacity)
@@ -33,7 +35,9 @@ void Grid::sort(std::span<const Record> unsorted) {
   std::fill(first_.begin(), first_.end(), 0U);
   for (std::size_t i = 0; i < size_; ++i) {
     cell_[i] = cell_of(unsorted[i].x, unsorted[i].y, unsorted[i].z);
-    ++first_[cell_[i]];
+    if (++first_[cell_[i]] <= kMaxInCell) continue;
+    --first_[cell_[i]];
+    cell_[i] = kNoCell;
   }
   // Counting sort: turn counts into ends, then fill each cell from its end; first_ is left at the beginnings.
   std::uint32_t end = 0;
@@ -41,10 +45,14 @@ void Grid::sort(std::span<const Record> unsorted) {
     end += entry;
     entry = end;
   }
-  for (std::size_t i = size_; i-- > 0;) sorted_[--first_[cell_[i]]] = unsorted[i];
+  auto overflow = static_cast<std::uint32_t>(size_);
+  for (std::size_t i = size_; i-- > 0;) {
+    const std::uint32_t place = cell_[i] == kNoCell ? --overflow : --first_[cell_[i]];
+    sorted_[place] = unsorted[i];
+  }
 }
 
-Neighbourhood Grid::neighbourhood(std::uint32_t cell) const {
+Neighbourhood Grid::neighbourhood(std::uint32_t cell, bool later_only) const {
   const std::array<std::uint32_t, 3> mask{(1U << bits_[0]) - 1U, (1U << bits_[1]) - 1U,
                                           (1U << bits_[2]) - 1U};
   const std::uint32_t x = cell & mask[0];
@@ -53,12 +61,16 @@ Neighbourhood Grid::neighbourhood(std::uint32_t cell) const {
   Neighbourhood result;
   const auto add = [&](std::uint32_t row, std::uint32_t from, std::uint32_t to) {
     const Run run{first_[row + from], first_[row + to + 1]};
-    if (run.begin < run.end) result.runs[result.count++] = run;
+    if (run.begin == run.end) return;
+    std::uint32_t at = result.count++;
+    for (; at > 0 && result.runs[at - 1].begin > run.begin; --at) result.runs[at] = result.runs[at - 1];
+    result.runs[at] = run;
   };
   for (std::uint32_t dz = 0; dz < 3; ++dz) {
     for (std::uint32_t dy = 0; dy < 3; ++dy) {
       const std::uint32_t row =
           (((z + dz - 1U) & mask[2]) << (bits_[0] + bits_[1])) | (((y + dy - 1U) & mask[1]) << bits_[0]);
+      if (later_only && row < cell - x) continue;
       if (x == 0) {
         add(row, 0, 1);
         add(row, mask[0], mask[0]);

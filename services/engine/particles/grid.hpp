@@ -25,8 +25,13 @@ struct Run {
   std::uint32_t begin = 0, end = 0;
 };
 
-/// Where the bodies near a cell are: at most three runs of cells along x for each of nine rows, less where a
-/// run would only be split by the wrap of the grid.
+/// A cell holds no more than this: what keeps a step bounded when everything is in one place. The rest of its
+/// bodies meet nobody, and nobody them. Equal spheres squeezed to half their diameter are 16 in a cell.
+inline constexpr std::uint32_t kMaxInCell = 128;
+inline constexpr std::uint32_t kMaxNeighbours = 27 * kMaxInCell;
+
+/// Where the bodies near a cell are, by ascending place: runs of cells along x, one or (where the grid wraps)
+/// two for each of nine rows, without the empty ones.
 struct Neighbourhood {
   std::array<Run, 18> runs{};
   std::uint32_t count = 0;
@@ -41,12 +46,15 @@ class Grid {
 
   /// Sorts `unsorted` by cell, and within a cell by its order there. Call before the queries.
   void sort(std::span<const Record> unsorted);
+  /// First the bodies in cells, then those that found theirs full.
   [[nodiscard]] std::span<const Record> sorted() const { return {sorted_.data(), size_}; }
+  [[nodiscard]] std::uint32_t in_cells() const { return first_.back(); }
   /// Cell of a point within the bounds.
   [[nodiscard]] std::uint32_t cell_of(float x, float y, float z) const {
     return (along(z, 2) << (bits_[0] + bits_[1])) | (along(y, 1) << bits_[0]) | along(x, 0);
   }
-  [[nodiscard]] Neighbourhood neighbourhood(std::uint32_t cell) const;
+  /// With `later_only`, rows that lie before the cell's own are left out: half of the look-ups.
+  [[nodiscard]] Neighbourhood neighbourhood(std::uint32_t cell, bool later_only = false) const;
 
  private:
   [[nodiscard]] std::uint32_t along(float at, std::size_t axis) const {

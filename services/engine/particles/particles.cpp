@@ -17,8 +17,7 @@ namespace {
 
 constexpr std::uint32_t kMaxThreads = 64;
 constexpr std::uint32_t kIntegrationBlock =
-    4096;  // bodies; smaller blocks cost more to hand out than they even out
-constexpr std::uint32_t kContactBlock = 256;
+    4096;                             // bodies; smaller blocks cost more to hand out than they even out
 constexpr float kCellSlack = 1.001F;  // rounding must not put touching bodies two cells apart
 
 std::uint64_t splitmix64(std::uint64_t x) {
@@ -30,6 +29,13 @@ std::uint64_t splitmix64(std::uint64_t x) {
 
 // Uniform in [0, 1), exact.
 float unit_float(std::uint64_t bits) { return static_cast<float>(bits >> 40U) * 0x1p-24F; }
+
+// Bodies in a block of the contact loop. One thread takes all at once, since pairs across blocks are computed
+// twice; several get about eight blocks each, so that none waits long for another.
+std::uint32_t contact_block(std::uint32_t capacity, std::uint32_t threads) {
+  if (threads == 1) return capacity;
+  return std::clamp(capacity / (8 * threads), 512U, 8192U);
+}
 
 float largest_radius(const World& world) {
   float radius = 0;
@@ -78,6 +84,8 @@ class Particles final : public Simulation {
   Workers workers_;
   std::vector<float> inverse_mass_;  // by type
   std::vector<Record> unsorted_;
+  std::vector<Contact> sums_;  // by place in the grid
+  std::uint32_t contact_block_;
   std::vector<Event> events_;
   std::uint32_t free_from_ = 0;  // no slot below is free
   std::uint32_t colliding_ = 0;
@@ -88,7 +96,9 @@ Particles::Particles(const World& world, std::uint32_t threads)
       fingerprint_(fingerprint(world)),
       columns_(world.capacity),
       grid_(world.low, world.high, 2 * kCellSlack * largest_radius(world), world.capacity),
-      workers_(threads) {
+      workers_(threads),
+      sums_(world.capacity),
+      contact_block_(contact_block(world.capacity, threads)) {
   for (const ParticleType& type : world.types) inverse_mass_.push_back(1.0F / type.mass);
   unsorted_.reserve(world.capacity);
   events_.reserve(2 * std::size_t{world.capacity});
@@ -255,10 +265,11 @@ void Particles::find_contacts() {
                          v[0][slot], v[1][slot], v[2][slot], slot});
   }
   grid_.sort(unsorted_);
-  workers_.run(static_cast<std::uint32_t>(unsorted_.size()), kContactBlock,
-               [&](std::uint32_t begin, std::uint32_t end) {
-                 sum_contacts(world_, grid_, begin, end, columns_.contact);
-               });
+  const auto count = static_cast<std::uint32_t>(unsorted_.size());
+  workers_.run(count, contact_block_, [&](std::uint32_t begin, std::uint32_t end) {
+    sum_contacts(world_, grid_, begin, end, sums_);
+    for (std::uint32_t i = begin; i < end; ++i) columns_.contact[grid_.sorted()[i].slot] = sums_[i];
+  });
 }
 
 void Particles::count_colliding() {

@@ -175,6 +175,7 @@ TEST(Physics, AllBodiesInOnePlaceStayFiniteAndBounded) {
   for (std::uint32_t slot = 0; slot < 3000; ++slot) {
     ASSERT_TRUE(s->bodies().alive[slot] == 0 || std::isfinite(position(*s, slot)[1]));
   }
+  EXPECT_LE(s->colliding(), 3000U);
 }
 
 TEST(Physics, APileOf2000ComesToRest) {
