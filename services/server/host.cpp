@@ -57,19 +57,6 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   return {};
 }
 
-TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity) {
-  TimelineConfig timeline;
-  timeline.capacity = capacity;
-  timeline.type_count = static_cast<TypeId>(config.types.size());
-  timeline.codec = config.codec;
-  timeline.codec_tables = config.codec_tables;
-  timeline.parameters = config.parameters;
-  timeline.predictor = config.predictor;
-  timeline.predictor_constants = config.predictor_constants;
-  timeline.max_lead = config.lead;
-  return timeline;
-}
-
 transport::SessionMessage session_message(const HostConfig& config, std::uint32_t capacity,
                                           const ServerTimeline& timeline) {
   transport::SessionMessage session;
@@ -99,6 +86,19 @@ transport::SessionMessage session_message(const HostConfig& config, std::uint32_
 
 }  // namespace
 
+TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity) {
+  TimelineConfig timeline;
+  timeline.capacity = capacity;
+  timeline.type_count = static_cast<TypeId>(config.types.size());
+  timeline.codec = config.codec;
+  timeline.codec_tables = config.codec_tables;
+  timeline.parameters = config.parameters;
+  timeline.predictor = config.predictor;
+  timeline.predictor_constants = config.predictor_constants;
+  timeline.max_lead = config.lead;
+  return timeline;
+}
+
 struct Host::Impl {
   Impl(HostConfig configuration, engine::Simulation& full, transport::ServerPort& endpoints,
        ServerTimeline server, const Drive& drive)
@@ -124,7 +124,7 @@ struct Host::Impl {
     timeline.set_clock(config.clock_ns);
     bodies = mirror.target().alive_count();
     report.frame = config.start_frame;
-    report.hash = StateHasher().hash(timeline.state());
+    report.hash = timeline.hash();
   }
 
   // --- What the rules see ---
@@ -478,16 +478,6 @@ std::vector<std::string> Host::take_notices() {
   all.insert(all.end(), more.begin(), more.end());
   more.clear();
   return all;
-}
-
-std::uint32_t delta_depth(std::uint32_t window_ceiling, std::size_t max_delta_bytes) {
-  constexpr std::size_t kMemoryBytes = std::size_t{256} << 20U;
-  constexpr std::size_t kLeast = 64;
-  const std::size_t parts = std::max<std::size_t>((max_delta_bytes + kPartBytes - 1) / kPartBytes, 1);
-  const std::size_t wanted = std::max<std::size_t>(std::size_t{2} * window_ceiling * parts, kLeast);
-  // Even where memory is short, two frames must fit, or no reader could follow at all.
-  const std::size_t affordable = std::max(kMemoryBytes / kPartBytes, 2 * parts);
-  return static_cast<std::uint32_t>(std::min(wanted, affordable));
 }
 
 }  // namespace tandem::server

@@ -131,8 +131,7 @@ class Host {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Delta samples that writers and readers must be able to hold: two window ceilings of frames, at least 64
-/// samples and no more than fit 256 MB. `max_delta_bytes` is the bound of a whole payload.
-[[nodiscard]] std::uint32_t delta_depth(std::uint32_t window_ceiling, std::size_t max_delta_bytes);
+/// What both sides of the session build their timelines from.
+[[nodiscard]] TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity);
 
 }  // namespace tandem::server

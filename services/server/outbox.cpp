@@ -50,7 +50,7 @@ bool Outbox::push(Outgoing message) {
 
 std::optional<Outgoing> Outbox::pop(std::chrono::nanoseconds timeout) {
   std::unique_lock lock(mutex_);
-  if (queue_.empty()) ready_.wait_for(lock, timeout);
+  if (queue_.empty() && timeout.count() > 0) ready_.wait_for(lock, timeout);
   if (queue_.empty()) return std::nullopt;
   std::optional<Outgoing> message(std::move(queue_.front()));
   queue_.pop_front();
