@@ -177,7 +177,7 @@ void ClientCore::Impl::send_status(Now now) {
     status.phase =
         static_cast<std::uint32_t>(epoch->joining ? transport::Phase::kJoining : transport::Phase::kPlaying);
   }
-  status.lag_ms = statistics.latency.at_ms(0.5);
+  status.lag_ms = statistics.smoothed_latency_ns / 1e6;
   status.client_ms_p50 = statistics.frame_cost.at_ms(0.5);
   status.mbit_per_s = last_status_ns == 0 ? 0 : static_cast<double>(bytes) * 8 / (1U << 20U) / elapsed_s;
   status.frames_applied = statistics.frames_applied;

@@ -160,7 +160,7 @@ void ClientCore::Impl::play(Now now, std::int64_t since_last_poll_ns) {
     e.sampler.after_apply(e.timeline);
     ++statistics.frames_applied;
     statistics.payload_bytes += delta->payload.size();
-    statistics.latency.add(now.wall_ns + measure() - poll_began_ns - delta->server_time_ns);
+    statistics.add_latency(now.wall_ns + measure() - poll_began_ns - delta->server_time_ns);
     if (options.measure_ns != nullptr) statistics.frame_cost.add(cost_ns);
     if (statistics.first_applied_ns == 0) statistics.first_applied_ns = now.steady_ns;
     statistics.last_applied_ns = now.steady_ns;

@@ -35,10 +35,16 @@ struct Statistics {
   std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
   std::int64_t join_ns = 0;                                ///< last join
   std::size_t queue_high_water = 0;
-  Quantiles latency;        ///< publish to applied
-  Quantiles input_latency;  ///< sent to the frame it acted on applied
-  Quantiles frame_cost;     ///< decode, apply and simulate, per applied frame
+  double smoothed_latency_ns = 0;  ///< publish to applied, over about the last half second
+  Quantiles latency;               ///< publish to applied
+  Quantiles input_latency;         ///< sent to the frame it acted on applied
+  Quantiles frame_cost;            ///< decode, apply and simulate, per applied frame
 
+  void add_latency(std::int64_t latency_ns) {
+    latency.add(latency_ns);
+    const double gain = latency.count() == 1 ? 1 : 1.0 / 16;
+    smoothed_latency_ns += (static_cast<double>(latency_ns) - smoothed_latency_ns) * gain;
+  }
   /// Payload since the first applied frame; 2^20 bits to the Mbit.
   [[nodiscard]] double mbit_per_s() const {
     const auto span_ns = static_cast<double>(last_applied_ns - first_applied_ns);
