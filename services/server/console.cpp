@@ -1,0 +1,45 @@
+#include "services/server/console.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace tandem::server {
+
+Console::Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
+Console::~Console() { clear_line(); }
+
+void Console::clear_line() {
+  if (line_shown_) fmt::print(stderr, "\r\x1b[K");
+  line_shown_ = false;
+}
+
+void Console::show(Host& host, std::int64_t now_ns) {
+  for (const std::string& notice : host.take_notices()) {
+    clear_line();
+    spdlog::info(notice);
+  }
+  if (!terminal_ || now_ns < next_ns_) return;
+  const HostTotals totals = host.totals();
+  const double elapsed_s = std::max(static_cast<double>(now_ns - last_ns_) * 1e-9, 1e-9);
+  const double frames = static_cast<double>(totals.frames - last_.frames);
+  const double bits = static_cast<double>(totals.payload_bytes - last_.payload_bytes) * 8;
+  const double corrected = static_cast<double>(totals.corrected - last_.corrected);
+  clear_line();
+  fmt::print(stderr,
+             "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
+             " window {}",
+             host.frame(), frames / elapsed_s, bits / 1048576 / elapsed_s,
+             frames > 0 ? corrected / frames : 0, host.report().frame_ms, host.participants(),
+             host.observers(), host.window());
+  std::fflush(stderr);
+  line_shown_ = true;
+  last_ = totals;
+  last_ns_ = now_ns;
+  next_ns_ = now_ns + kSecond;
+}
+
+}  // namespace tandem::server

@@ -1,0 +1,31 @@
+#pragma once
+// What tandemd shows while it runs: log lines, and on a terminal one live line.
+
+#include <cstdint>
+
+#include "services/server/host.hpp"
+
+namespace tandem::server {
+
+/// Writes to stderr. Not thread-safe.
+class Console {
+ public:
+  Console();
+  ~Console();
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  /// Logs the host's notices and, once a second on a terminal, rewrites the live line.
+  void show(Host& host, std::int64_t now_ns);
+
+ private:
+  void clear_line();
+
+  bool terminal_;
+  bool line_shown_ = false;
+  std::int64_t next_ns_ = 0;
+  HostTotals last_;
+  std::int64_t last_ns_ = 0;
+};
+
+}  // namespace tandem::server

@@ -1,0 +1,35 @@
+#pragma once
+// From a scene to a session: lattice, codec with its tables, and what clients are told about the scene.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "services/scenes/scene.hpp"
+#include "services/server/host.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::server {
+
+/// What an operator chooses on top of the scene.
+struct SessionChoice {
+  std::uint32_t bodies = 0;
+  std::string codec = "entropy";
+  std::string predictor = "ballistic";
+  std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
+  double threshold_scale = 1;
+  std::size_t budget_bytes = kPaperBudgetBytes;  ///< of corrections per frame; for `limited` only
+};
+
+/// The part of a host's configuration that follows from scene and choice: lattice, codec with tables,
+/// parameters and budget, predictor, types, names. The rest keeps its defaults. Where nothing was trained for
+/// this size and threshold, the nearest table is used, and the built-in one for a scene that was never
+/// trained. Errors: kInvalidArgument (the threshold, or a world too large for it).
+[[nodiscard]] Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice);
+
+/// Most bytes a delta of this session can take: what a transport must be ready for before the host exists.
+/// Errors: as Host::create for codec and predictor.
+[[nodiscard]] Result<std::size_t> largest_delta_bytes(const HostConfig& config, std::uint32_t capacity);
+
+}  // namespace tandem::server
