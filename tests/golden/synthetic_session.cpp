@@ -10,8 +10,9 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x71A958FC8803969C;
+constexpr std::uint64_t kGolden = 0xD61DC9301CA9EF80;
 constexpr std::uint32_t kCapacity = 500;
+constexpr std::string_view kCodecs[] = {"none", "selective", "quantized", "entropy", "limited"};
 
 // Runs one codec; mixes the hash of every frame into `digest`. False if the client ever disagrees.
 bool run(std::string_view codec, synthetic::Random& random, std::uint64_t& digest) {
@@ -49,7 +50,7 @@ bool run(std::string_view codec, synthetic::Random& random, std::uint64_t& diges
 int compare() {
   synthetic::Random random(1000);
   std::uint64_t digest = 0;
-  for (const std::string_view codec : codec_names()) {
+  for (const std::string_view codec : kCodecs) {
     if (!run(codec, random, digest)) {
       std::fprintf(stderr, "client and server disagree (%s)\n", std::string(codec).c_str());
       return 1;
