@@ -234,7 +234,7 @@ const ClientTimeline* ClientCore::timeline() const {
 }
 std::uint32_t ClientCore::join_attempt() const { return impl_->epoch ? impl_->epoch->joiner.attempt() : 0; }
 
-ClientStatus ClientCore::status(Now /*now*/) const {
+ClientStatus ClientCore::status() const {
   const Impl& self = *impl_;
   const Statistics& figures = self.statistics;
   ClientStatus out;

@@ -75,7 +75,7 @@ class ClientCore {
   [[nodiscard]] const transport::SessionMessage* session() const;
   /// Null unless playing.
   [[nodiscard]] const ClientTimeline* timeline() const;
-  [[nodiscard]] ClientStatus status(Now now) const;
+  [[nodiscard]] ClientStatus status() const;
   [[nodiscard]] std::uint32_t join_attempt() const;
 
   /// See Client::sample().

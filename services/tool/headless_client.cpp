@@ -101,7 +101,7 @@ void HeadlessClient::run(const std::atomic<bool>& stop) {
 
 void HeadlessClient::finish() {
   if (core_->statistics().frames_applied == 0) {
-    const std::string reason = core_->status(client::now()).reason;
+    const std::string reason = core_->status().reason;
     failure_ = fmt::format("never played in session '{}' on domain {}{}", options_.session, options_.domain,
                            reason.empty() ? ": no server found or no frame came" : ": " + reason);
   }
@@ -174,6 +174,7 @@ void HeadlessClient::tell_live(client::Now now) {
   const auto bytes = static_cast<double>(figures.payload_bytes - live_bytes_);
   static constexpr const char* kPhases[] = {"searching", "refused", "joining", "playing"};
   nlohmann::ordered_json line;
+  line["client"] = options_.index;
   line["seconds"] = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
   line["phase"] = kPhases[static_cast<std::size_t>(core_->phase())];
   line["frame"] = last_frame_;
@@ -181,7 +182,7 @@ void HeadlessClient::tell_live(client::Now now) {
   line["mbit_per_s"] = bytes * 8 / (1U << 20U) / span_s;
   line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
   line["resyncs"] = figures.resyncs;
-  fmt::print(stderr, "{}{}\n", options_.name, line.dump());
+  fmt::print(stderr, "{}\n", line.dump());
   live_ns_ = now.steady_ns;
   live_bytes_ = figures.payload_bytes;
   live_frames_ = figures.frames_applied;
@@ -215,7 +216,7 @@ nlohmann::ordered_json HeadlessClient::report() const {
   out["inputs_refused"] = figures.inputs_refused;
   out["last_frame"] = last_frame_;
   out["state_hash"] = to_hex(last_hash_);
-  const ClientStatus status = core_->status(client::now());
+  const ClientStatus status = core_->status();
   out["client"] = to_hex(status.client_id);
   out["role"] = status.role == ClientRole::kParticipant ? "participant" : "observer";
   out["lead"] = status.lead;

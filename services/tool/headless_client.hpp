@@ -25,6 +25,7 @@ struct HeadlessOptions {
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   bool live = false;                            ///< a JSON line a second on stderr
   bool quiet = false;                           ///< no lines for humans on stderr
+  std::uint32_t index = 0;                      ///< of several clients, in live lines
   std::string name;                             ///< in front of lines for humans; may be empty
 };
 

@@ -36,6 +36,7 @@ int run_join(const JoinOptions& options) {
   std::vector<std::unique_ptr<HeadlessClient>> clients;
   for (std::uint32_t i = 0; i < options.count; ++i) {
     HeadlessOptions one = options.client;
+    one.index = i;
     if (options.count > 1) {
       one.hash_log = with_suffix(one.hash_log, i);
       one.capture = with_suffix(one.capture, i);

@@ -106,7 +106,7 @@ void Client::poll(double wait_s) {
 
 ClientStatus Client::status() const {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->core.status(client::now());
+  return impl_->core.status();
 }
 
 void Client::run_for(double seconds) {

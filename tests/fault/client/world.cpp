@@ -39,7 +39,7 @@ void WatchedClient::poll(Now now) {
   core_->poll(now);
   const ClientTimeline* timeline = core_->timeline();
   if (timeline == nullptr) return;
-  const Frame most = timeline->applied() + core_->status(now).lead;
+  const Frame most = timeline->applied() + core_->status().lead;
   if (timeline->now() > most) blame("simulated beyond its lead, at frame " + std::to_string(timeline->now()));
   if (core_->statistics().hash_mismatches != 0) blame("hash mismatch");
   if (core_->statistics().refused_messages != 0) blame("refused bytes that nobody had touched");
@@ -206,7 +206,7 @@ void World::heal() {
 std::string World::not_playing() {
   for (std::size_t i = 0; i < clients_.size(); ++i) {
     ClientCore& core = clients_[i]->core();
-    const ClientStatus status = core.status({now_ns_, wall_ns()});
+    const ClientStatus status = core.status();
     const std::string who = "client " + std::to_string(i) + " (phase " +
                             std::to_string(static_cast<int>(status.phase)) + ", frame " +
                             std::to_string(status.frame) + ", epoch " + std::to_string(status.epoch) + ")";

@@ -1,0 +1,291 @@
+#!/usr/bin/env python3
+"""One tandemd and several `tandem join` processes over loopback DDS; their hash logs are compared frame by frame.
+
+session_test.py SCENARIO --tandemd PATH --tandem PATH        Standard library only. Exit 0 passed, 1 failed.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import random
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+LOOPBACK = (
+    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/>'
+    "</Interfaces></General><Discovery><Tag>{tag}</Tag></Discovery></Domain></CycloneDDS>"
+)
+LIMIT_S = 90  # of any one wait; a busy machine is slow
+
+
+class Failed(Exception):
+    """A broken promise, in one line."""
+
+
+class Stage:
+    """The processes of one scenario, ended whatever happens."""
+
+    def __init__(self, options, folder):
+        self.options = options
+        self.folder = pathlib.Path(folder)
+        self.processes = {}
+        # The tag keeps sessions of tests that run at the same time apart, whatever their domain.
+        tag = f"session-test-{os.getpid()}"
+        self.environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK.format(tag=tag)}
+        self.common = ["--domain", str(random.Random(os.getpid()).randrange(20, 90))]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *_):
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.kill()  # also ends what is stopped
+                process.wait()
+        if kind is not None:
+            for log in sorted(self.folder.glob("*.err")):
+                print(f"--- {log.stem}\n{log.read_text(errors='replace')[-3000:]}", file=sys.stderr)
+
+    def start(self, name, program, *arguments):
+        with open(self.folder / f"{name}.out", "wb") as out, open(self.folder / f"{name}.err", "wb") as err:
+            self.processes[name] = subprocess.Popen(
+                [program, *map(str, arguments), *self.common],
+                stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=self.environment,
+            )  # fmt: skip
+
+    def server(self, name, *arguments):
+        self.start(
+            name, self.options.tandemd, "--scene", "half_pipe", "--bodies", 400, "--json",
+            "--hash-log", self.log(name), *arguments,
+        )  # fmt: skip
+
+    def client(self, name, *arguments):
+        log = ("--hash-log", self.log(name)) if "--hash-log" not in arguments else ()
+        self.start(name, self.options.tandem, "join", "--json", "--live", *log, *arguments)
+
+    def script(self, name, seed, count, period_s):
+        """An input script: gravity turns every `period_s`."""
+        dice = random.Random(seed)
+        path = self.folder / f"{name}.textproto"
+        with open(path, "w", encoding="ascii") as out:
+            for i in range(count):
+                x, y = dice.uniform(-4, 4), dice.uniform(-4, 4)
+                gravity = f"gravity {{ x: {x:.3f} y: {y:.3f} z: -9.0 }}"
+                out.write(f"inputs {{ time_s: {(i + 1) * period_s:.2f} {gravity} }}\n")
+        return path
+
+    def log(self, name):
+        return self.folder / f"{name}.hashes"
+
+    def hashes(self, name):
+        """{(epoch, frame): hash}; the last line of a killed process may be cut off."""
+        found, order = {}, []
+        if self.log(name).exists():
+            for line in self.log(name).read_text(encoding="ascii", errors="replace").split("\n"):
+                match = re.fullmatch(r"(\d+),(\d+),([0-9a-f]{16})", line)
+                if match:
+                    key = (int(match[1]), int(match[2]))
+                    found[key] = match[3]
+                    order.append(key)
+        if len(found) != len(order):
+            raise Failed(f"{name} logged a frame twice")
+        return found
+
+    def live(self, name):
+        """Newest live line of a client, or an empty object."""
+        lines = (self.folder / f"{name}.err").read_text(errors="replace").split("\n")
+        live = [line for line in lines[:-1] if line.startswith("{")]
+        return json.loads(live[-1]) if live else {}
+
+    def wait_live(self, names, condition, what):
+        def ready():
+            for name in names:
+                if self.processes[name].poll() is not None:
+                    raise Failed(f"{name} ended while {what} was waited for")
+            return all(condition(self.live(name)) for name in names)
+
+        self.wait(ready, what)
+
+    @staticmethod
+    def wait(ready, what):
+        deadline = time.monotonic() + LIMIT_S
+        while not ready():
+            if time.monotonic() > deadline:
+                raise Failed(f"waited {LIMIT_S} s for {what}")
+            time.sleep(0.05)
+
+    def end(self, name, code=0):
+        """Waits for a process to end by itself and returns its JSON object."""
+        try:
+            got = self.processes[name].wait(LIMIT_S)
+        except subprocess.TimeoutExpired as error:
+            raise Failed(f"{name} did not end within {LIMIT_S} s") from error
+        if got != code:
+            raise Failed(f"{name} ended with {got}, not {code}")
+        text = (self.folder / f"{name}.out").read_text(encoding="utf-8")
+        try:
+            return json.loads(text)
+        except json.JSONDecodeError as error:
+            raise Failed(f"stdout of {name} is not one JSON object: {text!r}") from error
+
+    def stop(self, name, code=0):
+        self.processes[name].send_signal(signal.SIGTERM)
+        return self.end(name, code)
+
+    def kill(self, name):
+        self.processes[name].kill()
+        self.processes[name].wait()
+
+
+def compare(stage, servers, client, least, resyncs=0):
+    """Every frame a client applied has a server's hash, and none is missing unless it joined again."""
+    truth = {}
+    for server in servers:
+        truth.update(stage.hashes(server))
+    got = stage.hashes(client)
+    if len(got) < least:
+        raise Failed(f"{client} applied {len(got)} frames, expected at least {least}")
+    last_logged = {}
+    for epoch, frame in truth:
+        last_logged[epoch] = max(frame, last_logged.get(epoch, 0))
+    compared = 0
+    for (epoch, frame), value in got.items():
+        if frame > last_logged.get(epoch, 0):
+            continue  # a killed server does not write its last lines
+        if truth.get((epoch, frame)) != value:
+            raise Failed(f"{client}: frame {frame} of epoch {epoch} is {value}, the server's {truth.get((epoch, frame))}")
+        compared += 1
+    if compared < least // 2:
+        raise Failed(f"{client}: only {compared} frames could be compared")
+    holes = sum(1 for epoch, frame in got if (epoch, frame - 1) not in got) - len({epoch for epoch, _ in got})
+    if holes > resyncs:
+        raise Failed(f"{client}: {holes} holes in its frames, but {resyncs} resyncs")
+    print(f"{client}: {compared} frames agree, {holes} holes, {resyncs} resyncs")
+
+
+def check_report(report, keys=()):
+    for key in (
+        "frames_applied resyncs hash_mismatches payload_bytes mbit_per_s latency_ms input_latency_ms client_ms join_ms "
+        "inputs_sent inputs_refused last_frame state_hash"
+    ).split():
+        if key not in report:
+            raise Failed(f"{key} is missing from the report")
+    if report["hash_mismatches"] != 0:
+        raise Failed(f"{report['hash_mismatches']} hash mismatches")
+    for key in keys:
+        if not report[key] > 0:
+            raise Failed(f"{key} is {report[key]}")
+
+
+def two_thousand_frames(stage):
+    """1 server, 5 clients with inputs; one is killed, one is frozen, one comes late: all hold the server's state."""
+    stage.server("server", "--rate", 60, "--wait-for", 3)
+    for i in range(3):
+        script = stage.script(f"script{i}", i, 60, 0.4 + 0.1 * i)
+        stage.client(f"participant{i}", "--input-script", script)
+    stage.client("observer", "--observe", "--lead", 0)
+    stage.wait_live(["participant0", "participant1", "participant2", "observer"],
+                    lambda live: live.get("frame", 0) > 200, "frame 200")  # fmt: skip
+    stage.kill("participant1")
+    stage.client("late")
+    stage.wait_live(["late"], lambda live: live.get("frame", 0) > 400, "the late client")
+    stage.processes["participant2"].send_signal(signal.SIGSTOP)
+    time.sleep(1.5)
+    stage.processes["participant2"].send_signal(signal.SIGCONT)
+    everybody = ["participant0", "participant2", "observer", "late"]
+    stage.wait_live(everybody, lambda live: live.get("frame", 0) >= 2000, "frame 2000")
+    reports = {name: stage.stop(name) for name in everybody}
+    server = stage.stop("server")
+    if server["frames"] < 2000:
+        raise Failed(f"the server ran {server['frames']} frames")
+    for name, report in reports.items():
+        check_report(report, ["inputs_sent", "inputs_acted"] if name == "participant0" else [])
+        compare(stage, ["server"], name, 1000, report["resyncs"])
+        print(f"  joined in {report['join_ms']:.0f} ms, latency {report['latency_ms']}, client {report['client_ms']}")
+    compare(stage, ["server"], "participant1", 100)
+    if stage.hashes("observer").get((list(stage.hashes("server"))[0][0], 300)) is None:
+        raise Failed("the observer missed frame 300")
+
+
+def server_restart(stage):
+    """The server is killed and started again: clients play again by themselves, with nothing of the old epoch."""
+    stage.server("before")
+    stage.client("alone")
+    stage.client("crowd", "--count", 4, "--hash-log", stage.log("crowd"))
+    stage.wait_live(["alone", "crowd"], lambda live: live.get("frame", 0) > 60, "frame 60")
+    stage.kill("before")
+    stage.server("after")
+    stage.wait(lambda: len({epoch for epoch, _ in stage.hashes("after")}) > 0, "the new server's first frames")
+    new_epoch = next(iter(stage.hashes("after")))[0]
+    if any(epoch == new_epoch for epoch, _ in stage.hashes("before")):
+        raise Failed("both runs have one epoch")
+    time.sleep(8)
+    reports = {"alone": stage.stop("alone")}
+    crowd = stage.stop("crowd")["clients"]
+    stage.stop("after")
+    if len(crowd) != 4:
+        raise Failed(f"{len(crowd)} clients reported, not 4")
+    reports.update({f"crowd.{i}": report for i, report in enumerate(crowd)})
+    for name, report in reports.items():
+        check_report(report)
+        if name != "alone":
+            (stage.folder / f"crowd.hashes.{name[-1]}").rename(stage.log(name))
+        compare(stage, ["before", "after"], name, 60, report["resyncs"])
+        frames = sum(1 for epoch, _ in stage.hashes(name) if epoch == new_epoch)
+        if frames < 30:
+            raise Failed(f"{name} applied {frames} frames of the new run")
+
+
+def no_server(stage):
+    """A client without a server says so, waits, gives up when told to; then one starts late and it plays."""
+    stage.client("alone", "--timeout", 3, "--seconds", 1)
+    stage.client("patient", "--seconds", 2)
+    report = stage.end("alone", 1)
+    if report["frames_applied"] != 0:
+        raise Failed("frames without a server")
+    for name in ("alone", "patient"):
+        if "waiting for a server of session 'default'" not in (stage.folder / f"{name}.err").read_text():
+            raise Failed(f"{name} does not say what it waits for")
+    stage.server("server")
+    check_report(stage.end("patient", 0), ["frames_applied", "join_ms"])
+    for bad in (["--session", "a*"], ["--lead", "2"], ["--count", "0"], ["--seconds", "-1"], ["--no-such-flag"]):
+        stage.client("usage", *bad)
+        if stage.processes["usage"].wait(LIMIT_S) != 2:
+            raise Failed(f"{bad} is not refused as wrong usage")
+    script = stage.folder / "bad.textproto"
+    script.write_text("inputs {\n  time_s: 1\n  gravity { x: nan }\n}\n", encoding="ascii")
+    stage.client("usage", "--input-script", script)
+    if stage.processes["usage"].wait(LIMIT_S) != 1:
+        raise Failed("a script with NaN is not refused")
+    said = (stage.folder / "usage.err").read_text()
+    if "bad.textproto" not in said:
+        raise Failed(f"the message does not name the file: {said}")
+
+
+SCENARIOS = {f.__name__: f for f in (two_thousand_frames, server_restart, no_server)}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scenario", choices=SCENARIOS)
+    parser.add_argument("--tandemd", required=True)
+    parser.add_argument("--tandem", required=True)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            with Stage(options, folder) as stage:
+                SCENARIOS[options.scenario](stage)
+        except Failed as failure:
+            print(f"{options.scenario}: {failure}", file=sys.stderr)
+            return 1
+    print(f"{options.scenario}: passed")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
