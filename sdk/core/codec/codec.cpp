@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kNames{"none",    "selective", "quantized",
                                                  "entropy", "limited",   "tracker"};
-// 0.6 % a frame: a push is forgotten in seconds, support by other bodies is learned anew all the time.
-constexpr std::uint16_t kTrackerDecay = 393;
+// 0.8 % a frame. Faster suits piles that churn, slower those at rest.
+constexpr std::uint16_t kTrackerDecay = 524;
 
 Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
   CodeLengths lengths{};

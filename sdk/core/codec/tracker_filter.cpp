@@ -6,8 +6,8 @@ namespace {
 // A position error that grew over k frames means a velocity error of d/k; beta of that is believed, and a
 // part gamma of what that would be as an acceleration. Below kLeastK frames one correction says too little.
 constexpr std::int64_t kLeastK = 3;
-constexpr std::int64_t kBeta = 42598;   // 0.65, in 1/65536
-constexpr std::int64_t kGamma = 13107;  // 0.2, in 1/65536
+constexpr std::int64_t kBeta = 45875;  // 0.7, in 1/65536
+constexpr std::int64_t kGamma = 9830;  // 0.15, in 1/65536
 constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
 
 // x * share / 65536, rounded half up.

@@ -46,7 +46,7 @@ class TrackerSearch {
 };
 
 /// Steps that correct `d` (lattice units) at least cost: of the 27 around the nearest that leave an error of
-/// at most the threshold, the one with the least bits + 16 * (error / threshold)^2. False: none does; `steps`
+/// at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none does; `steps`
 /// is then the nearest.
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
                   std::int32_t threshold, const TrackerModels& models, const TrackerContext& context,

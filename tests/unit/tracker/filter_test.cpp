@@ -22,8 +22,8 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, body);
   const std::int32_t d = 2 * 3891;  // 0.95 * 4096, down
   EXPECT_EQ(state.p(0)[0], d);
-  EXPECT_NEAR(state.v(0)[0], 64 * 0.65 * d / 10, 8);
-  EXPECT_NEAR(state.c(0)[0], 64 * 0.65 * 0.2 * d / 100, 2);
+  EXPECT_NEAR(state.v(0)[0], 64 * 0.7 * d / 10, 8);
+  EXPECT_NEAR(state.c(0)[0], 64 * 0.7 * 0.15 * d / 100, 2);
   EXPECT_EQ(state.p(1)[0], 0);
   EXPECT_EQ(state.v(1)[0], 0);
   EXPECT_EQ(body.age, 0);
