@@ -27,34 +27,38 @@ class Durations {
   std::vector<float> ms_;
 };
 
-/// One codec's server and client, and what they were seen to do.
+/// One session's server and client, and what they were seen to do.
 struct Lane {
-  Lane(ServerTimeline server_side, ClientTimeline client_side, std::size_t budget)
-      : server(std::move(server_side)), client(std::move(client_side)), budget_bytes(budget) {}
+  Lane(const server::HostConfig& config, ServerTimeline server_side, ClientTimeline client_side)
+      : session(&config), server(std::move(server_side)), client(std::move(client_side)) {}
 
+  const server::HostConfig* session;
   ServerTimeline server;
   ClientTimeline client;
-  std::size_t budget_bytes;
   std::uint64_t payload_bytes = 0, corrected = 0, body_frames = 0;
   double max_squared = 0, sum_squared = 0;
   Durations predict, encode, decode, apply;
 };
 
-Result<Lane> make_lane(const BandwidthRun& run, const CodecSetup& codec, const Replay& replay) {
-  TimelineConfig config = run.timeline;
-  config.codec = codec.name;
-  config.codec_tables = codec.tables;
+/// Sessions on one trajectory may differ in how fast c decays.
+Drive drive_of(const server::HostConfig& session, Drive drive) {
+  drive.decay = session.decay;
+  return drive;
+}
+
+Result<Lane> make_lane(const server::HostConfig& session, const Replay& replay) {
+  const TimelineConfig config = server::timeline_config(session, replay.simulation().capacity());
   auto server = ServerTimeline::create(config, kEpoch);
   if (!server) return tl::unexpected(server.error());
   auto client = ClientTimeline::create(config);
   if (!client) return tl::unexpected(client.error());
   server->set_clock(&steady_ns);
   client->set_clock(&steady_ns);
-  server->start(0, replay.target(), replay.start_drive());
+  server->start(0, replay.target(), drive_of(session, replay.start_drive()));
   std::vector<std::byte> snapshot;
   server->snapshot(snapshot);
   if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
-  return Lane(std::move(*server), std::move(*client), codec.budget_bytes);
+  return Lane(session, std::move(*server), std::move(*client));
 }
 
 /// Euclidean distance of the agreed state to the simulation's floats, over all bodies that are shown.
@@ -73,16 +77,17 @@ void add_errors(const State& agreed, const engine::Bodies& bodies, double unit, 
   }
 }
 
-/// One frame of one codec: the server's half, then the client's.
-Result<void> advance(Lane& lane, const Replay& replay, double mirror_ms, double unit) {
-  for (const ScheduledDrive& input : replay.scheduled()) {
+/// One frame of one session: the server's half, then the client's.
+Result<void> advance(Lane& lane, const Replay& replay) {
+  for (ScheduledDrive input : replay.scheduled()) {
+    input.drive = drive_of(*lane.session, input.drive);
     auto scheduled = lane.server.schedule(input).and_then([&] { return lane.client.schedule(input); });
     if (!scheduled) return scheduled;
   }
   const ServerTimeline::FrameResult frame =
-      lane.server.advance(replay.target(), replay.lifecycle(), lane.budget_bytes);
+      lane.server.advance(replay.target(), replay.lifecycle(), lane.session->budget);
   lane.predict.add(frame.predict_ms);
-  lane.encode.add(frame.encode_ms + mirror_ms);
+  lane.encode.add(frame.encode_ms + replay.mirror_ms());
   lane.payload_bytes += frame.payload.size();
   lane.corrected += frame.corrected;
 
@@ -91,61 +96,66 @@ Result<void> advance(Lane& lane, const Replay& replay, double mirror_ms, double 
   lane.decode.add(lane.client.timings().decode_ms);
   lane.apply.add(lane.client.timings().apply_ms);
   if (!applied) return applied;
-  add_errors(lane.client.state(frame.frame), replay.simulation().bodies(), unit, lane);
+  add_errors(lane.client.state(frame.frame), replay.simulation().bodies(), lane.session->lattice.unit, lane);
   return {};
+}
+
+/// What a lane measured over `frames` frames.
+BandwidthRow row_of(Lane& lane, double frames) {
+  const server::HostConfig& session = *lane.session;
+  BandwidthRow row;
+  row.codec = session.codec;
+  row.predictor = session.predictor;
+  const double bits_per_frame = 8.0 * static_cast<double>(lane.payload_bytes) / frames;
+  row.mbit_per_s = bits_per_frame / session.lattice.dt_s / static_cast<double>(1U << 20U);
+  row.max_error = std::sqrt(lane.max_squared);
+  if (lane.body_frames > 0)
+    row.rms_error = std::sqrt(lane.sum_squared / static_cast<double>(lane.body_frames));
+  row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
+  row.predict_ms = lane.predict.median();
+  row.encode_ms = lane.encode.median();
+  row.decode_ms = lane.decode.median();
+  row.apply_ms = lane.apply.median();
+  return row;
 }
 
 }  // namespace
 
-Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay, const BandwidthRun& run,
-                                                    std::span<const CodecSetup> codecs,
+Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
+                                                    std::span<const server::HostConfig> sessions,
+                                                    std::uint64_t frames,
                                                     const std::function<void(Frame)>& progress) {
   std::vector<Lane> lanes;
-  lanes.reserve(codecs.size());
-  for (const CodecSetup& codec : codecs) {
-    auto lane = make_lane(run, codec, replay);
-    if (!lane) return fail(lane.error().code, fmt::format("codec {}: {}", codec.name, lane.error().message));
+  lanes.reserve(sessions.size());
+  for (const server::HostConfig& session : sessions) {
+    auto lane = make_lane(session, replay);
+    if (!lane)
+      return fail(lane.error().code, fmt::format("codec {}: {}", session.codec, lane.error().message));
     lanes.push_back(std::move(*lane));
   }
   Durations step;
   std::uint64_t colliding = 0;
-  for (std::uint64_t frame = 1; frame <= run.frames; ++frame) {
+  for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay.next(); !stepped) return tl::unexpected(stepped.error());
     step.add(replay.step_ms());
     colliding += replay.simulation().colliding();
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-      auto advanced = advance(lanes[i], replay, replay.mirror_ms(), run.lattice.unit);
-      if (!advanced) {
-        return fail(advanced.error().code,
-                    fmt::format("codec {}, frame {}: {}", codecs[i].name, frame, advanced.error().message));
+    for (Lane& lane : lanes) {
+      if (auto advanced = advance(lane, replay); !advanced) {
+        return fail(advanced.error().code, fmt::format("codec {}, frame {}: {}", lane.session->codec, frame,
+                                                       advanced.error().message));
       }
     }
     progress(frame);
   }
 
-  const auto frames = static_cast<double>(run.frames);
   const double step_ms = step.median();
   std::vector<BandwidthRow> rows;
-  for (std::size_t i = 0; i < lanes.size(); ++i) {
-    Lane& lane = lanes[i];
-    BandwidthRow row;
-    row.bodies = run.timeline.capacity;
-    row.codec = codecs[i].name;
-    row.predictor = run.timeline.predictor;
-    row.frames = run.frames;
-    const double bits_per_frame = 8.0 * static_cast<double>(lane.payload_bytes) / frames;
-    row.mbit_per_s = bits_per_frame / run.lattice.dt_s / static_cast<double>(1U << 20U);
-    row.max_error = std::sqrt(lane.max_squared);
-    row.rms_error =
-        lane.body_frames == 0 ? 0 : std::sqrt(lane.sum_squared / static_cast<double>(lane.body_frames));
-    row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
-    row.colliding_per_frame = static_cast<double>(colliding) / frames;
-    row.step_ms = step_ms;
-    row.predict_ms = lane.predict.median();
-    row.encode_ms = lane.encode.median();
-    row.decode_ms = lane.decode.median();
-    row.apply_ms = lane.apply.median();
-    rows.push_back(std::move(row));
+  for (Lane& lane : lanes) {
+    rows.push_back(row_of(lane, static_cast<double>(frames)));
+    rows.back().bodies = replay.simulation().capacity();
+    rows.back().frames = frames;
+    rows.back().colliding_per_frame = static_cast<double>(colliding) / static_cast<double>(frames);
+    rows.back().step_ms = step_ms;
   }
   return rows;
 }

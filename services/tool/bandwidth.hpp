@@ -9,17 +9,11 @@
 #include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
+#include "services/server/host.hpp"
 #include "services/tool/replay.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::tool {
-
-/// A codec as a session would set it up.
-struct CodecSetup {
-  std::string name;
-  std::vector<std::byte> tables;
-  std::size_t budget_bytes = kNoBudget;
-};
 
 /// One row of the result: a scene, a size and a codec. Times are medians over the frames.
 struct BandwidthRow {
@@ -38,20 +32,13 @@ struct BandwidthRow {
   double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;
 };
 
-/// What all codecs of a run share.
-struct BandwidthRun {
-  TimelineConfig timeline;  ///< codec name and tables are filled in per codec
-  server::Lattice lattice;
-  std::uint64_t frames = 0;
-};
-
-/// Runs `replay` for `run.frames` frames; every codec encodes every frame on a server's timeline, and a
-/// client's timeline decodes it and checks the hash. Fills the measured fields of a row per codec; `progress`
-/// gets the frame. Errors: what the timelines and the replay refuse; kMismatch when a client's state ever
-/// differs.
-[[nodiscard]] Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay, const BandwidthRun& run,
-                                                                  std::span<const CodecSetup> codecs,
-                                                                  const std::function<void(Frame)>& progress);
+/// Runs `replay` for `frames` frames. In each of `sessions`, which differ in codec and predictor and share
+/// the replay's lattice, a server's timeline encodes every frame, and a client's timeline decodes it and
+/// checks the hash. Fills the measured fields of a row per session; `progress` gets the frame. Errors: what
+/// the timelines and the replay refuse; kMismatch when a client's state ever differs.
+[[nodiscard]] Result<std::vector<BandwidthRow>> measure_bandwidth(
+    Replay& replay, std::span<const server::HostConfig> sessions, std::uint64_t frames,
+    const std::function<void(Frame)>& progress);
 
 /// The paper's table 5.3 in Mbit/s, where it has this scene, size and codec.
 [[nodiscard]] std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec);

@@ -40,12 +40,12 @@ void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
       ->capture_default_str();
 }
 
-void add_threshold_options(CLI::App& command, ThresholdChoice& threshold) {
+void add_threshold_options(CLI::App& command, server::SessionChoice& choice) {
   const auto positive = CLI::Range(std::numeric_limits<double>::min(), 1e6);
-  CLI::Option* length = command.add_option("--threshold", threshold.length,
+  CLI::Option* length = command.add_option("--threshold", choice.threshold_m,
                                            "Error threshold, scene units (default: the scene's)");
   length->check(positive);
-  command.add_option("--threshold-scale", threshold.scale, "Error threshold, times the scene's")
+  command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
       ->check(positive)
       ->excludes(length);
 }

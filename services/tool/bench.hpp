@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "services/scenes/scene.hpp"
+#include "services/server/session_plan.hpp"
 #include "services/tool/commands.hpp"
-#include "services/tool/scene_source.hpp"
 
 namespace tandem::tool {
 
@@ -27,6 +27,6 @@ int report(const std::string& command, const Error& error);
 /// Flags that several subcommands have.
 void add_scene_option(CLI::App& command, std::vector<std::string>& scenes);
 void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies);
-void add_threshold_options(CLI::App& command, ThresholdChoice& threshold);
+void add_threshold_options(CLI::App& command, server::SessionChoice& choice);
 
 }  // namespace tandem::tool

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "services/tool/bandwidth.hpp"
 #include "services/tool/bench.hpp"
 #include "services/tool/progress.hpp"
 #include "services/tool/train.hpp"
@@ -17,37 +18,33 @@ struct BandwidthOptions {
   std::vector<std::uint32_t> bodies{10000};
   std::uint64_t frames = 1000;
   std::vector<std::string> codecs;
-  std::string predictor = "ballistic";
   std::string trajectory;
-  ThresholdChoice threshold;
+  server::SessionChoice choice;
   SceneRun run;
-  std::size_t budget_bytes = kPaperBudgetBytes;
   bool json = false;
 };
 
-std::vector<CodecSetup> codec_setups(const BandwidthOptions& options, const scenes::TrainedTable& table) {
-  std::vector<CodecSetup> setups;
-  for (const std::string& name : options.codecs)
-    setups.push_back(make_codec_setup(name, table, options.budget_bytes));
-  return setups;
-}
-
-/// All codecs over one source; the rows lack only what the source does not know.
-Result<std::vector<BandwidthRow>> measure(Source& source, const scenes::TrainedTable& table,
-                                          const std::string& name, const BandwidthOptions& options,
-                                          std::uint64_t frames) {
-  auto run = make_run(source, table, options.predictor, frames);
-  if (!run) return tl::unexpected(run.error());
-  auto replay =
-      Replay::create(*source.simulation, std::move(source.script), source.lattice, source.type_count);
+/// All codecs over one source; the rows lack only what the scene does not know.
+Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& source,
+                                          const BandwidthOptions& options, std::uint64_t frames) {
+  server::SessionChoice choice = options.choice;
+  choice.bodies = source.simulation->capacity();
+  std::vector<server::HostConfig> sessions;
+  for (const std::string& codec : options.codecs) {
+    choice.codec = codec;
+    auto session = server::plan_session(scene, choice);
+    if (!session) return tl::unexpected(session.error());
+    sessions.push_back(std::move(*session));
+  }
+  auto replay = Replay::create(*source.simulation, std::move(source.script), sessions[0].lattice,
+                               static_cast<TypeId>(scene.types.size()));
   if (!replay) return tl::unexpected(replay.error());
-  Progress progress(fmt::format("{}, {} bodies: frame", name, run->timeline.capacity), frames);
-  auto rows = measure_bandwidth(*replay, *run, codec_setups(options, table),
-                                [&](Frame frame) { progress.at(frame); });
+  Progress progress(fmt::format("{}, {} bodies: frame", scene.name, choice.bodies), frames);
+  auto rows = measure_bandwidth(*replay, sessions, frames, [&](Frame frame) { progress.at(frame); });
   if (!rows) return rows;
   for (BandwidthRow& row : *rows) {
-    row.scene = name;
-    row.threshold = source.threshold;
+    row.scene = scene.name;
+    row.threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   }
   return rows;
 }
@@ -57,10 +54,9 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   SceneRun run = options.run;
   run.bodies = bodies;
   run.frames = options.frames;
-  auto source = make_source(scene, run, options.threshold);
+  auto source = make_source(scene, run);
   if (!source) return tl::unexpected(source.error());
-  auto rows =
-      measure(*source, table_for(scene, bodies, source->threshold), scene.name, options, options.frames);
+  auto rows = measure(scene, *source, options, options.frames);
   if (!rows) return rows;
   // With another number of users it is not the scene of the paper's table.
   const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
@@ -72,32 +68,41 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   return rows;
 }
 
-Result<Source> trajectory_source(const std::string& path, const ThresholdChoice& threshold) {
-  auto trajectory = RecordedTrajectory::open(path);
-  if (!trajectory) return tl::unexpected(trajectory.error());
-  Source source;
-  source.threshold = threshold.of((*trajectory)->info().threshold);
+/// What a session needs to know about a trajectory, in the shape of a scene.
+scenes::Scene scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
+  scenes::Scene scene;
+  scene.name = path;
+  scene.dt_s = trajectory.dt_s();
+  scene.threshold_m = trajectory.info().threshold;
   // A file without any motion has no extent of its own.
-  const double extent = std::max((*trajectory)->position_bound(), source.threshold);
-  auto lattice = server::choose_lattice(source.threshold, extent, (*trajectory)->dt_s());
-  if (!lattice) return fail(lattice.error().code, path + ": " + lattice.error().message);
-  source.lattice = *lattice;
-  source.simulation = std::move(*trajectory);
-  return source;
+  scene.extent_m = std::max(trajectory.position_bound(), trajectory.info().threshold);
+  scene.types.resize(1);
+  return scene;
 }
 
 /// There is no other run to train on, so a trajectory trains the paper's codecs itself, in their favour.
 Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& options) {
-  const auto make = [&] { return trajectory_source(options.trajectory, options.threshold); };
-  auto opened = RecordedTrajectory::open(options.trajectory);
+  const auto make = [&] {
+    return RecordedTrajectory::open(options.trajectory)
+        .map([](std::unique_ptr<RecordedTrajectory>&& trajectory) {
+          return Source{std::move(trajectory), {}};
+        });
+  };
+  const auto opened = RecordedTrajectory::open(options.trajectory);
   if (!opened) return tl::unexpected(opened.error());
+  scenes::Scene scene = scene_of(**opened, options.trajectory);
   const std::uint64_t frames = std::min(options.frames, (*opened)->frames());
-  Progress progress(fmt::format("{}: training, frame", options.trajectory), 2 * frames);
-  auto table = train(make, options.predictor, frames, [&](Frame frame) { progress.at(frame); });
-  if (!table) return tl::unexpected(table.error());
+  server::SessionChoice choice = options.choice;
+  choice.bodies = (*opened)->capacity();
+  {
+    Progress progress(fmt::format("{}: training, frame", options.trajectory), 2 * frames);
+    auto table = train(scene, choice, make, frames, [&](Frame frame) { progress.at(frame); });
+    if (!table) return fail(table.error().code, options.trajectory + ": " + table.error().message);
+    scene.trained = {std::move(*table)};
+  }
   auto source = make();
   if (!source) return tl::unexpected(source.error());
-  auto rows = measure(*source, *table, options.trajectory, options, frames);
+  auto rows = measure(scene, *source, options, frames);
   if (!rows) return rows;
   for (BandwidthRow& row : *rows) row.colliding_per_frame.reset();
   return rows;
@@ -141,16 +146,16 @@ void add_bandwidth(CLI::App& bench, Run& run) {
   command->add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(options->codecs));
-  command->add_option("--predictor", options->predictor, "Predicted step")->capture_default_str();
+  command->add_option("--predictor", options->choice.predictor, "Predicted step")->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
-  add_threshold_options(*command, options->threshold);
+  add_threshold_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
       ->check(CLI::Range(1U, scenes::kMaxUsers));
-  command->add_option("--budget", options->budget_bytes, "Bytes of corrections a frame for `limited`")
+  command->add_option("--budget", options->choice.budget_bytes, "Bytes of corrections a frame for `limited`")
       ->capture_default_str();
   command
       ->add_option("--trajectory", options->trajectory,

@@ -7,6 +7,7 @@
 
 #include "services/tool/bench.hpp"
 #include "services/tool/memory.hpp"
+#include "services/tool/scene_source.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -21,23 +22,16 @@ struct MemoryOptions {
 
 Result<HostedSimulation> host_scene(const scenes::Scene& scene, const MemoryOptions& options,
                                     std::uint32_t bodies) {
+  server::SessionChoice choice;
+  choice.bodies = bodies;
+  choice.codec = options.codec;
+  auto session = server::plan_session(scene, choice);
+  if (!session) return tl::unexpected(session.error());
   SceneRun run;
   run.bodies = bodies;
-  auto source = make_source(scene, run, {});
-  if (!source) return tl::unexpected(source.error());
-  const scenes::TrainedTable table = table_for(scene, bodies, source->threshold);
-  auto session = make_run(*source, table, "ballistic", options.frames);
-  if (!session) return tl::unexpected(session.error());
-  const CodecSetup codec = make_codec_setup(options.codec, table, kPaperBudgetBytes);
-  HostedSimulation hosted;
-  hosted.simulation = std::move(source->simulation);
-  hosted.config.lattice = source->lattice;
-  hosted.config.codec = codec.name;
-  hosted.config.codec_tables = codec.tables;
-  hosted.config.budget = codec.budget_bytes;
-  hosted.config.parameters = session->timeline.parameters;
-  hosted.config.types.resize(scene.types.size());
-  return hosted;
+  return make_source(scene, run).map([&](Source&& source) {
+    return HostedSimulation{std::move(source.simulation), std::move(*session)};
+  });
 }
 
 int run_memory(const MemoryOptions& options) {

@@ -19,8 +19,7 @@ struct TrainOptions {
   std::vector<std::string> scenes;
   std::vector<std::uint32_t> bodies{5000, 10000, 20000};
   std::uint64_t frames = 1000;
-  std::string predictor = "ballistic";
-  ThresholdChoice threshold;
+  server::SessionChoice choice;
   SceneRun run;
   bool json = false;
 };
@@ -30,9 +29,12 @@ Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const Train
   SceneRun run = options.run;
   run.bodies = bodies;
   run.frames = options.frames;
+  server::SessionChoice choice = options.choice;
+  choice.bodies = bodies;
   Progress progress(fmt::format("{}, {} bodies: training, frame", scene.name, bodies), 2 * options.frames);
-  auto table = train([&] { return make_source(scene, run, options.threshold); }, options.predictor,
-                     options.frames, [&](Frame frame) { progress.at(frame); });
+  auto table = train(
+      scene, choice, [&] { return make_source(scene, run); }, options.frames,
+      [&](Frame frame) { progress.at(frame); });
   if (!table) return table;
   return scenes::save_trained(scene.path, *table).map([&] { return std::move(*table); });
 }
@@ -75,9 +77,9 @@ void add_train(CLI::App& bench, Run& run) {
   command->add_option("--frames", options->frames, "Frames, from the start block on")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
       ->capture_default_str();
-  command->add_option("--predictor", options->predictor, "Predicted step")->capture_default_str();
+  command->add_option("--predictor", options->choice.predictor, "Predicted step")->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the training run")->capture_default_str();
-  add_threshold_options(*command, options->threshold);
+  add_threshold_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();

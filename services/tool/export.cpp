@@ -4,8 +4,10 @@
 
 #include <memory>
 
+#include "services/server/session_plan.hpp"
 #include "services/tool/bench.hpp"
 #include "services/tool/progress.hpp"
+#include "services/tool/scene_source.hpp"
 #include "services/tool/trajectory.hpp"
 
 namespace tandem::tool {
@@ -20,14 +22,16 @@ struct ExportOptions {
 Result<void> export_trajectory(const ExportOptions& options) {
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return tl::unexpected(scene.error());
-  auto source = make_source(*scene, options.run, {});
+  auto source = make_source(*scene, options.run);
   if (!source) return tl::unexpected(source.error());
+  const auto session = server::plan_session(*scene, {.bodies = options.run.bodies});
+  if (!session) return tl::unexpected(session.error());
   auto writer = TrajectoryWriter::create(options.out, options.run.bodies);
   if (!writer) return tl::unexpected(writer.error());
-  auto replay =
-      Replay::create(*source->simulation, std::move(source->script), source->lattice, source->type_count);
+  auto replay = Replay::create(*source->simulation, std::move(source->script), session->lattice,
+                               static_cast<TypeId>(session->types.size()));
   if (!replay) return tl::unexpected(replay.error());
-  TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, source->threshold, {}};
+  TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m, {}};
   Progress progress(fmt::format("{}, {} bodies: frame", scene->name, options.run.bodies), options.run.frames);
   for (Frame frame = 0;; ++frame) {
     info.gravity.push_back(replay->simulation().gravity());

@@ -1,6 +1,7 @@
 #include "services/tool/train.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "sdk/core/codec/training.hpp"
 
@@ -9,16 +10,16 @@ namespace {
 
 constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
 
-/// One pass of `codec` over the source; what it corrected.
-Result<CodecStatistics> observe(Source& source, const scenes::TrainedTable& table, const std::string& codec,
-                                const std::string& predictor, std::uint64_t frames,
+/// One pass over the source; what its session corrected.
+Result<CodecStatistics> observe(const server::HostConfig& session,
+                                const std::function<Result<Source>()>& make, std::uint64_t frames,
                                 const std::function<void(Frame)>& progress) {
-  auto run = make_run(source, table, predictor, frames);
-  if (!run) return tl::unexpected(run.error());
-  run->timeline.codec = codec;
-  auto replay = Replay::create(*source.simulation, source.script, source.lattice, source.type_count);
+  auto source = make();
+  if (!source) return tl::unexpected(source.error());
+  auto replay = Replay::create(*source->simulation, std::move(source->script), session.lattice,
+                               static_cast<TypeId>(session.types.size()));
   if (!replay) return tl::unexpected(replay.error());
-  auto timeline = ServerTimeline::create(run->timeline, 1);
+  auto timeline = ServerTimeline::create(server::timeline_config(session, source->simulation->capacity()), 1);
   if (!timeline) return tl::unexpected(timeline.error());
   CodecStatistics statistics;
   timeline->start(0, replay->target(), replay->start_drive());
@@ -36,31 +37,36 @@ Result<CodecStatistics> observe(Source& source, const scenes::TrainedTable& tabl
 
 std::vector<std::uint8_t> lengths(std::span<const std::byte> tables, std::size_t first) {
   std::vector<std::uint8_t> result;
-  for (const std::byte length : tables.subspan(first, kSymbols))
+  for (const std::byte length : tables.subspan(first, kSymbols)) {
     result.push_back(std::to_integer<std::uint8_t>(length));
+  }
   return result;
 }
 
 }  // namespace
 
-Result<scenes::TrainedTable> train(const std::function<Result<Source>()>& make, const std::string& predictor,
-                                   std::uint64_t frames, const std::function<void(Frame)>& progress) {
-  auto first = make();
+Result<scenes::TrainedTable> train(scenes::Scene scene, server::SessionChoice choice,
+                                   const std::function<Result<Source>()>& make, std::uint64_t frames,
+                                   const std::function<void(Frame)>& progress) {
+  scene.trained.clear();
+  choice.codec = "selective";
+  const auto first = server::plan_session(scene, choice);
   if (!first) return tl::unexpected(first.error());
-  scenes::TrainedTable table;
-  table.bodies = first->simulation->capacity();
-  table.threshold_m = first->threshold;
-  const auto ranges = observe(*first, table, "selective", predictor, frames, progress);
+  const auto ranges = observe(*first, make, frames, progress);
   if (!ranges) return tl::unexpected(ranges.error());
+  scenes::TrainedTable table;
+  table.bodies = choice.bodies;
+  table.threshold_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   // A run without any correction still needs a range; one unit is the least there is.
   table.position_range_m = kMargin * std::max(1U, ranges->largest_position) / first->lattice.position_scale();
   table.velocity_range_m_per_s =
       kMargin * std::max(1U, ranges->largest_velocity) / first->lattice.velocity_scale();
 
-  auto second = make();
+  scene.trained = {table};
+  choice.codec = "quantized";
+  const auto second = server::plan_session(scene, choice);
   if (!second) return tl::unexpected(second.error());
-  const auto counts =
-      observe(*second, table, "quantized", predictor, frames, [&](Frame frame) { progress(frames + frame); });
+  const auto counts = observe(*second, make, frames, [&](Frame frame) { progress(frames + frame); });
   if (!counts) return tl::unexpected(counts.error());
   const std::vector<std::byte> tables = trained_tables(*counts);
   table.position_code_lengths = lengths(tables, 0);

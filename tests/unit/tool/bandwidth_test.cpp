@@ -13,32 +13,29 @@ namespace {
 constexpr std::uint32_t kBodies = 500;
 constexpr double kThreshold = 0.05;
 
-BandwidthRun run_of(std::uint64_t frames) {
-  BandwidthRun run;
-  run.lattice = *server::choose_lattice(kThreshold, 100, Bouncing::kDt);
-  run.timeline.capacity = kBodies;
-  run.timeline.parameters = *server::codec_parameters(run.lattice, kThreshold, 0, 0);
-  run.timeline.predictor = "ballistic";
-  run.frames = frames;
-  return run;
+std::vector<server::HostConfig> sessions(const std::vector<std::string>& codecs) {
+  server::HostConfig session;
+  session.lattice = *server::choose_lattice(kThreshold, 100, Bouncing::kDt);
+  session.parameters = *server::codec_parameters(session.lattice, kThreshold, 0, 0);
+  std::vector<server::HostConfig> all;
+  for (const std::string& codec : codecs) {
+    session.codec = codec;
+    session.budget = codec == "limited" ? 100 : kNoBudget;
+    session.codec_tables =
+        codec == "entropy" || codec == "limited" ? default_code_tables() : std::vector<std::byte>{};
+    all.push_back(session);
+  }
+  return all;
 }
-
-std::vector<CodecSetup> paper_codecs() {
-  const std::vector<std::byte> tables = default_code_tables();
-  return {{"none", {}, kNoBudget},
-          {"selective", {}, kNoBudget},
-          {"quantized", {}, kNoBudget},
-          {"entropy", tables, kNoBudget},
-          {"limited", tables, 100}};
-}
+const std::vector<std::string> kPaper{"none", "selective", "quantized", "entropy", "limited"};
 
 std::vector<BandwidthRow> measure(std::vector<TimedInput> script, std::uint64_t frames) {
   Bouncing simulation(kBodies);
-  const BandwidthRun run = run_of(frames);
-  auto replay = Replay::create(simulation, std::move(script), run.lattice, 1);
+  const auto all = sessions(kPaper);
+  auto replay = Replay::create(simulation, std::move(script), all[0].lattice, 1);
   EXPECT_TRUE(replay) << replay.error().message;
   std::uint64_t last = 0;
-  auto rows = measure_bandwidth(*replay, run, paper_codecs(), [&last](Frame frame) { last = frame; });
+  auto rows = measure_bandwidth(*replay, all, frames, [&last](Frame frame) { last = frame; });
   EXPECT_TRUE(rows) << rows.error().message;
   EXPECT_EQ(last, frames);
   return rows ? *rows : std::vector<BandwidthRow>{};
@@ -73,21 +70,20 @@ TEST(Bandwidth, scripted_gravity_reaches_both_sides_on_its_frame) {
 
 TEST(Bandwidth, a_refused_scripted_input_names_its_frame) {
   Bouncing simulation(kBodies);
-  const BandwidthRun run = run_of(5);
-  auto replay = Replay::create(simulation, {{3, {}}}, run.lattice, 1);
+  const auto all = sessions(kPaper);
+  auto replay = Replay::create(simulation, {{3, {}}}, all[0].lattice, 1);
   ASSERT_TRUE(replay);
-  const auto rows = measure_bandwidth(*replay, run, paper_codecs(), [](Frame) {});
+  const auto rows = measure_bandwidth(*replay, all, 5, [](Frame) {});
   ASSERT_FALSE(rows);
   EXPECT_THAT(rows.error().message, ::testing::HasSubstr("frame 3"));
 }
 
 TEST(Bandwidth, an_unknown_codec_is_named) {
   Bouncing simulation(kBodies);
-  const BandwidthRun run = run_of(5);
-  auto replay = Replay::create(simulation, {}, run.lattice, 1);
+  const auto all = sessions({"zip"});
+  auto replay = Replay::create(simulation, {}, all[0].lattice, 1);
   ASSERT_TRUE(replay);
-  const std::vector<CodecSetup> codecs{{"zip", {}, kNoBudget}};
-  const auto rows = measure_bandwidth(*replay, run, codecs, [](Frame) {});
+  const auto rows = measure_bandwidth(*replay, all, 5, [](Frame) {});
   ASSERT_FALSE(rows);
   EXPECT_THAT(rows.error().message, ::testing::HasSubstr("zip"));
 }
