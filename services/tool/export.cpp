@@ -24,7 +24,9 @@ Result<void> export_trajectory(const ExportOptions& options) {
   if (!scene) return tl::unexpected(scene.error());
   auto source = make_source(*scene, options.run);
   if (!source) return tl::unexpected(source.error());
-  const auto session = server::plan_session(*scene, {.bodies = options.run.bodies});
+  server::SessionChoice choice;
+  choice.bodies = options.run.bodies;
+  const auto session = server::plan_session(*scene, choice);
   if (!session) return tl::unexpected(session.error());
   auto writer = TrajectoryWriter::create(options.out, options.run.bodies);
   if (!writer) return tl::unexpected(writer.error());

@@ -35,7 +35,8 @@ EDGES = {
     "services/server": TIMELINE
     + ["sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp", "services/scenes"],
     "services/tool": TIMELINE
-    + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp"]
+    + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
+    + ["services/engine/simulation.hpp"]
     + ["services/scenes", "services/server"],
     "tests": ["*"],
 }
