@@ -10,7 +10,7 @@ namespace tandem {
 namespace {
 
 // A body within the threshold but beyond this share of it (1/256) goes early if the model half expects it
-// anyway: costs a per cent of the bits and takes ten off the RMS error.
+// anyway: a few more bits, a much smaller RMS error (RESEARCH.md).
 constexpr std::int64_t kEarlyShare = 218;
 constexpr std::uint32_t kEarlyProbability = 19661;
 // Bits that an error of one threshold is worth.
