@@ -1,0 +1,65 @@
+"""The judgement of deploy/quickstart: which hash logs it accepts, and what it says of the others."""
+
+import importlib.util
+import pathlib
+import unittest
+
+path = pathlib.Path(__file__).resolve().parents[3] / "deploy" / "quickstart-session.py"
+spec = importlib.util.spec_from_file_location("quickstart_session", path)
+quickstart = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(quickstart)
+
+
+def log(first, last, epoch=7):
+    return {(epoch, frame): f"hash-{frame}" for frame in range(first, last + 1)}
+
+
+class Compare(unittest.TestCase):
+    server = log(1, 100)
+
+    def test_a_client_that_joined_late_is_fine(self):
+        self.assertEqual(quickstart.compare(self.server, log(40, 90)), (51, None))
+
+    def test_a_client_without_a_frame_is_not(self):
+        self.assertEqual(quickstart.compare(self.server, {}), (0, "applied no frame"))
+
+    def test_a_missing_frame_is_named(self):
+        client = log(40, 90)
+        del client[7, 50]
+        self.assertEqual(quickstart.compare(self.server, client), (10, "frame 50 is missing"))
+
+    def test_a_wrong_hash_is_named(self):
+        client = log(40, 90)
+        client[7, 41] = "other"
+        compared, problem = quickstart.compare(self.server, client)
+        self.assertEqual(compared, 1)
+        self.assertIn("frame 41", problem)
+
+    def test_another_epoch_is_a_gap(self):
+        self.assertIsNotNone(quickstart.compare(self.server, {**log(98, 100), **log(1, 3, epoch=8)})[1])
+
+    def test_a_frame_that_the_server_never_published_is_named(self):
+        self.assertEqual(quickstart.compare(self.server, log(99, 101)), (2, "frame 101 is not in the server's log"))
+
+
+class LiveLine(unittest.TestCase):
+    def test_waits_for_the_session(self):
+        self.assertIn("waiting", quickstart.live_line(1, {}))
+
+    def test_shows_bandwidth_and_the_lag_of_each_client(self):
+        top = {
+            "sessions": [
+                {"session": "quickstart", "frame": 60, "mbit_per_s": 1.5, "raw_mbit_per_s": 50.0, "corrected_per_frame": 9}
+            ],
+            "clients": [
+                {"client": "b", "role": "observer", "phase": "playing", "lag_ms": 3},
+                {"client": "a", "role": "participant", "phase": "playing", "lag_ms": 2},
+            ],
+        }
+        line = quickstart.live_line(2, top)
+        self.assertIn("1.50 of 50.00 Mbit/s (3.0 %)", line)
+        self.assertIn("participant 2 ms, observer 3 ms", line)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,145 @@
+"""The stable part of `tandem`'s command line: exit codes, JSON on stdout and nothing else, files that fit together."""
+
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = None  # first argument
+
+
+def run(*arguments, **environment):
+    return subprocess.run(
+        [PROGRAM, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+class CommandLine(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def path(self, name):
+        return pathlib.Path(self.folder.name) / name
+
+    def assert_usage(self, expected, *arguments):
+        done = run(*arguments)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertEqual(done.stdout, "")
+        self.assertIn(expected, done.stderr)
+
+    def test_help_and_version_are_no_errors(self):
+        self.assertEqual(run("--help").returncode, 0)
+        self.assertRegex(run("--version").stdout, r"^tandem \d+\.\d+\.\d+\n$")
+        for command in ("join", "bench", "export", "top", "doctor"):
+            self.assertEqual(run(command, "--help").returncode, 0, command)
+
+    def test_wrong_usage_exits_2_and_says_what_is_expected(self):
+        self.assert_usage("subcommand")
+        self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", "0")
+        self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", 2**20 + 1)
+        self.assert_usage("zip", "bench", "bandwidth", "--scene", "half_pipe", "--codec", "zip")
+        self.assert_usage("--scene", "bench", "bandwidth")
+        self.assert_usage("--out", "export", "--scene", "half_pipe")
+
+    def test_an_unknown_scene_lists_the_known_ones(self):
+        self.assert_usage("half_pipe_2", "bench", "bandwidth", "--scene", "nowhere", "--frames", "1")
+
+    def test_a_malformed_scene_file_is_named_with_its_line(self):
+        scene = self.path("broken.textproto")
+        scene.write_text("number: 1\nnonsense: 2\n", encoding="utf-8")
+        done = run("bench", "bandwidth", "--scene", scene, "--frames", "1")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("broken.textproto:2", done.stderr)
+
+    def test_bandwidth_prints_one_json_object_with_a_row_per_scene_size_and_codec(self):
+        done = run(
+            "bench", "bandwidth", "--scene", "half_pipe,cube", "--bodies", "100,200", "--frames", "5",
+            "--codec", "none,entropy", "--json",
+        )  # fmt: skip
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = json.loads(done.stdout)["rows"]
+        keys = [(row["scene"], row["number"], row["bodies"], row["codec"]) for row in rows]
+        scenes = (("half_pipe", 1), ("cube", 2))
+        self.assertEqual(
+            keys, [(s, n, b, c) for s, n in scenes for b in (100, 200) for c in ("none", "entropy")]
+        )
+        for row in rows:
+            self.assertEqual(row["frames"], 5)
+            self.assertLessEqual(row["rms_error"], row["max_error"])
+
+    def test_another_number_of_users_is_not_the_papers_scene(self):
+        done = run("bench", "bandwidth", "--scene", "half_pipe", "--bodies", "50", "--frames", "2", "--users", "4", "--json")
+        self.assertTrue(all(row["number"] is None for row in json.loads(done.stdout)["rows"]), done.stderr)
+
+    def test_a_bench_of_an_exported_trajectory_gives_the_rows_of_its_scene(self):
+        scene = ("--scene", "half_pipe", "--bodies", "200", "--frames", "40")
+        npy = self.path("x.npy")
+        exported = run("export", *scene, "--out", npy)
+        self.assertEqual(exported.returncode, 0, exported.stderr)
+        header = npy.read_bytes()[:128]
+        self.assertTrue(header.startswith(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118)))
+        self.assertIn(b"(41, 200, 6)", header)
+        self.assertEqual(npy.stat().st_size, 128 + 41 * 200 * 6 * 4)
+        sidecar = json.loads(self.path("x.json").read_text(encoding="utf-8"))
+        self.assertEqual(set(sidecar), {"dt_s", "damping_per_s", "radius", "threshold", "gravity"})
+        self.assertEqual(len(sidecar["gravity"]), 41)
+
+        bench = ("bench", "bandwidth", "--frames", "40", "--codec", "none,selective", "--json")
+        recorded = json.loads(run(*bench, "--trajectory", npy).stdout)["rows"]
+        live = json.loads(run(*bench, "--scene", "half_pipe", "--bodies", "200").stdout)["rows"]
+        for one, other in zip(recorded, live):
+            self.assertIsNone(one["colliding_per_frame"])
+            self.assertEqual(one["bodies"], other["bodies"])
+            self.assertEqual(one["threshold"], other["threshold"])
+            # The lattice follows from the bounds, which a recording knows only as far as bodies went.
+            self.assertAlmostEqual(one["mbit_per_s"], other["mbit_per_s"], delta=0.02 * other["mbit_per_s"])
+
+    def test_a_broken_trajectory_is_named(self):
+        npy = self.path("x.npy")
+        npy.write_bytes(b"nothing")
+        done = run("bench", "bandwidth", "--trajectory", npy)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(str(npy), done.stderr)
+
+    def test_training_writes_beside_the_scene_and_is_used(self):
+        source = pathlib.Path(__file__).resolve().parents[3] / "services/scenes/half_pipe.textproto"
+        scene = self.path("mine.textproto")
+        scene.write_bytes(source.read_bytes())
+        done = run("bench", "train", "--scene", scene, "--bodies", "200", "--frames", "30", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        row = json.loads(done.stdout)["rows"][0]
+        self.assertGreater(row["position_range"], row["threshold"])
+        self.assertTrue(self.path("mine.trained.textproto").is_file())
+        self.assertEqual(row["file"], str(self.path("mine.trained.textproto")))
+        bench = ("bench", "bandwidth", "--bodies", "200", "--frames", "30", "--seed", "1001", "--codec", "entropy", "--json")
+        trained = json.loads(run(*bench, "--scene", scene).stdout)["rows"][0]
+        self.path("mine.trained.textproto").unlink()
+        untrained = json.loads(run(*bench, "--scene", scene).stdout)["rows"][0]
+        self.assertNotEqual(trained["mbit_per_s"], untrained["mbit_per_s"])
+
+    def test_memory_gives_bytes_a_slot(self):
+        done = run("bench", "memory", "--bodies", "500", "--frames", "5", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        figures = json.loads(done.stdout)
+        for part in ("engine", "server", "client"):
+            self.assertIn("slot_bytes", figures[part])
+
+    def test_doctor_fails_on_a_configuration_file_that_is_not_there(self):
+        done = run("doctor", "--json", CYCLONEDDS_URI="file:///nowhere/cyclonedds.xml")
+        self.assertEqual(done.returncode, 1)
+        self.assertFalse(json.loads(done.stdout)["ok"])
+
+
+if __name__ == "__main__":
+    PROGRAM = sys.argv.pop(1)
+    unittest.main()
