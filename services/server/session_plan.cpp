@@ -34,6 +34,7 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   config.codec_tables = codec_tables(choice.codec, table);
   config.budget = choice.codec == "limited" ? choice.budget_bytes : kNoBudget;
   config.predictor = choice.predictor;
+  config.decay = recommended_decay(choice.codec);
   config.scene = scene.name;
   config.scene_description = scene.text;
   config.types.clear();
