@@ -142,6 +142,8 @@ def live_line(second, top):
     server = next((s for s in top.get("sessions", []) if s["session"] == "quickstart"), None)
     if server is None:
         return f"{second:4d} s  waiting for the session"
+    if server["frame"] == 0:
+        return f"{second:4d} s  the server waits for both participants"
     share = 100 * server["mbit_per_s"] / server["raw_mbit_per_s"] if server["raw_mbit_per_s"] else 0
     lags = [
         f"{'observer' if client['role'] == 'observer' else 'participant'} {client['lag_ms']:.0f} ms"
@@ -253,6 +255,9 @@ def main():
                       f" domain {session.common[1]}, loopback only", flush=True)  # fmt: skip
                 run(session, options.seconds)
                 return 0 if report(session, options) else 1
+    except BrokenPipeError:  # nobody reads what we print
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except Failure as failure:
         print(f"quickstart: {failure}", file=sys.stderr)
         return 1
