@@ -24,8 +24,8 @@ struct Domains {
 // Cyclone keeps one table of domains per process; this counts our uses of it. Never destroyed, so that a port
 // held by a static object may still close.
 Domains& domains() {
-  static auto* const kDomains = new Domains;
-  return *kDomains;
+  static auto* const all = new Domains;
+  return *all;
 }
 
 // Reasons and effects: idl/PROTOCOL.md, "Cyclone DDS configuration".

@@ -198,10 +198,9 @@ TEST_F(DdsProcesses, AServerThatWasStoppedIsReportedAgain) {
 
 TEST_F(DdsProcesses, SixteenProcessesFindEachOtherWithoutMulticast) {
   setenv("CYCLONEDDS_URI",
-         "<CycloneDDS><Domain id=\"any\"><General><AllowMulticast>false</AllowMulticast><Interfaces>"
-         "<NetworkInterface "
-         "name=\"lo\"/></Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-         "<Peers><Peer address=\"localhost\"/></Peers></Discovery></Domain></CycloneDDS>",
+         "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface "
+         "name=\"lo\"/></Interfaces></General>"
+         "</Domain></CycloneDDS>",
          1);
   const auto server = this->server();
   std::vector<std::unique_ptr<Child>> clients;
