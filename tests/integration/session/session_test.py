@@ -11,6 +11,7 @@ import pathlib
 import random
 import re
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -168,6 +169,35 @@ def compare(stage, servers, client, least, resyncs=0):
     print(f"{client}: {compared} frames agree, {holes} holes, {resyncs} resyncs")
 
 
+def capture_hashes(path):
+    """{(epoch, frame): hash} of the deltas of a capture (idl/CAPTURE.md), after checking its structure."""
+    data = path.read_bytes()
+    if data[:8] != b"TNDMCAP1":
+        raise Failed("the capture does not begin as one")
+    at, kinds, hashes, expected = 8, set(), {}, None
+    while at < len(data):
+        kind, length = struct.unpack_from("<II", data, at)
+        body = data[at + 8 : at + 8 + length]
+        if len(body) != length:
+            raise Failed("the capture ends within a record")
+        at += 8 + length
+        kinds.add(kind)
+        if kind == 2:
+            epoch, frame, size = struct.unpack_from("<QQI", body)
+            if size + 20 != length:
+                raise Failed("a snapshot of another size than its record")
+            expected = (epoch, frame + 1)
+        elif kind == 4:
+            epoch, frame, _, _, value, size = struct.unpack_from("<QQQqQI", body)
+            if size + 44 != length or (epoch, frame) != expected:
+                raise Failed(f"delta {epoch},{frame} in the capture, expected {expected}")
+            expected = (epoch, frame + 1)
+            hashes[epoch, frame] = f"{value:016x}"
+    if kinds != {1, 2, 3, 4}:
+        raise Failed(f"the capture holds records of types {kinds}")
+    return hashes
+
+
 def check_report(report, keys=()):
     for key in (
         "frames_applied resyncs hash_mismatches payload_bytes mbit_per_s latency_ms input_latency_ms client_ms join_ms "
@@ -188,7 +218,7 @@ def two_thousand_frames(stage):
     for i in range(3):
         script = stage.script(f"script{i}", i, 60, 0.4 + 0.1 * i)
         stage.client(f"participant{i}", "--input-script", script)
-    stage.client("observer", "--observe", "--lead", 0)
+    stage.client("observer", "--observe", "--lead", 0, "--capture", stage.folder / "capture")
     stage.wait_live(["participant0", "participant1", "participant2", "observer"],
                     lambda live: live.get("frame", 0) > 200, "frame 200")  # fmt: skip
     stage.kill("participant1")
@@ -208,6 +238,8 @@ def two_thousand_frames(stage):
         compare(stage, ["server"], name, 1000, report["resyncs"])
         print(f"  joined in {report['join_ms']:.0f} ms, latency {report['latency_ms']}, client {report['client_ms']}")
     compare(stage, ["server"], "participant1", 100)
+    if capture_hashes(stage.folder / "capture") != stage.hashes("observer"):
+        raise Failed("the capture and the hash log of the observer differ")
     if stage.hashes("observer").get((list(stage.hashes("server"))[0][0], 300)) is None:
         raise Failed("the observer missed frame 300")
 
