@@ -129,7 +129,11 @@ struct Host::Impl {
 
   // --- What the rules see ---
   [[nodiscard]] Roster::Now moment() const {
-    return {.ns = now_ns, .frame = timeline.frame(), .period_ns = pacing.period_ns()};
+    const Frame unwritten = outbox.unwritten_frames();
+    return {.ns = now_ns,
+            .frame = timeline.frame(),
+            .written = timeline.frame() - std::min(timeline.frame(), unwritten),
+            .period_ns = pacing.period_ns()};
   }
   [[nodiscard]] std::int64_t clock() const { return config.clock_ns == nullptr ? 0 : config.clock_ns(); }
 
@@ -147,7 +151,7 @@ struct Host::Impl {
   void digest(const transport::Received<transport::AckMessage>& ack);
   void digest(const transport::Received<transport::InputMessage>& input);
   void produce_frame();
-  void publish(const ServerTimeline::FrameResult& result);
+  void publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns);
   void note_foreigner(transport::ClientId client);
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
@@ -173,6 +177,7 @@ struct Host::Impl {
   std::optional<std::int64_t> first_poll_ns;
   std::int64_t next_look_ns = 0, next_status_ns = 0, last_foreign_note_ns = INT64_MIN;
   Waiting waiting = Waiting::kNothing;  // what the due frame waits for, since the last poll
+  Frame written_then = 0;               // at the last poll
   bool held = false;                    // the due frame had to wait
   bool stalled = false;                 // and was counted as a stall
   std::int64_t suspended_ns = 0;
@@ -222,7 +227,7 @@ void Host::Impl::claim_name() {
   next_look_ns = now_ns;
 }
 
-// Before anything new is taken in: the time since the last poll is charged to those who blocked then.
+// Before anything new is taken in: the time since the last poll is charged to those who were to blame then.
 void Host::Impl::charge_waiting() {
   if (waiting == Waiting::kNothing) return;
   const std::int64_t waited_ns = now_ns - std::max(last_poll_ns, pacing.suspended_from_ns());
@@ -231,7 +236,9 @@ void Host::Impl::charge_waiting() {
   if (waiting != Waiting::kParticipants) return;
   if (!stalled) ++totals.stalls;
   stalled = true;
-  roster.charge(std::min(waited_ns, kLongestChargeNs), moment());
+  Roster::Now then = moment();
+  then.written = written_then;
+  roster.charge(std::min(waited_ns, kLongestChargeNs), then);
 }
 
 void Host::Impl::receive() {
@@ -293,7 +300,9 @@ bool Host::Impl::advance_if_due() {
   }
   waiting = Waiting::kNothing;
   if (state != State::kRunning || !pacing.due(now_ns)) return false;
-  if (roster.blocked(moment())) waiting = Waiting::kParticipants;
+  const Roster::Now then = moment();
+  written_then = then.written;
+  if (roster.blocked(then)) waiting = roster.blamed(then) ? Waiting::kParticipants : Waiting::kQueue;
   if (!outbox.has_frame_room()) waiting = Waiting::kQueue;
   if (waiting != Waiting::kNothing) {
     held = true;
@@ -319,7 +328,7 @@ void Host::Impl::produce_frame() {
   }
   const auto result = timeline.advance(mirror.target(), mirror.lifecycle(), config.budget);
   const std::int64_t applied = clock();
-  publish(result);
+  publish(result, wall_ns + (applied - start));
   times.published(result.frame, now_ns);
   report = {.frame = result.frame,
             .hash = result.hash,
@@ -334,7 +343,7 @@ void Host::Impl::produce_frame() {
   second_durations.add(report.frame_ms);
 }
 
-void Host::Impl::publish(const ServerTimeline::FrameResult& result) {
+void Host::Impl::publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns) {
   const std::size_t size = result.payload.size();
   const std::size_t parts = std::max<std::size_t>((size + kPartBytes - 1) / kPartBytes, 1);
   for (std::size_t part = 0; part < parts; ++part) {
@@ -346,7 +355,7 @@ void Host::Impl::publish(const ServerTimeline::FrameResult& result) {
     delta.part = static_cast<std::uint32_t>(part);
     delta.parts = static_cast<std::uint32_t>(parts);
     delta.last_input = result.last_input;
-    delta.server_time_ns = wall_ns;
+    delta.server_time_ns = published_wall_ns;
     delta.hash = result.hash;
     delta.payload.assign(bytes.begin(), bytes.end());
     // Room was made sure of before the frame started, and this thread is the only producer.

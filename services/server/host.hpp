@@ -54,7 +54,8 @@ struct HostConfig {
   std::string scene_description;
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
 
-  /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0.
+  /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
+  /// stamped with the time at which their frame started.
   std::int64_t (*clock_ns)() = nullptr;
 };
 

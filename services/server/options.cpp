@@ -153,7 +153,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--bodies", flags.bodies, "Number of bodies");
   app.add_option("--session", flags.session, "Name that clients join by [default]");
   app.add_option("--domain", flags.domain, "DDS domain [0]");
-  app.add_option("--codec", flags.codec, "none, selective, quantized, entropy or limited [entropy]");
+  app.add_option("--codec", flags.codec, fmt::format("{} [entropy]", fmt::join(codec_names(), ", ")));
   app.add_option("--predictor", flags.predictor, "Predicted step of server and clients [ballistic]");
   app.add_option("--threshold", flags.threshold,
                  "Position error above which a body is corrected, in metres [the scene's]");

@@ -50,10 +50,12 @@ bool Outbox::push(Outgoing message) {
 
 std::optional<Outgoing> Outbox::pop(std::chrono::nanoseconds timeout) {
   std::unique_lock lock(mutex_);
+  writing_frame_ = false;
   if (queue_.empty() && timeout.count() > 0) ready_.wait_for(lock, timeout);
   if (queue_.empty()) return std::nullopt;
   std::optional<Outgoing> message(std::move(queue_.front()));
   queue_.pop_front();
+  writing_frame_ = std::holds_alternative<transport::DeltaMessage>(*message);
   std::uint32_t limit = 0;
   if (std::uint32_t* const count = count_of(*message, limit)) --*count;
   return message;
@@ -64,6 +66,11 @@ void Outbox::wake() { ready_.notify_all(); }
 std::size_t Outbox::size() const {
   const std::scoped_lock lock(mutex_);
   return queue_.size();
+}
+
+std::uint32_t Outbox::unwritten_frames() const {
+  const std::scoped_lock lock(mutex_);
+  return frames_ + (writing_frame_ ? 1U : 0U);
 }
 
 std::size_t Outbox::high_water() const {

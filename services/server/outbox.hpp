@@ -40,12 +40,14 @@ class Outbox {
   /// with the last; check has_frame_room() before the first.
   [[nodiscard]] bool push(Outgoing message);
 
-  /// The oldest message, or nothing after `timeout`.
+  /// The oldest message, or nothing after `timeout`. Asking for the next says that the one before is written.
   [[nodiscard]] std::optional<Outgoing> pop(std::chrono::nanoseconds timeout);
   /// Wakes a waiting pop().
   void wake();
 
   [[nodiscard]] std::size_t size() const;
+  /// Deltas pushed and not yet written.
+  [[nodiscard]] std::uint32_t unwritten_frames() const;
   /// Most messages ever queued.
   [[nodiscard]] std::size_t high_water() const;
 
@@ -57,6 +59,7 @@ class Outbox {
   Limits limits_;
   std::deque<Outgoing> queue_;
   std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
+  bool writing_frame_ = false;  // the last pop() handed out a delta
   std::size_t high_water_ = 0;
 };
 

@@ -111,9 +111,13 @@ bool Roster::blocked(const Now& now) const {
       accounts_, [&](const auto& entry) { return entry.second.counted && !keeps_up(entry.second, now); });
 }
 
+bool Roster::blamed(const Now& now) const {
+  return std::ranges::any_of(accounts_, [&](const auto& entry) { return blamed(entry.second, now); });
+}
+
 void Roster::charge(std::int64_t duration_ns, const Now& now) {
   for (auto& [id, account] : accounts_) {
-    if (!account.counted || keeps_up(account, now)) continue;
+    if (!blamed(account, now)) continue;
     account.stalls.charge(now.ns, duration_ns);
     if (!rules_.stall_timeout_ns || account.stalls.total_ns(now.ns) <= *rules_.stall_timeout_ns) continue;
     account.demoted = true;
@@ -129,7 +133,7 @@ std::optional<std::int64_t> Roster::patience_ns(const Now& now) {
   std::optional<std::int64_t> least;
   if (!rules_.stall_timeout_ns) return least;
   for (auto& [id, account] : accounts_) {
-    if (!account.counted || keeps_up(account, now)) continue;
+    if (!blamed(account, now)) continue;
     const std::int64_t left =
         std::max<std::int64_t>(*rules_.stall_timeout_ns - account.stalls.total_ns(now.ns), 0);
     least = std::min(least.value_or(left), left);

@@ -77,7 +77,8 @@ class Roster {
   /// Where the server stands when something happens.
   struct Now {
     std::int64_t ns = 0;
-    Frame frame = 0;  ///< last delta out; s is the next
+    Frame frame = 0;    ///< last delta made; s is the next
+    Frame written = 0;  ///< last delta that left the queue: nobody is to blame for lacking a later one
     std::int64_t period_ns = 0;
   };
 
@@ -92,9 +93,11 @@ class Roster {
   void look_for_dead(transport::ServerPort& port, const Now& now);
   /// Who keeps the server from starting frame s = now.frame + 1.
   [[nodiscard]] bool blocked(const Now& now) const;
-  /// Charges a suspension that lasted `duration_ns` to all who caused it, and demotes who caused too much.
+  /// Whether a client is to blame for that: it lacks a delta that was written.
+  [[nodiscard]] bool blamed(const Now& now) const;
+  /// Charges a suspension that lasted `duration_ns` to all who are to blame, and demotes who caused too much.
   void charge(std::int64_t duration_ns, const Now& now);
-  /// Shortest time until somebody who blocks has used up its allowance; nothing if nobody does or may.
+  /// Shortest time until somebody who is to blame has used up its allowance; nothing if nobody does or may.
   [[nodiscard]] std::optional<std::int64_t> patience_ns(const Now& now);
   /// Frame s = now.frame + 1 starts: notes which demoted clients do not keep up.
   void frame_starts(const Now& now);
@@ -115,6 +118,9 @@ class Roster {
   void note(const Account& account, std::string_view what);
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
     return account.applied + window_ >= now.frame + 1;
+  }
+  [[nodiscard]] bool blamed(const Account& account, const Now& now) const {
+    return account.counted && !keeps_up(account, now) && account.applied < now.written;
   }
 
   Rules rules_;

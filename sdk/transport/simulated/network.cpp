@@ -85,7 +85,7 @@ class SimulatedServerPort final : public ServerPort {
         status_(member_.writer<ServerStatusMessage>()),
         others_(member_.reader<SessionMessage>(kSessionReaderDepth)),
         input_(member_.reader<InputMessage>(kInputDepth)),
-        ack_(member_.reader<AckMessage>()) {}
+        ack_(member_.reader<AckMessage>(16)) {}
 
   [[nodiscard]] ParticipantId self() const override { return member_.id(); }
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {

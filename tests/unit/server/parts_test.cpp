@@ -139,6 +139,19 @@ TEST(Outbox, CountsADeltaOnceWhateverItsParts) {
   EXPECT_TRUE(outbox.has_frame_room());
 }
 
+TEST(Outbox, ADeltaIsUnwrittenUntilTheNextMessageIsAskedFor) {
+  Outbox outbox({});
+  ASSERT_TRUE(outbox.push(delta(1, 0, 1)));
+  ASSERT_TRUE(outbox.push(delta(2, 0, 1)));
+  EXPECT_EQ(outbox.unwritten_frames(), 2U);
+  ASSERT_TRUE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 2U);
+  ASSERT_TRUE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 1U);
+  EXPECT_FALSE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 0U);
+}
+
 TEST(Outbox, EachKindIsBoundedByItself) {
   Outbox outbox({.frames = 1, .snapshots = 1, .control = 1});
   EXPECT_TRUE(outbox.push(delta(1, 0, 1)));

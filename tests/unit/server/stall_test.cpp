@@ -210,6 +210,20 @@ TEST_F(StallTest, WaitingForTheQueueIsNobodysFault) {
   EXPECT_GT(bench.host->totals().suspended_ms, 2000U);
 }
 
+TEST_F(StallTest, NobodyIsToBlameForADeltaThatWasNotWrittenYet) {
+  enter(1);
+  bench.run_ms(500);
+  awake.clear();
+  bench.playing(1, bench.host->frame());  // all that was written
+  bench.draining = false;
+  bench.run_ms(3000);
+  EXPECT_EQ(bench.host->totals().demotions, 0U);
+  EXPECT_EQ(bench.host->totals().stalls, 0U);
+  bench.draining = true;
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.host->totals().demotions, 1U) << "now it is";
+}
+
 TEST_F(StallTest, TheHostAsksToBeWokenWhenSomebodysPatienceEnds) {
   enter(1);
   awake.clear();

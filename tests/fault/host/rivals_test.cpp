@@ -1,0 +1,65 @@
+// Two servers of one session.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/fault/host/stage.hpp"
+
+namespace tandem::server {
+namespace {
+
+// A refused server leaves, as tandemd does.
+void leave_if_refused(Server& server) {
+  if (server.host == nullptr || server.host->state() != Host::State::kRefused) return;
+  server.host.reset();
+  server.port.reset();
+}
+
+TEST(Rivals, OfTwoServersStartingWithinASecondExactlyOneStaysAndClientsPlayIt) {
+  for_seeds(60, [](std::uint64_t seed) {
+    Dice dice(seed);
+    Stage stage(seed, {.delay_ns = 1'000'000 + static_cast<std::int64_t>(dice.below(20'000'000)),
+                       .jitter_ns = 5'000'000});
+    stage.add_client();
+    stage.add_client(transport::Role::kObserver);
+    stage.run_ms(static_cast<std::int64_t>(dice.below(50)));
+    stage.add_server(1'000'000);
+    stage.run_ms(static_cast<std::int64_t>(dice.below(1000)));
+    stage.add_server(1'000'000 + dice.below(1500));
+    stage.on_ms = [&] {
+      for (auto& server : stage.servers) leave_if_refused(*server);
+    };
+    stage.run_ms(4000);
+    const auto staying =
+        std::ranges::count_if(stage.servers, [](const auto& server) { return server->host != nullptr; });
+    ASSERT_EQ(staying, 1);
+    const auto& winner =
+        *std::ranges::find_if(stage.servers, [](const auto& s) { return s->host != nullptr; });
+    EXPECT_EQ(winner->host->state(), Host::State::kRunning);
+    for (const auto& client : stage.clients) EXPECT_TRUE(Stage::plays(*client, *winner->host));
+  });
+}
+
+TEST(Rivals, ALaterServerLeavesAndTheClientsOfTheFirstDoNotNotice) {
+  for_seeds(30, [](std::uint64_t seed) {
+    Dice dice(seed);
+    Stage stage(seed, {.delay_ns = 2'000'000, .jitter_ns = 10'000'000});
+    Server& first = stage.add_server(1'000'000);
+    Client& client = stage.add_client();
+    stage.run_ms(3000);
+    ASSERT_TRUE(Stage::plays(client, *first.host));
+    Server& second = stage.add_server(1'004'000 - dice.below(2) * 1'000'000);  // even one with an older epoch
+    stage.run_ms(600);
+    EXPECT_EQ(second.host->state(), Host::State::kRefused);
+    EXPECT_EQ(second.host->error()->code, ErrorCode::kConflict);
+    second.host.reset();
+    second.port.reset();
+    stage.run_ms(1000);
+    EXPECT_EQ(client.core->statistics().epochs, 1U);
+    EXPECT_EQ(client.core->statistics().resyncs, 0U);
+    EXPECT_TRUE(Stage::plays(client, *first.host));
+  });
+}
+
+}  // namespace
+}  // namespace tandem::server

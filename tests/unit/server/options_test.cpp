@@ -1,0 +1,206 @@
+#include "services/server/options.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "sdk/core/codec/codec.hpp"
+#include "services/server/session_plan.hpp"
+
+namespace tandem::server {
+namespace {
+
+Settings least() {
+  Settings settings;
+  settings.scene = "cube";
+  settings.bodies = 100;
+  return settings;
+}
+
+std::string refusal(const std::function<void(Settings&)>& spoil) {
+  Settings settings = least();
+  spoil(settings);
+  const auto options = check_settings(settings);
+  return options ? "" : options.error().message;
+}
+
+class ConfigFile : public ::testing::Test {
+ protected:
+  ~ConfigFile() override { std::remove(path.c_str()); }
+  void write(const std::string& text) const { std::ofstream(path) << text; }
+  std::string path = (std::filesystem::temp_directory_path() /
+                      ("tandem-options-" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
+                       "-" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".textproto"))
+                         .string();
+};
+
+TEST(Options, DefaultsAreThoseOfTheManual) {
+  const auto options = check_settings(least());
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->session, "default");
+  EXPECT_EQ(options->codec, "entropy");
+  EXPECT_EQ(options->lead, 1U);
+  EXPECT_FALSE(options->window);
+  EXPECT_FALSE(options->free_rate);
+  EXPECT_EQ(options->stall_timeout_s, 0.5);
+  EXPECT_FALSE(options->duration_s);
+  EXPECT_EQ(options->budget_bytes, kPaperBudgetBytes);
+}
+
+TEST(Options, WordsAndNumbersAreBothUnderstood) {
+  Settings settings = least();
+  settings.window = "2";
+  settings.rate = "max";
+  settings.stall_timeout = "off";
+  const auto words = check_settings(settings);
+  ASSERT_TRUE(words);
+  EXPECT_EQ(words->window, 2U);
+  EXPECT_TRUE(words->free_rate);
+  EXPECT_FALSE(words->stall_timeout_s);
+  settings.window = "auto";
+  settings.rate = "59.94";
+  settings.stall_timeout = "1.5";
+  const auto numbers = check_settings(settings);
+  ASSERT_TRUE(numbers);
+  EXPECT_FALSE(numbers->window);
+  EXPECT_EQ(numbers->rate_hz, 59.94);
+  EXPECT_EQ(numbers->stall_timeout_s, 1.5);
+}
+
+TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
+  EXPECT_NE(refusal([](Settings& s) { s.scene.reset(); }).find("--scene"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.bodies.reset(); }).find("--bodies"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.bodies = 0; }).find("--bodies"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.bodies = kMaxCapacity + 1; }).find("--bodies"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.session = "a*"; }).find("--session"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.session = ""; }).find("--session"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.lead = 2; }).find("--lead"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.domain = 231; }).find("--domain"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.threads = 0; }).find("--threads"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.client_limit = 0; }).find("--client-limit"), std::string::npos);
+  for (const char* bad : {"0", "25", "-1", "2x", "", "automatic"}) {
+    EXPECT_NE(refusal([bad](Settings& s) { s.window = bad; }).find("--window"), std::string::npos) << bad;
+  }
+  for (const char* bad : {"0", "1001", "nan", "inf", "30Hz", ""}) {
+    EXPECT_NE(refusal([bad](Settings& s) { s.rate = bad; }).find("--rate"), std::string::npos) << bad;
+  }
+  for (const char* bad : {"0", "11", "nan", "never", "-1"}) {
+    EXPECT_NE(refusal([bad](Settings& s) { s.stall_timeout = bad; }).find("--stall-timeout"),
+              std::string::npos)
+        << bad;
+  }
+  for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
+    EXPECT_NE(refusal([bad](Settings& s) { s.threshold = bad; }).find("--threshold"), std::string::npos)
+        << bad;
+    EXPECT_NE(refusal([bad](Settings& s) { s.threshold_scale = bad; }).find("--threshold-scale"),
+              std::string::npos);
+  }
+  EXPECT_NE(refusal([](Settings& s) { s.duration = -1; }).find("--duration"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.duration = std::nan(""); }).find("--duration"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.budget_bytes = 1000; }).find("--budget"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) {
+              s.threshold = 1;
+              s.threshold_scale = 1;
+            }).find("--threshold-scale"),
+            std::string::npos);
+}
+
+TEST(Options, OneWayToSetTheThresholdOnTheCommandLineDisplacesTheOtherInTheFile) {
+  Settings flags = least(), file;
+  file.threshold = 0.1;
+  flags.threshold_scale = 2;
+  EXPECT_TRUE(check_settings(overlay(flags, file)));
+  EXPECT_FALSE(overlay(flags, file).threshold);
+}
+
+TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
+  write(
+      "scene: \"cube\" bodies: 500 session: \"arena\" window: \"4\" scripted: true seed: 9 duration: 2.5\n");
+  const std::string flag = "--config=" + path;
+  const char* arguments[] = {"tandemd", flag.c_str(), "--bodies", "300", "--json"};
+  const CommandLine command = parse_command_line(5, arguments);
+  ASSERT_TRUE(command.options);
+  EXPECT_EQ(command.options->scene, "cube");
+  EXPECT_EQ(command.options->bodies, 300U) << "the flag wins";
+  EXPECT_EQ(command.options->session, "arena");
+  EXPECT_EQ(command.options->window, 4U);
+  EXPECT_TRUE(command.options->scripted);
+  EXPECT_EQ(command.options->seed, 9U);
+  EXPECT_EQ(command.options->duration_s, 2.5);
+  EXPECT_TRUE(command.options->json);
+}
+
+TEST_F(ConfigFile, AMistakeIsNamedWithFileLineAndField) {
+  write("scene: \"cube\"\nbodys: 500\n");
+  const auto unknown = load_config(path);
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::kMalformed);
+  EXPECT_NE(unknown.error().message.find(path + ":2:"), std::string::npos) << unknown.error().message;
+  EXPECT_NE(unknown.error().message.find("bodys"), std::string::npos) << unknown.error().message;
+  write("bodies: \"many\"\n");
+  EXPECT_FALSE(load_config(path));
+}
+
+TEST_F(ConfigFile, AFileThatIsNotThereIsAnError) {
+  const auto missing = load_config(path + ".missing");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kIo);
+}
+
+TEST(CommandLineOf, UnknownFlagsAndMissingValuesAreUsageErrors) {
+  const char* unknown[] = {"tandemd", "--scene", "cube", "--bodies", "5", "--fast"};
+  EXPECT_EQ(parse_command_line(6, unknown).exit_code, 2);
+  const char* word[] = {"tandemd", "--scene", "cube", "--bodies", "many"};
+  EXPECT_EQ(parse_command_line(5, word).exit_code, 2);
+  const char* nothing[] = {"tandemd"};
+  EXPECT_EQ(parse_command_line(1, nothing).exit_code, 2);
+  const char* help[] = {"tandemd", "--help"};
+  const CommandLine shown = parse_command_line(2, help);
+  EXPECT_FALSE(shown.options);
+  EXPECT_EQ(shown.exit_code, 0);
+}
+
+TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
+  for (const char* name : {"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"}) {
+    const auto scene = scenes::load_scene(name);
+    ASSERT_TRUE(scene) << scene.error().message;
+    for (const char* codec : {"none", "selective", "quantized", "entropy", "limited"}) {
+      SessionChoice choice;
+      choice.bodies = 1000;
+      choice.codec = codec;
+      const auto config = plan_session(*scene, choice);
+      ASSERT_TRUE(config) << config.error().message;
+      EXPECT_EQ(config->types.size(), scene->types.size());
+      EXPECT_EQ(config->scene, name);
+      EXPECT_EQ(config->budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
+      EXPECT_EQ(config->parameters.threshold, 1 << config->lattice.halvings);
+      const auto largest = largest_delta_bytes(*config, choice.bodies);
+      ASSERT_TRUE(largest) << largest.error().message;
+      EXPECT_GT(*largest, 0U);
+    }
+  }
+}
+
+TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
+  const auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  SessionChoice choice;
+  choice.bodies = 1000;
+  const auto threshold_m = [&] {
+    const auto config = *plan_session(*scene, choice);
+    return config.parameters.threshold * config.lattice.unit;
+  };
+  EXPECT_NEAR(threshold_m(), scene->threshold_m, 1e-9);
+  choice.threshold_scale = 2;
+  EXPECT_NEAR(threshold_m(), 2 * scene->threshold_m, 1e-9);
+  choice.threshold_m = 0.25;
+  EXPECT_NEAR(threshold_m(), 0.25, 1e-9);
+  choice.threshold_m = 1e-12;
+  EXPECT_FALSE(plan_session(*scene, choice));
+}
+
+}  // namespace
+}  // namespace tandem::server
