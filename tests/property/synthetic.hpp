@@ -49,8 +49,11 @@ inline State random_state(Random& random, std::uint32_t capacity, std::uint64_t 
   State state(capacity);
   for (Slot slot = 0; slot < capacity; ++slot) {
     if (dead_one_in != 0 && random.one_in(dead_one_in)) continue;
-    state.spawn(slot, static_cast<std::uint8_t>(random.below(256)), static_cast<TypeId>(random.below(kTypes)),
-                random_body(random));
+    // One draw a statement: compilers differ in the order in which they evaluate arguments.
+    const BodyState body = random_body(random);
+    const auto type = static_cast<TypeId>(random.below(kTypes));
+    const auto generation = static_cast<std::uint8_t>(random.below(256));
+    state.spawn(slot, generation, type, body);
   }
   return state;
 }
