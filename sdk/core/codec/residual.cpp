@@ -15,11 +15,13 @@ void mark_suspects(const State& state, const State& target, const Block& block, 
   const std::int32_t* z1 = target.p(2).data() + block.first;
   // |a - b| > near in one unsigned comparison; differences of up to 2^31 wrap and still compare right.
   const auto beyond = [near](std::int32_t a, std::int32_t b) {
-    return static_cast<std::uint32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b) + near) >
-           2 * near;
+    const std::uint32_t shifted = static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b) + near;
+    return static_cast<std::uint8_t>(shifted > 2 * near);
   };
   std::uint8_t* mark = marks.data();
-  for (std::uint32_t s = 0; s < block.slots; ++s) {
+  const std::uint32_t slots =
+      block.slots;  // a store to a byte could change the block, for all a compiler knows
+  for (std::uint32_t s = 0; s < slots; ++s) {
     mark[s] = static_cast<std::uint8_t>(beyond(x1[s], x0[s]) | beyond(y1[s], y0[s]) | beyond(z1[s], z0[s]));
   }
   const std::uint32_t whole = (block.slots + 7U) & ~7U;

@@ -19,50 +19,72 @@ inline std::int32_t share_of(std::int32_t x, std::uint32_t k) {
 
 inline std::int32_t clamp_velocity(std::int32_t x) { return std::clamp(x, -kVelocityLimit, kVelocityLimit); }
 
-// One channel. `from` and `to` may be the same columns: slots do not depend on each other.
-struct Columns {
-  const std::int32_t* p;
-  const std::int32_t* v;
-  const std::int32_t* c;
-  std::int32_t* p_to;
-  std::int32_t* v_to;
-  std::int32_t* c_to;
+struct Motion {
+  std::int32_t p;
+  std::int32_t v;
+  std::int32_t c;
 };
 
 // |v|, |g|, |c| <= 2^28, so their sum stays inside 32 bits. Without decay c is within its limits already.
 template <bool Decays>
-inline void step_one(const Columns& x, std::size_t s, std::int32_t gravity, std::uint32_t damping,
-                     std::uint32_t decay) {
-  std::int32_t c = x.c[s];
-  std::int32_t v = x.v[s] + gravity + c;
-  if constexpr (Decays) c = clamp_velocity(c - share_of(c, decay));
-  v = clamp_velocity(v - share_of(v, damping));
-  x.p_to[s] = std::clamp(x.p[s] + ((v + 32) >> 6), -kPositionLimit, kPositionLimit);
-  x.v_to[s] = v;
-  x.c_to[s] = c;
+inline Motion stepped(Motion m, std::int32_t gravity, std::uint32_t damping, std::uint32_t decay) {
+  m.v += gravity + m.c;
+  if constexpr (Decays) m.c = clamp_velocity(m.c - share_of(m.c, decay));
+  m.v = clamp_velocity(m.v - share_of(m.v, damping));
+  m.p = std::clamp(m.p + ((m.v + 32) >> 6), -kPositionLimit, kPositionLimit);
+  return m;
 }
 
-#if defined(__clang__)
-#define TANDEM_INDEPENDENT_LOOP _Pragma("clang loop vectorize(assume_safety)")
-#elif defined(__GNUC__)
-#define TANDEM_INDEPENDENT_LOOP _Pragma("GCC ivdep")
-#else
-#define TANDEM_INDEPENDENT_LOOP
-#endif
+// A dead slot is all zero; without gravity it stays so, which keeps the loops free of branches.
+inline std::int32_t gravity_of(std::uint8_t alive, std::int32_t gravity) {
+  return gravity & -static_cast<std::int32_t>(alive);
+}
 
-// A dead slot is all zero; without gravity it stays so, which keeps the loop free of branches.
+// One channel. Columns never overlap; a compiler that is told so vectorises.
 template <bool Decays>
-void step_channel(const Columns x, const std::uint8_t* alive, std::size_t count, std::int32_t gravity,
-                  std::uint32_t damping, std::uint32_t decay) {
-  TANDEM_INDEPENDENT_LOOP
+void step_channel(const std::int32_t* __restrict p, const std::int32_t* __restrict v,
+                  const std::int32_t* __restrict c, std::int32_t* __restrict p_to,
+                  std::int32_t* __restrict v_to, std::int32_t* __restrict c_to,
+                  const std::uint8_t* __restrict alive, std::size_t count, std::int32_t gravity,
+                  const Drive& drive) {
+  const std::uint32_t damping = drive.damping;
+  const std::uint32_t decay = drive.decay;
   for (std::size_t s = 0; s < count; ++s) {
-    step_one<Decays>(x, s, gravity & -static_cast<std::int32_t>(alive[s]), damping, decay);
+    const Motion m = stepped<Decays>({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
+    p_to[s] = m.p;
+    v_to[s] = m.v;
+    c_to[s] = m.c;
   }
 }
 
-Columns columns(const State& from, State& to, std::size_t channel) {
-  return {from.p(channel).data(), from.v(channel).data(), from.c(channel).data(),
-          to.p(channel).data(),   to.v(channel).data(),   to.c(channel).data()};
+template <bool Decays>
+void step_channel_in_place(std::int32_t* __restrict p, std::int32_t* __restrict v, std::int32_t* __restrict c,
+                           const std::uint8_t* __restrict alive, std::size_t count, std::int32_t gravity,
+                           const Drive& drive) {
+  const std::uint32_t damping = drive.damping;
+  const std::uint32_t decay = drive.decay;
+  for (std::size_t s = 0; s < count; ++s) {
+    const Motion m = stepped<Decays>({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
+    p[s] = m.p;
+    v[s] = m.v;
+    c[s] = m.c;
+  }
+}
+
+template <bool Decays>
+void step_all(const State& from, State& to, const Drive& drive) {
+  const std::size_t count = from.capacity();
+  const std::uint8_t* alive = from.alive().data();
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    const std::int32_t gravity = drive.gravity[i];
+    if (&from == &to) {
+      step_channel_in_place<Decays>(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity,
+                                    drive);
+    } else {
+      step_channel<Decays>(from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(),
+                           to.v(i).data(), to.c(i).data(), alive, count, gravity, drive);
+    }
+  }
 }
 
 }  // namespace
@@ -73,11 +95,7 @@ void Ballistic::step(const State& from, State& to, const Drive& drive) {
     std::ranges::copy(from.generation(), to.generation().begin());
     std::ranges::copy(from.type(), to.type().begin());
   }
-  const auto step_all = drive.decay != 0 ? step_channel<true> : step_channel<false>;
-  for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    step_all(columns(from, to, i), from.alive().data(), from.capacity(), drive.gravity[i], drive.damping,
-             drive.decay);
-  }
+  drive.decay != 0 ? step_all<true>(from, to, drive) : step_all<false>(from, to, drive);
 }
 
 void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) {
@@ -87,10 +105,18 @@ void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std
     to.type()[s] = from.type()[s];
   }
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    const Columns x = columns(from, to, i);
+    const std::int32_t* p = from.p(i).data();
+    const std::int32_t* v = from.v(i).data();
+    const std::int32_t* c = from.c(i).data();
+    std::int32_t* p_to = to.p(i).data();
+    std::int32_t* v_to = to.v(i).data();
+    std::int32_t* c_to = to.c(i).data();
     for (const Slot s : slots) {
-      step_one<true>(x, s, drive.gravity[i] & -static_cast<std::int32_t>(from.alive()[s]), drive.damping,
-                     drive.decay);
+      const std::int32_t gravity = gravity_of(from.alive()[s], drive.gravity[i]);
+      const Motion m = stepped<true>({p[s], v[s], c[s]}, gravity, drive.damping, drive.decay);
+      p_to[s] = m.p;
+      v_to[s] = m.v;
+      c_to[s] = m.c;
     }
   }
 }
