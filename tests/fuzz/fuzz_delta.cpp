@@ -1,0 +1,58 @@
+// Any payload, for every codec: refused with the state untouched, or applied without breaking it.
+
+#include <cstdlib>
+
+#include "tests/property/synthetic.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kCapacity = 24;
+constexpr CodecParameters kParameters{200, 16, 64};
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+struct Target {
+  explicit Target(std::string_view codec) : delta(synthetic::make_delta(codec, kCapacity, kParameters)) {
+    synthetic::Random random(1);
+    before = synthetic::random_state(random, kCapacity);
+    state = before;
+  }
+  DeltaCodec delta;
+  State before;
+  State state;
+};
+
+void try_payload(std::span<const std::byte> input) {
+  static std::vector<Target> targets = [] {
+    std::vector<Target> made;
+    for (const std::string_view name : codec_names()) made.emplace_back(name);
+    return made;
+  }();
+  if (input.empty()) return;
+  Target& target = targets[std::to_integer<std::size_t>(input[0]) % targets.size()];
+  target.delta.restore_parameters(kParameters);
+  target.state = target.before;
+  if (target.delta.decode(target.state, input.subspan(1))) {
+    require(synthetic::broken_invariant(target.state) == nullptr);
+    // What the delta did not touch is as it was.
+    std::vector<bool> touched(kCapacity);
+    for (const Slot slot : target.delta.touched()) touched.at(slot) = true;
+    for (Slot slot = 0; slot < kCapacity; ++slot) {
+      require(touched[slot] || target.state.body(slot) == target.before.body(slot));
+    }
+  } else {
+    require(target.state == target.before);
+    require(target.delta.parameters() == kParameters);
+  }
+}
+
+}  // namespace
+}  // namespace tandem
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  tandem::try_payload(std::as_bytes(std::span(data, size)));
+  return 0;
+}

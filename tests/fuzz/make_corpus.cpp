@@ -1,0 +1,83 @@
+// Writes the seed corpus: make_corpus FOLDER. Small states, so that a fuzzer runs fast.
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "tests/property/synthetic.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kCapacity = 24;  // as in the fuzz targets
+constexpr CodecParameters kParameters{200, 16, 64};
+
+bool write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream file(path, std::ios::binary);
+  for (const std::byte byte : bytes) file.put(static_cast<char>(byte));
+  return static_cast<bool>(file.flush());
+}
+
+// The state that fuzz_delta decodes onto, moved a little, much and not at all; with and without lifecycle.
+bool write_deltas(const std::filesystem::path& folder) {
+  for (std::size_t codec = 0; codec < codec_names().size(); ++codec) {
+    for (const std::uint64_t moved_one_in : {1U, 6U}) {
+      for (const bool lively : {false, true}) {
+        synthetic::Random random(1);
+        State state = synthetic::random_state(random, kCapacity);
+        State target = synthetic::random_target(random, state, moved_one_in);
+        std::vector<LifecycleRecord> lifecycle;
+        if (lively) lifecycle = synthetic::random_lifecycle(random, state, target, 4);
+        DeltaCodec delta = synthetic::make_delta(codec_names()[codec], kCapacity, kParameters);
+        if (lively) delta.set_parameters({100, 8, 32});
+        std::vector<std::byte> bytes(1 + delta.bound());
+        bytes[0] = static_cast<std::byte>(codec);
+        const auto encoded = delta.encode(state, target, lifecycle, kNoBudget, std::span(bytes).subspan(1));
+        bytes.resize(1 + encoded.size_bytes);
+        const std::string name = std::string(codec_names()[codec]) + "-" + std::to_string(moved_one_in) +
+                                 (lively ? "-lifecycle" : "");
+        if (!write_file(folder / "delta" / name, bytes)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool write_snapshots(const std::filesystem::path& folder) {
+  TimelineConfig config;
+  config.capacity = kCapacity;
+  config.type_count = synthetic::kTypes;
+  config.codec = "quantized";
+  config.parameters = kParameters;
+  config.predictor = "ballistic";
+  for (const std::uint64_t dead_one_in : {0U, 1U, 3U}) {
+    synthetic::Random random(2);
+    auto server = ServerTimeline::create(config, 1);
+    if (!server) return false;
+    server->start(10, synthetic::random_state(random, kCapacity, dead_one_in), Drive{{0, -640, 0}, 10, 3});
+    for (std::uint64_t number = 1; number <= dead_one_in; ++number) {
+      if (!server->schedule({number, 11 + number, Drive{{1, 2, 3}, 4, 5}})) return false;
+    }
+    std::vector<std::byte> bytes;
+    server->snapshot(bytes);
+    if (!write_file(folder / "snapshot" / ("dead-one-in-" + std::to_string(dead_one_in)), bytes))
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace tandem
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fputs("usage: make_corpus FOLDER\n", stderr);
+    return 2;
+  }
+  const std::filesystem::path folder(argv[1]);
+  if (tandem::write_deltas(folder) && tandem::write_snapshots(folder)) return 0;
+  std::fprintf(stderr, "could not write to %s\n", argv[1]);
+  return 1;
+}
