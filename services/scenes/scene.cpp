@@ -123,7 +123,7 @@ void read_script(const idl::Script& script, Scene& scene) {
   }
   for (const idl::Tilting& t : script.tilting()) {
     scene.tilting.push_back({t.start_s(), t.period_s(), t.period_jitter(), t.spread(), t.swing_s(),
-                             t.send_every_s(), t.strength() > 0 ? t.strength() : 1});
+                             t.send_every_s(), t.strength() > 0 ? t.strength() : 1, t.turn_over()});
   }
   for (const idl::Poking& p : script.poking()) {
     scene.poking.push_back({p.start_s(), p.period_s(), p.period_jitter(), to_vec3(p.region().low()),

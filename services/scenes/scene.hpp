@@ -36,6 +36,7 @@ struct StartBlock {
 struct Tilting {
   double start_s = 0, period_s = 1, period_jitter = 0, spread = 0, swing_s = 0, send_every_s = 0,
          strength = 1;
+  bool turn_over = false;
 };
 
 /// See Poking in idl/scene.proto.

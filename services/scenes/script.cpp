@@ -48,10 +48,12 @@ void tilt(const Hand& hand, const Tilting& tilting, double offset_s, Random rand
   const Vec3 down = normalised(hand.scene.gravity, {0, -1, 0});
   const double every_s = std::max(tilting.send_every_s, hand.scene.dt_s);
   Vec3 held = down;
+  bool over = false;
   for (double t = tilting.start_s + offset_s; t <= hand.end_s();) {
     const Vec3 aside = random.in_ball();
+    over = tilting.turn_over && !over;
     Vec3 wanted{};
-    for (std::size_t i = 0; i < 3; ++i) wanted[i] = down[i] + tilting.spread * aside[i];
+    for (std::size_t i = 0; i < 3; ++i) wanted[i] = (over ? -down[i] : down[i]) + tilting.spread * aside[i];
     wanted = normalised(wanted, down);
     for (double into_s = every_s; into_s < tilting.swing_s; into_s += every_s) {
       const double share = into_s / tilting.swing_s;

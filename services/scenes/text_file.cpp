@@ -87,10 +87,12 @@ int Node::line_of(const pb::FieldDescriptor* field, int index) const {
 
 void Node::require(bool fine, const std::string& field, const std::string& rule, int index) const {
   if (fine || findings_->first) return;
-  const std::string index_text = index < 0 ? "" : "[" + std::to_string(index) + "]";
-  const std::string full = path_.empty() ? field : field.empty() ? path_ : path_ + "." + field;
+  std::string full = path_;
+  if (!path_.empty() && !field.empty()) full += '.';
+  full += field;
+  if (index >= 0) full.append("[").append(std::to_string(index)).append("]");
   findings_->first = Error{ErrorCode::kMalformed, located(findings_->file, line_of(descriptor(field), index),
-                                                          "field \"" + full + index_text + "\" " + rule)};
+                                                          "field \"" + full + "\" " + rule)};
 }
 
 Node Node::child(const std::string& field, int index) const {
@@ -100,7 +102,7 @@ Node Node::child(const std::string& field, int index) const {
       index < 0 ? reflection->GetMessage(*message_, d) : reflection->GetRepeatedMessage(*message_, d, index);
   auto* lines = lines_ == nullptr ? nullptr : lines_->GetTreeForNested(d, index);
   std::string path = path_.empty() ? field : path_ + "." + field;
-  if (index >= 0) path += "[" + std::to_string(index) + "]";
+  if (index >= 0) path.append("[").append(std::to_string(index)).append("]");
   return {nested, lines, path, line_of(d, index), *findings_};
 }
 

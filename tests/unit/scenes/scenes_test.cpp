@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "tests/unit/scenes/temporary.hpp"
 
@@ -45,6 +45,64 @@ INSTANTIATE_TEST_SUITE_P(Shipped, EveryScene,
                          ::testing::Values("half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3",
                                            "emitter"),
                          [](const auto& test) { return test.param; });
+
+class PaperScene : public ::testing::TestWithParam<std::string> {};
+
+// Positions, not velocities: with sub-steps a resting body's velocity makes up for the gravity of the coming
+// step.
+TEST_P(PaperScene, LeftAloneItsPileComesToRest) {
+  constexpr std::uint32_t kBodies = 1000;
+  const auto scene = load_scene(GetParam());
+  ASSERT_TRUE(scene) << scene.error().message;
+  auto made = make_simulation(*scene, kBodies, 7, 1);
+  ASSERT_TRUE(made) << made.error().message;
+  engine::Simulation& simulation = **made;
+  for (int frame = 0; frame < 2000; ++frame) simulation.step();
+  std::array<std::vector<float>, 3> before;
+  for (std::size_t i = 0; i < 3; ++i) {
+    before[i].assign(simulation.bodies().position[i].begin(), simulation.bodies().position[i].end());
+  }
+  for (int frame = 0; frame < 30; ++frame) simulation.step();
+  std::vector<double> moved(kBodies);
+  for (std::uint32_t slot = 0; slot < kBodies; ++slot) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto d = static_cast<double>(simulation.bodies().position[i][slot] - before[i][slot]);
+      moved[slot] += d * d;
+    }
+    moved[slot] = std::sqrt(moved[slot]);
+  }
+  std::sort(moved.begin(), moved.end());
+  EXPECT_LT(moved[kBodies / 2], 0.05 * scene->smallest_radius_m) << "way of half of them in one second";
+  EXPECT_LT(moved[kBodies * 9 / 10], 0.15 * scene->smallest_radius_m) << "way of nine in ten";
+  EXPECT_GE(simulation.colliding(), kBodies * 99 / 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, PaperScene,
+                         ::testing::Values("half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"),
+                         [](const auto& test) { return test.param; });
+
+TEST(Emitter, KeepsTwoThousandSlotsInMotionWithEveryKindOfEvent) {
+  const auto scene = load_scene("emitter");
+  ASSERT_TRUE(scene) << scene.error().message;
+  auto made = make_simulation(*scene, 2000, 7, 1);
+  ASSERT_TRUE(made) << made.error().message;
+  engine::Simulation& simulation = **made;
+  const auto inputs = scripted_inputs(*scene, 7, 0, 900);
+  std::array<std::size_t, 4> events{};
+  std::size_t next = 0;
+  for (std::uint64_t frame = 1; frame <= 900; ++frame) {
+    for (; next < inputs.size() && inputs[next].frame == frame; ++next) simulation.apply(inputs[next].input);
+    simulation.step();
+    for (const engine::Event& event : simulation.events()) ++events.at(static_cast<std::size_t>(event.kind));
+  }
+  const auto count = [&events](engine::Event::Kind kind) {
+    return events.at(static_cast<std::size_t>(kind));
+  };
+  EXPECT_GT(count(engine::Event::Kind::kSpawned), 5000U);
+  EXPECT_GT(count(engine::Event::Kind::kDespawned), 3500U);
+  EXPECT_GT(count(engine::Event::Kind::kTeleported), 100U);
+  EXPECT_GT(count(engine::Event::Kind::kTypeChanged), 3500U);
+}
 
 TEST(Scenes, ThePapersFiveAreThereWithTheirNumbersAndUsers) {
   const std::vector<std::string> names{"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"};

@@ -60,6 +60,15 @@ TEST(Scripts, TiltingKeepsGravitysStrengthAndStaysInItsCone) {
   }
 }
 
+TEST(Scripts, TurningOverPointsEveryOtherGravityUp) {
+  const Scene scene = scene_with("script { tilting { period_s: 1 spread: 0.3 turn_over: true } }");
+  const auto inputs = scripted_inputs(scene, 4, 0, 300);
+  ASSERT_GE(inputs.size(), 10U);
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    EXPECT_GT(inputs[i].input.values[1] * (i % 2 == 0 ? 1 : -1), 4) << i;
+  }
+}
+
 TEST(Scripts, EventsActOnTheirFramesForUsersThatAreThere) {
   const Scene scene = scene_with(
       "script { events { time_s: 0.4 gravity { x: 1 } } events { frame: 3 push { radius_m: 2 velocity_change "
