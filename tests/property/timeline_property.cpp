@@ -57,8 +57,7 @@ struct Delta {
 /// A server, what it has published, and one client.
 class Scenario {
  public:
-  Scenario(Random& random, bool interacting, std::uint32_t lead)
-      : random_(random), interacting_(interacting) {
+  Scenario(Random& random, bool interacting, std::uint32_t lead) : random_(random) {
     config_.capacity = static_cast<std::uint32_t>(1 + random.below(60));
     config_.type_count = synthetic::kTypes;
     config_.codec = codec_names()[random.below(codec_names().size())];
@@ -107,7 +106,6 @@ class Scenario {
     const std::size_t at = inputs_.size() > 1 && random_.one_in(4) ? 1 : 0;
     const ScheduledDrive input = inputs_[at];
     inputs_.erase(inputs_.begin() + static_cast<std::ptrdiff_t>(at));
-    delivered_ = std::max(delivered_, input.number);
     RC_ASSERT(client_->schedule(input).has_value());
     if (random_.one_in(4)) RC_ASSERT(client_->schedule(input).has_value());
     return true;
@@ -159,7 +157,6 @@ class Scenario {
   }
 
   Random& random_;
-  bool interacting_;
   TimelineConfig config_;
   std::optional<ServerTimeline> server_;
   std::optional<ClientTimeline> client_;
@@ -167,7 +164,6 @@ class Scenario {
   std::deque<ScheduledDrive> inputs_;
   std::map<std::uint64_t, ScheduledDrive> all_inputs_;
   std::deque<Delta> deltas_;
-  std::uint64_t delivered_ = 0;
 };
 
 void any_interleaving(bool interacting) {
