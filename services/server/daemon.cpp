@@ -48,6 +48,7 @@ class HashLog {
     if (path.empty()) return {};
     file_.reset(std::fopen(path.c_str(), "w"));
     if (!file_) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", path));
+    std::setvbuf(file_.get(), nullptr, _IOLBF, BUFSIZ);  // whole lines, also of a server that is killed
     return {};
   }
   void add(Frame frame, std::uint64_t hash) {

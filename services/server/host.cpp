@@ -26,6 +26,7 @@ constexpr std::int64_t kShortWakeNs = 10 * kMillisecond;
 constexpr std::int64_t kLookNs = kSecond / 4;  // between looks for rivals and for dead clients
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
+constexpr std::size_t kMostNotices = 256;  // until somebody takes them
 constexpr double kBitsPerMbit = 1048576.0;
 constexpr double kRawBytesPerBody = 24;
 
@@ -42,7 +43,8 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   if (config.window && (*config.window < 1 || *config.window > config.window_ceiling)) {
     return refuse(fmt::format("window must lie in 1..{}", config.window_ceiling));
   }
-  if (config.client_limit == 0) return refuse("client limit must be positive");
+  if (config.client_limit == 0 || config.participant_limit == 0)
+    return refuse("client limits must be positive");
   if (config.types.empty() || config.types.size() > 65535) return refuse("1..65535 body types are needed");
   if (config.epoch == 0) return refuse("epoch must not be 0");
   const std::uint32_t capacity = simulation.capacity();
@@ -110,6 +112,7 @@ struct Host::Impl {
         outbox(config.outbox),
         roster({.epoch = config.epoch,
                 .client_limit = config.client_limit,
+                .participant_limit = config.participant_limit,
                 .stall_timeout_ns = config.stall_timeout_ns,
                 .fixed_window = config.window,
                 .window_ceiling = config.window_ceiling}),
@@ -282,6 +285,7 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
 void Host::Impl::note_foreigner(transport::ClientId client) {
   if (last_foreign_note_ns != INT64_MIN && now_ns - last_foreign_note_ns < kSecond) return;
   last_foreign_note_ns = now_ns;
+  if (notices.size() >= kMostNotices) return;
   notices.push_back(fmt::format("client {} is used by a second participant: refused", client_name(client)));
 }
 
@@ -358,8 +362,8 @@ void Host::Impl::publish(const ServerTimeline::FrameResult& result, std::int64_t
     delta.server_time_ns = published_wall_ns;
     delta.hash = result.hash;
     delta.payload.assign(bytes.begin(), bytes.end());
-    // Room was made sure of before the frame started, and this thread is the only producer.
-    if (!outbox.push(std::move(delta))) notices.emplace_back("publishing queue overflow");
+    // There is room: it was made sure of before the frame started, and this thread is the only producer.
+    static_cast<void>(outbox.push(std::move(delta)));
   }
 }
 

@@ -37,7 +37,8 @@ struct HostConfig {
   std::optional<std::int64_t> stall_timeout_ns = kSecond / 2;  ///< empty: nobody is demoted
   std::uint32_t wait_for = 0;                                  ///< participants that must play before frame 1
   std::uint32_t client_limit = 256;
-  std::int64_t claim_ns = kSecond / 2;  ///< how long to look for another server before announcing
+  std::uint32_t participant_limit = 16;  ///< clients of one DDS participant, or it could take all seats
+  std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
   Outbox::Limits outbox;
 
   Lattice lattice;

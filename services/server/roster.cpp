@@ -27,6 +27,9 @@ void Roster::note(const Account& account, std::string_view what) {
 
 Account* Roster::admit(const transport::AckMessage& ack, const transport::ParticipantId& from,
                        std::int64_t now_ns) {
+  const auto siblings =
+      std::ranges::count_if(accounts_, [&from](const auto& entry) { return entry.second.from == from; });
+  if (siblings >= rules_.participant_limit) return nullptr;
   if (accounts_.size() >= rules_.client_limit) {
     const auto oldest = std::ranges::min_element(accounts_, {}, [](const auto& entry) {
       return entry.second.present ? INT64_MAX : entry.second.heard_ns;

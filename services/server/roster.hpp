@@ -67,6 +67,7 @@ class Roster {
   struct Rules {
     Epoch epoch = 0;
     std::uint32_t client_limit = 256;
+    std::uint32_t participant_limit = 16;  ///< clients of one DDS participant
     std::optional<std::int64_t> stall_timeout_ns;
     std::optional<std::uint32_t> fixed_window;
     std::uint32_t window_ceiling = 24;

@@ -13,7 +13,7 @@ namespace {
 class Liar {
  public:
   Liar(Stage& stage, Server& server, std::uint64_t seed)
-      : stage_(&stage), server_(&server), dice_(seed), port_(must(stage.network.make_client("default"))) {}
+      : server_(&server), dice_(seed), port_(must(stage.network.make_client("default"))) {}
 
   void speak() {
     if (dice_.one_in(2)) {
@@ -74,7 +74,6 @@ class Liar {
     }
   }
 
-  Stage* stage_;
   Server* server_;
   Dice dice_;
   std::unique_ptr<transport::ClientPort> port_;

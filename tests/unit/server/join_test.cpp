@@ -246,5 +246,19 @@ TEST(ClientLimit, ClientsBeyondTheLimitAreToldAndSeatsOfTheDeadAreGivenAway) {
   EXPECT_EQ(bench.last_reply(3)->reason, static_cast<std::uint32_t>(Reason::kNone));
 }
 
+TEST(ClientLimit, OneParticipantHoldsSixteenClientsAtMost) {
+  Bench bench;
+  bench.poll();
+  for (transport::ClientId id = 1; id <= 20; ++id) {
+    bench.port.acks.push_back({bench.ack(id, Phase::kJoining, 0), participant(1)});
+  }
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().clients_seen, 16U);
+  EXPECT_EQ(bench.last_reply(17)->reason, static_cast<std::uint32_t>(Reason::kFull));
+  bench.joining(21);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().clients_seen, 17U) << "another participant's client finds a seat";
+}
+
 }  // namespace
 }  // namespace tandem::server
