@@ -178,7 +178,7 @@ struct Host::Impl {
   std::optional<Error> error;
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
   std::optional<std::int64_t> first_poll_ns;
-  std::int64_t next_look_ns = 0, next_status_ns = 0, last_foreign_note_ns = INT64_MIN;
+  std::int64_t last_look_ns = 0, next_status_ns = 0, last_foreign_note_ns = INT64_MIN;
   Waiting waiting = Waiting::kNothing;  // what the due frame waits for, since the last poll
   Frame written_then = 0;               // at the last poll
   bool held = false;                    // the due frame had to wait
@@ -227,7 +227,7 @@ void Host::Impl::claim_name() {
   }
   if (now_ns - *first_poll_ns < config.claim_ns || !outbox.push(session)) return;
   state = State::kWaiting;
-  next_look_ns = now_ns;
+  last_look_ns = now_ns;
 }
 
 // Before anything new is taken in: the time since the last poll is charged to those who were to blame then.
@@ -290,8 +290,9 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
 }
 
 void Host::Impl::look_around() {
-  if (now_ns < next_look_ns) return;
-  next_look_ns = now_ns + (waiting == Waiting::kParticipants ? kLongestWakeNs : kLookNs);
+  // More often while somebody is waited for: he may be gone.
+  if (now_ns - last_look_ns < (waiting == Waiting::kParticipants ? kLongestWakeNs : kLookNs)) return;
+  last_look_ns = now_ns;
   roster.look_for_dead(*port, moment());
   error = claim.check(*port, true);
   if (error) state = State::kRefused;
