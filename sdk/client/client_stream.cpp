@@ -6,6 +6,16 @@
 
 namespace tandem::client {
 
+namespace {
+
+// A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
+std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
+  constexpr std::int64_t kMostNs = 3'600'000'000'000;
+  return wall_ns - std::clamp(server_time_ns, wall_ns - kMostNs, wall_ns + kMostNs);
+}
+
+}  // namespace
+
 // Deltas first: whatever scheduled inputs they promise were published before them, so taking the inputs
 // afterwards finds the most.
 void ClientCore::Impl::take_stream(Now now) {
@@ -160,7 +170,7 @@ void ClientCore::Impl::play(Now now, std::int64_t since_last_poll_ns) {
     e.sampler.after_apply(e.timeline);
     ++statistics.frames_applied;
     statistics.payload_bytes += delta->payload.size();
-    statistics.add_latency(now.wall_ns + measure() - poll_began_ns - delta->server_time_ns);
+    statistics.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns, delta->server_time_ns));
     if (options.measure_ns != nullptr) statistics.frame_cost.add(cost_ns);
     if (statistics.first_applied_ns == 0) statistics.first_applied_ns = now.steady_ns;
     statistics.last_applied_ns = now.steady_ns;
