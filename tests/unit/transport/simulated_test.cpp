@@ -230,16 +230,18 @@ TEST(Simulated, WhatKeepLastOverwroteBeforeItsRepairIsGone) {
 TEST(Simulated, AReaderThatDoesNotTakeKeepsTheLastOfEachKey) {
   Pair pair(NetworkOptions{}, 3);
   for (Frame frame = 1; frame <= 10; ++frame) ASSERT_TRUE(pair.server->write(delta(frame)));
-  for (Frame applied = 1; applied <= 5; ++applied) {
+  for (Frame applied = 1; applied <= 20; ++applied) {
     ASSERT_TRUE(pair.client->write(ack(1, applied)));
     ASSERT_TRUE(pair.client->write(ack(2, 10 * applied)));
   }
   pair.run(10 * kMs);
   EXPECT_EQ(frames(*pair.client), range(8, 10));
   const auto acks = take<AckMessage>(*pair.server);
-  ASSERT_EQ(acks.size(), 2U);
+  ASSERT_EQ(acks.size(), 2U * 16U);  // the reader's history of acknowledgements, for each client
   EXPECT_EQ(acks[0].message.applied, 5U);
   EXPECT_EQ(acks[1].message.applied, 50U);
+  EXPECT_EQ(acks[30].message.applied, 20U);
+  EXPECT_EQ(acks[31].message.applied, 200U);
 }
 
 TEST(Simulated, TheLossModelCanDropForGood) {
