@@ -58,6 +58,8 @@ class ClientCore {
   ~ClientCore();
   ClientCore(const ClientCore&) = delete;
   ClientCore& operator=(const ClientCore&) = delete;
+  ClientCore(ClientCore&&) = delete;
+  ClientCore& operator=(ClientCore&&) = delete;
 
   /// Takes what arrived and does what is due. Returns the steady time at which it wants to be called again
   /// even if nothing arrives.

@@ -38,6 +38,8 @@ class HeadlessClient final : public client::CoreListener {
   ~HeadlessClient() override;
   HeadlessClient(const HeadlessClient&) = delete;
   HeadlessClient& operator=(const HeadlessClient&) = delete;
+  HeadlessClient(HeadlessClient&&) = delete;
+  HeadlessClient& operator=(HeadlessClient&&) = delete;
 
   /// Plays until its time is over or `stop` is set.
   void run(const std::atomic<bool>& stop);

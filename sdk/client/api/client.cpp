@@ -48,6 +48,8 @@ struct Client::Impl {
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
+  Impl(Impl&&) = delete;
+  Impl& operator=(Impl&&) = delete;
 
   /// One round; waits at most `longest_ns` for the next thing to do.
   void round(std::int64_t longest_ns) {

@@ -82,6 +82,10 @@ class World {
  public:
   explicit World(const WorldOptions& options);
   ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+  World(World&&) = delete;
+  World& operator=(World&&) = delete;
 
   /// Lets `seconds` pass.
   void run(double seconds);
