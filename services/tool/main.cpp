@@ -2,8 +2,19 @@
 
 #include <cstdio>
 #include <exception>
+#include <string>
 
 #include "services/tool/commands.hpp"
+
+namespace {
+
+// CLI11 would only say that a command is needed, not that this one is unknown.
+bool unknown(const CLI::App& app, const std::string& command) {
+  const auto known = app.get_subcommands([&](const CLI::App* one) { return one->get_name() == command; });
+  return known.empty();
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"Streams large interactive simulations over DDS: clients, measurements, diagnosis.", "tandem"};
@@ -16,6 +27,10 @@ int main(int argc, char** argv) {
   tandem::tool::add_export(app, run);
   tandem::tool::add_top(app, run);
   tandem::tool::add_doctor(app, run);
+  if (argc > 1 && argv[1][0] != '-' && unknown(app, argv[1])) {
+    std::fprintf(stderr, "tandem: unknown command '%s'; see tandem --help\n", argv[1]);
+    return 2;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

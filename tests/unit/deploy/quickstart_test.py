@@ -35,6 +35,13 @@ class Compare(unittest.TestCase):
         self.assertEqual(compared, 1)
         self.assertIn("frame 41", problem)
 
+    def test_a_client_that_stopped_long_before_the_end_is_named(self):
+        server = log(1, 600)
+        self.assertEqual(quickstart.compare(server, log(1, 590)), (590, None))
+        self.assertEqual(
+            quickstart.compare(server, log(1, 300)), (300, "stopped at frame 300, the server went on to 600")
+        )
+
     def test_another_epoch_is_a_gap(self):
         self.assertIsNotNone(quickstart.compare(self.server, {**log(98, 100), **log(1, 3, epoch=8)})[1])
 

@@ -104,6 +104,10 @@ class CommandLine(unittest.TestCase):
             # The lattice follows from the bounds, which a recording knows only as far as bodies went.
             self.assertAlmostEqual(one["mbit_per_s"], other["mbit_per_s"], delta=0.02 * other["mbit_per_s"])
 
+    def test_an_unknown_command_is_named(self):
+        done = run("jion")
+        self.assertEqual((done.returncode, done.stderr), (2, "tandem: unknown command 'jion'; see tandem --help\n"))
+
     def test_a_broken_trajectory_is_named(self):
         npy = self.path("x.npy")
         npy.write_bytes(b"nothing")
