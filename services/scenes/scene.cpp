@@ -1,5 +1,6 @@
 #include "services/scenes/scene.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -32,25 +33,26 @@ engine::Plane to_plane(const idl::Plane& plane) {
 }
 
 engine::Box to_box(const idl::Box& box) {
-  std::array<Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // a column an axis of the box
   for (const idl::Turn& turn : box.turns()) {
-    const double length = std::sqrt(turn.rise() * turn.rise() + turn.run() * turn.run());
-    const double sine = turn.rise() / length;
-    const double cosine = turn.run() / length;
-    const std::size_t about = turn.axis() == "x" ? 0 : turn.axis() == "y" ? 1 : 2;
-    const std::size_t b = (about + 1) % 3;
-    const std::size_t c = (about + 2) % 3;
-    for (Vec3& axis : axes) {
-      const double old_b = axis[b];
-      axis[b] = cosine * old_b - sine * axis[c];
-      axis[c] = sine * old_b + cosine * axis[c];
-    }
+    // From rise and run rather than an angle: no sine or cosine of a mathematics library, whose last bits
+    // differ.
+    const Eigen::Vector2d direction = Eigen::Vector2d(turn.run(), turn.rise()).normalized();
+    const int about = turn.axis() == "x" ? 0 : turn.axis() == "y" ? 1 : 2;
+    const int b = (about + 1) % 3;
+    const int c = (about + 2) % 3;
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    rotation(b, b) = rotation(c, c) = direction.x();
+    rotation(c, b) = direction.y();
+    rotation(b, c) = -direction.y();
+    axes = rotation * axes;
   }
   engine::Box result;
   result.centre = to_float(box.centre());
   const Vec3 size = to_vec3(box.size());
   result.half = to_float(Vec3{size[0] / 2, size[1] / 2, size[2] / 2});
-  for (std::size_t i = 0; i < 3; ++i) result.axes[i] = to_float(axes[i]);
+  for (int i = 0; i < 3; ++i)
+    Eigen::Vector3f::Map(result.axes[static_cast<std::size_t>(i)].data()) = axes.col(i).cast<float>();
   return result;
 }
 
