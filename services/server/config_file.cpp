@@ -36,6 +36,9 @@ Settings settings_of(const idl::ServerConfig& file) {
   if (file.has_predictor()) settings.predictor = file.predictor();
   if (file.has_threshold()) settings.threshold = file.threshold();
   if (file.has_threshold_scale()) settings.threshold_scale = file.threshold_scale();
+  if (file.has_threshold_auto()) settings.automatic = file.threshold_auto();
+  if (file.has_target_bandwidth()) settings.target_bandwidth = file.target_bandwidth();
+  if (file.has_max_error()) settings.max_error = file.max_error();
   if (file.has_budget_bytes()) settings.budget_bytes = file.budget_bytes();
   if (file.has_window()) settings.window = file.window();
   if (file.has_lead()) settings.lead = file.lead();

@@ -31,10 +31,10 @@ void Console::show(Host& host, std::int64_t now_ns) {
   clear_line();
   fmt::print(stderr,
              "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
-             " window {}",
+             " window {}  threshold {:.3g} m",
              host.frame(), frames / elapsed_s, bits / 1048576 / elapsed_s,
              frames > 0 ? corrected / frames : 0, host.report().frame_ms, host.participants(),
-             host.observers(), host.window());
+             host.observers(), host.window(), host.threshold_m());
   std::fflush(stderr);
   line_shown_ = true;
   last_ = totals;

@@ -110,6 +110,9 @@ Result<HostConfig> configure(const scenes::Scene& scene, const Options& options)
   choice.predictor = options.predictor;
   choice.threshold_m = options.threshold_m;
   choice.threshold_scale = options.threshold_scale;
+  choice.automatic = options.automatic;
+  choice.target_mbit_per_s = options.target_mbit_per_s;
+  choice.max_error_m = options.max_error_m;
   choice.budget_bytes = options.budget_bytes;
   return plan_session(scene, choice).map([&](HostConfig config) {
     config.session = options.session;
@@ -227,6 +230,7 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   const auto closed = hashes.close();
   if (!closed) spdlog::error(closed.error().message);
   if (ending == Ending::kRefused) return report_error(*(*host)->error(), 1);
+  if (options.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
   print_report((*host)->totals(), frame_rate_hz, options.json);
   if (ending == Ending::kNobodyCame) {
     return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",

@@ -46,6 +46,9 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   if (config.client_limit == 0 || config.participant_limit == 0)
     return refuse("client limits must be positive");
   if (config.types.empty() || config.types.size() > 65535) return refuse("1..65535 body types are needed");
+  if (config.quality && !valid_goal(*config.quality, config.parameters)) {
+    return refuse("automatic quality: the threshold must lie between its smallest and its largest");
+  }
   if (config.epoch == 0) return refuse("epoch must not be 0");
   const std::uint32_t capacity = simulation.capacity();
   if (capacity == 0 || capacity > kMaxCapacity) {
@@ -125,6 +128,10 @@ struct Host::Impl {
     mirror.start(full.bodies());
     timeline.start(config.start_frame, mirror.target(), drive);
     timeline.set_clock(config.clock_ns);
+    if (config.quality) {
+      quality.emplace(*config.quality, config.parameters, config.frame_rate_hz);
+      timeline.set_statistics(&quality->statistics());
+    }
     bodies = mirror.target().alive_count();
     report.frame = config.start_frame;
     report.hash = timeline.hash();
@@ -156,6 +163,10 @@ struct Host::Impl {
   void produce_frame();
   void publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns);
   void note_foreigner(transport::ClientId client);
+  void use(const CodecParameters& parameters) {
+    config.parameters = parameters;
+    timeline.set_parameters(parameters);
+  }
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
 
@@ -172,6 +183,7 @@ struct Host::Impl {
   Claim claim;
   Pacing pacing;
   PublishTimes times;
+  std::optional<QualityControl> quality;
   transport::SessionMessage session;
 
   State state = State::kClaiming;
@@ -335,6 +347,9 @@ void Host::Impl::produce_frame() {
   const std::int64_t applied = clock();
   publish(result, wall_ns + (applied - start));
   times.published(result.frame, now_ns);
+  if (quality) {
+    if (const auto next = quality->after_frame(result.payload.size())) use(*next);
+  }
   report = {.frame = result.frame,
             .hash = result.hash,
             .payload_bytes = result.payload.size(),
@@ -465,6 +480,14 @@ const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
 Result<Frame> Host::inject(const engine::Input& input) { return impl_->inputs.inject(input); }
+Result<void> Host::set_parameters(const CodecParameters& parameters) {
+  if (!valid_parameters(parameters)) return fail(ErrorCode::kInvalidArgument, "parameters out of range");
+  if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
+  impl_->use(parameters);
+  return {};
+}
+const CodecParameters& Host::parameters() const { return impl_->config.parameters; }
+double Host::threshold_m() const { return impl_->config.parameters.threshold * impl_->config.lattice.unit; }
 const transport::SessionMessage& Host::session() const { return impl_->session; }
 Frame Host::frame() const { return impl_->timeline.frame(); }
 const tandem::State& Host::agreed() const { return impl_->timeline.state(); }

@@ -15,6 +15,7 @@
 #include "services/engine/simulation.hpp"
 #include "services/server/lattice_choice.hpp"
 #include "services/server/outbox.hpp"
+#include "services/server/quality.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::server {
@@ -46,7 +47,8 @@ struct HostConfig {
   std::size_t budget = kNoBudget;  ///< bytes of corrections per frame
   std::string codec = "entropy";
   std::vector<std::byte> codec_tables;
-  CodecParameters parameters;
+  CodecParameters parameters;          ///< of the first frame
+  std::optional<QualityGoal> quality;  ///< empty: parameters change only by set_parameters()
   std::string predictor = "ballistic";
   std::vector<std::int32_t> predictor_constants;
 
@@ -115,6 +117,13 @@ class Host {
   /// Applies an input of the server's own, as if a participant had sent it now. Returns the frame it acts on.
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
   Result<Frame> inject(const engine::Input& input);
+
+  /// What the decoder reads (threshold, quantisation steps), in force from the next frame on. Travels in that
+  /// frame's delta; clients need nothing else. Errors: kInvalidArgument (out of range, or automatic quality
+  /// is on).
+  [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
+  [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
+  [[nodiscard]] double threshold_m() const;                 ///< of the next frame, scene units
 
   [[nodiscard]] const transport::SessionMessage& session() const;
   [[nodiscard]] Frame frame() const;                  ///< of the last delta

@@ -67,6 +67,14 @@ Result<void> check_numbers(const Settings& settings, const Options& options) {
   }
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
     return refuse("duration", "seconds, not negative");
+  if (options.automatic && settings.threshold) return refuse("threshold", "a length or auto, not both");
+  if (!options.automatic && settings.target_bandwidth)
+    return refuse("target-bandwidth", "needs --threshold auto");
+  if (!options.automatic && settings.max_error) return refuse("max-error", "needs --threshold auto");
+  if (settings.target_bandwidth && !within(options.target_mbit_per_s, 0.001, 1e6))
+    return refuse("target-bandwidth", "Mbit/s, at least 0.001");
+  if (options.max_error_m && !within(*options.max_error_m, 1e-9, 1e9))
+    return refuse("max-error", "a positive length");
   if (settings.budget_bytes && options.codec != "limited")
     return refuse("budget", "only with --codec limited");
   if (options.budget_bytes < 64) return refuse("budget", "at least 64 bytes");
@@ -96,13 +104,18 @@ Settings overlay(const Settings& over, const Settings& under) {
                       &Settings::client_limit, &Settings::wait_for, &Settings::threads, &Settings::users}) {
     pick(member);
   }
-  for (auto member : {&Settings::threshold, &Settings::threshold_scale, &Settings::duration}) pick(member);
+  for (auto member : {&Settings::threshold, &Settings::threshold_scale, &Settings::duration,
+                      &Settings::target_bandwidth, &Settings::max_error}) {
+    pick(member);
+  }
   pick(&Settings::seed);
   pick(&Settings::scripted);
+  pick(&Settings::automatic);
   // The two ways to set the threshold exclude each other, so one on the command line displaces the other in
   // the file.
   if (over.threshold) all.threshold_scale = over.threshold_scale;
   if (over.threshold_scale) all.threshold = over.threshold;
+  if (over.automatic) all.threshold = over.threshold;
   return all;
 }
 
@@ -127,6 +140,9 @@ Result<Options> check_settings(const Settings& settings) {
   take(options.seed, settings.seed);
   take(options.scripted, settings.scripted);
   take(options.threshold_scale, settings.threshold_scale);
+  take(options.automatic, settings.automatic);
+  take(options.target_mbit_per_s, settings.target_bandwidth);
+  options.max_error_m = settings.max_error;
   options.threshold_m = settings.threshold;
   options.duration_s = settings.duration;
   if (options.duration_s && *options.duration_s == 0) options.duration_s.reset();
@@ -155,8 +171,22 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--domain", flags.domain, "DDS domain [0]");
   app.add_option("--codec", flags.codec, fmt::format("{} [entropy]", fmt::join(codec_names(), ", ")));
   app.add_option("--predictor", flags.predictor, "Predicted step of server and clients [ballistic]");
-  app.add_option("--threshold", flags.threshold,
-                 "Position error above which a body is corrected, in metres [the scene's]");
+  app.add_option_function<std::string>(
+         "--threshold",
+         [&flags](const std::string& text) {
+           flags.automatic = text == "auto";
+           if (*flags.automatic) return;
+           flags.threshold = number<double>(text);
+           if (!flags.threshold) throw CLI::ValidationError("--threshold", "a positive length, or auto");
+         },
+         "Position error above which a body is corrected, in metres, or auto: chosen at run time [the "
+         "scene's]")
+      ->type_name("METRES|auto");
+  app.add_option(
+      "--target-bandwidth", flags.target_bandwidth,
+      "Mbit/s that --threshold auto keeps to, from a quarter of the scene's threshold up to --max-error");
+  app.add_option("--max-error", flags.max_error,
+                 "Largest threshold of --threshold auto, in metres [four times the scene's]");
   app.add_option("--threshold-scale", flags.threshold_scale, "The scene's threshold times this [1]");
   app.add_option("--budget", flags.budget_bytes,
                  "Bytes of corrections per frame with --codec limited [6553]");

@@ -14,8 +14,8 @@ struct Settings {
   std::optional<std::string> scene, session, codec, predictor, window, rate, stall_timeout, hash_log;
   std::optional<std::uint32_t> bodies, domain, budget_bytes, lead, client_limit, wait_for, threads, users;
   std::optional<std::uint64_t> seed;
-  std::optional<double> threshold, threshold_scale, duration;
-  std::optional<bool> scripted;
+  std::optional<double> threshold, threshold_scale, duration, target_bandwidth, max_error;
+  std::optional<bool> scripted, automatic;
 };
 
 /// Checked and complete.
@@ -26,6 +26,9 @@ struct Options {
   std::uint64_t seed = 1;
   std::optional<double> threshold_m;
   double threshold_scale = 1;
+  bool automatic = false;  ///< --threshold auto
+  double target_mbit_per_s = 0;
+  std::optional<double> max_error_m;
   std::optional<double> duration_s;
   std::optional<std::uint32_t> window;          ///< empty: automatic
   std::optional<double> rate_hz;                ///< empty: the scene's

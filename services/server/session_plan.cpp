@@ -1,9 +1,18 @@
 #include "services/server/session_plan.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
 #include "sdk/core/codec/training.hpp"
 
 namespace tandem::server {
 namespace {
+
+// Automatic quality moves between these multiples of the threshold it starts from.
+constexpr double kFinest = 0.25;
+constexpr double kCoarsest = 4;
 
 std::vector<std::byte> codec_tables(const std::string& codec, const scenes::TrainedTable& table) {
   std::vector<std::byte> bytes;
@@ -18,7 +27,8 @@ std::vector<std::byte> codec_tables(const std::string& codec, const scenes::Trai
 
 Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
   const double threshold_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
-  const auto lattice = choose_lattice(threshold_m, scene.extent_m, scene.dt_s);
+  const double finest_m = choice.automatic ? threshold_m * kFinest : threshold_m;
+  const auto lattice = choose_lattice(finest_m, scene.extent_m, scene.dt_s);
   if (!lattice) return tl::unexpected(lattice.error());
   const scenes::TrainedTable* trained = scenes::nearest_table(scene.trained, choice.bodies, threshold_m);
   const scenes::TrainedTable table = trained == nullptr ? scenes::TrainedTable{} : *trained;
@@ -27,6 +37,18 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   if (!parameters) return tl::unexpected(parameters.error());
 
   HostConfig config;
+  if (choice.automatic) {
+    const auto units = [&](double metres) {
+      return static_cast<std::int32_t>(
+          std::clamp(std::round(metres * lattice->position_scale()), 1.0, double{kPositionLimit}));
+    };
+    config.quality = QualityGoal{choice.target_mbit_per_s, units(finest_m),
+                                 units(choice.max_error_m.value_or(threshold_m * kCoarsest))};
+    if (!valid_goal(*config.quality, *parameters)) {
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("--max-error: at least the threshold, {} in this scene", threshold_m));
+    }
+  }
   config.lattice = *lattice;
   config.parameters = *parameters;
   config.frame_rate_hz = 1 / scene.dt_s;

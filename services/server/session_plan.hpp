@@ -19,6 +19,9 @@ struct SessionChoice {
   std::string predictor = "ballistic";
   std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
   double threshold_scale = 1;
+  bool automatic = false;        ///< quality follows the scene at run time, from a quarter of that threshold
+  double target_mbit_per_s = 0;  ///< with `automatic`; 0: the threshold stays
+  std::optional<double> max_error_m;             ///< with `automatic`; empty: four times the threshold
   std::size_t budget_bytes = kPaperBudgetBytes;  ///< of corrections per frame; for `limited` only
 };
 

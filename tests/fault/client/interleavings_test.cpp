@@ -27,12 +27,13 @@ struct Sums {
 /// One life of a session: a few seconds of trouble, then peace; all must be well in the end.
 void live(std::uint64_t seed, Sums& sums) {
   Dice dice(seed);
-  static constexpr const char* kCodecs[] = {"none", "selective", "quantized", "entropy"};
+  static constexpr const char* kCodecs[] = {"none",    "selective", "quantized",
+                                            "entropy", "limited",   "tracker"};
   WorldOptions options;
   options.seed = seed;
   options.clients = 1 + static_cast<std::uint32_t>(dice.below(4));
   options.lead = static_cast<std::uint32_t>(dice.below(2));
-  options.codec = kCodecs[dice.below(4)];
+  options.codec = kCodecs[dice.below(6)];
   options.link.delay_ns = static_cast<std::int64_t>(dice.uniform(0.1e6, 30e6));
   options.link.jitter_ns = static_cast<std::int64_t>(dice.uniform(0, 20e6));
   options.link.loss = dice.chance(0.5) ? dice.uniform(0, 0.1) : 0;

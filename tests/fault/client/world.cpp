@@ -110,7 +110,9 @@ void World::start_server() {
   config.lead = options_.lead;
   if (dice_.chance(0.3)) config.window = 2;
   config.codec = options_.codec;
-  if (config.codec == "entropy") config.codec_tables = default_code_tables();
+  config.decay = recommended_decay(config.codec);
+  if (config.codec == "limited") config.budget = 600;
+  if (config.codec == "entropy" || config.codec == "limited") config.codec_tables = default_code_tables();
   config.lattice = must(server::choose_lattice(0.01, 3, simulation_->dt_s()));
   config.parameters = must(server::codec_parameters(config.lattice, 0.01, 0.1, 2));
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};
@@ -187,6 +189,14 @@ void World::incident(bool restart) {
     run(dice_.uniform(0.01, 1.5));
     network_.set_frozen(server_port_->self(), false);
     server_frozen_ = false;
+  } else if (what == 5) {  // quality is changed at run time
+    CodecParameters parameters = host_->parameters();
+    parameters.threshold = std::max(1, static_cast<int>(parameters.threshold * dice_.uniform(0.5, 2)));
+    parameters.position_step =
+        std::max(1, static_cast<int>(parameters.position_step * dice_.uniform(0.5, 2)));
+    parameters.velocity_step =
+        std::max(1, static_cast<int>(parameters.velocity_step * dice_.uniform(0.5, 2)));
+    if (!host_->set_parameters(parameters)) throw std::logic_error("parameters refused");
   } else if (!clients_[at]->frozen) {
     for (std::uint64_t burst = 1 + dice_.below(4); burst > 0; --burst) {
       clients_[at]->send_gravity(dice_.uniform(-5, 5), {now_ns_, wall_ns()});

@@ -116,6 +116,34 @@ TEST(Options, OneWayToSetTheThresholdOnTheCommandLineDisplacesTheOtherInTheFile)
   EXPECT_FALSE(overlay(flags, file).threshold);
 }
 
+TEST(Options, AutomaticQualityHasItsOwnFlags) {
+  const auto parse = [](std::vector<const char*> words) {
+    words.insert(words.begin(), {"tandemd", "--scene", "cube", "--bodies", "10"});
+    return parse_command_line(static_cast<int>(words.size()), words.data()).options;
+  };
+  const auto options = parse({"--threshold", "auto", "--target-bandwidth", "0.5", "--max-error", "0.2"});
+  ASSERT_TRUE(options);
+  EXPECT_TRUE(options->automatic);
+  EXPECT_FALSE(options->threshold_m);
+  EXPECT_DOUBLE_EQ(options->target_mbit_per_s, 0.5);
+  EXPECT_DOUBLE_EQ(options->max_error_m.value_or(0), 0.2);
+  EXPECT_FALSE(parse({"--threshold", "0.1"})->automatic);
+  EXPECT_FALSE(parse({"--threshold", "much"}));
+  EXPECT_FALSE(parse({"--target-bandwidth", "0.5"})) << "needs --threshold auto";
+  EXPECT_FALSE(parse({"--threshold", "0.1", "--max-error", "0.2"}));
+  EXPECT_FALSE(parse({"--threshold", "auto", "--target-bandwidth", "nan"}));
+}
+
+TEST(Options, AThresholdOnTheCommandLineDisplacesAutomaticQualityInTheFile) {
+  Settings flags = least(), file;
+  file.automatic = true;
+  flags.threshold = 0.1;
+  flags.automatic = false;  // as the command line sets it with a length
+  const auto options = check_settings(overlay(flags, file));
+  ASSERT_TRUE(options);
+  EXPECT_FALSE(options->automatic);
+}
+
 TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
   write(
       "scene: \"cube\" bodies: 500 session: \"arena\" window: \"4\" scripted: true seed: 9 duration: 2.5\n");
