@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <utility>
+
+#include "services/tool/peers.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -27,6 +30,40 @@ class Durations {
   std::vector<float> ms_;
 };
 
+/// Euclidean distances of what a client shows to the simulation's floats, over all bodies that are shown.
+class Errors {
+ public:
+  /// `shown(channel, body)` in scene units.
+  template <class Shown>
+  void add(std::span<const std::uint8_t> alive, const engine::Bodies& bodies, const Shown& shown) {
+    for (std::size_t body = 0; body < alive.size(); ++body) {
+      if (alive[body] == 0) continue;
+      double squared = 0;
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        const double off = shown(channel, body) - double{bodies.position[channel][body]};
+        squared += off * off;
+      }
+      max_squared_ = std::max(max_squared_, squared);
+      sum_squared_ += squared;
+      ++body_frames_;
+    }
+  }
+  void fill(BandwidthRow& row) const {
+    row.max_error = std::sqrt(max_squared_);
+    if (body_frames_ > 0) row.rms_error = std::sqrt(sum_squared_ / static_cast<double>(body_frames_));
+  }
+
+ private:
+  double max_squared_ = 0, sum_squared_ = 0;
+  std::uint64_t body_frames_ = 0;
+};
+
+double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
+  const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
+  return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s /
+         static_cast<double>(1U << 20U);
+}
+
 /// One session's server and client, and what they were seen to do.
 struct Lane {
   Lane(const server::HostConfig& config, ServerTimeline server_side, ClientTimeline client_side)
@@ -35,8 +72,9 @@ struct Lane {
   const server::HostConfig* session;
   ServerTimeline server;
   ClientTimeline client;
-  std::uint64_t payload_bytes = 0, corrected = 0, body_frames = 0;
-  double max_squared = 0, sum_squared = 0;
+  std::vector<std::uint32_t> bytes;
+  std::uint64_t corrected = 0;
+  Errors errors;
   Durations predict, encode, decode, apply;
 };
 
@@ -61,22 +99,6 @@ Result<Lane> make_lane(const server::HostConfig& session, const Replay& replay) 
   return Lane(session, std::move(*server), std::move(*client));
 }
 
-/// Euclidean distance of the agreed state to the simulation's floats, over all bodies that are shown.
-void add_errors(const State& agreed, const engine::Bodies& bodies, double unit, Lane& lane) {
-  const std::span<const std::uint8_t> alive = agreed.alive();
-  for (std::size_t i = 0; i < alive.size(); ++i) {
-    if (alive[i] == 0) continue;
-    double squared = 0;
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      const double off = agreed.p(channel)[i] * unit - double{bodies.position[channel][i]};
-      squared += off * off;
-    }
-    lane.max_squared = std::max(lane.max_squared, squared);
-    lane.sum_squared += squared;
-    ++lane.body_frames;
-  }
-}
-
 /// One frame of one session: the server's half, then the client's.
 Result<void> advance(Lane& lane, const Replay& replay) {
   for (ScheduledDrive input : replay.scheduled()) {
@@ -88,7 +110,7 @@ Result<void> advance(Lane& lane, const Replay& replay) {
       lane.server.advance(replay.target(), replay.lifecycle(), lane.session->budget);
   lane.predict.add(frame.predict_ms);
   lane.encode.add(frame.encode_ms + replay.mirror_ms());
-  lane.payload_bytes += frame.payload.size();
+  lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
 
   lane.client.step(1);
@@ -96,7 +118,10 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.decode.add(lane.client.timings().decode_ms);
   lane.apply.add(lane.client.timings().apply_ms);
   if (!applied) return applied;
-  add_errors(lane.client.state(frame.frame), replay.simulation().bodies(), lane.session->lattice.unit, lane);
+  const State& agreed = lane.client.state(frame.frame);
+  const double unit = lane.session->lattice.unit;
+  lane.errors.add(agreed.alive(), replay.simulation().bodies(),
+                  [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; });
   return {};
 }
 
@@ -106,11 +131,9 @@ BandwidthRow row_of(Lane& lane, double frames) {
   BandwidthRow row;
   row.codec = session.codec;
   row.predictor = session.predictor;
-  const double bits_per_frame = 8.0 * static_cast<double>(lane.payload_bytes) / frames;
-  row.mbit_per_s = bits_per_frame / session.lattice.dt_s / static_cast<double>(1U << 20U);
-  row.max_error = std::sqrt(lane.max_squared);
-  if (lane.body_frames > 0)
-    row.rms_error = std::sqrt(lane.sum_squared / static_cast<double>(lane.body_frames));
+  row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
+  row.bytes = std::move(lane.bytes);
+  lane.errors.fill(row);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
   row.predict_ms = lane.predict.median();
   row.encode_ms = lane.encode.median();
@@ -119,12 +142,65 @@ BandwidthRow row_of(Lane& lane, double frames) {
   return row;
 }
 
+/// A peer at work.
+struct PeerLane {
+  const PeerKind* kind;
+  std::unique_ptr<Peer> peer;
+  std::array<std::vector<double>, 3> seen;
+  std::vector<std::uint32_t> bytes;
+  Errors errors;
+};
+
+Result<std::size_t> send(PeerLane& lane, const engine::Bodies& bodies) {
+  auto size = lane.peer->send(bodies, lane.seen);
+  if (!size) return fail(size.error().code, fmt::format("{}: {}", lane.kind->name, size.error().message));
+  return size;
+}
+
+/// The start state is free, as a session's snapshot is.
+Result<std::vector<PeerLane>> make_peers(const PeerSetting& setting, const engine::Bodies& start) {
+  std::vector<PeerLane> lanes;
+  for (const PeerKind& kind : peer_kinds()) {
+    PeerLane& lane = lanes.emplace_back();
+    lane.kind = &kind;
+    if (kind.make == nullptr) continue;
+    lane.peer = kind.make(setting);
+    for (auto& column : lane.seen) column.resize(setting.bodies);
+    if (auto sent = send(lane, start); !sent) return tl::unexpected(sent.error());
+  }
+  return lanes;
+}
+
+Result<void> advance(PeerLane& lane, const engine::Bodies& bodies) {
+  if (!lane.peer) return {};
+  return send(lane, bodies).map([&](std::size_t size) {
+    lane.bytes.push_back(static_cast<std::uint32_t>(size));
+    lane.errors.add(bodies.alive, bodies,
+                    [&](std::size_t channel, std::size_t body) { return lane.seen[channel][body]; });
+  });
+}
+
+BandwidthRow row_of(PeerLane& lane, double dt_s) {
+  BandwidthRow row;
+  row.codec = lane.kind->name;
+  if (!lane.peer) {
+    row.missing = lane.kind->missing;
+    return row;
+  }
+  row.mbit_per_s = mbit_per_s(lane.bytes, dt_s);
+  row.bytes = std::move(lane.bytes);
+  lane.errors.fill(row);
+  return row;
+}
+
 }  // namespace
 
 Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
                                                     std::span<const server::HostConfig> sessions,
                                                     std::uint64_t frames,
-                                                    const std::function<void(Frame)>& progress) {
+                                                    const std::function<void(Frame)>& progress,
+                                                    std::optional<double> peer_threshold) {
+  const double dt_s = replay.simulation().dt_s();
   std::vector<Lane> lanes;
   lanes.reserve(sessions.size());
   for (const server::HostConfig& session : sessions) {
@@ -133,99 +209,125 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
       return fail(lane.error().code, fmt::format("codec {}: {}", session.codec, lane.error().message));
     lanes.push_back(std::move(*lane));
   }
+  std::vector<PeerLane> peers;
+  if (peer_threshold) {
+    auto made =
+        make_peers({replay.simulation().capacity(), *peer_threshold, dt_s}, replay.simulation().bodies());
+    if (!made) return tl::unexpected(made.error());
+    peers = std::move(*made);
+  }
   Durations step;
-  std::uint64_t colliding = 0;
+  std::vector<std::uint32_t> colliding;
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay.next(); !stepped) return tl::unexpected(stepped.error());
     step.add(replay.step_ms());
-    colliding += replay.simulation().colliding();
+    colliding.push_back(replay.simulation().colliding());
     for (Lane& lane : lanes) {
       if (auto advanced = advance(lane, replay); !advanced) {
         return fail(advanced.error().code, fmt::format("codec {}, frame {}: {}", lane.session->codec, frame,
                                                        advanced.error().message));
       }
     }
+    for (PeerLane& peer : peers) {
+      if (auto advanced = advance(peer, replay.simulation().bodies()); !advanced)
+        return tl::unexpected(advanced.error());
+    }
     progress(frame);
   }
 
   const double step_ms = step.median();
   std::vector<BandwidthRow> rows;
-  for (Lane& lane : lanes) {
-    rows.push_back(row_of(lane, static_cast<double>(frames)));
-    rows.back().bodies = replay.simulation().capacity();
-    rows.back().frames = frames;
-    rows.back().colliding_per_frame = static_cast<double>(colliding) / static_cast<double>(frames);
-    rows.back().step_ms = step_ms;
+  for (Lane& lane : lanes) rows.push_back(row_of(lane, static_cast<double>(frames)));
+  for (PeerLane& peer : peers) rows.push_back(row_of(peer, dt_s));
+  const auto contacts = std::accumulate(colliding.begin(), colliding.end(), std::uint64_t{0});
+  for (BandwidthRow& row : rows) {
+    row.bodies = replay.simulation().capacity();
+    row.frames = frames;
+    row.dt_s = dt_s;
+    row.colliding_per_frame = static_cast<double>(contacts) / static_cast<double>(frames);
+    row.colliding = colliding;
+    row.step_ms = step_ms;
   }
   return rows;
 }
 
-std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec) {
-  constexpr std::array<std::string_view, 5> codecs{"none", "selective", "quantized", "entropy", "limited"};
-  struct Line {
-    int scene;
-    std::uint32_t bodies;
-    std::array<double, 5> mbit_per_s;
-  };
-  static constexpr Line kTable53[] = {
-      {1, 5000, {27.47, 2.41, 0.89, 0.65, 0.65}}, {1, 10000, {54.93, 5.26, 1.87, 1.35, 1.20}},
-      {2, 5000, {27.47, 2.32, 0.89, 0.71, 0.66}}, {2, 10000, {54.93, 5.66, 2.07, 1.60, 1.15}},
-      {3, 5000, {27.47, 7.46, 2.67, 1.86, 1.37}}, {3, 10000, {54.93, 15.84, 5.60, 4.00, 1.43}},
-      {4, 5000, {27.47, 2.07, 0.80, 0.57, 0.57}}, {4, 10000, {54.93, 4.29, 1.62, 1.15, 1.06}},
-      {5, 5000, {27.47, 9.46, 3.26, 2.23, 1.44}}, {5, 10000, {54.93, 20.07, 6.82, 4.73, 1.45}},
-  };
-  const auto* const column = std::find(codecs.begin(), codecs.end(), codec);
-  if (column == codecs.end()) return std::nullopt;
-  for (const Line& line : kTable53) {
-    if (line.scene == scene && line.bodies == bodies) {
-      return line.mbit_per_s[static_cast<std::size_t>(column - codecs.begin())];
-    }
-  }
-  return std::nullopt;
+namespace {
+
+std::optional<double> mbit_in_paper(const BandwidthRow& row) {
+  return row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt;
 }
+
+std::optional<double> colliding_in_paper(const BandwidthRow& row) {
+  return row.number ? paper_colliding_per_frame(*row.number, row.bodies) : std::nullopt;
+}
+
+std::string rounded(const std::optional<double>& value, int digits) {
+  return value ? fmt::format("{:.{}f}", *value, digits) : "-";
+}
+
+}  // namespace
 
 std::string to_json(std::span<const BandwidthRow> rows) {
   using Json = nlohmann::ordered_json;
   Json list = Json::array();
   for (const BandwidthRow& row : rows) {
-    list.push_back(
-        {{"scene", row.scene},
-         {"number", row.number ? Json(*row.number) : Json(nullptr)},
-         {"bodies", row.bodies},
-         {"codec", row.codec},
-         {"predictor", row.predictor},
-         {"threads", row.threads},
-         {"seed", row.seed},
-         {"frames", row.frames},
-         {"threshold", row.threshold},
-         {"mbit_per_s", row.mbit_per_s},
-         {"max_error", row.max_error},
-         {"rms_error", row.rms_error},
-         {"corrected_per_frame", row.corrected_per_frame},
-         {"colliding_per_frame", row.colliding_per_frame ? Json(*row.colliding_per_frame) : Json(nullptr)},
-         {"step_ms", row.step_ms},
-         {"predict_ms", row.predict_ms},
-         {"encode_ms", row.encode_ms},
-         {"decode_ms", row.decode_ms},
-         {"apply_ms", row.apply_ms}});
+    const auto number = [](const std::optional<double>& value) {
+      return value ? Json(*value) : Json(nullptr);
+    };
+    const auto measured = [&](double value) { return row.missing.empty() ? Json(value) : Json(nullptr); };
+    const bool is_peer = row.predictor.empty() && !row.codec.empty();
+    const auto ours = [&](double value) { return is_peer ? Json(nullptr) : Json(value); };
+    list.push_back({{"scene", row.scene},
+                    {"number", row.number ? Json(*row.number) : Json(nullptr)},
+                    {"bodies", row.bodies},
+                    {"codec", row.codec},
+                    {"predictor", row.predictor},
+                    {"threads", row.threads},
+                    {"seed", row.seed},
+                    {"frames", row.frames},
+                    {"threshold", row.threshold},
+                    {"mbit_per_s", measured(row.mbit_per_s)},
+                    {"paper_mbit_per_s", number(mbit_in_paper(row))},
+                    {"max_error", measured(row.max_error)},
+                    {"rms_error", measured(row.rms_error)},
+                    {"corrected_per_frame", ours(row.corrected_per_frame)},
+                    {"colliding_per_frame", number(row.colliding_per_frame)},
+                    {"paper_colliding_per_frame", number(colliding_in_paper(row))},
+                    {"step_ms", row.step_ms},
+                    {"predict_ms", ours(row.predict_ms)},
+                    {"encode_ms", ours(row.encode_ms)},
+                    {"decode_ms", ours(row.decode_ms)},
+                    {"apply_ms", ours(row.apply_ms)},
+                    {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});
   }
   return Json{{"rows", list}}.dump();
 }
 
 std::string to_table(std::span<const BandwidthRow> rows) {
   std::string text = fmt::format(
-      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
       "scene", "bodies", "codec", "Mbit/s", "paper", "max err", "rms err", "threshold", "corrected",
-      "colliding", "step ms", "predict", "encode", "decode", "apply");
+      "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
   for (const BandwidthRow& row : rows) {
-    const auto paper = row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt;
+    if (!row.missing.empty()) {
+      text += fmt::format("{:<12} {:>7} {:<10} not in this build: {} was missing\n", row.scene, row.bodies,
+                          row.codec, row.missing);
+      continue;
+    }
+    if (row.predictor.empty()) {
+      text += fmt::format("{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n", row.scene,
+                          row.bodies, row.codec, row.mbit_per_s, "-", row.max_error, row.rms_error,
+                          row.threshold);
+      continue;
+    }
     text += fmt::format(
-        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>8.3f} {:>8.3f} "
+        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>7} {:>8.3f} "
+        "{:>8.3f} "
         "{:>8.3f} {:>8.3f} {:>8.3f}\n",
-        row.scene, row.bodies, row.codec, row.mbit_per_s, paper ? fmt::format("{:.2f}", *paper) : "-",
-        row.max_error, row.rms_error, row.threshold, row.corrected_per_frame,
-        row.colliding_per_frame ? fmt::format("{:.0f}", *row.colliding_per_frame) : "-", row.step_ms,
-        row.predict_ms, row.encode_ms, row.decode_ms, row.apply_ms);
+        row.scene, row.bodies, row.codec, row.mbit_per_s, rounded(mbit_in_paper(row), 2), row.max_error,
+        row.rms_error, row.threshold, row.corrected_per_frame, rounded(row.colliding_per_frame, 0),
+        rounded(colliding_in_paper(row), 0), row.step_ms, row.predict_ms, row.encode_ms, row.decode_ms,
+        row.apply_ms);
   }
   return text;
 }

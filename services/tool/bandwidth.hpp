@@ -10,6 +10,7 @@
 
 #include "sdk/core/timeline/timeline.hpp"
 #include "services/server/host.hpp"
+#include "services/tool/paper_numbers.hpp"
 #include "services/tool/replay.hpp"
 #include "tandem/result.hpp"
 
@@ -24,24 +25,26 @@ struct BandwidthRow {
   std::uint32_t threads = 1;
   std::uint64_t seed = 0;
   std::uint64_t frames = 0;
+  double dt_s = 0;                            ///< a frame
   double threshold = 0;                       ///< scene units
   double mbit_per_s = 0;                      ///< payload only, at the nominal rate; 2^20 bits to the Mbit
   double max_error = 0, rms_error = 0;        ///< scene units; agreed state against the simulation's floats
   double corrected_per_frame = 0;             ///< bodies
   std::optional<double> colliding_per_frame;  ///< bodies; not known for recorded trajectories
   double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;
+  std::string missing;                   ///< not empty: nothing was measured, for want of this Debian package
+  std::vector<std::uint32_t> bytes;      ///< payload of each frame
+  std::vector<std::uint32_t> colliding;  ///< bodies in contact in each frame
 };
 
 /// Runs `replay` for `frames` frames. In each of `sessions`, which differ in codec and predictor and share
 /// the replay's lattice, a server's timeline encodes every frame, and a client's timeline decodes it and
 /// checks the hash. Fills the measured fields of a row per session; `progress` gets the frame. Errors: what
-/// the timelines and the replay refuse; kMismatch when a client's state ever differs.
+/// the timelines and the replay refuse; kMismatch when a client's state ever differs. With a `peer_threshold`
+/// (scene units) rows of all peers follow, at that largest error on the same frames.
 [[nodiscard]] Result<std::vector<BandwidthRow>> measure_bandwidth(
     Replay& replay, std::span<const server::HostConfig> sessions, std::uint64_t frames,
-    const std::function<void(Frame)>& progress);
-
-/// The paper's table 5.3 in Mbit/s, where it has this scene, size and codec.
-[[nodiscard]] std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec);
+    const std::function<void(Frame)>& progress, std::optional<double> peer_threshold = {});
 
 /// {"rows": [...]}, one line.
 [[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows);

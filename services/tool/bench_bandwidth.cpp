@@ -2,9 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
+#include <iterator>
 #include <memory>
+#include <mutex>
+#include <thread>
 
 #include "services/tool/bandwidth.hpp"
+#include "services/tool/bandwidth_report.hpp"
 #include "services/tool/bench.hpp"
 #include "services/tool/progress.hpp"
 #include "services/tool/train.hpp"
@@ -22,11 +27,21 @@ struct BandwidthOptions {
   server::SessionChoice choice;
   SceneRun run;
   bool json = false;
+  bool peers = false;
+  std::string report;
+  unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
+};
+
+/// One scene at one size.
+struct Job {
+  const scenes::Scene* scene;
+  std::uint32_t bodies;
 };
 
 /// All codecs over one source; the rows lack only what the scene does not know.
 Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& source,
-                                          const BandwidthOptions& options, std::uint64_t frames) {
+                                          const BandwidthOptions& options, std::uint64_t frames,
+                                          const std::function<void(Frame)>& progress) {
   server::SessionChoice choice = options.choice;
   choice.bodies = source.simulation->capacity();
   std::vector<server::HostConfig> sessions;
@@ -39,24 +54,26 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
   auto replay = Replay::create(*source.simulation, std::move(source.script), sessions[0].lattice,
                                static_cast<TypeId>(scene.types.size()));
   if (!replay) return tl::unexpected(replay.error());
-  Progress progress(fmt::format("{}, {} bodies: frame", scene.name, choice.bodies), frames);
-  auto rows = measure_bandwidth(*replay, sessions, frames, [&](Frame frame) { progress.at(frame); });
+  const double threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  auto rows = measure_bandwidth(*replay, sessions, frames, progress,
+                                options.peers ? std::optional(threshold) : std::nullopt);
   if (!rows) return rows;
   for (BandwidthRow& row : *rows) {
     row.scene = scene.name;
-    row.threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+    row.threshold = threshold;
   }
   return rows;
 }
 
 Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, const BandwidthOptions& options,
-                                                std::uint32_t bodies) {
+                                                std::uint32_t bodies,
+                                                const std::function<void(Frame)>& progress) {
   SceneRun run = options.run;
   run.bodies = bodies;
   run.frames = options.frames;
   auto source = make_source(scene, run);
   if (!source) return tl::unexpected(source.error());
-  auto rows = measure(scene, *source, options, options.frames);
+  auto rows = measure(scene, *source, options, options.frames, progress);
   if (!rows) return rows;
   // With another number of users it is not the scene of the paper's table.
   const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
@@ -102,9 +119,42 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   }
   auto source = make();
   if (!source) return tl::unexpected(source.error());
-  auto rows = measure(scene, *source, options, frames);
+  Progress progress(fmt::format("{}: frame", options.trajectory), frames);
+  auto rows = measure(scene, *source, options, frames, [&](Frame frame) { progress.at(frame); });
   if (!rows) return rows;
   for (BandwidthRow& row : *rows) row.colliding_per_frame.reset();
+  return rows;
+}
+
+/// Jobs run beside each other; their rows come in the order of the jobs.
+Result<std::vector<BandwidthRow>> measure_jobs(std::span<const Job> jobs, const BandwidthOptions& options) {
+  std::vector<Result<std::vector<BandwidthRow>>> results(jobs.size());
+  std::atomic<std::size_t> next = 0;
+  std::atomic<bool> failed = false;
+  std::mutex mutex;
+  std::uint64_t done = 0;
+  Progress progress(fmt::format("{} runs: frame", jobs.size()), jobs.size() * options.frames);
+  const auto one_frame = [&](Frame) {
+    const std::lock_guard lock(mutex);
+    progress.at(++done);
+  };
+  const auto work = [&] {
+    for (std::size_t job = next++; job < jobs.size() && !failed; job = next++) {
+      results[job] = measure_scene(*jobs[job].scene, options, jobs[job].bodies, one_frame);
+      if (!results[job]) failed = true;
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t i = 1; i < std::min<std::size_t>(options.jobs, jobs.size()); ++i)
+      workers.emplace_back(work);
+    work();
+  }
+  std::vector<BandwidthRow> rows;
+  for (auto& result : results) {
+    if (!result) return result;
+    std::move(result->begin(), result->end(), std::back_inserter(rows));
+  }
   return rows;
 }
 
@@ -112,20 +162,20 @@ Result<std::vector<BandwidthRow>> measure_all(const BandwidthOptions& options) {
   if (!options.trajectory.empty()) return measure_trajectory(options);
   auto scenes = load_scenes(options.scenes);
   if (!scenes) return tl::unexpected(scenes.error());
-  std::vector<BandwidthRow> rows;
+  std::vector<Job> jobs;
   for (const scenes::Scene& scene : *scenes) {
-    for (const std::uint32_t bodies : options.bodies) {
-      auto measured = measure_scene(scene, options, bodies);
-      if (!measured) return measured;
-      rows.insert(rows.end(), measured->begin(), measured->end());
-    }
+    for (const std::uint32_t bodies : options.bodies) jobs.push_back({&scene, bodies});
   }
-  return rows;
+  return measure_jobs(jobs, options);
 }
 
 int run_bandwidth(const BandwidthOptions& options) {
   const auto rows = measure_all(options);
   if (!rows) return report("bench bandwidth", rows.error());
+  if (!options.report.empty()) {
+    if (const auto written = write_report(options.report, *rows); !written)
+      return report("bench bandwidth", written.error());
+  }
   fmt::print("{}{}", options.json ? to_json(*rows) : to_table(*rows), options.json ? "\n" : "");
   return 0;
 }
@@ -161,9 +211,17 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->add_option("--trajectory", options->trajectory,
                    "X.npy with X.json in the place of a scene; trains on itself")
       ->excludes("--scene");
+  command->add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_flag("--peers", options->peers,
+                    "Also Draco, zfp, zstd and dead reckoning (DIS), at the threshold as the largest error");
+  command->add_option("--report", options->report,
+                      "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
   command->add_flag("--json", options->json, "One JSON object: rows[...]");
   command->footer(
-      "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.");
+      "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.\n"
+      "Bits and errors are the same on any number of --threads and --jobs; times are quiet with --jobs 1.");
   command->callback([options, &run] {
     if (options->scenes.empty() && options->trajectory.empty())
       throw CLI::RequiredError("--scene or --trajectory");

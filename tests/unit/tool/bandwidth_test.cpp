@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "sdk/core/codec/training.hpp"
+#include "services/tool/peers.hpp"
 #include "tests/unit/tool/bouncing.hpp"
 
 namespace tandem::tool {
@@ -93,6 +94,8 @@ TEST(Bandwidth, knows_the_papers_table) {
   EXPECT_EQ(paper_mbit_per_s(5, 5000, "limited"), 1.44);
   EXPECT_EQ(paper_mbit_per_s(1, 20000, "entropy"), std::nullopt);
   EXPECT_EQ(paper_mbit_per_s(1, 10000, "tracker"), std::nullopt);
+  EXPECT_EQ(paper_colliding_per_frame(1, 20000), 13648);
+  EXPECT_EQ(paper_colliding_per_frame(4, 20000), std::nullopt);
 }
 
 TEST(Bandwidth, rows_have_the_agreed_fields) {
@@ -102,13 +105,60 @@ TEST(Bandwidth, rows_have_the_agreed_fields) {
   ASSERT_EQ(json["rows"].size(), 1U);
   std::vector<std::string> keys;
   for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
-  EXPECT_THAT(keys,
-              ::testing::UnorderedElementsAre("scene", "number", "bodies", "codec", "predictor", "threads",
-                                              "seed", "frames", "threshold", "mbit_per_s", "max_error",
-                                              "rms_error", "corrected_per_frame", "colliding_per_frame",
-                                              "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms"));
+  EXPECT_THAT(keys, ::testing::UnorderedElementsAre(
+                        "scene", "number", "bodies", "codec", "predictor", "threads", "seed", "frames",
+                        "threshold", "mbit_per_s", "max_error", "rms_error", "corrected_per_frame",
+                        "colliding_per_frame", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms",
+                        "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
   EXPECT_TRUE(json["rows"][0]["number"].is_null());
   EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
+}
+
+TEST(Bandwidth, peers_keep_to_the_same_largest_error_and_name_a_missing_library) {
+  Bouncing simulation(kBodies);
+  const auto all = sessions({"selective"});
+  auto replay = Replay::create(simulation, {}, all[0].lattice, 1);
+  ASSERT_TRUE(replay);
+  const auto rows = measure_bandwidth(
+      *replay, all, 60, [](Frame) {}, kThreshold);
+  ASSERT_TRUE(rows) << rows.error().message;
+  ASSERT_EQ(rows->size(), 1 + peer_kinds().size());
+  for (std::size_t i = 1; i < rows->size(); ++i) {
+    const BandwidthRow& row = (*rows)[i];
+    EXPECT_EQ(row.codec, peer_kinds()[i - 1].name);
+    if (peer_kinds()[i - 1].make == nullptr) {
+      EXPECT_EQ(row.missing, peer_kinds()[i - 1].missing);
+      EXPECT_THAT(to_table(std::vector{row}), ::testing::HasSubstr(row.missing));
+      continue;
+    }
+    EXPECT_LE(row.max_error, kThreshold * 1.001) << row.codec;
+    EXPECT_GT(row.max_error, 0) << row.codec;
+    EXPECT_GT(row.mbit_per_s, 0) << row.codec;
+    EXPECT_EQ(row.bytes.size(), 60U) << row.codec;
+  }
+}
+
+TEST(Bandwidth, a_correction_of_dead_reckoning_costs_24_bytes) {
+  const PeerKind& first_order = peer_kinds()[3];
+  ASSERT_EQ(first_order.name, "dis-1");
+  const auto peer = first_order.make({1, 0.1, 1.0});
+  std::array<float, 3> position{}, velocity{1, 0, 0};
+  const std::uint8_t alive = 1;
+  engine::Bodies body;
+  for (std::size_t k = 0; k < 3; ++k) {
+    body.position[k] = std::span(&position[k], 1);
+    body.velocity[k] = std::span(&velocity[k], 1);
+  }
+  body.alive = std::span(&alive, 1);
+  std::array<std::vector<double>, 3> seen;
+  for (auto& column : seen) column.resize(1);
+  EXPECT_EQ(peer->send(body, seen), std::size_t{24}) << "the start";
+  position[0] = 1.05F;
+  EXPECT_EQ(peer->send(body, seen), std::size_t{0}) << "within the threshold";
+  EXPECT_EQ(seen[0][0], 1.0);
+  position[0] = 2.2F;
+  EXPECT_EQ(peer->send(body, seen), std::size_t{24}) << "beyond the threshold";
+  EXPECT_EQ(seen[0][0], double{2.2F});
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import shutil
 import struct
 import subprocess
 import sys
@@ -103,6 +104,61 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(one["threshold"], other["threshold"])
             # The lattice follows from the bounds, which a recording knows only as far as bodies went.
             self.assertAlmostEqual(one["mbit_per_s"], other["mbit_per_s"], delta=0.02 * other["mbit_per_s"])
+
+    def test_the_same_seed_gives_the_same_bits_on_any_number_of_threads_and_jobs(self):
+        bench = ("bench", "bandwidth", "--scene", "half_pipe,cube", "--bodies", "300", "--frames", "60", "--json", "--peers")
+        timed = ("threads", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms")
+        results = []
+        for threads, jobs in ((1, 1), (2, 2), (3, 1)):
+            done = run(*bench, "--threads", threads, "--jobs", jobs)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            rows = json.loads(done.stdout)["rows"]
+            results.append([{k: v for k, v in row.items() if k not in timed} for row in rows])
+        self.assertEqual(results[0], results[1])
+        self.assertEqual(results[0], results[2])
+
+    @unittest.skipUnless(shutil.which("gnuplot"), "gnuplot draws the figures")
+    def test_a_report_has_rows_series_and_figures(self):
+        bench = ("bench", "bandwidth", "--scene", "cube", "--bodies", "100", "--frames", "30", "--codec", "none,entropy")
+        done = run(*bench, "--report", self.path("report"), "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = self.path("report")
+        names = {"rows.csv", "report.json", "cube-100.csv", "cube-100.gnuplot", "cube-100.svg"}
+        self.assertEqual({file.name for file in report.iterdir()}, names)
+        self.assertEqual(json.loads((report / "report.json").read_text()), json.loads(done.stdout))
+        series = (report / "cube-100.csv").read_text().splitlines()
+        self.assertEqual(series[0], "frame,colliding,none,entropy")
+        self.assertEqual(len(series), 31)
+        svg = (report / "cube-100.svg").read_text()
+        self.assertIn("entropy", svg)
+        self.assertTrue(svg.rstrip().endswith("</svg>"))
+
+    def test_a_report_that_cannot_be_written_is_an_error_and_not_taken_for_a_whole_one(self):
+        report = self.path("report")
+        report.mkdir()
+        (report / "report.json").write_text("of an earlier run")
+        (report / "rows.csv.part").symlink_to("/dev/full")
+        done = run("bench", "bandwidth", "--scene", "cube", "--bodies", "50", "--frames", "3", "--report", report)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("rows.csv", done.stderr)
+        self.assertIn("No space left", done.stderr)
+        self.assertEqual(list(report.iterdir()), [])
+
+    def test_a_bad_trajectory_is_named_with_what_was_expected(self):
+        bench = ("bench", "bandwidth", "--trajectory")
+        exported = run("export", "--scene", "cube", "--bodies", "20", "--frames", "3", "--out", self.path("x.npy"))
+        self.assertEqual(exported.returncode, 0, exported.stderr)
+        sidecar = self.path("x.json")
+        good = json.loads(sidecar.read_text())
+        sidecar.write_text(json.dumps({**good, "dt_s": 0}))
+        done = run(*bench, self.path("x.npy"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("x.json", done.stderr)
+        self.assertIn("dt", done.stderr)
+        sidecar.unlink()
+        done = run(*bench, self.path("x.npy"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("x.json", done.stderr)
 
     def test_an_unknown_command_is_named(self):
         done = run("jion")

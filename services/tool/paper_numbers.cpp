@@ -1,0 +1,56 @@
+#include "services/tool/paper_numbers.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace tandem::tool {
+namespace {
+
+constexpr std::array<std::string_view, 5> kCodecs{"none", "selective", "quantized", "entropy", "limited"};
+
+struct Line {
+  int scene;
+  std::uint32_t bodies;
+  double colliding;
+  std::array<double, 5> mbit_per_s;  // as kCodecs; 0: not measured
+};
+
+constexpr std::array<Line, 13> kTable{{
+    {1, 5000, 2792, {27.47, 2.41, 0.89, 0.65, 0.65}},
+    {1, 10000, 6309, {54.93, 5.26, 1.87, 1.35, 1.20}},
+    {1, 20000, 13648, {}},
+    {2, 5000, 1635, {27.47, 2.32, 0.89, 0.71, 0.66}},
+    {2, 10000, 4771, {54.93, 5.66, 2.07, 1.60, 1.15}},
+    {2, 20000, 10973, {}},
+    {3, 5000, 3966, {27.47, 7.46, 2.67, 1.86, 1.37}},
+    {3, 10000, 8476, {54.93, 15.84, 5.60, 4.00, 1.43}},
+    {3, 20000, 17607, {}},
+    {4, 5000, 2549, {27.47, 2.07, 0.80, 0.57, 0.57}},
+    {4, 10000, 5676, {54.93, 4.29, 1.62, 1.15, 1.06}},
+    {5, 5000, 4586, {27.47, 9.46, 3.26, 2.23, 1.44}},
+    {5, 10000, 9436, {54.93, 20.07, 6.82, 4.73, 1.45}},
+}};
+
+const Line* line_of(int scene, std::uint32_t bodies) {
+  const auto* const line = std::find_if(kTable.begin(), kTable.end(), [&](const Line& candidate) {
+    return candidate.scene == scene && candidate.bodies == bodies;
+  });
+  return line == kTable.end() ? nullptr : line;
+}
+
+}  // namespace
+
+std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec) {
+  const Line* const line = line_of(scene, bodies);
+  const auto* const column = std::find(kCodecs.begin(), kCodecs.end(), codec);
+  if (line == nullptr || column == kCodecs.end()) return std::nullopt;
+  const double value = line->mbit_per_s[static_cast<std::size_t>(column - kCodecs.begin())];
+  return value > 0 ? std::optional(value) : std::nullopt;
+}
+
+std::optional<double> paper_colliding_per_frame(int scene, std::uint32_t bodies) {
+  const Line* const line = line_of(scene, bodies);
+  return line == nullptr ? std::nullopt : std::optional(line->colliding);
+}
+
+}  // namespace tandem::tool

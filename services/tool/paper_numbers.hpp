@@ -1,0 +1,16 @@
+#pragma once
+// The thesis's numbers that `tandem bench` prints beside its own.
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace tandem::tool {
+
+/// Table 5.3 in Mbit/s, where it has this scene, size and codec.
+[[nodiscard]] std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec);
+
+/// Bodies in contact per frame: table 5.3, and table 5.6 for 20,000 bodies.
+[[nodiscard]] std::optional<double> paper_colliding_per_frame(int scene, std::uint32_t bodies);
+
+}  // namespace tandem::tool
