@@ -26,14 +26,13 @@ class AdaptiveBit {
                                                            5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5};
     const unsigned fast_shift = kShift[seen];
     const unsigned slow_shift = seen < kMostSeen ? fast_shift : 8U;
-    if (seen < kMostSeen) ++seen;
-    if (bit) {
-      fast = static_cast<std::uint16_t>(fast + ((65535U - fast) >> fast_shift));
-      slow = static_cast<std::uint16_t>(slow + ((65535U - slow) >> slow_shift));
-    } else {
-      fast = static_cast<std::uint16_t>(fast - (fast >> fast_shift));
-      slow = static_cast<std::uint16_t>(slow - (slow >> slow_shift));
-    }
+    seen = static_cast<std::uint8_t>(seen + (seen < kMostSeen ? 1 : 0));
+    // Without a branch, because the bit is hard to guess: a 1 moves the complement towards zero.
+    const unsigned flip = bit ? 65535U : 0U;
+    const unsigned quick = fast ^ flip;
+    const unsigned steady = slow ^ flip;
+    fast = static_cast<std::uint16_t>((quick - (quick >> fast_shift)) ^ flip);
+    slow = static_cast<std::uint16_t>((steady - (steady >> slow_shift)) ^ flip);
   }
 
   std::uint16_t fast = 32768, slow = 32768;
@@ -49,13 +48,10 @@ class RangeEncoder {
   /// `p1`: probability of 1 in 1/65536, in 1 .. 65535.
   void put(bool bit, std::uint32_t p1) {
     const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
-    if (bit) {
-      range_ = bound;
-    } else {
-      low_ += bound;
-      if (low_ < bound) carry();
-      range_ -= bound;
-    }
+    const std::uint32_t skipped = bit ? 0U : bound;
+    low_ += skipped;
+    if (low_ < skipped) carry();
+    range_ = bit ? bound : range_ - bound;
     while (range_ < kLeastRange) {
       emit(static_cast<std::byte>(low_ >> 24U));
       low_ <<= 8U;
@@ -129,12 +125,8 @@ class RangeDecoder {
   bool get(std::uint32_t p1) {
     const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
     const bool bit = code_ < bound;
-    if (bit) {
-      range_ = bound;
-    } else {
-      code_ -= bound;
-      range_ -= bound;
-    }
+    code_ -= bit ? 0U : bound;
+    range_ = bit ? bound : range_ - bound;
     while (range_ < kLeastRange) {
       code_ = (code_ << 8U) | next();
       range_ <<= 8U;

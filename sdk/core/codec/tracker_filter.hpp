@@ -27,6 +27,9 @@ struct TrackerBody {
 /// Steps to lattice units for one threshold e.
 class TrackerSteppings {
  public:
+  /// No correction is longer than this along an axis.
+  static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
+
   explicit TrackerSteppings(std::int32_t threshold) {
     const auto share = [threshold](std::int64_t of_65536) {
       return static_cast<std::int32_t>(std::max<std::int64_t>(1, (threshold * of_65536) >> 16));
@@ -43,6 +46,8 @@ class TrackerSteppings {
     return d;
   }
   [[nodiscard]] std::int32_t step() const { return step_; }
+  /// What one step is worth where all |steps| <= 1 and `moved` (1 .. 3) of them are not zero.
+  [[nodiscard]] std::int32_t small(std::size_t moved) const { return small_[moved - 1]; }
 
   /// The same in 1/256 of the threshold; steps within +-127.
   [[nodiscard]] static std::array<std::int32_t, 3> relative(const TrackerSteps& steps) {
@@ -52,7 +57,6 @@ class TrackerSteppings {
   }
 
  private:
-  static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
   // In 1/65536 of the threshold. A step of 0.95 keeps the worst rounding error, sqrt(3)/2 steps, inside the
   // error ball.
   static constexpr std::int32_t kStep = 62259;

@@ -82,34 +82,42 @@ bool code_escape(Coder& coder, Models& models, std::uint32_t& x) {
 
 }  // namespace tracker_detail
 
+/// Codes one axis. `moved`: how many earlier axes are not zero. Returns as code_steps().
+template <class Coder, class Models>
+bool code_axis(Coder& coder, Models& models, const TrackerContext& context, std::uint32_t axis,
+               std::uint32_t moved, std::int32_t& steps) {
+  const std::int32_t wanted = steps;
+  const bool is_last_hope = axis == 2 && moved == 0;
+  if (!is_last_hope) {
+    const std::uint32_t at =
+        ((axis * TrackerModels::kShortAges * TrackerModels::kIntervals + context.zero) * 3 + moved) * 2 +
+        context.moved_last[axis];
+    if (!coder.code(wanted != 0, models.zero[at])) {
+      steps = 0;
+      return true;
+    }
+  }
+  const bool negative = coder.code(wanted < 0, models.sign[context.sign[axis]]);
+  const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
+  const std::uint32_t base = (context.magnitude * 3 + moved) * TrackerModels::kUnary;
+  std::uint32_t size = 1;
+  while (size <= TrackerModels::kUnary && coder.code(length > size, models.magnitude[base + size - 1]))
+    ++size;
+  if (size > TrackerModels::kUnary) {
+    std::uint32_t beyond = length > TrackerModels::kUnary ? length - TrackerModels::kUnary - 1 : 0;
+    if (!tracker_detail::code_escape(coder, models, beyond)) return false;
+    size = TrackerModels::kUnary + 1 + beyond;
+  }
+  steps = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
+  return true;
+}
+
 template <class Coder, class Models>
 bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps) {
   std::uint32_t moved = 0;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    const bool is_last_hope = axis == 2 && moved == 0;
-    const std::int32_t wanted = steps[axis];
-    if (!is_last_hope) {
-      const std::uint32_t at =
-          ((axis * TrackerModels::kShortAges * TrackerModels::kIntervals + context.zero) * 3 + moved) * 2 +
-          context.moved_last[axis];
-      if (!coder.code(wanted != 0, models.zero[at])) {
-        steps[axis] = 0;
-        continue;
-      }
-    }
-    ++moved;
-    const bool negative = coder.code(wanted < 0, models.sign[context.sign[axis]]);
-    const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
-    const std::uint32_t base = (context.magnitude * 3 + moved - 1) * TrackerModels::kUnary;
-    std::uint32_t size = 1;
-    while (size <= TrackerModels::kUnary && coder.code(length > size, models.magnitude[base + size - 1]))
-      ++size;
-    if (size > TrackerModels::kUnary) {
-      std::uint32_t beyond = length > TrackerModels::kUnary ? length - TrackerModels::kUnary - 1 : 0;
-      if (!tracker_detail::code_escape(coder, models, beyond)) return false;
-      size = TrackerModels::kUnary + 1 + beyond;
-    }
-    steps[axis] = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
+    if (!code_axis(coder, models, context, axis, moved, steps[axis])) return false;
+    moved += static_cast<std::uint32_t>(steps[axis] != 0);
   }
   return true;
 }

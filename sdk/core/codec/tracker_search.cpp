@@ -15,6 +15,7 @@ constexpr std::int64_t kEarlyShare = 218;
 constexpr std::uint32_t kEarlyProbability = 19661;
 // Bits that an error of one threshold is worth.
 constexpr std::uint64_t kErrorWorth = 14;
+constexpr std::int64_t kMostDistance = TrackerSteppings::kMostDistance;
 constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + 2;
 // A tried number of bodies this close (1/64) to the largest that fits is good enough.
 constexpr std::uint32_t kTryPrecision = 64;
@@ -54,23 +55,76 @@ struct CostCoder {
 };
 
 std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
-  const std::uint64_t unit = static_cast<std::uint64_t>(step);
-  const std::uint64_t steps = (magnitude(to, from) + unit / 2) / unit;
-  const auto q = static_cast<std::int32_t>(std::min<std::uint64_t>(steps, kMostTrackerSteps - 1));
+  const auto unit = static_cast<std::uint32_t>(step);
+  const std::uint32_t steps = (magnitude(to, from) + unit / 2) / unit;
+  const auto q = static_cast<std::int32_t>(std::min<std::uint32_t>(steps, kMostTrackerSteps - 1));
   return to < from ? -q : q;
 }
 
-// 27 neighbours; the middle one first, because it is the fallback.
-constexpr std::array<std::array<std::int8_t, 3>, 27> kAround = [] {
-  std::array<std::array<std::int8_t, 3>, 27> around{};
-  for (std::size_t i = 0; i < 27; ++i) {
-    const std::size_t at = (i + 13) % 27;
-    around[i] = {static_cast<std::int8_t>(static_cast<int>(at % 3) - 1),
-                 static_cast<std::int8_t>(static_cast<int>(at / 3 % 3) - 1),
-                 static_cast<std::int8_t>(static_cast<int>(at / 9) - 1)};
+// What the two values on either side of the residual leave over on each axis, so that the eight points are
+// sums of table entries, and what they cost, found out when first asked for: few lie inside the error ball.
+// (The third value around the nearest, on its far side, does not pay: RESEARCH.md.)
+class Choices {
+ public:
+  Choices(const TrackerModels& models, const TrackerContext& context, const TrackerSteps& lower)
+      : models_(&models), context_(&context), lower_(lower) {
+    for (auto& axis : cost_) {
+      for (auto& moved : axis) moved.fill(kUnknown);
+    }
   }
-  return around;
-}();
+
+  void fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
+                   std::int64_t threshold);
+  [[nodiscard]] std::int32_t value(std::size_t axis, std::size_t i) const {
+    return lower_[axis] + static_cast<std::int32_t>(i);
+  }
+  /// Error squared on one axis: of the unit of long steps (0), or of small ones with 1, 2, 3 axes moved.
+  [[nodiscard]] std::uint64_t error(std::size_t unit, std::size_t axis, std::size_t i) const {
+    return error_[unit][axis][i];
+  }
+  /// The least of the four.
+  [[nodiscard]] std::uint64_t least_error(std::size_t axis, std::size_t i) const { return least_[axis][i]; }
+  /// In 1/256 bits, after `moved` axes that are not zero.
+  [[nodiscard]] std::uint32_t cost(std::uint32_t axis, std::uint32_t moved, std::size_t i) {
+    std::uint32_t& cost = cost_[axis][moved][i];
+    if (cost == kUnknown) {
+      CostCoder coder;
+      std::int32_t steps = value(axis, i);
+      code_axis(coder, *models_, *context_, axis, moved, steps);
+      cost = coder.cost;
+    }
+    return cost;
+  }
+
+ private:
+  static constexpr std::uint32_t kUnknown = UINT32_MAX;
+  static constexpr std::uint64_t kOutside = std::uint64_t{1} << 62U;  // three of them do not overflow
+
+  const TrackerModels* models_;
+  const TrackerContext* context_;
+  TrackerSteps lower_;
+  std::array<std::array<std::array<std::uint64_t, 2>, 3>, 4> error_{};
+  std::array<std::array<std::uint64_t, 2>, 3> least_{};
+  std::array<std::array<std::array<std::uint32_t, 2>, 3>, 3> cost_{};
+};
+
+void Choices::fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
+                          std::int64_t threshold) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::int64_t steps = value(axis, i);
+      std::uint64_t least = kOutside;
+      for (std::size_t unit = 0; unit < 4; ++unit) {
+        const std::int64_t one = unit == 0 ? steppings.step() : steppings.small(unit);
+        const std::int64_t off = d[axis] - std::clamp(steps * one, -kMostDistance, kMostDistance);
+        const bool inside = -threshold <= off && off <= threshold;
+        error_[unit][axis][i] = inside ? static_cast<std::uint64_t>(off * off) : kOutside;
+        least = std::min(least, error_[unit][axis][i]);
+      }
+      least_[axis][i] = least;
+    }
+  }
+}
 
 }  // namespace
 
@@ -79,36 +133,46 @@ bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& st
                   TrackerSteps& steps) {
   std::array<std::int64_t, 3> d{};
   TrackerSteps middle{};
+  TrackerSteps lower{};
   for (std::size_t i = 0; i < 3; ++i) {
     d[i] = std::int64_t{to[i]} - from[i];
     middle[i] = nearest(from[i], to[i], steppings.step());
+    lower[i] = middle[i] - (std::int64_t{middle[i]} * steppings.step() > d[i] ? 1 : 0);
   }
   const auto limit = static_cast<std::uint64_t>(threshold) * static_cast<std::uint64_t>(threshold);
   // error^2 / threshold^2 without a division for each: both shifted to 24 bits, then times a reciprocal.
   const auto shift = static_cast<unsigned>(std::max(0, static_cast<int>(std::bit_width(limit)) - 24));
   const std::uint64_t worth = (kErrorWorth * 256U << 24U) / (limit >> shift);
 
+  Choices choices(models, context, lower);
+  choices.fill_errors(steppings, d, threshold);
   std::uint64_t best = UINT64_MAX;
   steps = middle;
-  for (const auto& offset : kAround) {
-    TrackerSteps tried{};
-    for (std::size_t i = 0; i < 3; ++i) tried[i] = middle[i] + offset[i];
-    if (tried == TrackerSteps{}) continue;
-    const auto moved = steppings.distance(tried);
-    std::uint64_t error = 0;
-    bool inside = true;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::int64_t off = d[i] - moved[i];
-      inside &= -threshold <= off && off <= threshold;
-      if (inside) error += static_cast<std::uint64_t>(off * off);
-    }
-    if (!inside || error > limit) continue;
-    CostCoder coder;
-    code_steps(coder, models, context, tried);
-    const std::uint64_t cost = coder.cost + (((error >> shift) * worth) >> 24U);
-    if (cost < best) {
-      best = cost;
-      steps = tried;
+  for (std::size_t x = 0; x < 2; ++x) {
+    const std::uint64_t least_x = choices.least_error(0, x);
+    if (least_x > limit) continue;
+    for (std::size_t y = 0; y < 2; ++y) {
+      const std::uint64_t least_xy = least_x + choices.least_error(1, y);
+      if (least_xy > limit) continue;
+      for (std::size_t z = 0; z < 2; ++z) {
+        if (least_xy + choices.least_error(2, z) > limit) continue;
+        const TrackerSteps tried{choices.value(0, x), choices.value(1, y), choices.value(2, z)};
+        const std::uint32_t before_y = tried[0] != 0 ? 1U : 0U;
+        const std::uint32_t before_z = before_y + (tried[1] != 0 ? 1U : 0U);
+        const std::uint32_t moved = before_z + (tried[2] != 0 ? 1U : 0U);
+        if (moved == 0) continue;
+        const auto is_long = [](std::int32_t value) { return value < -1 || value > 1; };
+        const std::size_t unit = is_long(tried[0]) || is_long(tried[1]) || is_long(tried[2]) ? 0 : moved;
+        const std::uint64_t error =
+            choices.error(unit, 0, x) + choices.error(unit, 1, y) + choices.error(unit, 2, z);
+        if (error > limit) continue;
+        const std::uint64_t cost = choices.cost(0, 0, x) + choices.cost(1, before_y, y) +
+                                   choices.cost(2, before_z, z) + (((error >> shift) * worth) >> 24U);
+        if (cost < best) {
+          best = cost;
+          steps = tried;
+        }
+      }
     }
   }
   return best != UINT64_MAX;
