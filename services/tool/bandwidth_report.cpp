@@ -105,7 +105,7 @@ std::string gnuplot_script(Rows rows, const std::string& svg) {
                       "set output \"{}\"\n"
                       "set title \"{}, {} bodies\" noenhanced\n"
                       "set xlabel \"simulated seconds\"\nset ylabel \"Mbit/s, mean of {} frames\"\n"
-                      "set xrange [0:{:.6g}]\nset yrange [0:*]\nset grid\nset key top right noenhanced\n"
+                      "set xrange [0:{:.6g}]\nset yrange [0:*]\nset grid\nset key outside right top noenhanced\n"
                       "plot {}\n",
                       svg, std::filesystem::path(any.scene).stem().string(), any.bodies, kFramesAPoint,
                       static_cast<double>(any.frames) * any.dt_s, curves);
