@@ -103,6 +103,10 @@ TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger err
   expect_bytes("limited", "0380 0b000000 0000 01 080000 e51fee8600", predicted(), target(), {}, nullptr, 18);
 }
 
+TEST(GoldenBytes, OfTracker) {  // Positions alone; v and c follow from them on both sides.
+  expect_bytes("tracker", "0380 08000000 0000 b5c5400bdc98", predicted(), target());
+}
+
 TEST(GoldenBytes, OfLifecycleAndParameters) {
   State to = predicted();
   to.despawn(2);

@@ -57,7 +57,7 @@ class AbsoluteCoding {
  private:
   struct Section {
     std::span<const std::byte> values;
-    std::size_t first;  // of its slots among all corrected ones
+    std::size_t first = 0;  // of its slots among all corrected ones
   };
   static BodyState clamped(BodyState body) {
     for (std::int32_t& value : body.p) value = std::clamp(value, -kPositionLimit, kPositionLimit);

@@ -32,8 +32,8 @@ void write_section_header(SectionType type, std::size_t size_bytes, ByteWriter& 
 
 struct DeltaCodec::Impl {
   std::unique_ptr<Codec> codec;
-  std::uint32_t capacity;
-  TypeId type_count;
+  std::uint32_t capacity = 0;
+  TypeId type_count = 0;
   CodecParameters parameters;  // in force
   CodecParameters next;        // server: from the next encode() on
   CodecStatistics* statistics = nullptr;

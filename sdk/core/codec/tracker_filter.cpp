@@ -4,9 +4,11 @@ namespace tandem {
 namespace {
 
 // A position error that grew over k frames means a velocity error of d/k; beta of that is believed, and a
-// part gamma of what that would be as an acceleration. Below kLeastK frames one correction says too little.
+// part gamma of what that would be as an acceleration. Below kLeastK frames one correction says too little
+// about either; but a body corrected twice running was hit: all of it is velocity, and more is believed.
 constexpr std::int64_t kLeastK = 3;
-constexpr std::int64_t kBeta = 45875;  // 0.7, in 1/65536
+constexpr std::int64_t kKOfTheHit = 2;
+constexpr std::int64_t kBeta = 52429;  // 0.8, in 1/65536
 constexpr std::int64_t kGamma = 9830;  // 0.15, in 1/65536
 constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
 
@@ -22,8 +24,9 @@ constexpr Gains make_gains() {
   for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
     const std::int64_t k = std::max(i, kLeastK);
     const auto at = static_cast<std::size_t>(i);
-    gains.velocity[at] = 64 * kBeta / k;
-    gains.acceleration[at] = ((64 * kBeta * kGamma) >> 16) / (k * k);
+    const bool hit = i == 1;
+    gains.velocity[at] = 64 * kBeta / (hit ? kKOfTheHit : k);
+    gains.acceleration[at] = hit ? 0 : ((64 * kBeta * kGamma) >> 16) / (k * k);
   }
   return gains;
 }

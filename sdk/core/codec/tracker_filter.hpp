@@ -80,7 +80,7 @@ class TrackerSteppings {
 
 /// Corrects a body by `steps` and updates what is remembered of it:
 ///   k = min(age + 1, 255);  d = distance(steps);  u = clamp(d . d_last / e^2, -1, 1)
-///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2)
+///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2), H(1) = 0
 void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
                   std::int32_t threshold, TrackerBody& body);
 

@@ -22,13 +22,21 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, body);
   const std::int32_t d = 2 * 3891;  // 0.95 * 4096, down
   EXPECT_EQ(state.p(0)[0], d);
-  EXPECT_NEAR(state.v(0)[0], 64 * 0.7 * d / 10, 8);
-  EXPECT_NEAR(state.c(0)[0], 64 * 0.7 * 0.15 * d / 100, 2);
+  EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * d / 10, 8);
+  EXPECT_NEAR(state.c(0)[0], 64 * 0.8 * 0.15 * d / 100, 2);
   EXPECT_EQ(state.p(1)[0], 0);
   EXPECT_EQ(state.v(1)[0], 0);
   EXPECT_EQ(body.age, 0);
   EXPECT_EQ(body.interval, 10);
   EXPECT_EQ(body.steps, (std::array<std::int8_t, 3>{2, 0, 0}));
+}
+
+TEST(TrackerFilter, ABodyCorrectedTwiceRunningWasHitAndLearnsVelocityAlone) {
+  State state = one_body();
+  TrackerBody body;
+  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, body);
+  EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * (2 * 3891) / 2, 8);
+  EXPECT_EQ(state.c(0)[0], 0);
 }
 
 TEST(TrackerFilter, BelievesCorrectionsThatKeepTheirDirectionMore) {
@@ -48,6 +56,7 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
     TrackerBody body;
     for (int i = 0; i < 20; ++i) {
       const std::int32_t far = sign * kMostTrackerSteps;
+      body.age = 2;  // c learns nothing from a body corrected twice running
       correct_body(state, 0, {far, far, far}, TrackerSteppings(kPositionLimit), kPositionLimit, body);
     }
     for (std::size_t i = 0; i < 3; ++i) {
