@@ -94,8 +94,11 @@ double Pacer::arrived_frame(std::int64_t now_ns) const {
 }
 
 std::int64_t Pacer::due_ns(Frame frame) const {
+  // A server may number its frames as it likes, but nothing is due further off than any clock goes.
+  constexpr double kFarNs = 1e18;
   const double ahead =
-      (static_cast<double>(frame) - static_cast<double>(base_frame_)) * period_ns_ + phase_ns_;
+      std::clamp((static_cast<double>(frame) - static_cast<double>(base_frame_)) * period_ns_ + phase_ns_,
+                 -kFarNs, kFarNs);
   return base_ns_ + std::llround(ahead) - clock_.offset_ns();
 }
 

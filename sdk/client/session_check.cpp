@@ -9,6 +9,7 @@ namespace tandem::client {
 namespace {
 
 constexpr std::uint32_t kDefinedLead = 1;
+constexpr double kMinFrameRateHz = 1;
 constexpr double kMaxFrameRateHz = 10'000;
 // The largest payload is `none` over all slots with a lifecycle record each: below 64 bytes a slot, plus
 // headers.
@@ -16,10 +17,13 @@ constexpr std::uint64_t kMaxBytesPerSlot = 128;
 constexpr std::uint64_t kMaxFixedBytes = 1U << 20U;
 
 Result<void> check_values(const transport::SessionMessage& s) {
-  const auto bad = [](std::string what) { return fail(ErrorCode::kMalformed, "session refused: " + what); };
+  const auto bad = [](const std::string& what) {
+    return fail(ErrorCode::kMalformed, "session refused: " + what);
+  };
   if (s.epoch == 0) return bad("epoch 0");
   if (s.capacity == 0 || s.capacity > kMaxCapacity) return bad("capacity " + std::to_string(s.capacity));
-  if (!(s.frame_rate_hz > 0) || s.frame_rate_hz > kMaxFrameRateHz) return bad("frame rate out of range");
+  if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))
+    return bad("frame rate out of range");
   if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
   if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
   if (s.types.empty() || s.types.size() > std::numeric_limits<TypeId>::max())

@@ -78,6 +78,7 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& s) { s.capacity = 0; }));
   EXPECT_TRUE(refused([](auto& s) { s.capacity = kMaxCapacity + 1; }));
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 1e-300; }));  // periods would overflow all clocks
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_TRUE(refused([](auto& s) { s.lattice_unit = std::numeric_limits<double>::infinity(); }));
   EXPECT_TRUE(refused([](auto& s) { s.lead = 2; }));
