@@ -3,6 +3,7 @@
 #include <google/protobuf/io/tokenizer.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -62,11 +63,13 @@ Result<std::string> read_all(const std::string& path) {
   if (!std::filesystem::is_regular_file(path, ignored)) return fail(ErrorCode::kIo, path + ": no such file");
   std::ifstream in(path, std::ios::binary);
   std::string text;
-  text.resize(kMaxFileBytes + 1);
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  // In pieces: files are small, and one may grow while it is read.
+  std::array<char, 16384> piece{};
+  while (in.read(piece.data(), piece.size()), in.gcount() > 0) {
+    text.append(piece.data(), static_cast<std::size_t>(in.gcount()));
+    if (text.size() > kMaxFileBytes) return fail(ErrorCode::kIo, path + ": larger than 16 MiB");
+  }
   if (in.bad() || !in.is_open()) return fail(ErrorCode::kIo, path + ": cannot be read");
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxFileBytes) return fail(ErrorCode::kIo, path + ": larger than 16 MiB");
   return text;
 }
 
