@@ -59,9 +59,9 @@ class Stage:
                 stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=self.environment,
             )  # fmt: skip
 
-    def server(self, name, *arguments):
+    def server(self, name, *arguments, scene="half_pipe", bodies=400):
         self.start(
-            name, self.options.tandemd, "--scene", "half_pipe", "--bodies", 400, "--json",
+            name, self.options.tandemd, "--scene", scene, "--bodies", bodies, "--json",
             "--hash-log", self.log(name), *arguments,
         )  # fmt: skip
 
@@ -133,6 +133,11 @@ class Stage:
             return json.loads(text)
         except json.JSONDecodeError as error:
             raise Failed(f"stdout of {name} is not one JSON object: {text!r}") from error
+
+    def resident_kb(self, name):
+        """Memory that a process holds, in KiB."""
+        status = pathlib.Path(f"/proc/{self.processes[name].pid}/status").read_text(encoding="ascii")
+        return int(re.search(r"VmRSS:\s*(\d+) kB", status)[1])
 
     def stop(self, name, code=0):
         self.processes[name].send_signal(signal.SIGTERM)
@@ -299,7 +304,39 @@ def no_server(stage):
         raise Failed(f"the message does not name the file: {said}")
 
 
-SCENARIOS = {f.__name__: f for f in (two_thousand_frames, server_restart, no_server)}
+def emitter(stage):
+    """Bodies that come and go for some minutes, a client joining every ten seconds: no mismatch, flat memory."""
+    seconds = stage.options.seconds
+    stage.server("server", "--scripted", scene="emitter", bodies=2000)
+    stage.client("steady")
+    stage.wait_live(["steady"], lambda live: live.get("frame", 0) > 30, "frame 30")
+    begun, visitors, memory = time.monotonic(), [], {"server": [], "steady": []}
+    while time.monotonic() - begun < seconds:
+        name = f"visitor{len(visitors)}"
+        visitors.append(name)
+        stage.client(name, *(["--observe"] if len(visitors) % 2 else []), "--seconds", 15)
+        time.sleep(max(0, begun + 10 * len(visitors) - time.monotonic()))
+        for process, sizes in memory.items():
+            sizes.append(stage.resident_kb(process))
+        print(f"{time.monotonic() - begun:4.0f} s: {len(visitors)} clients came, resident KiB: "
+              + ", ".join(f"{process} {sizes[-1]}" for process, sizes in memory.items()), flush=True)  # fmt: skip
+    for name in visitors:
+        check_report(stage.end(name), ["frames_applied", "join_ms"])
+    report = stage.stop("steady")
+    check_report(report)
+    stage.stop("server")
+    compare(stage, ["server"], "steady", 25 * seconds, report["resyncs"])
+    for name in visitors:
+        compare(stage, ["server"], name, 300)
+    for process, sizes in memory.items():
+        # The first minute fills what is bounded: histories, hash logs' buffers, tables of clients.
+        settled = max(sizes[: max(1, min(6, len(sizes) // 2))])
+        if max(sizes) > settled + MEMORY_SLACK_KB:
+            raise Failed(f"{process} grew from {settled} to {max(sizes)} KiB")
+
+
+MEMORY_SLACK_KB = 2048  # what the allocator keeps may move a little
+SCENARIOS = {f.__name__: f for f in (two_thousand_frames, server_restart, no_server, emitter)}
 
 
 def main():
@@ -307,6 +344,7 @@ def main():
     parser.add_argument("scenario", choices=SCENARIOS)
     parser.add_argument("--tandemd", required=True)
     parser.add_argument("--tandem", required=True)
+    parser.add_argument("--seconds", type=int, default=600, help="length of the scenario `emitter`")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         try:
