@@ -2,6 +2,7 @@
 // From generated messages to plain values. Internal to scenes.
 
 #include <scene.pb.h>
+#include <cmath>
 
 #include "services/engine/simulation.hpp"
 
@@ -27,7 +28,7 @@ inline engine::Input to_input(const idl::InputEvent& event) {
 /// A checked event's frame: 1 is the first.
 inline std::uint64_t to_frame(const idl::InputEvent& event, double dt_s) {
   if (event.when_case() == idl::InputEvent::kFrame) return event.frame();
-  return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(event.time_s() / dt_s + 0.5));
+  return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(event.time_s() / dt_s)));
 }
 
 }  // namespace tandem::scenes

@@ -1,6 +1,7 @@
 #include "services/scenes/script.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "services/scenes/random.hpp"
 #include "services/scenes/scene.hpp"
@@ -25,7 +26,7 @@ struct Hand {
   [[nodiscard]] double end_s() const { return static_cast<double>(frames) * scene.dt_s; }
   void act(double time_s, Input input) const {
     const std::uint64_t frame =
-        std::max<std::uint64_t>(1, static_cast<std::uint64_t>(time_s / scene.dt_s + 0.5));
+        std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(time_s / scene.dt_s)));
     if (frame <= frames) out.push_back({frame, user, std::move(input)});
   }
 };

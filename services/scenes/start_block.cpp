@@ -1,6 +1,7 @@
 #include "services/scenes/start_block.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "services/scenes/random.hpp"
 
@@ -20,7 +21,7 @@ Footprint footprint(const engine::Vec3& proportions, std::uint32_t bodies) {
   Footprint best;
   for (double scale = 1 / smallest;; scale += 1 / (16 * smallest)) {
     const auto along = [&](std::size_t i) {
-      return static_cast<std::uint64_t>(proportions[i] * scale + 0.5);
+      return static_cast<std::uint64_t>(std::llround(proportions[i] * scale));
     };
     best = {std::max<std::uint64_t>(along(0), 1), std::max<std::uint64_t>(along(2), 1)};
     if (best.x * best.z * std::max<std::uint64_t>(along(1), 1) >= bodies) return best;

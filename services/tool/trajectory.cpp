@@ -109,11 +109,12 @@ Result<TrajectoryInfo> read_info(const std::string& path, std::uint64_t rows) {
 }  // namespace
 
 Result<std::string> sidecar_path(const std::string& npy) {
-  constexpr std::string_view suffix = ".npy";
-  if (npy.size() <= suffix.size() || npy.compare(npy.size() - suffix.size(), suffix.size(), suffix) != 0) {
+  constexpr std::string_view kSuffix = ".npy";
+  if (npy.size() <= kSuffix.size() ||
+      npy.compare(npy.size() - kSuffix.size(), kSuffix.size(), kSuffix) != 0) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("{}: expected a file name that ends in .npy", npy));
   }
-  return npy.substr(0, npy.size() - suffix.size()) + ".json";
+  return npy.substr(0, npy.size() - kSuffix.size()) + ".json";
 }
 
 TrajectoryWriter::TrajectoryWriter(OutputFile npy, OutputFile sidecar, std::uint32_t bodies)
