@@ -18,7 +18,8 @@ constexpr std::string_view kMagic{"\x93NUMPY\x01\x00", 8};
 // Fixed, so that the header can be written before the number of rows is known.
 constexpr std::size_t kHeaderBytes = 128;
 constexpr std::size_t kChannels = 6;
-constexpr std::size_t kMaxHeaderBytes = 65536;
+// numpy writes 118; std::regex recurses for every character, so a long header would end the stack.
+constexpr std::size_t kMaxHeaderBytes = 4096;
 constexpr std::uint64_t kMaxBodies = 1U << 20U;
 // Rows are read and checked a frame at a time; a frame count beyond this is a broken header.
 constexpr std::uint64_t kMaxRows = 1U << 24U;
@@ -198,16 +199,18 @@ Result<void> RecordedTrajectory::open_npy(const std::string& path) {
   if (!file_) return malformed("the header is cut off");
   data_offset_ = file_.tellg();
 
+  static const std::regex kType(R"('descr'\s*:\s*'([^']*)')");
+  static const std::regex kOrder(R"('fortran_order'\s*:\s*False)");
+  static const std::regex kShape(R"('shape'\s*:\s*\(([^)]*)\))");
+  static const std::regex kRowsBodies(R"(\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*6\s*,?\s*)");
   std::smatch match;
-  if (!std::regex_search(text, match, std::regex(R"('descr'\s*:\s*'([^']*)')")) || match[1] != "<f4") {
+  if (!std::regex_search(text, match, kType) || match[1] != "<f4") {
     return malformed(match.empty() ? "no single 'descr'" : fmt::format("the type is '{}'", match[1].str()));
   }
-  if (!std::regex_search(text, std::regex(R"('fortran_order'\s*:\s*False)")))
-    return malformed("the order is Fortran's");
-  if (!std::regex_search(text, match, std::regex(R"('shape'\s*:\s*\(([^)]*)\))")))
-    return malformed("no 'shape'");
+  if (!std::regex_search(text, kOrder)) return malformed("the order is Fortran's");
+  if (!std::regex_search(text, match, kShape)) return malformed("no 'shape'");
   const std::string shape = match[1];
-  if (!std::regex_match(shape, match, std::regex(R"(\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*6\s*,?\s*)"))) {
+  if (!std::regex_match(shape, match, kRowsBodies)) {
     return malformed(fmt::format("the shape is ({})", shape));
   }
   rows_ = std::stoull(match[1]);

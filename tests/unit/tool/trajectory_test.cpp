@@ -166,6 +166,14 @@ TEST_F(Trajectory, refuses_what_is_no_npy_file) {
   expect_refused("x.npy", "not a .npy file");
 }
 
+TEST_F(Trajectory, refuses_a_header_that_never_ends) {
+  write_pair();
+  std::string header = "{'descr': '" + std::string(64'000, '<');
+  const std::string length{static_cast<char>(header.size() & 0xffU), static_cast<char>(header.size() >> 8U)};
+  std::ofstream(npy_, std::ios::binary) << std::string("\x93NUMPY\x01\x00", 8) << length << header;
+  expect_refused(npy_, "too long");
+}
+
 TEST_F(Trajectory, refuses_nan_and_names_its_place) {
   auto writer = TrajectoryWriter::create(npy_, 1);
   ASSERT_TRUE(writer);
