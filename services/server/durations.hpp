@@ -2,6 +2,7 @@
 // Percentiles of durations in constant memory.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace tandem::server {
@@ -19,6 +20,7 @@ class Durations {
   static constexpr double kBinMs = 0.01;
   static constexpr std::size_t kBins = 20'000;
   std::array<std::uint32_t, kBins> bins_{};
+  std::size_t used_ = 0;  // bins from here on are zero: clear() comes every status, and need not touch them
   std::uint64_t count_ = 0;
 };
 

@@ -26,7 +26,7 @@ class Run {
     for (int frame = 0; frame < 4; ++frame) poll(Bench::kPeriod);
     auto input = bench_.gravity(kHonest, ++honest_inputs_);
     bench_.send(input);
-    for (int frame = 0; frame < 60; ++frame) poll(Bench::kPeriod);
+    for (int frame = 0; frame < 60 && !bench_.outcome(kHonest, honest_inputs_); ++frame) poll(Bench::kPeriod);
     require(bench_.host->state() == Host::State::kRunning);
     require(bench_.refusal(kHonest, honest_inputs_) == transport::Reason::kNone);
     require(bench_.outcome(kHonest, honest_inputs_).has_value());
