@@ -1,16 +1,30 @@
 #include "sdk/core/lattice/hash.hpp"
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <bit>
+
+#include "sdk/core/lattice/hash_avx2.hpp"
 
 namespace tandem {
 
 static_assert(std::endian::native == std::endian::little, "columns are hashed in place: little-endian only");
 
+namespace {
+
+using Update = XXH_errorcode (*)(XXH3_state_t*, const void*, std::size_t);
+
+// The same bits either way; see hash_avx2.hpp.
+Update fastest_update() {
+#ifdef TANDEM_HASH_AVX2
+  if (__builtin_cpu_supports("avx2") != 0) return update_avx2;
+#endif
+  return XXH3_64bits_update;
+}
+
+}  // namespace
+
 struct StateHasher::Impl {
   XXH3_state_t* state = XXH3_createState();
+  Update update = fastest_update();
   Impl() = default;
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -25,7 +39,9 @@ StateHasher::~StateHasher() = default;
 std::uint64_t StateHasher::hash(const State& state, std::span<const std::byte> codec_state) {
   XXH3_state_t* const h = impl_->state;
   XXH3_64bits_reset(h);
-  const auto add = [h](const auto& column) { XXH3_64bits_update(h, column.data(), column.size_bytes()); };
+  const auto add = [h, update = impl_->update](const auto& column) {
+    update(h, column.data(), column.size_bytes());
+  };
   add(state.alive());
   add(state.generation());
   add(state.type());

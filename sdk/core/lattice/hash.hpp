@@ -21,8 +21,8 @@ class StateHasher {
   StateHasher& operator=(const StateHasher&) = delete;
   ~StateHasher();
 
-  /// Columns in this order, each over all slots: alive (u8), generation (u8), type (u16), p x, y, z, v x, y, z,
-  /// c x, y, z (i32), then `codec_state`, the codec's per-body bytes (empty for the paper's codecs).
+  /// Columns in this order, each over all slots: alive (u8), generation (u8), type (u16), p x, y, z, v x, y,
+  /// z, c x, y, z (i32), then `codec_state`, the codec's per-body bytes (empty for the paper's codecs).
   [[nodiscard]] std::uint64_t hash(const State& state, std::span<const std::byte> codec_state = {});
 
  private:

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/vector_clones.hpp"
+
 namespace tandem {
 namespace {
 
@@ -25,11 +27,10 @@ struct Motion {
   std::int32_t c;
 };
 
-// |v|, |g|, |c| <= 2^28, so their sum stays inside 32 bits. Without decay c is within its limits already.
-template <bool Decays>
+// |v|, |g|, |c| <= 2^28, so their sum stays inside 32 bits.
 inline Motion stepped(Motion m, std::int32_t gravity, std::uint32_t damping, std::uint32_t decay) {
   m.v += gravity + m.c;
-  if constexpr (Decays) m.c = clamp_velocity(m.c - share_of(m.c, decay));
+  m.c = clamp_velocity(m.c - share_of(m.c, decay));
   m.v = clamp_velocity(m.v - share_of(m.v, damping));
   m.p = std::clamp(m.p + ((m.v + 32) >> 6), -kPositionLimit, kPositionLimit);
   return m;
@@ -41,48 +42,45 @@ inline std::int32_t gravity_of(std::uint8_t alive, std::int32_t gravity) {
 }
 
 // One channel. Columns never overlap; a compiler that is told so vectorises.
-template <bool Decays>
-void step_channel(const std::int32_t* __restrict p, const std::int32_t* __restrict v,
-                  const std::int32_t* __restrict c, std::int32_t* __restrict p_to,
-                  std::int32_t* __restrict v_to, std::int32_t* __restrict c_to,
-                  const std::uint8_t* __restrict alive, std::size_t count, std::int32_t gravity,
-                  const Drive& drive) {
+TANDEM_VECTOR_CLONES void step_channel(const std::int32_t* __restrict p, const std::int32_t* __restrict v,
+                                       const std::int32_t* __restrict c, std::int32_t* __restrict p_to,
+                                       std::int32_t* __restrict v_to, std::int32_t* __restrict c_to,
+                                       const std::uint8_t* __restrict alive, std::size_t count,
+                                       std::int32_t gravity, const Drive& drive) {
   const std::uint32_t damping = drive.damping;
   const std::uint32_t decay = drive.decay;
   for (std::size_t s = 0; s < count; ++s) {
-    const Motion m = stepped<Decays>({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
+    const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
     p_to[s] = m.p;
     v_to[s] = m.v;
     c_to[s] = m.c;
   }
 }
 
-template <bool Decays>
-void step_channel_in_place(std::int32_t* __restrict p, std::int32_t* __restrict v, std::int32_t* __restrict c,
-                           const std::uint8_t* __restrict alive, std::size_t count, std::int32_t gravity,
-                           const Drive& drive) {
+TANDEM_VECTOR_CLONES void step_channel_in_place(std::int32_t* __restrict p, std::int32_t* __restrict v,
+                                                std::int32_t* __restrict c,
+                                                const std::uint8_t* __restrict alive, std::size_t count,
+                                                std::int32_t gravity, const Drive& drive) {
   const std::uint32_t damping = drive.damping;
   const std::uint32_t decay = drive.decay;
   for (std::size_t s = 0; s < count; ++s) {
-    const Motion m = stepped<Decays>({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
+    const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
     p[s] = m.p;
     v[s] = m.v;
     c[s] = m.c;
   }
 }
 
-template <bool Decays>
 void step_all(const State& from, State& to, const Drive& drive) {
   const std::size_t count = from.capacity();
   const std::uint8_t* alive = from.alive().data();
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     const std::int32_t gravity = drive.gravity[i];
     if (&from == &to) {
-      step_channel_in_place<Decays>(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity,
-                                    drive);
+      step_channel_in_place(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, drive);
     } else {
-      step_channel<Decays>(from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(),
-                           to.v(i).data(), to.c(i).data(), alive, count, gravity, drive);
+      step_channel(from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
+                   to.c(i).data(), alive, count, gravity, drive);
     }
   }
 }
@@ -95,7 +93,7 @@ void Ballistic::step(const State& from, State& to, const Drive& drive) {
     std::ranges::copy(from.generation(), to.generation().begin());
     std::ranges::copy(from.type(), to.type().begin());
   }
-  drive.decay != 0 ? step_all<true>(from, to, drive) : step_all<false>(from, to, drive);
+  step_all(from, to, drive);
 }
 
 void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) {
@@ -113,7 +111,7 @@ void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std
     std::int32_t* c_to = to.c(i).data();
     for (const Slot s : slots) {
       const std::int32_t gravity = gravity_of(from.alive()[s], drive.gravity[i]);
-      const Motion m = stepped<true>({p[s], v[s], c[s]}, gravity, drive.damping, drive.decay);
+      const Motion m = stepped({p[s], v[s], c[s]}, gravity, drive.damping, drive.decay);
       p_to[s] = m.p;
       v_to[s] = m.v;
       c_to[s] = m.c;
