@@ -39,8 +39,9 @@ void ServerClock::on_message(std::int64_t server_time_ns, std::int64_t now_ns) {
 }
 
 void ServerClock::on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns) {
-  turn(now_ns);
+  // Before turn(): only a message that brings bounds may make older ones be forgotten.
   if (echoed_client_ns <= 0 || echoed_client_ns > now_ns) return;
+  turn(now_ns);
   const std::int64_t bound = bounded(server_time_ns) - bounded(echoed_client_ns);
   if (lower() != kNone && bound < lower() - kToleranceNs) {
     current_ = {};

@@ -51,6 +51,14 @@ TEST(ServerClock, StartsAgainWhenSomebodySetsTheClock) {
   EXPECT_NEAR(static_cast<double>(clock.offset_ns() - offset), 0, 1.0 * kMs);
 }
 
+TEST(ServerClock, EchoesOfNothingDoNotMakeItForget) {
+  ServerClock clock;
+  clock.on_message(kOffset + kMs, kMs);
+  for (std::int64_t t = kMs; t < 20'000 * kMs; t += 1000 * kMs) clock.on_echo(kOffset + t, 0, t);
+  EXPECT_TRUE(clock.known());
+  EXPECT_EQ(clock.offset_ns(), kOffset);
+}
+
 TEST(Pacer, FollowsAServerThatJitters) {
   Pacer pacer(30);
   std::uint64_t random = 42;
