@@ -5,6 +5,8 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <cstddef>
+
 namespace tandem {
 
 /// As XXH3_64bits_update(); only where the processor has AVX2. Defined with TANDEM_HASH_AVX2 only.

@@ -89,9 +89,9 @@ void step_all(const State& from, State& to, const Drive& drive) {
 
 void Ballistic::step(const State& from, State& to, const Drive& drive) {
   if (&from != &to) {
-    std::ranges::copy(from.alive(), to.alive().begin());
-    std::ranges::copy(from.generation(), to.generation().begin());
-    std::ranges::copy(from.type(), to.type().begin());
+    std::copy(from.alive().begin(), from.alive().end(), to.alive().begin());
+    std::copy(from.generation().begin(), from.generation().end(), to.generation().begin());
+    std::copy(from.type().begin(), from.type().end(), to.type().begin());
   }
   step_all(from, to, drive);
 }

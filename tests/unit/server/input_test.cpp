@@ -301,6 +301,16 @@ TEST_F(InputTest, MoreScheduledInputsForOneFrameThanReadersKeepAreRefused) {
   EXPECT_EQ(bench.host->totals().refused_inputs, 200U - kMostScheduledPerFrame);
 }
 
+TEST_F(InputTest, MoreImmediateInputsThanOneStepTakesAreRefused) {
+  const engine::Input push{.kind = 2, .values = {0, 0, 0, 1, 0, 1, 0}, .bytes = {}};
+  for (std::size_t i = 0; i < kMostImmediate; ++i) ASSERT_TRUE(bench.host->inject(push)) << i;
+  const auto refused = bench.host->inject(push);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kCapacity);
+  bench.run_ms(100);
+  EXPECT_TRUE(bench.host->inject(push)) << "the next step takes more";
+}
+
 TEST_F(InputTest, TheServersOwnInputsTakeTheSameWay) {
   const engine::Input gravity{.kind = 1, .values = {0, 0, -3}, .bytes = {}};
   const auto frame = bench.host->inject(gravity);
