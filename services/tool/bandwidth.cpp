@@ -58,6 +58,37 @@ class Errors {
   std::uint64_t body_frames_ = 0;
 };
 
+/// How far corrections move bodies at once: what somebody sees who shows a client's state as it is.
+class Snaps {
+ public:
+  /// The state of the frame before its delta.
+  void before(const State& predicted) {
+    for (std::size_t i = 0; i < kPositionChannels; ++i)
+      before_[i].assign(predicted.p(i).begin(), predicted.p(i).end());
+  }
+  /// And after it. `renewed`: bodies that are new or jumped, which is no correction.
+  void after(const State& agreed, std::span<const Slot> touched, std::span<const LifecycleRecord> renewed) {
+    for (const Slot slot : touched) {
+      if (std::ranges::any_of(renewed, [slot](const auto& record) { return record.slot == slot; })) continue;
+      const double squared =
+          static_cast<double>(distance_squared({before_[0][slot], before_[1][slot], before_[2][slot]},
+                                               {agreed.p(0)[slot], agreed.p(1)[slot], agreed.p(2)[slot]}));
+      max_squared_ = std::max(max_squared_, squared);
+      sum_squared_ += squared;
+      ++count_;
+    }
+  }
+  void fill(BandwidthRow& row, double unit) const {
+    row.max_snap = std::sqrt(max_squared_) * unit;
+    if (count_ > 0) row.rms_snap = std::sqrt(sum_squared_ / static_cast<double>(count_)) * unit;
+  }
+
+ private:
+  std::array<std::vector<std::int32_t>, kPositionChannels> before_;
+  double max_squared_ = 0, sum_squared_ = 0;
+  std::uint64_t count_ = 0;
+};
+
 double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
   const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
   return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s /
@@ -75,6 +106,7 @@ struct Lane {
   std::vector<std::uint32_t> bytes;
   std::uint64_t corrected = 0;
   Errors errors;
+  Snaps snaps;
   Durations predict, encode, decode, apply;
 };
 
@@ -114,11 +146,13 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.corrected += frame.corrected;
 
   lane.client.step(1);
+  lane.snaps.before(lane.client.state(frame.frame));
   auto applied = lane.client.apply(frame.frame, frame.last_input, frame.hash, frame.payload);
   lane.decode.add(lane.client.timings().decode_ms);
   lane.apply.add(lane.client.timings().apply_ms);
   if (!applied) return applied;
   const State& agreed = lane.client.state(frame.frame);
+  lane.snaps.after(agreed, lane.client.touched(), replay.lifecycle());
   const double unit = lane.session->lattice.unit;
   lane.errors.add(agreed.alive(), replay.simulation().bodies(),
                   [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; });
@@ -134,6 +168,7 @@ BandwidthRow row_of(Lane& lane, double frames) {
   row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
   lane.errors.fill(row);
+  lane.snaps.fill(row, session.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
   row.predict_ms = lane.predict.median();
   row.encode_ms = lane.encode.median();
@@ -290,6 +325,8 @@ std::string to_json(std::span<const BandwidthRow> rows) {
                     {"paper_mbit_per_s", number(mbit_in_paper(row))},
                     {"max_error", measured(row.max_error)},
                     {"rms_error", measured(row.rms_error)},
+                    {"max_snap", ours(row.max_snap)},
+                    {"rms_snap", ours(row.rms_snap)},
                     {"corrected_per_frame", ours(row.corrected_per_frame)},
                     {"colliding_per_frame", number(row.colliding_per_frame)},
                     {"paper_colliding_per_frame", number(colliding_in_paper(row))},
@@ -305,9 +342,10 @@ std::string to_json(std::span<const BandwidthRow> rows) {
 
 std::string to_table(std::span<const BandwidthRow> rows) {
   std::string text = fmt::format(
-      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-      "scene", "bodies", "codec", "Mbit/s", "paper", "max err", "rms err", "threshold", "corrected",
-      "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
+      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} "
+      "{:>8}\n",
+      "scene", "bodies", "codec", "Mbit/s", "paper", "max err", "rms err", "threshold", "rms snap",
+      "corrected", "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
   for (const BandwidthRow& row : rows) {
     if (!row.missing.empty()) {
       text += fmt::format("{:<12} {:>7} {:<10} not in this build: {} was missing\n", row.scene, row.bodies,
@@ -321,13 +359,14 @@ std::string to_table(std::span<const BandwidthRow> rows) {
       continue;
     }
     text += fmt::format(
-        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>7} {:>8.3f} "
+        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>7} "
+        "{:>8.3f} "
         "{:>8.3f} "
         "{:>8.3f} {:>8.3f} {:>8.3f}\n",
         row.scene, row.bodies, row.codec, row.mbit_per_s, rounded(mbit_in_paper(row), 2), row.max_error,
-        row.rms_error, row.threshold, row.corrected_per_frame, rounded(row.colliding_per_frame, 0),
-        rounded(colliding_in_paper(row), 0), row.step_ms, row.predict_ms, row.encode_ms, row.decode_ms,
-        row.apply_ms);
+        row.rms_error, row.threshold, row.rms_snap, row.corrected_per_frame,
+        rounded(row.colliding_per_frame, 0), rounded(colliding_in_paper(row), 0), row.step_ms, row.predict_ms,
+        row.encode_ms, row.decode_ms, row.apply_ms);
   }
   return text;
 }

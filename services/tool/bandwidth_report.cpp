@@ -44,20 +44,21 @@ double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count)
 std::string rows_csv(Rows rows) {
   std::string text =
       "scene,number,bodies,codec,predictor,seed,frames,threshold,mbit_per_s,paper_mbit_per_s,max_error,"
-      "rms_error,corrected_per_frame,colliding_per_frame,missing\n";
+      "rms_error,max_snap,rms_snap,corrected_per_frame,colliding_per_frame,missing\n";
   const auto number = [](const std::optional<double>& value) {
     return value ? fmt::format("{}", *value) : std::string();
   };
   for (const BandwidthRow& row : rows) {
     const auto measured = [&](double value) { return row.missing.empty() ? fmt::format("{}", value) : ""; };
-    text +=
-        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
-                    row.number ? fmt::format("{}", *row.number) : "", row.bodies, row.codec, row.predictor,
-                    row.seed, row.frames, row.threshold, measured(row.mbit_per_s),
-                    number(row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt),
-                    measured(row.max_error), measured(row.rms_error),
-                    row.predictor.empty() ? "" : measured(row.corrected_per_frame),
-                    number(row.colliding_per_frame), row.missing);
+    text += fmt::format(
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
+        row.number ? fmt::format("{}", *row.number) : "", row.bodies, row.codec, row.predictor, row.seed,
+        row.frames, row.threshold, measured(row.mbit_per_s),
+        number(row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt),
+        measured(row.max_error), measured(row.rms_error), row.predictor.empty() ? "" : measured(row.max_snap),
+        row.predictor.empty() ? "" : measured(row.rms_snap),
+        row.predictor.empty() ? "" : measured(row.corrected_per_frame), number(row.colliding_per_frame),
+        row.missing);
   }
   return text;
 }
@@ -100,15 +101,16 @@ std::string gnuplot_script(Rows rows, const std::string& svg) {
   }
   const BandwidthRow& any = rows.front();
   if (curve == 0) curves = "NaN notitle";
-  return script + fmt::format(
-                      "set terminal svg size 900,480 background \"white\" noenhanced\n"
-                      "set output \"{}\"\n"
-                      "set title \"{}, {} bodies\" noenhanced\n"
-                      "set xlabel \"simulated seconds\"\nset ylabel \"Mbit/s, mean of {} frames\"\n"
-                      "set xrange [0:{:.6g}]\nset yrange [0:*]\nset grid\nset key outside right top noenhanced\n"
-                      "plot {}\n",
-                      svg, std::filesystem::path(any.scene).stem().string(), any.bodies, kFramesAPoint,
-                      static_cast<double>(any.frames) * any.dt_s, curves);
+  return script +
+         fmt::format(
+             "set terminal svg size 900,480 background \"white\" noenhanced\n"
+             "set output \"{}\"\n"
+             "set title \"{}, {} bodies\" noenhanced\n"
+             "set xlabel \"simulated seconds\"\nset ylabel \"Mbit/s, mean of {} frames\"\n"
+             "set xrange [0:{:.6g}]\nset yrange [0:*]\nset grid\nset key outside right top noenhanced\n"
+             "plot {}\n",
+             svg, std::filesystem::path(any.scene).stem().string(), any.bodies, kFramesAPoint,
+             static_cast<double>(any.frames) * any.dt_s, curves);
 }
 
 /// Runs gnuplot on a script. Errors: kIo.

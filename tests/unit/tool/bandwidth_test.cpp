@@ -58,6 +58,9 @@ TEST(Bandwidth, each_step_of_the_papers_method_saves_and_keeps_to_the_threshold)
   EXPECT_LE(rows[1].max_error, kThreshold * 1.01) << "selective";
   EXPECT_GT(rows[1].max_error, 0);
   EXPECT_LE(rows[1].rms_error, rows[1].max_error);
+  EXPECT_GT(rows[1].max_snap, kThreshold) << "who is within the threshold is left alone";
+  EXPECT_LE(rows[1].rms_snap, rows[1].max_snap);
+  EXPECT_GT(rows[1].rms_snap, kThreshold);
   EXPECT_EQ(rows[1].colliding_per_frame, 7.0);
   EXPECT_LE(rows[4].mbit_per_s, 100 * 8.0 * 30 / 1048576) << "the budget of limited";
 }
@@ -107,9 +110,9 @@ TEST(Bandwidth, rows_have_the_agreed_fields) {
   for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
   EXPECT_THAT(keys, ::testing::UnorderedElementsAre(
                         "scene", "number", "bodies", "codec", "predictor", "threads", "seed", "frames",
-                        "threshold", "mbit_per_s", "max_error", "rms_error", "corrected_per_frame",
-                        "colliding_per_frame", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms",
-                        "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
+                        "threshold", "mbit_per_s", "max_error", "rms_error", "max_snap", "rms_snap",
+                        "corrected_per_frame", "colliding_per_frame", "step_ms", "predict_ms", "encode_ms",
+                        "decode_ms", "apply_ms", "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
   EXPECT_TRUE(json["rows"][0]["number"].is_null());
   EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
 }
