@@ -51,12 +51,14 @@ void add_threshold_options(CLI::App& command, server::SessionChoice& choice) {
 }
 
 void add_bench(CLI::App& app, Run& run) {
-  CLI::App* bench =
-      app.add_subcommand("bench", "Measures without a network: bandwidth, training of codecs, memory.");
+  CLI::App* bench = app.add_subcommand(
+      "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine.");
   bench->require_subcommand(1);
   add_bandwidth(*bench, run);
   add_train(*bench, run);
   add_memory(*bench, run);
+  add_engine(*bench, run);
+  add_framerate(*bench, run);
 }
 
 }  // namespace tandem::tool

@@ -31,6 +31,30 @@ constexpr std::array<Line, 13> kTable{{
     {5, 10000, 9436, {54.93, 20.07, 6.82, 4.73, 1.45}},
 }};
 
+constexpr std::array<std::string_view, 4> kMethods{"client-only", "none", "entropy", "limited"};
+
+struct Rates {
+  int scene;
+  std::uint32_t bodies;
+  std::array<double, 4> updates_per_s;  // as kMethods; 0: not measured
+};
+
+constexpr std::array<Rates, 13> kRates{{
+    {1, 5000, {8.9, 19.2, 100.1, 118.1}},
+    {1, 10000, {4.4, 8.0, 77.9, 86.7}},
+    {1, 20000, {2.6, 4.6, 40.4, 46.1}},
+    {2, 5000, {6.6, 16.4, 107.4, 109.3}},
+    {2, 10000, {3.4, 8.5, 73.0, 85.0}},
+    {2, 20000, {2.3, 8.3, 40.0, 43.0}},
+    {3, 5000, {2.6, 18.0, 77.2, 77.3}},
+    {3, 10000, {1.3, 8.7, 39.1, 41.27}},
+    {3, 20000, {0.9, 4.3, 18.5, 19.1}},
+    {4, 5000, {0, 4.2, 68.9, 81.2}},
+    {4, 10000, {0, 2.1, 46.2, 60.5}},
+    {5, 5000, {0, 3.9, 26.9, 37.2}},
+    {5, 10000, {0, 2.1, 18.7, 25.8}},
+}};
+
 const Line* line_of(int scene, std::uint32_t bodies) {
   const auto* const line = std::find_if(kTable.begin(), kTable.end(), [&](const Line& candidate) {
     return candidate.scene == scene && candidate.bodies == bodies;
@@ -51,6 +75,16 @@ std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::str
 std::optional<double> paper_colliding_per_frame(int scene, std::uint32_t bodies) {
   const Line* const line = line_of(scene, bodies);
   return line == nullptr ? std::nullopt : std::optional(line->colliding);
+}
+
+std::optional<double> paper_updates_per_s(int scene, std::uint32_t bodies, std::string_view method) {
+  const auto* const rates = std::find_if(kRates.begin(), kRates.end(), [&](const Rates& candidate) {
+    return candidate.scene == scene && candidate.bodies == bodies;
+  });
+  const auto* const column = std::find(kMethods.begin(), kMethods.end(), method);
+  if (rates == kRates.end() || column == kMethods.end()) return std::nullopt;
+  const double value = rates->updates_per_s[static_cast<std::size_t>(column - kMethods.begin())];
+  return value > 0 ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace tandem::tool

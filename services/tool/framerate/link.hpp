@@ -1,0 +1,42 @@
+#pragma once
+// One direction of a slow link, as arithmetic: no clock and no packets of its own.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace tandem::tool {
+
+struct LinkOptions {
+  double bits_per_s = 15e6;
+  std::int64_t delay_ns = 5'000'000;   ///< one way
+  std::int64_t queue_ns = 50'000'000;  ///< what would wait longer than this for its turn is dropped
+};
+
+/// Packets leave one after the other at the link's rate and arrive a delay later.
+class LinkDirection {
+ public:
+  explicit LinkDirection(const LinkOptions& options) : options_(options) {}
+
+  /// A packet of `bytes` reaches the link: when it arrives at the other end, or nothing when it is dropped.
+  /// `now_ns` never goes back.
+  [[nodiscard]] std::optional<std::int64_t> offer(std::int64_t now_ns, std::size_t bytes) {
+    const std::int64_t starts_ns = free_ns_ > now_ns ? free_ns_ : now_ns;
+    if (starts_ns - now_ns > options_.queue_ns) {
+      ++dropped_;
+      return std::nullopt;
+    }
+    free_ns_ = starts_ns + static_cast<std::int64_t>(static_cast<double>(bytes) * 8e9 / options_.bits_per_s);
+    bytes_ += bytes;
+    return free_ns_ + options_.delay_ns;
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }      ///< let through so far
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< packets
+
+ private:
+  LinkOptions options_;
+  std::int64_t free_ns_ = 0;  // the last packet has left by then
+  std::uint64_t bytes_ = 0, dropped_ = 0;
+};
+
+}  // namespace tandem::tool
