@@ -23,6 +23,25 @@ constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
     {false, false},  // client status
 }};
 
+// About what DDS puts around a sample: headers of IP, UDP and RTPS, and its fields besides the payload.
+constexpr std::size_t kOverheadBytes = 150;
+
+struct PayloadBytes {
+  std::size_t operator()(const DeltaMessage& m) const { return m.payload.size(); }
+  std::size_t operator()(const SnapshotMessage& m) const { return m.bytes.size(); }
+  std::size_t operator()(const SessionMessage& m) const { return m.codec_tables.size(); }
+  std::size_t operator()(const InputMessage& m) const { return 8 * m.values.size() + m.bytes.size(); }
+  std::size_t operator()(const ReplyMessage& m) const { return 20 * m.entries.size(); }
+  template <class Small>
+  std::size_t operator()(const Small& /*m*/) const {
+    return 0;
+  }
+};
+
+std::size_t wire_bytes(const AnyMessage& message) {
+  return kOverheadBytes + std::visit(PayloadBytes{}, message);
+}
+
 std::pair<std::uint32_t, std::uint32_t> ordered(std::uint32_t a, std::uint32_t b) {
   return {std::min(a, b), std::max(a, b)};
 }
@@ -144,13 +163,22 @@ Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) 
 
 void Fabric::forget_history(Index writer) { writers_[writer].history.clear(); }
 
+std::optional<std::int64_t> Fabric::squeeze_ns(const LinkModel& model, const AnyMessage& message) const {
+  if (!model.bottleneck) return 0;
+  const auto arrives_ns = model.bottleneck->offer(now_ns_, wire_bytes(message));
+  return arrives_ns ? std::optional(*arrives_ns - now_ns_) : std::nullopt;
+}
+
 void Fabric::send(Index pair, const Sample& sample) {
   Pair& way = pairs_[pair];
   const Writer& writer = writers_[way.writer];
   const Index to = readers_[way.reader].participant;
   const LinkModel& model = link(writer.participant, to);
   Travelling travelling{sample, now_ns_ + model.delay_ns + random_.between(0, model.jitter_ns), false};
-  if (is_cut(writer.participant, to) || random_.chance(model.loss)) {
+  const bool lost = is_cut(writer.participant, to) || random_.chance(model.loss);
+  const auto squeezed_ns = lost ? std::nullopt : squeeze_ns(model, *sample.message);
+  travelling.due_ns += squeezed_ns.value_or(0);
+  if (!squeezed_ns) {
     if (!kRules[writer.topic].reliable) return;
     if (random_.chance(model.lost_for_good)) {
       ++counts_.lost_for_good;
@@ -222,6 +250,13 @@ bool Fabric::settle_front(Pair& pair, Index index) {
     if (participants_[writer.participant].frozen_ns != kNever || is_cut(writer.participant, to) ||
         random_.chance(model.loss)) {
       front.due_ns = now_ns_ + std::max<std::int64_t>(1, model.repair_ns);
+      schedule(index, front.due_ns);
+      return false;
+    }
+    const auto squeezed_ns = squeeze_ns(model, *front.sample.message);
+    if (!squeezed_ns || *squeezed_ns > 0) {
+      front.to_repair = !squeezed_ns;
+      front.due_ns = now_ns_ + squeezed_ns.value_or(std::max<std::int64_t>(1, model.repair_ns));
       schedule(index, front.due_ns);
       return false;
     }

@@ -154,6 +154,9 @@ class Fabric {
   void deliver(const Pair& pair, const Sample& sample);
   [[nodiscard]] bool keeps(const Writer& writer, const Sample& sample) const;
   [[nodiscard]] const LinkModel& link(Index from, Index to) const;
+  /// Through the path's bottleneck: how long that takes from now, or nothing when it is dropped there.
+  [[nodiscard]] std::optional<std::int64_t> squeeze_ns(const LinkModel& model,
+                                                       const AnyMessage& message) const;
   [[nodiscard]] bool is_cut(Index a, Index b) const;
   [[nodiscard]] bool gone(Index participant) const;
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "sdk/transport/port.hpp"
+#include "sdk/transport/simulated/bottleneck.hpp"
 
 namespace tandem::transport::simulated {
 
@@ -18,6 +19,9 @@ struct LinkModel {
   std::int64_t repair_ns =
       20'000'000;            ///< a lost sample of a reliable topic is sent again after this, if still kept
   double lost_for_good = 0;  ///< chance that a lost sample of a reliable topic is never repaired
+  /// What all samples have to pass, also those of other paths that name the same one; what it drops is lost.
+  /// Null: room for everything.
+  std::shared_ptr<Bottleneck> bottleneck = nullptr;
 };
 
 struct NetworkOptions {

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <sstream>
 
@@ -66,14 +67,14 @@ Result<void> prepare(FramerateOptions& options) {
   options.setup.link.delay_ns = std::llround(options.delay_ms * 1e6);
   options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
   options.setup.tandem = fs::read_symlink("/proc/self/exe").string();
-  if (!streams(options)) return {};
+  if (!streams(options) || options.setup.kind == LinkKind::kMemory) return {};
   options.setup.tandemd = options.tandemd.empty() ? find_server() : options.tandemd;
   if (access(options.setup.tandemd.c_str(), X_OK) != 0)
     return fail(ErrorCode::kInvalidArgument, "no tandemd found; say where it is with --server");
   if (const auto tried = make_enclave("10.77.0.1"); !tried) {
     return fail(ErrorCode::kIo,
-                fmt::format("cannot make a network of its own ({}): run it as root with /dev/net/tun; "
-                            "--method client-only needs neither",
+                fmt::format("cannot make a network of its own ({}): run it as root with /dev/net/tun, or "
+                            "take --link memory",
                             tried.error().message));
   }
   return {};
@@ -98,6 +99,7 @@ int run_framerate(FramerateOptions options) {
     const auto found = calibrate(options.setup, *device, kPhoneUpdatesPerS, tell);
     if (!found) return report(kCommand, found.error());
     calibration = *found;
+    options.setup.slowdown = found->slowdown;
   }
   std::vector<FramerateRow> rows;
   for (const scenes::Scene& scene : *scenes) {
@@ -160,6 +162,12 @@ void add_framerate(CLI::App& bench, Run& run) {
       ->capture_default_str();
   command->add_option("--seed", options->setup.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
+  command
+      ->add_option("--link", options->setup.kind,
+                   "namespaces: DDS between processes, as root; memory: one process, simulated time")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, LinkKind>{
+          {"namespaces", LinkKind::kNamespaces}, {"memory", LinkKind::kMemory}}))
+      ->default_str("namespaces");
   command->add_option("--rate", options->setup.link.bits_per_s, "Of the link, bit/s each way")
       ->check(CLI::Range(1e4, 1e10))
       ->capture_default_str();
@@ -173,7 +181,8 @@ void add_framerate(CLI::App& bench, Run& run) {
                       "The program tandemd (default: beside this one, or in PATH)");
   command->add_flag("--json", options->json, "One JSON object: device, rows[...]");
   command->footer(
-      "Needs root: server and users run in network namespaces of their own, joined by one link. The thin "
+      "Needs root unless with --link memory: server and users run in network namespaces of their own, joined "
+      "by one link. The thin "
       "device\n"
       "is given the share of a processor at which client-only makes the 4.4 updates/s of the thesis's "
       "phone.");

@@ -84,7 +84,8 @@ struct Packet {
 
 /// From one device to the other.
 struct Way {
-  Way(int from_fd, int to_fd, const LinkOptions& options) : from(from_fd), to(to_fd), link(options) {}
+  Way(int from_fd, int to_fd, const transport::simulated::BottleneckOptions& options)
+      : from(from_fd), to(to_fd), link(options) {}
 
   void take_in(std::span<char> buffer) {
     for (;;) {
@@ -106,7 +107,7 @@ struct Way {
   }
 
   int from, to;
-  LinkDirection link;
+  transport::simulated::Bottleneck link;
   std::deque<Packet> waiting;
   std::uint64_t refused = 0;
 };
@@ -129,7 +130,7 @@ Result<Enclave> make_enclave(const std::string& address) {
 }
 
 struct Link::State {
-  State(const Enclave& server, const Enclave& clients, const LinkOptions& options)
+  State(const Enclave& server, const Enclave& clients, const transport::simulated::BottleneckOptions& options)
       : there(server.device.get(), clients.device.get(), options),
         back(clients.device.get(), server.device.get(), options) {}
 
@@ -153,7 +154,8 @@ struct Link::State {
   Way there, back;
 };
 
-Link::Link(const Enclave& server, const Enclave& clients, const LinkOptions& options)
+Link::Link(const Enclave& server, const Enclave& clients,
+           const transport::simulated::BottleneckOptions& options)
     : state_(std::make_unique<State>(server, clients, options)),
       thread_([state = state_.get()](const std::stop_token& stop) { state->run(stop); }) {}
 Link::~Link() = default;

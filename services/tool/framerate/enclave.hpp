@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "services/tool/framerate/link.hpp"
+#include "sdk/transport/simulated/bottleneck.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::tool {
@@ -43,7 +43,7 @@ struct LinkCounts {
 /// Carries packets between the devices of two enclaves, which must outlive it, in a thread of its own.
 class Link {
  public:
-  Link(const Enclave& server, const Enclave& clients, const LinkOptions& options);
+  Link(const Enclave& server, const Enclave& clients, const transport::simulated::BottleneckOptions& options);
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;

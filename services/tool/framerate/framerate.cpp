@@ -142,7 +142,9 @@ void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& 
     if (!rate) row.missing = rate.error().message;
     return;
   }
-  if (const auto streamed = stream(setup, device, row); !streamed) row.missing = streamed.error().message;
+  const auto streamed =
+      setup.kind == LinkKind::kMemory ? play_in_memory(setup, row) : stream(setup, device, row);
+  if (!streamed) row.missing = streamed.error().message;
 }
 
 Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, double updates_per_s,
@@ -153,7 +155,7 @@ Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, d
   progress("thin device: client-only at full speed");
   const auto native = client_only(setup, nullptr, kScene, kBodies, 3);
   if (!native) return tl::unexpected(native.error());
-  Calibration found{updates_per_s / *native, 0};
+  Calibration found{.share = updates_per_s / *native};
   for (int i = 0; i < kMostTries; ++i) {
     if (auto set = device.set_share(found.share); !set) return tl::unexpected(set.error());
     progress(fmt::format("thin device: client-only with {:.1f} % of a processor", 100 * found.share));
@@ -161,6 +163,7 @@ Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, d
     const auto rate = client_only(setup, &device, kScene, kBodies, setup.seconds);
     if (!rate) return tl::unexpected(rate.error());
     found.updates_per_s = *rate;
+    found.slowdown = *native / *rate;
     const double off = *rate / updates_per_s;
     if (std::abs(off - 1) < 0.05) break;
     if (i + 1 < kMostTries) found.share = std::min(found.share / off, 1.0);

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "services/tool/framerate/link.hpp"
+#include "sdk/transport/simulated/bottleneck.hpp"
 #include "services/tool/framerate/thin_device.hpp"
 #include "tandem/result.hpp"
 
@@ -34,10 +34,18 @@ struct FramerateRow {
   std::string missing;                            ///< not empty: why nothing was measured
 };
 
+/// Where server and users meet.
+enum class LinkKind : std::uint8_t {
+  kNamespaces,  ///< DDS between processes in network namespaces: the real thing, for root only
+  kMemory,      ///< all in one process and in simulated time: for everybody, without what DDS costs
+};
+
 /// How all rows are measured.
 struct FramerateSetup {
   std::string tandem, tandemd;  ///< paths of the programs
-  LinkOptions link;
+  transport::simulated::BottleneckOptions link;
+  LinkKind kind = LinkKind::kNamespaces;
+  double slowdown = 1;  ///< kMemory: of the measured user's processor
   double seconds = 10;  ///< from the first update on
   std::uint64_t seed = 1;
   const std::atomic<bool>* stop = nullptr;  ///< ends a row early; must outlive the measurement
@@ -47,11 +55,17 @@ struct FramerateSetup {
 /// null. `row` says scene, users, bodies, method. Errors end up in `missing`.
 void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row);
 
+/// The server's and the users' programs in one thread, on a simulated network with the setup's link. Time is
+/// simulated: what a program computes takes as long as it takes here, times the slowdown for the first user.
+/// Fills the row as measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
+[[nodiscard]] Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row);
+
 /// Sets the device's share of a processor so that client-only makes `updates_per_s` of the paper's first
 /// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
 /// share. Errors: kIo.
 struct Calibration {
   double share = 1, updates_per_s = 0;
+  double slowdown = 1;  ///< against this machine's whole processor
 };
 [[nodiscard]] Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device,
                                             double updates_per_s,

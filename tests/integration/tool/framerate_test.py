@@ -27,7 +27,7 @@ class Framerate(unittest.TestCase):
         if not may_make_networks():
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertEqual(done.stdout, "")
-            self.assertIn("root", done.stderr)
+            self.assertIn("--link memory", done.stderr)
             return
         self.assertEqual(done.returncode, 0, done.stderr)
         client_only, streamed = json.loads(done.stdout)["rows"]
@@ -50,6 +50,13 @@ class Framerate(unittest.TestCase):
     def test_client_only_needs_no_network_of_its_own(self):
         done = run(*SMALL, "--method", "client-only", "--device", "native")
         self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_everybody_may_measure_in_memory(self):
+        done = run(*SMALL, "--method", "none,entropy", "--device", "native", "--link", "memory", "--rate", "1e6")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        none, entropy = json.loads(done.stdout)["rows"]
+        self.assertGreater(none["updates_per_s"], 0)
+        self.assertGreater(entropy["updates_per_s"], 4 * none["updates_per_s"], "the link is what bounds")
 
     def test_wrong_usage_is_named(self):
         done = run("--method", "telepathy")

@@ -9,35 +9,6 @@
 namespace tandem::tool {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
-
-TEST(LinkDirection, PacketsLeaveOneAfterTheOtherAtItsRate) {
-  LinkDirection link({.bits_per_s = 8e6, .delay_ns = 5 * kMs, .queue_ns = 50 * kMs});
-  EXPECT_EQ(link.offer(0, 1000), 6 * kMs) << "1 ms to leave, 5 ms on its way";
-  EXPECT_EQ(link.offer(0, 2000), 8 * kMs) << "waits for the first";
-  EXPECT_EQ(link.offer(100 * kMs, 1000), 106 * kMs) << "an idle link saves nothing up";
-  EXPECT_EQ(link.bytes(), 4000U);
-}
-
-TEST(LinkDirection, DropsWhatWouldWaitTooLongAndNothingElse) {
-  LinkDirection link({.bits_per_s = 8e6, .delay_ns = 0, .queue_ns = 50 * kMs});
-  int taken = 0;
-  while (link.offer(0, 1000)) ++taken;
-  EXPECT_EQ(taken, 51) << "the one that leaves, and 50 ms of others";
-  EXPECT_EQ(link.dropped(), 1U);
-  EXPECT_FALSE(link.offer(0, 1));
-  EXPECT_TRUE(link.offer(2 * kMs, 1000)) << "there is room as soon as packets have left";
-  EXPECT_EQ(link.dropped(), 2U);
-}
-
-TEST(LinkDirection, CarriesItsRateHoweverMuchIsOffered) {
-  LinkDirection link({});  // 15e6 bit/s, 50 ms
-  for (std::int64_t ms = 0; ms < 10'000; ++ms) {
-    for (int i = 0; i < 3; ++i) static_cast<void>(link.offer(ms * kMs, 1400));  // 33.6e6 bit/s
-  }
-  EXPECT_NEAR(8 * static_cast<double>(link.bytes()) / 10, 15e6, 0.01 * 15e6);
-}
-
 TEST(Framerate, RowsHaveTheAgreedFields) {
   FramerateRow row;
   row.scene = "half_pipe";

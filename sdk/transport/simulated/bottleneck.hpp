@@ -1,22 +1,23 @@
 #pragma once
 // One direction of a slow link, as arithmetic: no clock and no packets of its own.
+// Several paths of a simulated network may share one, as the users behind a home router do.
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 
-namespace tandem::tool {
+namespace tandem::transport::simulated {
 
-struct LinkOptions {
+struct BottleneckOptions {
   double bits_per_s = 15e6;
   std::int64_t delay_ns = 5'000'000;   ///< one way
   std::int64_t queue_ns = 50'000'000;  ///< what would wait longer than this for its turn is dropped
 };
 
 /// Packets leave one after the other at the link's rate and arrive a delay later.
-class LinkDirection {
+class Bottleneck {
  public:
-  explicit LinkDirection(const LinkOptions& options) : options_(options) {}
+  explicit Bottleneck(const BottleneckOptions& options) : options_(options) {}
 
   /// A packet of `bytes` reaches the link: when it arrives at the other end, or nothing when it is dropped.
   /// `now_ns` never goes back.
@@ -34,9 +35,9 @@ class LinkDirection {
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< packets
 
  private:
-  LinkOptions options_;
+  BottleneckOptions options_;
   std::int64_t free_ns_ = 0;  // the last packet has left by then
   std::uint64_t bytes_ = 0, dropped_ = 0;
 };
 
-}  // namespace tandem::tool
+}  // namespace tandem::transport::simulated
