@@ -50,6 +50,9 @@ TEST(Framerate, KnowsThePapersTable) {
   EXPECT_EQ(paper_updates_per_s(5, 10000, "limited"), 25.8);
   EXPECT_EQ(paper_updates_per_s(4, 5000, "client-only"), std::nullopt);
   EXPECT_EQ(paper_updates_per_s(1, 10000, "tracker"), std::nullopt);
+  EXPECT_EQ(paper_framerate_users(3), 1U);
+  EXPECT_EQ(paper_framerate_users(4), 4U);
+  EXPECT_EQ(paper_framerate_users(0), std::nullopt);
 }
 
 }  // namespace
