@@ -77,11 +77,6 @@ std::optional<double> paper_colliding_per_frame(int scene, std::uint32_t bodies)
   return line == nullptr ? std::nullopt : std::optional(line->colliding);
 }
 
-std::optional<std::uint32_t> paper_framerate_users(int scene) {
-  if (scene < 1 || scene > 5) return std::nullopt;
-  return scene < 4 ? 1 : 4;
-}
-
 std::optional<double> paper_updates_per_s(int scene, std::uint32_t bodies, std::string_view method) {
   const auto* const rates = std::find_if(kRates.begin(), kRates.end(), [&](const Rates& candidate) {
     return candidate.scene == scene && candidate.bodies == bodies;
@@ -90,12 +85,6 @@ std::optional<double> paper_updates_per_s(int scene, std::uint32_t bodies, std::
   if (rates == kRates.end() || column == kMethods.end()) return std::nullopt;
   const double value = rates->updates_per_s[static_cast<std::size_t>(column - kMethods.begin())];
   return value > 0 ? std::optional(value) : std::nullopt;
-}
-
-std::optional<std::uint32_t> paper_framerate_users(int scene) {
-  constexpr std::array<std::uint32_t, 5> kUsers{1, 1, 1, 4, 4};
-  if (scene < 1 || static_cast<std::size_t>(scene) > kUsers.size()) return std::nullopt;
-  return kUsers[static_cast<std::size_t>(scene) - 1];
 }
 
 }  // namespace tandem::tool
