@@ -77,6 +77,11 @@ std::optional<double> paper_colliding_per_frame(int scene, std::uint32_t bodies)
   return line == nullptr ? std::nullopt : std::optional(line->colliding);
 }
 
+std::optional<std::uint32_t> paper_framerate_users(int scene) {
+  if (scene < 1 || scene > 5) return std::nullopt;
+  return scene < 4 ? 1 : 4;
+}
+
 std::optional<double> paper_updates_per_s(int scene, std::uint32_t bodies, std::string_view method) {
   const auto* const rates = std::find_if(kRates.begin(), kRates.end(), [&](const Rates& candidate) {
     return candidate.scene == scene && candidate.bodies == bodies;
