@@ -32,6 +32,8 @@ class Child {
   ~Child();
 
   [[nodiscard]] pid_t pid() const { return pid_; }
+  /// Processor time of all its threads, after finish().
+  [[nodiscard]] double cpu_ms() const { return cpu_ms_; }
   /// Waits for its end; what it printed. Errors: kIo, when it takes longer than that, exits with an error, or
   /// `stop` is set meanwhile.
   Result<std::string> finish(std::chrono::seconds at_most, const std::atomic<bool>& stop);
@@ -42,6 +44,7 @@ class Child {
 
   pid_t pid_;
   Descriptor out_;
+  double cpu_ms_ = 0;
 };
 
 }  // namespace tandem::tool

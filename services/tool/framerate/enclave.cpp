@@ -11,10 +11,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <deque>
+#include <iterator>
 #include <span>
 #include <utility>
 #include <vector>
@@ -82,6 +84,13 @@ struct Packet {
   std::vector<char> bytes;
 };
 
+/// What was let through by a moment.
+struct Mark {
+  std::int64_t at_ns = 0;
+  std::uint64_t bytes_there = 0, bytes_back = 0;
+};
+constexpr std::int64_t kMarkEveryNs = 100'000'000;
+
 /// From one device to the other.
 struct Way {
   Way(int from_fd, int to_fd, const transport::simulated::BottleneckOptions& options)
@@ -138,6 +147,9 @@ struct Link::State {
     std::vector<char> buffer(kMostPacketBytes);
     while (!stop.stop_requested()) {
       std::int64_t wait_ns = 20'000'000;  // how late a stop may be noticed
+      if (const std::int64_t now_ns = steady_ns();
+          marks.empty() || now_ns - marks.back().at_ns > kMarkEveryNs)
+        marks.push_back({now_ns, there.link.bytes(), back.link.bytes()});
       for (Way* way : {&there, &back}) {
         way->take_in(buffer);
         way->give_out();
@@ -151,7 +163,15 @@ struct Link::State {
     }
   }
 
+  /// The last mark not after `at_ns`, or nothing carried yet.
+  [[nodiscard]] Mark at(std::int64_t at_ns) const {
+    const auto after =
+        std::find_if(marks.begin(), marks.end(), [&](const Mark& mark) { return mark.at_ns > at_ns; });
+    return after == marks.begin() ? Mark{} : *std::prev(after);
+  }
+
   Way there, back;
+  std::vector<Mark> marks;  // for at most minutes
 };
 
 Link::Link(const Enclave& server, const Enclave& clients,
@@ -159,11 +179,12 @@ Link::Link(const Enclave& server, const Enclave& clients,
     : state_(std::make_unique<State>(server, clients, options)),
       thread_([state = state_.get()](const std::stop_token& stop) { state->run(stop); }) {}
 Link::~Link() = default;
-LinkCounts Link::finish() {
+LinkCounts Link::finish(double seconds) {
   thread_.request_stop();
   if (thread_.joinable()) thread_.join();
   const State& state = *state_;
-  return {state.there.link.bytes(), state.back.link.bytes(),
+  const Mark before = state.at(steady_ns() - static_cast<std::int64_t>(seconds * 1e9));
+  return {state.there.link.bytes() - before.bytes_there, state.back.link.bytes() - before.bytes_back,
           state.there.link.dropped() + state.back.link.dropped()};
 }
 

@@ -47,8 +47,8 @@ class Link {
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
-  /// Stops it; what it carried.
-  LinkCounts finish();
+  /// Stops it; what it carried in its last `seconds`, and dropped in all its time.
+  LinkCounts finish(double seconds);
 
  private:
   struct State;

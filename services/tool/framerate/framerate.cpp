@@ -32,7 +32,8 @@ std::string dds_config(const char* peer) {
       peer);
 }
 
-/// Runs a program to its end, as the measured user, and reads the JSON object it prints.
+/// Runs a program to its end, as the measured user; the JSON object it prints, and its processor time in
+/// that.
 Result<Json> run(const FramerateSetup& setup, const std::vector<std::string>& arguments, ChildPlace place,
                  ThinDevice* device) {
   const auto at_most = kStart + std::chrono::seconds(std::llround(2 * setup.seconds));
@@ -45,6 +46,7 @@ Result<Json> run(const FramerateSetup& setup, const std::vector<std::string>& ar
   if (!said) return fail(said.error().code, fmt::format("{}: {}", arguments[1], said.error().message));
   Json parsed = Json::parse(*said, nullptr, false);
   if (parsed.is_discarded()) return fail(ErrorCode::kIo, arguments[1] + " printed no JSON");
+  parsed["cpu_ms"] = child->cpu_ms();
   return parsed;
 }
 
@@ -104,11 +106,12 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device, FramerateRo
     others.push_back(std::move(*other));
   }
   const auto json = run(setup, user_command(setup, setup.seconds), at_users, device);
-  const LinkCounts carried = link.finish();
+  const LinkCounts carried = link.finish(setup.seconds);
   if (!json) return tl::unexpected(json.error());
   row.updates_per_s = (*json)["frames_applied"].get<double>() / setup.seconds;
   row.client_ms_p50 = (*json)["client_ms"]["p50"].get<double>();
   row.latency_ms_p50 = (*json)["latency_ms"]["p50"].get<double>();
+  row.client_cpu_ms = (*json)["cpu_ms"].get<double>() / (*json)["frames_applied"].get<double>();
   row.resyncs = (*json)["resyncs"].get<std::uint64_t>();
   row.link_mbit_per_s = static_cast<double>(carried.bytes_there) * 8 / kBitsPerMbit / setup.seconds;
   row.dropped = carried.dropped;
@@ -132,6 +135,7 @@ std::optional<double> in_paper(const FramerateRow& row) {
 
 void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row) {
   row.device = device == nullptr ? "native" : "thin";
+  row.seconds = setup.seconds;
   if (row.method == kClientOnly) {
     if (row.users > 1) {
       row.missing = "without a server there is one user";
@@ -183,6 +187,8 @@ std::string to_json(std::span<const FramerateRow> rows, const std::string& devic
                     {"device", row.device},
                     {"updates_per_s", row.missing.empty() ? Json(row.updates_per_s) : Json(nullptr)},
                     {"paper_updates_per_s", optional(in_paper(row))},
+                    {"seconds", row.seconds},
+                    {"client_cpu_ms", optional(row.client_cpu_ms)},
                     {"client_ms_p50", optional(row.client_ms_p50)},
                     {"latency_ms_p50", optional(row.latency_ms_p50)},
                     {"link_mbit_per_s", optional(row.link_mbit_per_s)},

@@ -26,9 +26,11 @@ struct FramerateRow {
   std::uint32_t users = 1, bodies = 0;
   std::string method;  ///< client-only, or a codec
   std::string device;  ///< native or thin
+  double seconds = 0;  ///< that were measured
   double updates_per_s = 0;
   // With a server:
   std::optional<double> client_ms_p50, latency_ms_p50;
+  std::optional<double> client_cpu_ms;            ///< an update; DDS, start and snapshot included
   std::optional<double> link_mbit_per_s;          ///< to all users together, 2^20 bits, with all protocol
   std::optional<std::uint64_t> dropped, resyncs;  ///< packets the link's queue had no room for; rejoins
   std::string missing;                            ///< not empty: why nothing was measured

@@ -33,6 +33,8 @@ Result<void> write_text(const fs::path& path, const std::string& text) {
 class ControlGroup final : public ThinDevice {
  public:
   ControlGroup(fs::path path, bool unified) : path_(std::move(path)), unified_(unified) {}
+  ControlGroup(const ControlGroup&) = delete;
+  ControlGroup& operator=(const ControlGroup&) = delete;
   ~ControlGroup() override {
     // A process that was killed a moment ago may still be in it.
     std::error_code error;
@@ -60,6 +62,9 @@ class ControlGroup final : public ThinDevice {
 
 class StopAndGo final : public ThinDevice {
  public:
+  StopAndGo() = default;
+  StopAndGo(const StopAndGo&) = delete;
+  StopAndGo& operator=(const StopAndGo&) = delete;
   ~StopAndGo() override { end(); }
   [[nodiscard]] std::string name() const override { return "SIGSTOP and SIGCONT"; }
   [[nodiscard]] std::string procs() const override { return {}; }
