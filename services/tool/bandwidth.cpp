@@ -179,7 +179,7 @@ BandwidthRow row_of(Lane& lane, double frames) {
 
 /// A peer at work.
 struct PeerLane {
-  const PeerKind* kind;
+  const PeerKind* kind = nullptr;
   std::unique_ptr<Peer> peer;
   std::array<std::vector<double>, 3> seen;
   std::vector<std::uint32_t> bytes;
@@ -272,6 +272,7 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
 
   const double step_ms = step.median();
   std::vector<BandwidthRow> rows;
+  rows.reserve(lanes.size() + peers.size());
   for (Lane& lane : lanes) rows.push_back(row_of(lane, static_cast<double>(frames)));
   for (PeerLane& peer : peers) rows.push_back(row_of(peer, dt_s));
   const auto contacts = std::accumulate(colliding.begin(), colliding.end(), std::uint64_t{0});

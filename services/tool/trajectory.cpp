@@ -199,18 +199,18 @@ Result<void> RecordedTrajectory::open_npy(const std::string& path) {
   if (!file_) return malformed("the header is cut off");
   data_offset_ = file_.tellg();
 
-  static const std::regex kType(R"('descr'\s*:\s*'([^']*)')");
-  static const std::regex kOrder(R"('fortran_order'\s*:\s*False)");
-  static const std::regex kShape(R"('shape'\s*:\s*\(([^)]*)\))");
-  static const std::regex kRowsBodies(R"(\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*6\s*,?\s*)");
+  static const std::regex type_pattern(R"('descr'\s*:\s*'([^']*)')");
+  static const std::regex order_pattern(R"('fortran_order'\s*:\s*False)");
+  static const std::regex shape_pattern(R"('shape'\s*:\s*\(([^)]*)\))");
+  static const std::regex size_pattern(R"(\s*(\d{1,9})\s*,\s*(\d{1,9})\s*,\s*6\s*,?\s*)");
   std::smatch match;
-  if (!std::regex_search(text, match, kType) || match[1] != "<f4") {
+  if (!std::regex_search(text, match, type_pattern) || match[1] != "<f4") {
     return malformed(match.empty() ? "no single 'descr'" : fmt::format("the type is '{}'", match[1].str()));
   }
-  if (!std::regex_search(text, kOrder)) return malformed("the order is Fortran's");
-  if (!std::regex_search(text, match, kShape)) return malformed("no 'shape'");
+  if (!std::regex_search(text, order_pattern)) return malformed("the order is Fortran's");
+  if (!std::regex_search(text, match, shape_pattern)) return malformed("no 'shape'");
   const std::string shape = match[1];
-  if (!std::regex_match(shape, match, kRowsBodies)) {
+  if (!std::regex_match(shape, match, size_pattern)) {
     return malformed(fmt::format("the shape is ({})", shape));
   }
   rows_ = std::stoull(match[1]);
