@@ -103,14 +103,18 @@ Result<void> Tracker::parse_block(const Block& block, std::span<const std::uint8
   models = models_[block.index];
   RangeDecoder coder(bytes);
   const std::size_t first = count_;
-  bool previous = false;
+  std::size_t count = count_;
+  std::uint32_t previous = 0;
   bool good = true;
   for_each_body(block, alive, [&](Slot slot, bool renewed, std::uint32_t flag) {
-    previous = coder.code(false, models.flag[flag + static_cast<std::uint32_t>(previous)]);
-    if (!previous) return;
-    good &= code_steps(coder, models, context(slot, renewed, threshold_), steps_[count_]);
-    corrected_[count_++] = slot;
+    previous = static_cast<std::uint32_t>(coder.code(false, models.flag[flag + previous]));
+    if (previous == 0) return;
+    RangeDecoder values = coder;  // a copy, so that the call leaves `coder` in registers
+    good &= code_steps(values, models, context(slot, renewed, threshold_), steps_[count]);
+    coder = values;
+    corrected_[count++] = slot;
   });
+  count_ = count;
   if (!good) return fail(ErrorCode::kMalformed, "correction beyond any lattice");
   if (!coder.at_end()) return fail(ErrorCode::kMalformed, "bytes after the code stream");
   if (count_ == first) return fail(ErrorCode::kMalformed, "corrections section without a body");
@@ -133,7 +137,8 @@ void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
   }
   for (const Slot slot : renewed_) age[slot] = std::byte{0xFF};
   // 255 wraps to 0; what was 254 stays there.
-  for (std::uint32_t slot = 0; slot < capacity_; ++slot) {
+  const std::uint32_t slots = capacity_;  // a local, as in mark_suspects()
+  for (std::uint32_t slot = 0; slot < slots; ++slot) {
     const auto was = std::to_integer<std::uint8_t>(age[slot]);
     const auto older = static_cast<std::uint8_t>(was + (was != kMostAge - 1 ? 1 : 0));
     age[slot] = static_cast<std::byte>(alive[slot] != 0 ? older : 0);

@@ -84,13 +84,22 @@ class Tracker final : public Codec {
 
 template <class F>
 void Tracker::for_each_body(const Block& block, std::span<const std::uint8_t> alive, F&& f) const {
-  auto renewed = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
-  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
-    const bool is_renewed = renewed != renewed_.end() && *renewed == slot;
+  const auto first = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
+  const Slot* renewed = renewed_.data() + (first - renewed_.begin());
+  const Slot* const renewed_end = renewed_.data() + renewed_.size();
+  // Locals, because f writes bytes, which could be any member for all a compiler knows.
+  const std::byte* const age = bodies_.data();
+  const std::byte* const interval = age + capacity_;
+  const std::uint8_t* const living = alive.data();
+  const Slot end = block.first + block.slots;
+  for (Slot slot = block.first; slot < end; ++slot) {
+    const bool is_renewed = renewed != renewed_end && *renewed == slot;
     if (is_renewed) ++renewed;
-    if (alive[slot] == 0) continue;
+    if (living[slot] == 0) continue;
     f(slot, is_renewed,
-      is_renewed ? flag_context(0, 0) : flag_context(remembered(0, slot), remembered(1, slot)));
+      is_renewed ? flag_context(0, 0)
+                 : flag_context(std::to_integer<std::uint8_t>(age[slot]),
+                                std::to_integer<std::uint8_t>(interval[slot])));
   }
 }
 

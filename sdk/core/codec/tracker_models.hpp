@@ -50,10 +50,55 @@ extern const std::array<std::uint8_t, 256> kTrackerAgeBuckets;
   return (kTrackerAgeBuckets[age + 1U] * TrackerModels::kAges + kTrackerAgeBuckets[interval]) * 2U;
 }
 
+namespace tracker_detail {
+
+// 0: below -limit, 1: between, 2: above. Sums of comparisons, because branches would be hard to guess.
+inline std::uint32_t side(std::int32_t value, std::int32_t limit) {
+  return 1U + static_cast<std::uint32_t>(value > limit) - static_cast<std::uint32_t>(value < -limit);
+}
+
+inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+  return static_cast<std::uint32_t>(count > a) + static_cast<std::uint32_t>(count > b) +
+         static_cast<std::uint32_t>(count > c);
+}
+
+}  // namespace tracker_detail
+
 /// The rest of a corrected body's context. `v`, `c`: of its predicted state; zero for a body renewed in this
 /// frame.
-[[nodiscard]] TrackerContext value_context(const TrackerBody& body, const Vec3i& v, const Vec3i& c,
-                                           std::int32_t threshold);
+[[nodiscard]] inline TrackerContext value_context(const TrackerBody& body, const Vec3i& v, const Vec3i& c,
+                                                  std::int32_t threshold) {
+  using tracker_detail::bucket;
+  using tracker_detail::side;
+  TrackerContext context;
+  const std::uint32_t k = body.age + 1U;
+  const std::uint32_t short_age = bucket(k, 2, 4, 8) + static_cast<std::uint32_t>(k > 20);
+  context.zero = short_age * TrackerModels::kIntervals + bucket(body.interval, 2, 6, 20);
+  context.magnitude = bucket(k, 1, 4, 20);
+  const std::uint32_t sign_age = bucket(k, 2, 6, 20);
+  // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
+  const std::int32_t slow = threshold + threshold / 4;
+  const std::int32_t faint = threshold / 32;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::uint32_t last = side(body.steps[axis], 0);
+    context.moved_last[axis] = static_cast<std::uint32_t>(body.steps[axis] != 0);
+    const std::uint32_t seen = (last * 3 + side(c[axis], faint)) * 3 + side(v[axis], slow);
+    context.sign[axis] =
+        (static_cast<std::uint32_t>(axis) * 27 + seen) * TrackerModels::kIntervals + sign_age;
+  }
+  return context;
+}
+
+/// Index of "is this axis untouched", after `moved` axes that are not.
+[[nodiscard]] inline std::uint32_t zero_model(const TrackerContext& context, std::uint32_t axis,
+                                              std::uint32_t moved) {
+  return ((axis * TrackerModels::kShortAges * TrackerModels::kIntervals + context.zero) * 3 + moved) * 2 +
+         context.moved_last[axis];
+}
+/// Index of "is it longer than 1", after `moved` axes that are not zero; those of longer ones follow it.
+[[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t moved) {
+  return (context.magnitude * 3 + moved) * TrackerModels::kUnary;
+}
 
 /// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
 /// returning the bit; for a decoder the argument means nothing and `steps` is filled. False: a decoder read
@@ -89,23 +134,23 @@ bool code_axis(Coder& coder, Models& models, const TrackerContext& context, std:
   const std::int32_t wanted = steps;
   const bool is_last_hope = axis == 2 && moved == 0;
   if (!is_last_hope) {
-    const std::uint32_t at =
-        ((axis * TrackerModels::kShortAges * TrackerModels::kIntervals + context.zero) * 3 + moved) * 2 +
-        context.moved_last[axis];
-    if (!coder.code(wanted != 0, models.zero[at])) {
+    if (!coder.code(wanted != 0, models.zero[zero_model(context, axis, moved)])) {
       steps = 0;
       return true;
     }
   }
   const bool negative = coder.code(wanted < 0, models.sign[context.sign[axis]]);
   const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
-  const std::uint32_t base = (context.magnitude * 3 + moved) * TrackerModels::kUnary;
+  const std::uint32_t base = magnitude_model(context, moved);
   std::uint32_t size = 1;
   while (size <= TrackerModels::kUnary && coder.code(length > size, models.magnitude[base + size - 1]))
     ++size;
   if (size > TrackerModels::kUnary) {
     std::uint32_t beyond = length > TrackerModels::kUnary ? length - TrackerModels::kUnary - 1 : 0;
-    if (!tracker_detail::code_escape(coder, models, beyond)) return false;
+    Coder rare = coder;  // a copy, so that a call that is not inlined leaves `coder` in registers
+    const bool good = tracker_detail::code_escape(rare, models, beyond);
+    coder = rare;
+    if (!good) return false;
     size = TrackerModels::kUnary + 1 + beyond;
   }
   steps = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
@@ -114,12 +159,15 @@ bool code_axis(Coder& coder, Models& models, const TrackerContext& context, std:
 
 template <class Coder, class Models>
 bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps) {
+  Coder local = coder;  // in registers: models are written through pointers in between
   std::uint32_t moved = 0;
-  for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    if (!code_axis(coder, models, context, axis, moved, steps[axis])) return false;
+  bool good = true;
+  for (std::uint32_t axis = 0; axis < 3 && good; ++axis) {
+    good = code_axis(local, models, context, axis, moved, steps[axis]);
     moved += static_cast<std::uint32_t>(steps[axis] != 0);
   }
-  return true;
+  coder = local;
+  return good;
 }
 
 }  // namespace tandem

@@ -40,12 +40,17 @@ constexpr auto kBits = [] {
   return table;
 }();
 
-// Adds up what decisions would cost, in 1/256 bits.
+// What a decision would cost, in 1/256 bits.
+std::uint32_t cost_of(bool bit, const AdaptiveBit& model) {
+  const std::uint32_t p1 = model.p1() >> 4U;
+  return kBits[bit ? p1 : 4095U - p1];
+}
+
+// Adds up what decisions would cost.
 struct CostCoder {
   std::uint32_t cost = 0;
   bool code(bool bit, const AdaptiveBit& model) {
-    const std::uint32_t p1 = model.p1() >> 4U;
-    cost += kBits[bit ? p1 : 4095U - p1];
+    cost += cost_of(bit, model);
     return bit;
   }
   bool code_even(bool bit) {
@@ -61,121 +66,140 @@ std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
   return to < from ? -q : q;
 }
 
-// What the two values on either side of the residual leave over on each axis, so that the eight points are
-// sums of table entries, and what they cost, found out when first asked for: few lie inside the error ball.
-// (The third value around the nearest, on its far side, does not pay: RESEARCH.md.)
+// The two values on either side of the residual on each axis, what they leave over and what they cost, so
+// that the eight points are sums of table entries. All are filled, used or not: almost no branch that is hard
+// to guess. (The third value around the nearest, on its far side, does not pay: RESEARCH.md.)
 class Choices {
  public:
   Choices(const TrackerModels& models, const TrackerContext& context, const TrackerSteps& lower)
-      : models_(&models), context_(&context), lower_(lower) {
-    for (auto& axis : cost_) {
-      for (auto& moved : axis) moved.fill(kUnknown);
-    }
+      : lower_(lower) {
+    const Lengths lengths = length_costs(models, context);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) fill_costs(models, context, lengths, axis);
   }
 
   void fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
                    std::int64_t threshold);
+  /// The cheapest point within the error ball; false: there is none.
+  bool cheapest(const ErrorWorth& worth, TrackerSteps& steps) const;
+
+ private:
+  static constexpr std::uint64_t kOutside = std::uint64_t{1} << 61U;  // three of them do not overflow
+  // Costs of the lengths 1 and 2 after so many axes that are not zero.
+  using Lengths = std::array<std::array<std::uint32_t, 2>, 3>;
+
+  static Lengths length_costs(const TrackerModels& models, const TrackerContext& context) {
+    Lengths lengths{};
+    for (std::uint32_t moved = 0; moved < 3; ++moved) {
+      const AdaptiveBit* longer = &models.magnitude[magnitude_model(context, moved)];
+      lengths[moved] = {cost_of(false, longer[0]), cost_of(true, longer[0]) + cost_of(false, longer[1])};
+    }
+    return lengths;
+  }
+  void fill_costs(const TrackerModels& models, const TrackerContext& context, const Lengths& lengths,
+                  std::uint32_t axis);
   [[nodiscard]] std::int32_t value(std::size_t axis, std::size_t i) const {
     return lower_[axis] + static_cast<std::int32_t>(i);
   }
-  /// Error squared on one axis: of the unit of long steps (0), or of small ones with 1, 2, 3 axes moved.
-  [[nodiscard]] std::uint64_t error(std::size_t unit, std::size_t axis, std::size_t i) const {
-    return error_[unit][axis][i];
-  }
-  /// The least of the four.
-  [[nodiscard]] std::uint64_t least_error(std::size_t axis, std::size_t i) const { return least_[axis][i]; }
-  /// In 1/256 bits, after `moved` axes that are not zero.
-  [[nodiscard]] std::uint32_t cost(std::uint32_t axis, std::uint32_t moved, std::size_t i) {
-    std::uint32_t& cost = cost_[axis][moved][i];
-    if (cost == kUnknown) {
-      CostCoder coder;
-      std::int32_t steps = value(axis, i);
-      code_axis(coder, *models_, *context_, axis, moved, steps);
-      cost = coder.cost;
-    }
-    return cost;
-  }
 
- private:
-  static constexpr std::uint32_t kUnknown = UINT32_MAX;
-  static constexpr std::uint64_t kOutside = std::uint64_t{1} << 62U;  // three of them do not overflow
-
-  const TrackerModels* models_;
-  const TrackerContext* context_;
   TrackerSteps lower_;
+  // Error squared on one axis: of the unit of long steps (0), or of small ones with 1, 2, 3 axes moved.
   std::array<std::array<std::array<std::uint64_t, 2>, 3>, 4> error_{};
-  std::array<std::array<std::uint64_t, 2>, 3> least_{};
+  // In 1/256 bits, [axis][earlier axes that are not zero].
   std::array<std::array<std::array<std::uint32_t, 2>, 3>, 3> cost_{};
 };
 
-void Choices::fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
-                          std::int64_t threshold) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+void Choices::fill_costs(const TrackerModels& models, const TrackerContext& context, const Lengths& lengths,
+                         std::uint32_t axis) {
+  const AdaptiveBit& sign = models.sign[context.sign[axis]];
+  for (std::uint32_t moved = 0; moved <= axis; ++moved) {
+    std::array<std::uint32_t, 2> is_moved{0, 0};
+    if (axis != 2 || moved != 0) {
+      const AdaptiveBit& zero = models.zero[zero_model(context, axis, moved)];
+      is_moved = {cost_of(false, zero), cost_of(true, zero)};
+    }
     for (std::size_t i = 0; i < 2; ++i) {
-      const std::int64_t steps = value(axis, i);
-      std::uint64_t least = kOutside;
-      for (std::size_t unit = 0; unit < 4; ++unit) {
-        const std::int64_t one = unit == 0 ? steppings.step() : steppings.small(unit);
-        const std::int64_t off = d[axis] - std::clamp(steps * one, -kMostDistance, kMostDistance);
-        const bool inside = -threshold <= off && off <= threshold;
-        error_[unit][axis][i] = inside ? static_cast<std::uint64_t>(off * off) : kOutside;
-        least = std::min(least, error_[unit][axis][i]);
+      std::int32_t steps = value(axis, i);
+      if (steps < -2 || steps > 2) {
+        CostCoder coder;
+        code_axis(coder, models, context, axis, moved, steps);
+        cost_[axis][moved][i] = coder.cost;
+        continue;
       }
-      least_[axis][i] = least;
+      const std::uint32_t length = lengths[moved][steps == 2 || steps == -2 ? 1 : 0];
+      cost_[axis][moved][i] = steps == 0 ? is_moved[0] : is_moved[1] + cost_of(steps < 0, sign) + length;
     }
   }
 }
 
-}  // namespace
-
-bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
-                  std::int32_t threshold, const TrackerModels& models, const TrackerContext& context,
-                  TrackerSteps& steps) {
-  std::array<std::int64_t, 3> d{};
-  TrackerSteps middle{};
-  TrackerSteps lower{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    d[i] = std::int64_t{to[i]} - from[i];
-    middle[i] = nearest(from[i], to[i], steppings.step());
-    lower[i] = middle[i] - (std::int64_t{middle[i]} * steppings.step() > d[i] ? 1 : 0);
-  }
-  const auto limit = static_cast<std::uint64_t>(threshold) * static_cast<std::uint64_t>(threshold);
-  // error^2 / threshold^2 without a division for each: both shifted to 24 bits, then times a reciprocal.
-  const auto shift = static_cast<unsigned>(std::max(0, static_cast<int>(std::bit_width(limit)) - 24));
-  const std::uint64_t worth = (kErrorWorth * 256U << 24U) / (limit >> shift);
-
-  Choices choices(models, context, lower);
-  choices.fill_errors(steppings, d, threshold);
-  std::uint64_t best = UINT64_MAX;
-  steps = middle;
-  for (std::size_t x = 0; x < 2; ++x) {
-    const std::uint64_t least_x = choices.least_error(0, x);
-    if (least_x > limit) continue;
-    for (std::size_t y = 0; y < 2; ++y) {
-      const std::uint64_t least_xy = least_x + choices.least_error(1, y);
-      if (least_xy > limit) continue;
-      for (std::size_t z = 0; z < 2; ++z) {
-        if (least_xy + choices.least_error(2, z) > limit) continue;
-        const TrackerSteps tried{choices.value(0, x), choices.value(1, y), choices.value(2, z)};
-        const std::uint32_t before_y = tried[0] != 0 ? 1U : 0U;
-        const std::uint32_t before_z = before_y + (tried[1] != 0 ? 1U : 0U);
-        const std::uint32_t moved = before_z + (tried[2] != 0 ? 1U : 0U);
-        if (moved == 0) continue;
-        const auto is_long = [](std::int32_t value) { return value < -1 || value > 1; };
-        const std::size_t unit = is_long(tried[0]) || is_long(tried[1]) || is_long(tried[2]) ? 0 : moved;
-        const std::uint64_t error =
-            choices.error(unit, 0, x) + choices.error(unit, 1, y) + choices.error(unit, 2, z);
-        if (error > limit) continue;
-        const std::uint64_t cost = choices.cost(0, 0, x) + choices.cost(1, before_y, y) +
-                                   choices.cost(2, before_z, z) + (((error >> shift) * worth) >> 24U);
-        if (cost < best) {
-          best = cost;
-          steps = tried;
-        }
+void Choices::fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
+                          std::int64_t threshold) {
+  for (std::size_t unit = 0; unit < 4; ++unit) {
+    const std::int64_t one = unit == 0 ? steppings.step() : steppings.small(unit);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        const std::int64_t off = d[axis] - std::clamp(value(axis, i) * one, -kMostDistance, kMostDistance);
+        const bool inside = -threshold <= off && off <= threshold;
+        // The product of values outside may wrap; it is not used.
+        const auto size = static_cast<std::uint64_t>(off);
+        error_[unit][axis][i] = inside ? size * size : kOutside;
       }
     }
   }
-  return best != UINT64_MAX;
+}
+
+bool Choices::cheapest(const ErrorWorth& worth, TrackerSteps& steps) const {
+  std::array<std::array<std::uint32_t, 2>, 3> moves{};
+  std::array<std::array<bool, 2>, 3> is_long{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::int32_t v = value(axis, i);
+      moves[axis][i] = static_cast<std::uint32_t>(v != 0);
+      is_long[axis][i] = v < -1 || v > 1;
+    }
+  }
+  std::uint64_t best = UINT64_MAX;
+  std::size_t best_point = 0;
+  for (std::size_t point = 0; point < 8; ++point) {
+    const std::size_t x = point >> 2U;
+    const std::size_t y = (point >> 1U) & 1U;
+    const std::size_t z = point & 1U;
+    const std::uint32_t before_y = moves[0][x];
+    const std::uint32_t before_z = before_y + moves[1][y];
+    const std::uint32_t moved = before_z + moves[2][z];
+    const std::size_t unit = (is_long[0][x] | is_long[1][y] | is_long[2][z]) ? 0 : moved;
+    const std::uint64_t error = error_[unit][0][x] + error_[unit][1][y] + error_[unit][2][z];
+    const std::uint64_t cost = std::uint64_t{cost_[0][0][x]} + cost_[1][before_y][y] + cost_[2][before_z][z] +
+                               (((error >> worth.shift) * worth.worth) >> 24U);
+    const std::uint64_t counted = moved != 0 && error <= worth.limit ? cost : UINT64_MAX;
+    best_point = counted < best ? point : best_point;
+    best = std::min(counted, best);
+  }
+  if (best == UINT64_MAX) return false;
+  steps = {value(0, best_point >> 2U), value(1, (best_point >> 1U) & 1U), value(2, best_point & 1U)};
+  return true;
+}
+
+}  // namespace
+
+ErrorWorth::ErrorWorth(std::int32_t e)
+    : threshold(e),
+      limit(static_cast<std::uint64_t>(e) * static_cast<std::uint64_t>(e)),
+      shift(static_cast<unsigned>(std::max(0, static_cast<int>(std::bit_width(limit)) - 24))),
+      worth((kErrorWorth * 256U << 24U) / (limit >> shift)) {}
+
+bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
+                  const ErrorWorth& worth, const TrackerModels& models, const TrackerContext& context,
+                  TrackerSteps& steps) {
+  std::array<std::int64_t, 3> d{};
+  TrackerSteps lower{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    d[i] = std::int64_t{to[i]} - from[i];
+    steps[i] = nearest(from[i], to[i], steppings.step());
+    lower[i] = steps[i] - (std::int64_t{steps[i]} * steppings.step() > d[i] ? 1 : 0);
+  }
+  Choices choices(models, context, lower);
+  choices.fill_errors(steppings, d, worth.threshold);
+  return choices.cheapest(worth, steps);
 }
 
 TrackerSearch::TrackerSearch(std::uint32_t capacity)
@@ -260,6 +284,7 @@ bool TrackerSearch::write_block(Tracker& tracker, const State& target, const Blo
   TrackerModels& models = tracker.work_[block.index];
   models = tracker.models_[block.index];
   const TrackerSteppings steppings(threshold_);
+  const ErrorWorth worth(threshold_);
   const std::span<std::byte> rest = out.subspan(size_bytes);
   const std::size_t header = std::min(kHeaderBytes, rest.size());
   RangeEncoder coder(rest.subspan(header));
@@ -274,14 +299,16 @@ bool TrackerSearch::write_block(Tracker& tracker, const State& target, const Blo
       const Candidate& candidate = candidates_[at++];
       if (candidate.must ? candidate.rank < limit : early && model.p1() > kEarlyProbability) {
         context = tracker.context(slot, renewed, threshold_);
-        const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, threshold_,
+        const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth,
                                          models, context, steps);
         previous = inside || (candidate.must && steps != TrackerSteps{});
       }
     }
     coder.code(previous, model);
     if (!previous) return;
-    code_steps(coder, models, context, steps);
+    RangeEncoder values = coder;  // a copy, so that the call leaves `coder` in registers
+    code_steps(values, models, context, steps);
+    coder = values;
     tracker.corrected_[tracker.count_] = slot;
     tracker.steps_[tracker.count_++] = steps;
   });

@@ -45,11 +45,20 @@ class TrackerSearch {
   std::int32_t threshold_ = 1;
 };
 
-/// Steps that correct `d` (lattice units) at least cost: of the 27 around the nearest that leave an error of
-/// at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none does; `steps`
-/// is then the nearest.
+/// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.
+struct ErrorWorth {
+  explicit ErrorWorth(std::int32_t e);
+  std::int64_t threshold;
+  std::uint64_t limit;  ///< threshold squared
+  unsigned shift;       ///< limit >> shift has at most 24 bits
+  std::uint64_t worth;  ///< (error^2 >> shift) * worth >> 24: in 1/256 bits
+};
+
+/// Steps that correct `to` - `from` (lattice units) at least cost: of the eight points around it that leave
+/// an error of at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none
+/// does; `steps` is then the nearest.
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
-                  std::int32_t threshold, const TrackerModels& models, const TrackerContext& context,
+                  const ErrorWorth& worth, const TrackerModels& models, const TrackerContext& context,
                   TrackerSteps& steps);
 
 }  // namespace tandem

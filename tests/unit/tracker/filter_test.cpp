@@ -80,13 +80,14 @@ TEST(TrackerSearch, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
   const TrackerModels models;
   for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11}) {
     const TrackerSteppings steppings(threshold);
+    const ErrorWorth worth(threshold);
     const std::int32_t reach = 3 * threshold + 2;
     for (std::int32_t x = -reach; x <= reach; ++x) {
       for (std::int32_t y = 0; y <= reach; ++y) {
         for (std::int32_t z = 0; z <= y; ++z) {
           if (x * x + y * y + z * z <= threshold * threshold) continue;
           TrackerSteps steps{};
-          ASSERT_TRUE(choose_steps({}, {x, y, z}, steppings, threshold, models, {}, steps))
+          ASSERT_TRUE(choose_steps({}, {x, y, z}, steppings, worth, models, {}, steps))
               << threshold << ": " << x << " " << y << " " << z;
         }
       }
