@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sdk/core/codec/training.hpp"
+#include "services/server/contact_plan.hpp"
 
 namespace tandem::server {
 namespace {
@@ -56,6 +58,11 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   config.codec_tables = codec_tables(choice.codec, table);
   config.budget = choice.codec == "limited" ? choice.budget_bytes : kNoBudget;
   config.predictor = choice.predictor;
+  if (choice.predictor == "contact") {
+    auto constants = contact_constants(scene.world, *lattice);
+    if (!constants) return tl::unexpected(constants.error());
+    config.predictor_constants = std::move(*constants);
+  }
   config.decay = recommended_decay(choice.codec);
   config.scene = scene.name;
   config.scene_description = scene.text;

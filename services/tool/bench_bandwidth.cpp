@@ -198,8 +198,10 @@ void add_bandwidth(CLI::App& bench, Run& run) {
   command->add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(options->codecs));
-  command->add_option("--predictor", options->choice.predictor,
-                      "Predicted step of `tracker`: ballistic or contact; the paper's codecs have ballistic")->capture_default_str();
+  command
+      ->add_option("--predictor", options->choice.predictor,
+                   "Predicted step of `tracker`: ballistic or contact; the paper's codecs have ballistic")
+      ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
   add_threshold_options(*command, options->choice);

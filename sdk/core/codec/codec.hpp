@@ -46,6 +46,9 @@ class Codec {
   /// Most bytes encode() can write for this session's capacity.
   [[nodiscard]] virtual std::size_t bound() const = 0;
 
+  /// The predicted step of the session, by name, before anything else. For codecs whose gains depend on it.
+  virtual void predicted_by(std::string_view /*predictor*/) {}
+
   /// The frame to come: `predicted` stays valid until the end of encode() or apply(); `slots` (ascending,
   /// each once) are those that lifecycle records spawned, despawned or teleported in it. Comes before
   /// encode() and before the first parse(); a decoder's `predicted` does not have the records applied yet, so

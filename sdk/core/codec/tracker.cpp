@@ -131,7 +131,7 @@ void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
   const std::uint8_t* alive = state.alive().data();
   for (std::size_t i = 0; i < count_; ++i) {
     TrackerBody body = this->body(corrected_[i]);
-    correct_body(state, corrected_[i], steps_[i], steppings, threshold_, body);
+    correct_body(state, corrected_[i], steps_[i], steppings, threshold_, *gains_, body);
     set_body(corrected_[i], body);
     age[corrected_[i]] = std::byte{0xFF};
   }

@@ -29,6 +29,7 @@ class Tracker final : public Codec {
 
   [[nodiscard]] std::string_view name() const override { return "tracker"; }
   [[nodiscard]] std::size_t bound() const override;
+  void predicted_by(std::string_view predictor) override { gains_ = &tracker_gains(predictor); }
   void renew(const State& predicted, std::span<const Slot> slots) override;
   std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
                        std::size_t budget, ByteWriter& out) override;
@@ -79,6 +80,7 @@ class Tracker final : public Codec {
   std::size_t count_ = 0;
   std::uint32_t next_block_ = 0;
   std::int32_t threshold_ = 1;
+  const TrackerGains* gains_ = &tracker_gains("ballistic");
   std::unique_ptr<TrackerSearch> search_;  // encoder only, made by the first encode()
 };
 

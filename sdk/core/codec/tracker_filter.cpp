@@ -3,34 +3,35 @@
 namespace tandem {
 namespace {
 
-// A position error that grew over k frames means a velocity error of d/k; beta of that is believed, and a
-// part gamma of what that would be as an acceleration. Below kLeastK frames one correction says too little
-// about either; but a body corrected twice running was hit: all of it is velocity, and more is believed.
-constexpr std::int64_t kLeastK = 3;
-constexpr std::int64_t kKOfTheHit = 2;
-constexpr std::int64_t kBeta = 52429;  // 0.8, in 1/65536
-constexpr std::int64_t kGamma = 9830;  // 0.15, in 1/65536
 constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
 
 // x * share / 65536, rounded half up.
 constexpr std::int64_t scaled(std::int64_t x, std::int64_t share) { return (x * share + 32768) >> 16; }
 
-struct Gains {
-  std::array<std::int64_t, kMostAge + 1> velocity{};      // 64 beta / k, in 1/65536
-  std::array<std::int64_t, kMostAge + 1> acceleration{};  // 64 beta gamma / k^2, in 1/65536
+// A position error that grew over k frames means a velocity error of d/k; beta of that is believed, and a
+// part gamma of what that would be as an acceleration. Below least_k frames one correction says too little
+// about either; but a body corrected twice running was hit: all of it is velocity, and more is believed.
+struct GainSet {
+  std::int64_t beta;   // in 1/65536
+  std::int64_t gamma;  // in 1/65536
+  std::int64_t least_k;
+  std::int64_t k_of_the_hit;
 };
-constexpr Gains make_gains() {
-  Gains gains;
+constexpr GainSet kBallistic{52429, 9830, 3, 2};  // 0.8, 0.15
+// Contacts are predicted: what is left grows slower, and there is no force to learn.
+constexpr GainSet kContact{45875, 0, 3, 3};  // 0.7, 0
+
+TrackerGains make_gains(const GainSet& set) {
+  TrackerGains gains;
   for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
-    const std::int64_t k = std::max(i, kLeastK);
+    const std::int64_t k = std::max(i, set.least_k);
     const auto at = static_cast<std::size_t>(i);
     const bool hit = i == 1;
-    gains.velocity[at] = 64 * kBeta / (hit ? kKOfTheHit : k);
-    gains.acceleration[at] = hit ? 0 : ((64 * kBeta * kGamma) >> 16) / (k * k);
+    gains.velocity[at] = 64 * set.beta / (hit ? set.k_of_the_hit : k);
+    gains.acceleration[at] = hit ? 0 : ((64 * set.beta * set.gamma) >> 16) / (k * k);
   }
   return gains;
 }
-constexpr Gains kGains = make_gains();
 
 std::int32_t limited(std::int64_t value, std::int64_t limit) {
   return static_cast<std::int32_t>(std::clamp(value, -limit, limit));
@@ -38,8 +39,14 @@ std::int32_t limited(std::int64_t value, std::int64_t limit) {
 
 }  // namespace
 
+const TrackerGains& tracker_gains(std::string_view predictor) {
+  static const TrackerGains ballistic = make_gains(kBallistic);
+  static const TrackerGains contact = make_gains(kContact);
+  return predictor == "contact" ? contact : ballistic;
+}
+
 void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
-                  std::int32_t threshold, TrackerBody& body) {
+                  std::int32_t threshold, const TrackerGains& gains, TrackerBody& body) {
   TrackerSteps now{};
   for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
   const auto before = TrackerSteppings::relative({body.steps[0], body.steps[1], body.steps[2]});
@@ -60,8 +67,8 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
     std::int32_t& v = state.v(i)[slot];
     std::int32_t& c = state.c(i)[slot];
     p = limited(p + d[i], kPositionLimit);
-    v = limited(v + grown(kGains.velocity[k]), kVelocityLimit);
-    c = limited(c + grown(kGains.acceleration[k]), most_c);
+    v = limited(v + grown(gains.velocity[k]), kVelocityLimit);
+    c = limited(c + grown(gains.acceleration[k]), most_c);
     body.steps[i] = static_cast<std::int8_t>(now[i]);
   }
   body.interval = static_cast<std::uint8_t>(k);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "sdk/core/lattice/state.hpp"
 
@@ -23,6 +24,16 @@ struct TrackerBody {
   std::uint8_t interval = 0;           ///< k of the last correction, 0: none yet
   std::array<std::int8_t, 3> steps{};  ///< of the last correction, saturated at +-127
 };
+
+/// How much of a correction is believed to be an error of the velocity and of the acceleration, by
+/// k = min(age + 1, 255): 64 beta / k and 64 beta gamma / k^2, in 1/65536.
+struct TrackerGains {
+  std::array<std::int64_t, kMostAge + 1> velocity{};
+  std::array<std::int64_t, kMostAge + 1> acceleration{};
+};
+
+/// The gains that belong to a predictor; those of `ballistic` for a name not known here.
+[[nodiscard]] const TrackerGains& tracker_gains(std::string_view predictor);
 
 /// Steps to lattice units for one threshold e.
 class TrackerSteppings {
@@ -82,6 +93,6 @@ class TrackerSteppings {
 ///   k = min(age + 1, 255);  d = distance(steps);  u = clamp(d . d_last / e^2, -1, 1)
 ///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2), H(1) = 0
 void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
-                  std::int32_t threshold, TrackerBody& body);
+                  std::int32_t threshold, const TrackerGains& gains, TrackerBody& body);
 
 }  // namespace tandem

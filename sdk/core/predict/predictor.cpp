@@ -3,13 +3,20 @@
 #include <string>
 
 #include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/predict/contact.hpp"
 
 namespace tandem {
 
-Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t /*capacity*/,
+Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
                                                   std::span<const std::int32_t> constants) {
+  if (name == "contact") {
+    if (capacity == 0 || capacity > kMaxCapacity)
+      return fail(ErrorCode::kInvalidArgument, "predictor 'contact': capacity out of range");
+    return Contact::create(capacity, constants);
+  }
   if (name != "ballistic") {
-    return fail(ErrorCode::kUnsupported, "unknown predictor '" + std::string(name) + "' (known: ballistic)");
+    return fail(ErrorCode::kUnsupported,
+                "unknown predictor '" + std::string(name) + "' (known: ballistic, contact)");
   }
   if (!constants.empty()) return fail(ErrorCode::kMalformed, "predictor 'ballistic' takes no constants");
   return std::make_unique<Ballistic>();

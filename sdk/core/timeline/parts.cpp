@@ -19,6 +19,7 @@ Result<TimelineParts> make_parts(const TimelineConfig& config, std::unique_ptr<P
   }
   auto codec = make_codec(config.codec, config.capacity, config.codec_tables);
   if (!codec) return tl::unexpected<Error>(codec.error());
+  (*codec)->predicted_by(predictor->name());
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), config.capacity, config.parameters, config.type_count)};
 }

@@ -1,0 +1,57 @@
+#pragma once
+// What the tier `contact` knows of the world, and its form in the session.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/lattice/state.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem {
+
+/// Changes of v in one sub-step, in 1/65536: by overlap (lattice units a frame), and by relative velocity.
+struct ContactMaterial {
+  std::int32_t spring = 0, damping = 0, shear = 0;
+};
+
+struct ContactConstants {
+  static constexpr std::int32_t kMostSubsteps = 16;
+  static constexpr std::int32_t kMostGain = 1 << 20;
+  static constexpr std::int32_t kMostRadius = 1 << 24;
+  static constexpr std::int32_t kOne = 1 << 30;  ///< a component 1 of a unit vector
+  static constexpr std::size_t kMostShapes = 256;
+
+  struct Type {
+    std::int32_t radius = 1;
+    std::int32_t mobility = 65536;  ///< mass of type 0 over this one's, in 1/65536
+  };
+  struct Plane {
+    Vec3i normal{};
+    std::int32_t offset = 0;
+  };
+  struct Box {
+    Vec3i centre{}, half{};
+    std::array<Vec3i, 3> axes{};
+  };
+  struct Ball {
+    Vec3i centre{};
+    std::int32_t radius = 0;
+  };
+
+  std::int32_t substeps = 1;
+  ContactMaterial pair, wall;
+  std::vector<Type> types;  ///< at least one; a body of a type beyond has the last one's
+  std::vector<Plane> planes;
+  std::vector<Box> boxes;
+  std::vector<Ball> balls;
+};
+
+/// The integers of a session's `predictor_constants`.
+[[nodiscard]] std::vector<std::int32_t> write_contact_constants(const ContactConstants& constants);
+
+/// Errors: kMalformed with the reason; nothing in `values` is trusted.
+[[nodiscard]] Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> values);
+
+}  // namespace tandem

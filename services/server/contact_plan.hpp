@@ -1,0 +1,18 @@
+#pragma once
+// The scene's world as the constants of the predictor `contact`.
+
+#include <cstdint>
+#include <vector>
+
+#include "services/engine/particles/world.hpp"
+#include "services/server/lattice_choice.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::server {
+
+/// The integers that travel in the session. Errors: kInvalidArgument for a world without body types (a
+/// recorded trajectory) or one that does not fit the lattice.
+[[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const engine::World& world,
+                                                                  const Lattice& lattice);
+
+}  // namespace tandem::server

@@ -1,0 +1,187 @@
+#include "sdk/core/predict/contact.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "sdk/core/lattice/hash.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::int32_t kRadius = 20000;
+
+ContactConstants constants_of(std::int32_t substeps) {
+  ContactConstants constants;
+  constants.substeps = substeps;
+  constants.pair = {14563 / substeps, 3277 / substeps, 3277 / substeps};
+  constants.wall = constants.pair;
+  constants.types = {{kRadius, 65536}, {kRadius / 2, 131072}};
+  constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
+  constants.boxes = {
+      {{200000, 0, 0},
+       {50000, 50000, 50000},
+       {{{ContactConstants::kOne, 0, 0}, {0, ContactConstants::kOne, 0}, {0, 0, ContactConstants::kOne}}}}};
+  constants.balls = {{{-200000, 0, 0}, 60000}};
+  return constants;
+}
+
+std::unique_ptr<Predictor> contact(std::uint32_t capacity, const ContactConstants& constants) {
+  return *make_predictor("contact", capacity, write_contact_constants(constants));
+}
+
+Vec3i vector_within(std::mt19937_64& random, std::int32_t limit) {
+  Vec3i v{};
+  for (std::int32_t& x : v)
+    x = static_cast<std::int32_t>(random() % (2 * static_cast<std::uint64_t>(limit) + 1)) - limit;
+  return v;
+}
+
+State bodies_within(std::mt19937_64& random, std::uint32_t capacity, std::int32_t p, std::int32_t v) {
+  State state(capacity);
+  for (Slot s = 0; s < capacity; ++s) {
+    if (random() % 7 == 0) continue;
+    const TypeId type = static_cast<TypeId>(random() % 3);  // one more than the constants know
+    state.spawn(s, 0, type, {vector_within(random, p), vector_within(random, v)});
+  }
+  return state;
+}
+
+const Drive kFalling{{0, -3000, 0}, 200, 800};
+
+TEST(Contact, InPlaceEqualsApartForAnyState) {
+  constexpr std::uint64_t kSeed = 51;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  for (const std::int32_t reach : {0, 10, kRadius, 20 * kRadius, kPositionLimit}) {
+    for (const std::int32_t speed : {0, 100000, kVelocityLimit}) {
+      for (const std::int32_t substeps : {1, 2, 16}) {
+        const auto predictor = contact(300, constants_of(substeps));
+        State state = bodies_within(random, 300, reach, speed);
+        State apart(300);
+        for (int frame = 0; frame < 4; ++frame) {
+          predictor->step(state, apart, kFalling);
+          predictor->step(state, state, kFalling);
+          ASSERT_EQ(state, apart);
+        }
+        for (Slot s = 0; s < 300; ++s) {
+          for (std::size_t i = 0; i < 3; ++i) {
+            ASSERT_LE(std::abs(state.p(i)[s]), kPositionLimit);
+            ASSERT_LE(std::abs(state.v(i)[s]), kVelocityLimit);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Contact, ExtremeConstantsMeetExtremeStates) {
+  constexpr std::uint64_t kSeed = 52;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  ContactConstants constants = constants_of(1);
+  constants.pair = constants.wall = {ContactConstants::kMostGain, ContactConstants::kMostGain,
+                                     ContactConstants::kMostGain};
+  const Vec3i ones{ContactConstants::kOne, ContactConstants::kOne, ContactConstants::kOne};
+  const Vec3i corner{kPositionLimit, -kPositionLimit, kPositionLimit};
+  constants.planes = {{ones, kPositionLimit}, {ones, -kPositionLimit}};
+  constants.boxes = {{corner, {kPositionLimit, kPositionLimit, kPositionLimit}, {ones, ones, ones}}};
+  constants.balls = {{corner, kPositionLimit}, {{}, 0}};
+  for (const std::int32_t radius : {1, 100, ContactConstants::kMostRadius}) {
+    constants.types = {{radius, ContactConstants::kMostGain}};
+    const auto predictor = contact(200, constants);
+    for (const std::int32_t reach : {0, 1, kPositionLimit}) {
+      State state = bodies_within(random, 200, reach, kVelocityLimit);
+      for (int frame = 0; frame < 5; ++frame) predictor->step(state, state, kFalling);
+      EXPECT_GT(state.alive_count(), 0U);
+    }
+  }
+}
+
+TEST(Contact, TwoBodiesPartWithEqualAndOppositeSpeed) {
+  ContactConstants constants = constants_of(1);
+  constants.planes.clear();
+  const auto predictor = contact(2, constants);
+  State state(2);
+  state.spawn(0, 0, 0, {{0, 0, 0}, {}});
+  state.spawn(1, 0, 0, {{3 * kRadius / 2, 0, 0}, {}});
+  predictor->step(state, state, {});
+  EXPECT_LT(state.v(0)[0], 0);
+  EXPECT_EQ(state.v(0)[0], -state.v(0)[1]);
+  // Half a radius of overlap, times the spring.
+  EXPECT_NEAR(state.v(0)[1], 64.0 * (kRadius / 2.0) * 14563 / 65536, 64.0 * kRadius / 1000);
+}
+
+TEST(Contact, BodiesApartMoveAsBallistic) {
+  std::mt19937_64 random(53);
+  ContactConstants constants = constants_of(1);
+  constants.planes.clear();
+  constants.boxes.clear();
+  constants.balls.clear();
+  State state(64);
+  for (Slot s = 0; s < 64; ++s) {
+    const auto x = static_cast<std::int32_t>(s) * 3 * kRadius;
+    state.spawn(s, 0, 0, {{x, 0, -x}, vector_within(random, 100000)});
+    state.c(1)[s] = 77;
+  }
+  State expected = state;
+  const auto ballistic = *make_predictor("ballistic", 64, {});
+  contact(64, constants)->step(state, state, kFalling);
+  ballistic->step(expected, expected, kFalling);
+  EXPECT_EQ(state, expected);
+}
+
+TEST(Contact, ABodyOnThePlaneComesToRest) {
+  const auto predictor = contact(1, constants_of(1));
+  State state(1);
+  state.spawn(0, 0, 0, {{0, 3 * kRadius, 0}, {}});
+  for (int frame = 0; frame < 600; ++frame) predictor->step(state, state, kFalling);
+  EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20);
+  EXPECT_NEAR(state.v(1)[0], 0, 64);
+}
+
+TEST(Contact, AMixedRunKeepsItsHash) {
+  const auto predictor = contact(200, constants_of(2));
+  State state(200);
+  std::uint32_t x = 1;
+  const auto next = [&x](std::int32_t limit) {
+    x = x * 1664525U + 1013904223U;
+    return static_cast<std::int32_t>((x >> 8U) % (2 * static_cast<std::uint32_t>(limit))) - limit;
+  };
+  for (Slot s = 0; s < 200; ++s) {
+    const Vec3i p{next(8 * kRadius), next(3 * kRadius) + 4 * kRadius, next(4 * kRadius)};
+    state.spawn(s, 0, static_cast<TypeId>(s % 2), {p, {next(99999), next(99999), next(99999)}});
+  }
+  for (int frame = 0; frame < 50; ++frame) predictor->step(state, state, kFalling);
+  StateHasher hasher;
+  EXPECT_EQ(to_hex(hasher.hash(state, {})), "8f664c20e3147546");
+}
+
+TEST(Contact, ConstantsReadBackAsTheyWereWritten) {
+  const auto values = write_contact_constants(constants_of(2));
+  const auto read = read_contact_constants(values);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(write_contact_constants(*read), values);
+}
+
+TEST(Contact, BadConstantsAreRefused) {
+  const auto good = write_contact_constants(constants_of(2));
+  const auto refused = [](std::span<const std::int32_t> values) {
+    const auto made = make_predictor("contact", 10, values);
+    return !made && made.error().code == ErrorCode::kMalformed;
+  };
+  for (std::size_t size = 0; size < good.size(); ++size) EXPECT_TRUE(refused(std::span(good).first(size)));
+  auto longer = good;
+  longer.push_back(0);
+  EXPECT_TRUE(refused(longer));
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    auto bad = good;
+    bad[i] = INT32_MIN;
+    EXPECT_TRUE(refused(bad)) << "value " << i;
+  }
+  EXPECT_FALSE(make_predictor("contact", 0, good));
+  EXPECT_FALSE(make_predictor("contact", kMaxCapacity + 1, good));
+}
+
+}  // namespace
+}  // namespace tandem

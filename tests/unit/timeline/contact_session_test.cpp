@@ -1,0 +1,73 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "sdk/core/predict/contact_constants.hpp"
+#include "tests/unit/timeline/session.hpp"
+
+// A session whose predicted bodies interact: what was simulated ahead is simulated again as a whole.
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kCapacity = 120;
+constexpr std::int32_t kRadius = 2000;
+
+TimelineConfig contact_config(std::uint32_t max_lead) {
+  TimelineConfig config = synthetic::config_for("tracker", kCapacity, max_lead);
+  ContactConstants constants;
+  constants.pair = constants.wall = {14563, 3277, 3277};
+  constants.types = {{kRadius, 65536}};
+  constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
+  config.predictor = "contact";
+  config.predictor_constants = write_contact_constants(constants);
+  return config;
+}
+
+State heap(std::mt19937_64& random) {
+  State state(kCapacity);
+  for (Slot s = 0; s < kCapacity; ++s) {
+    Vec3i p{};
+    for (std::int32_t& x : p) x = static_cast<std::int32_t>(random() % (8 * kRadius));
+    state.spawn(s, 0, 0, {p, {}});
+  }
+  return state;
+}
+
+class ContactSession : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
+  constexpr std::uint64_t kSeed = 61;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  const TimelineConfig config = contact_config(2);
+  auto server = synthetic::server_of(config);
+  auto client = synthetic::client_of(config);
+  State target = heap(random);
+  server.start(0, target, {{0, -300, 0}, 200, 800});
+  ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
+  const auto predictor = *make_predictor("contact", kCapacity, config.predictor_constants);
+  std::uint32_t corrected = 0;
+  for (int frame = 0; frame < 100; ++frame) {
+    while (client.step(GetParam())) {
+    }
+    predictor->step(target, target, {{0, -300, 0}, 200, 0});
+    const Slot pushed = static_cast<Slot>(random() % kCapacity);
+    target.p(0)[pushed] += 700;
+    const auto result = server.advance(target, {}, kNoBudget);
+    corrected += result.corrected;
+    ASSERT_TRUE(synthetic::apply(client, result)) << "frame " << frame;
+    ASSERT_EQ(client.state(client.applied()), server.state());
+    State ahead = server.state();
+    for (Frame f = client.applied() + 1; f <= client.now(); ++f) {
+      predictor->step(ahead, ahead, server.drive());
+      ASSERT_EQ(client.state(f), ahead) << "frame " << f << " ahead";
+    }
+  }
+  EXPECT_GE(corrected, 100U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Leads, ContactSession, testing::Values(0U, 1U, 2U));
+
+}  // namespace
+}  // namespace tandem
