@@ -35,27 +35,10 @@ std::size_t Tracker::bound() const {
          kMostBytesPerBody * capacity_;
 }
 
-TrackerBody Tracker::body(Slot slot) const {
-  TrackerBody body{remembered(0, slot), remembered(1, slot), {}};
-  for (std::size_t i = 0; i < 3; ++i) body.steps[i] = static_cast<std::int8_t>(remembered(2 + i, slot));
-  return body;
-}
-
 void Tracker::set_body(Slot slot, const TrackerBody& body) {
   column(0)[slot] = static_cast<std::byte>(body.age);
   column(1)[slot] = static_cast<std::byte>(body.interval);
   for (std::size_t i = 0; i < 3; ++i) column(2 + i)[slot] = static_cast<std::byte>(body.steps[i]);
-}
-
-TrackerContext Tracker::context(Slot slot, bool renewed, std::int32_t threshold) const {
-  if (renewed) return value_context({}, {}, {}, threshold);
-  Vec3i v{};
-  Vec3i c{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    v[i] = predicted_->v(i)[slot];
-    c[i] = predicted_->c(i)[slot];
-  }
-  return value_context(body(slot), v, c, threshold);
 }
 
 void Tracker::renew(const State& predicted, std::span<const Slot> slots) {

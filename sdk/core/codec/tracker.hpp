@@ -84,6 +84,22 @@ class Tracker final : public Codec {
   std::unique_ptr<TrackerSearch> search_;  // encoder only, made by the first encode()
 };
 
+inline TrackerBody Tracker::body(Slot slot) const {
+  const std::byte* at = bodies_.data() + slot;
+  TrackerBody body;
+  body.age = std::to_integer<std::uint8_t>(*at);
+  body.interval = std::to_integer<std::uint8_t>(*(at += capacity_));
+  for (std::int8_t& step : body.steps) step = static_cast<std::int8_t>(*(at += capacity_));
+  return body;
+}
+
+inline TrackerContext Tracker::context(Slot slot, bool renewed, std::int32_t threshold) const {
+  if (renewed) return value_context({}, {}, {}, threshold);
+  const State& state = *predicted_;
+  return value_context(body(slot), {state.v(0)[slot], state.v(1)[slot], state.v(2)[slot]},
+                       {state.c(0)[slot], state.c(1)[slot], state.c(2)[slot]}, threshold);
+}
+
 template <class F>
 void Tracker::for_each_body(const Block& block, std::span<const std::uint8_t> alive, F&& f) const {
   const auto first = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
