@@ -149,12 +149,12 @@ void Choices::fill_errors(const TrackerSteppings& steppings, const std::array<st
 
 bool Choices::cheapest(const ErrorWorth& worth, TrackerSteps& steps) const {
   std::array<std::array<std::uint32_t, 2>, 3> moves{};
-  std::array<std::array<bool, 2>, 3> is_long{};
+  std::array<std::array<std::uint32_t, 2>, 3> is_long{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < 2; ++i) {
       const std::int32_t v = value(axis, i);
       moves[axis][i] = static_cast<std::uint32_t>(v != 0);
-      is_long[axis][i] = v < -1 || v > 1;
+      is_long[axis][i] = static_cast<std::uint32_t>(v < -1 || v > 1);
     }
   }
   std::uint64_t best = UINT64_MAX;
@@ -166,7 +166,7 @@ bool Choices::cheapest(const ErrorWorth& worth, TrackerSteps& steps) const {
     const std::uint32_t before_y = moves[0][x];
     const std::uint32_t before_z = before_y + moves[1][y];
     const std::uint32_t moved = before_z + moves[2][z];
-    const std::size_t unit = (is_long[0][x] | is_long[1][y] | is_long[2][z]) ? 0 : moved;
+    const std::size_t unit = (is_long[0][x] | is_long[1][y] | is_long[2][z]) != 0 ? 0 : moved;
     const std::uint64_t error = error_[unit][0][x] + error_[unit][1][y] + error_[unit][2][z];
     const std::uint64_t cost = std::uint64_t{cost_[0][0][x]} + cost_[1][before_y][y] + cost_[2][before_z][z] +
                                (((error >> worth.shift) * worth.worth) >> 24U);
