@@ -161,8 +161,6 @@ void Contact::add_pair(std::uint32_t first, std::uint32_t second) {
 void Contact::add_pairs_of(std::uint32_t place, std::uint32_t cell_end,
                            std::span<const std::array<std::uint32_t, 2>> runs) {
   const Record& self = sorted_[place];
-  // 13 cells ahead and its own; one more for the write before the count.
-  std::array<std::uint32_t, 14 * kMostInCell + 1> partners{};
   std::uint32_t count = 0;
   const auto collect = [&](std::uint32_t from, std::uint32_t to) {
     for (std::uint32_t j = from; j < to; ++j) {
@@ -177,13 +175,13 @@ void Contact::add_pairs_of(std::uint32_t place, std::uint32_t cell_end,
         squared += d * d;
       }
       const std::uint32_t reach = static_cast<std::uint32_t>(self.radius + other.radius) >> shift_;
-      partners[count] = j;
+      partners_[count] = j;
       count += static_cast<std::uint32_t>(far == 0) & static_cast<std::uint32_t>(squared < reach * reach);
     }
   };
   collect(place + 1, cell_end);
   for (const auto& run : runs) collect(run[0], run[1]);
-  for (std::uint32_t k = 0; k < count; ++k) add_pair(place, partners[k]);
+  for (std::uint32_t k = 0; k < count; ++k) add_pair(place, partners_[k]);
 }
 
 void Contact::add_pairs() {

@@ -59,6 +59,8 @@ class Contact final : public Predictor {
   std::vector<std::uint32_t> begin_;  // by cell, and one more
   std::vector<std::uint32_t> end_;    // by cell: behind the bodies that take part
   std::vector<Record> sorted_;
+  // Of one body: 13 cells ahead and its own; one more for the write before the count.
+  std::array<std::uint32_t, 14 * kMostInCell + 1> partners_{};
   std::vector<Force> force_;                 // by slot
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
 };

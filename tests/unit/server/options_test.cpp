@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/predict/contact_constants.hpp"
 #include "services/server/session_plan.hpp"
 
 namespace tandem::server {
@@ -209,6 +210,28 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       ASSERT_TRUE(largest) << largest.error().message;
       EXPECT_GT(*largest, 0U);
     }
+  }
+}
+
+TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
+  for (const char* name : {"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3", "emitter"}) {
+    SCOPED_TRACE(name);
+    auto scene = scenes::load_scene(name);
+    ASSERT_TRUE(scene) << scene.error().message;
+    SessionChoice choice;
+    choice.bodies = 1000;
+    choice.codec = "tracker";
+    choice.predictor = "contact";
+    const auto config = plan_session(*scene, choice);
+    ASSERT_TRUE(config) << config.error().message;
+    EXPECT_TRUE(largest_delta_bytes(*config, choice.bodies));
+    const auto read = read_contact_constants(config->predictor_constants);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->substeps, static_cast<std::int32_t>(scene->world.substeps));
+    EXPECT_EQ(read->planes.size(), scene->world.planes.size());
+    EXPECT_NEAR(read->types[0].radius * config->lattice.unit, scene->smallest_radius_m, config->lattice.unit);
+    scene->world.types.clear();  // as of a recorded trajectory
+    EXPECT_FALSE(plan_session(*scene, choice));
   }
 }
 
