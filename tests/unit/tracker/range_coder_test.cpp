@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sdk/core/codec/tracker_models.hpp"
@@ -156,6 +157,64 @@ TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
     ASSERT_EQ(steps, expected);
   }
   EXPECT_TRUE(decoder.at_end());
+}
+
+// Adds up the ideal lengths of decisions under the models that the range coder is given.
+struct IdealCoder {
+  double bits = 0;
+  bool code(bool bit, AdaptiveBit& model) {
+    bits -= std::log2((bit ? model.p1() : 65536 - model.p1()) / 65536.0);
+    model.update(bit);
+    return bit;
+  }
+  bool code_even(bool bit) {
+    bits += 1;
+    return bit;
+  }
+};
+
+// Bodies of a block, one in `corrected_one_in` corrected by short steps; as Tracker codes them.
+template <class Coder>
+void code_block(Coder& coder, TrackerModels& models, std::mt19937_64& random,
+                std::uint64_t corrected_one_in) {
+  std::uint32_t previous = 0;
+  for (std::uint32_t body = 0; body < 2000; ++body) {
+    const auto age = static_cast<std::uint8_t>(random() % 20U);
+    const auto interval = static_cast<std::uint8_t>(random() % 20U);
+    const bool is_corrected = random() % corrected_one_in == 0;
+    coder.code(is_corrected, models.flag[flag_context(age, interval) + previous]);
+    previous = static_cast<std::uint32_t>(is_corrected);
+    if (!is_corrected) continue;
+    TrackerSteps steps{1, 0, 0};
+    for (std::int32_t& step : steps) step = static_cast<std::int32_t>(random() % 5U) - 2;
+    if (steps == TrackerSteps{}) steps[0] = 20;
+    code_steps(coder, models, value_context({age, interval, {}}, {}, {}, 100), steps);
+  }
+}
+
+TEST(TrackerModels, SectionsStayWithinOnePercentOfTheIdealLengthOfTheirModels) {
+  for (const std::uint64_t corrected_one_in : {2U, 6U, 30U}) {
+    constexpr std::uint64_t kSeed = 5;
+    SCOPED_TRACE(testing::Message() << "seed " << kSeed << ", one in " << corrected_one_in);
+    TrackerModels models;
+    TrackerModels ideal_models;
+    IdealCoder ideal;
+    double real = 0;
+    for (std::uint64_t frame = 0; frame < 50; ++frame) {
+      Bytes out(100'000);
+      RangeEncoder encoder(out);
+      std::mt19937_64 random(kSeed + frame);
+      code_block(encoder, models, random, corrected_one_in);
+      real += 8.0 * static_cast<double>(encoder.finish());
+      ASSERT_FALSE(encoder.overflow());
+      std::mt19937_64 again(kSeed + frame);
+      code_block(ideal, ideal_models, again, corrected_one_in);
+    }
+    EXPECT_GE(real, ideal.bits);
+    EXPECT_LT(real, 1.01 * ideal.bits);
+    RecordProperty("excess_ppm_one_in_" + std::to_string(corrected_one_in),
+                   static_cast<int>(1e6 * (real / ideal.bits - 1)));
+  }
 }
 
 }  // namespace
