@@ -28,7 +28,8 @@ ContactMaterial material_of(const engine::Material& material, double mass, doubl
 
 }  // namespace
 
-Result<std::vector<std::int32_t>> contact_constants(const engine::World& world, const Lattice& lattice) {
+Result<std::vector<std::int32_t>> contact_constants(const scenes::Scene& scene, const Lattice& lattice) {
+  const engine::World& world = scene.world;
   if (world.types.empty())
     return fail(ErrorCode::kInvalidArgument, "predictor 'contact' needs a scene with body types");
   const double scale = lattice.position_scale();

@@ -4,15 +4,15 @@
 #include <cstdint>
 #include <vector>
 
-#include "services/engine/particles/world.hpp"
+#include "services/scenes/scene.hpp"
 #include "services/server/lattice_choice.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::server {
 
-/// The integers that travel in the session. Errors: kInvalidArgument for a world without body types (a
+/// The integers that travel in the session. Errors: kInvalidArgument for a scene without body types (a
 /// recorded trajectory) or one that does not fit the lattice.
-[[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const engine::World& world,
+[[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const scenes::Scene& scene,
                                                                   const Lattice& lattice);
 
 }  // namespace tandem::server

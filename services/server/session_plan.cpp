@@ -59,7 +59,7 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   config.budget = choice.codec == "limited" ? choice.budget_bytes : kNoBudget;
   config.predictor = choice.predictor;
   if (choice.predictor == "contact") {
-    auto constants = contact_constants(scene.world, *lattice);
+    auto constants = contact_constants(scene, *lattice);
     if (!constants) return tl::unexpected(constants.error());
     config.predictor_constants = std::move(*constants);
   }
