@@ -17,6 +17,8 @@ TEST(Framerate, RowsHaveTheAgreedFields) {
   row.method = "entropy";
   row.device = "thin";
   row.updates_per_s = 30;
+  row.seconds = 6;
+  row.client_cpu_ms = 0.5;
   const auto json = nlohmann::json::parse(to_json(std::vector{row}, "cgroup v2", Calibration{0.02, 4.4}));
   EXPECT_EQ(json["device"]["processor_share"], 0.02);
   ASSERT_EQ(json["rows"].size(), 1U);
@@ -28,6 +30,8 @@ TEST(Framerate, RowsHaveTheAgreedFields) {
   EXPECT_EQ(only["method"], "entropy");
   EXPECT_EQ(only["device"], "thin");
   EXPECT_EQ(only["updates_per_s"], 30);
+  EXPECT_EQ(only["seconds"], 6);
+  EXPECT_EQ(only["client_cpu_ms"], 0.5);
   EXPECT_EQ(only["paper_updates_per_s"], 77.9);
 }
 
