@@ -1,28 +1,46 @@
-// A session of 1,000 frames that needs nothing but the core: prints the final state hash of server and client
+// A session of 1,400 frames that needs nothing but the core: prints the final state hash of server and client
 // and compares it with the one that every compiler, flag and machine must give. Exit 1 where it differs.
 
 #include <cstdio>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "sdk/core/predict/contact_constants.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0xD61DC9301CA9EF80;
+constexpr std::uint64_t kGolden = 0xBBF83B358A2BCD0F;
 constexpr std::uint32_t kCapacity = 500;
-constexpr std::string_view kCodecs[] = {"none", "selective", "quantized", "entropy", "limited"};
+constexpr std::string_view kBallistic = "ballistic", kContact = "contact";
+constexpr std::pair<std::string_view, std::string_view> kSessions[] = {
+    {"none", kBallistic},    {"selective", kBallistic}, {"quantized", kBallistic}, {"entropy", kBallistic},
+    {"limited", kBallistic}, {"tracker", kBallistic},   {"tracker", kContact}};
 
-// Runs one codec; mixes the hash of every frame into `digest`. False if the client ever disagrees.
-bool run(std::string_view codec, synthetic::Random& random, std::uint64_t& digest) {
+std::vector<std::int32_t> contact_constants() {
+  ContactConstants constants;
+  constants.substeps = 2;
+  constants.pair = constants.wall = {7281, 1638, 1638};
+  constants.types = {{20000, 65536}, {10000, 131072}};
+  constants.planes = {{{0, ContactConstants::kOne, 0}, -100000}};
+  constants.balls = {{{-200000, 0, 0}, 60000}};
+  return write_contact_constants(constants);
+}
+
+// Runs one session; mixes the hash of every frame into `digest`. False if the client ever disagrees.
+bool run(std::string_view codec, std::string_view predictor, synthetic::Random& random,
+         std::uint64_t& digest) {
   TimelineConfig config;
   config.capacity = kCapacity;
   config.type_count = synthetic::kTypes;
   config.codec = codec;
   config.codec_tables = synthetic::tables_for(codec);
   config.parameters = {200, 16, 64};
-  config.predictor = "ballistic";
+  config.predictor = predictor;
+  if (predictor == kContact) config.predictor_constants = contact_constants();
   auto server = ServerTimeline::create(config, 1);
   auto client = ClientTimeline::create(config);
   if (!server || !client) return false;
@@ -50,9 +68,10 @@ bool run(std::string_view codec, synthetic::Random& random, std::uint64_t& diges
 int compare() {
   synthetic::Random random(1000);
   std::uint64_t digest = 0;
-  for (const std::string_view codec : kCodecs) {
-    if (!run(codec, random, digest)) {
-      std::fprintf(stderr, "client and server disagree (%s)\n", std::string(codec).c_str());
+  for (const auto& [codec, predictor] : kSessions) {
+    if (!run(codec, predictor, random, digest)) {
+      std::fprintf(stderr, "client and server disagree (%s, %s)\n", std::string(codec).c_str(),
+                   std::string(predictor).c_str());
       return 1;
     }
   }
