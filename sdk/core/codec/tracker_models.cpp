@@ -15,6 +15,6 @@ constexpr std::array<std::uint8_t, 256> make_age_buckets() {
 
 }  // namespace
 
-const std::array<std::uint8_t, 256> kTrackerAgeBuckets = make_age_buckets();
+const std::array<std::uint8_t, 256> tracker_age_buckets = make_age_buckets();
 
 }  // namespace tandem

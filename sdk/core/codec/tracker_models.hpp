@@ -23,10 +23,10 @@ struct TrackerContext {
 struct TrackerModels {
   static constexpr std::uint32_t kAges = 15, kShortAges = 5, kIntervals = 4, kUnary = 14;
 
-  std::array<AdaptiveBit, kAges * kAges * 2> flag;
-  std::array<AdaptiveBit, 3 * kShortAges * kIntervals * 3 * 2> zero;
-  std::array<AdaptiveBit, 3 * 3 * 3 * 3 * kIntervals> sign;
-  std::array<AdaptiveBit, kIntervals * 3 * kUnary> magnitude;
+  std::array<AdaptiveBit, std::size_t{kAges} * kAges * 2> flag;
+  std::array<AdaptiveBit, std::size_t{kShortAges} * kIntervals * 3 * 3 * 2> zero;
+  std::array<AdaptiveBit, std::size_t{kIntervals} * 3 * 3 * 3 * 3> sign;
+  std::array<AdaptiveBit, std::size_t{kIntervals} * 3 * kUnary> magnitude;
   std::array<AdaptiveBit, 32> escape;
 
   /// Calls f(AdaptiveBit&) for every probability, in the order of snapshots.
@@ -38,16 +38,17 @@ struct TrackerModels {
     for (auto& bit : models.magnitude) f(bit);
     for (auto& bit : models.escape) f(bit);
   }
-  static constexpr std::size_t kCount = kAges * kAges * 2 + 3 * kShortAges * kIntervals * 3 * 2 +
-                                        81 * kIntervals + kIntervals * 3 * kUnary + 32;
+  static constexpr std::size_t kCount =
+      std::size_t{kAges} * kAges * 2 + std::size_t{kShortAges} * kIntervals * 3 * 3 * 2 +
+      std::size_t{81} * kIntervals + std::size_t{kIntervals} * 3 * kUnary + 32;
 };
 
 /// Buckets of frame counts 0 .. 255; see tracker_models.cpp.
-extern const std::array<std::uint8_t, 256> kTrackerAgeBuckets;
+extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 
 /// Index of the flag by age and by the interval before; add 1 where the body coded before it was corrected.
 [[nodiscard]] inline std::uint32_t flag_context(std::uint8_t age, std::uint8_t interval) {
-  return (kTrackerAgeBuckets[age + 1U] * TrackerModels::kAges + kTrackerAgeBuckets[interval]) * 2U;
+  return (tracker_age_buckets[age + 1U] * TrackerModels::kAges + tracker_age_buckets[interval]) * 2U;
 }
 
 namespace tracker_detail {
@@ -107,7 +108,8 @@ template <class Coder, class Models>
 bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps);
 
 /// Most bits code_steps() takes.
-inline constexpr std::size_t kMostStepsBits = 3 * (2 * 11 + (TrackerModels::kUnary + 31) * 11 + 31);
+inline constexpr std::size_t kMostStepsBits =
+    3 * (2 * 11 + (std::size_t{TrackerModels::kUnary} + 31) * 11 + 31);
 
 namespace tracker_detail {
 
