@@ -108,8 +108,7 @@ template <class Coder, class Models>
 bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps);
 
 /// Most bits code_steps() takes.
-inline constexpr std::size_t kMostStepsBits =
-    3 * (2 * 11 + (std::size_t{TrackerModels::kUnary} + 31) * 11 + 31);
+inline constexpr std::size_t kMostStepsBits = 3 * (22 + (std::size_t{TrackerModels::kUnary} + 31) * 11 + 31);
 
 namespace tracker_detail {
 
