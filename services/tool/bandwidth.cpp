@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "services/tool/cells.hpp"
 #include "services/tool/peers.hpp"
 
 namespace tandem::tool {
@@ -88,12 +89,6 @@ class Snaps {
   double max_squared_ = 0, sum_squared_ = 0;
   std::uint64_t count_ = 0;
 };
-
-double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
-  const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
-  return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s /
-         static_cast<double>(1U << 20U);
-}
 
 /// One session's server and client, and what they were seen to do.
 struct Lane {
@@ -230,6 +225,11 @@ BandwidthRow row_of(PeerLane& lane, double dt_s) {
 
 }  // namespace
 
+double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
+  const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
+  return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s / kBitsPerMbit;
+}
+
 Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
                                                     std::span<const server::HostConfig> sessions,
                                                     std::uint64_t frames,
@@ -297,24 +297,17 @@ std::optional<double> colliding_in_paper(const BandwidthRow& row) {
   return row.number ? paper_colliding_per_frame(*row.number, row.bodies) : std::nullopt;
 }
 
-std::string rounded(const std::optional<double>& value, int digits) {
-  return value ? fmt::format("{:.{}f}", *value, digits) : "-";
-}
-
 }  // namespace
 
 std::string to_json(std::span<const BandwidthRow> rows) {
   using Json = nlohmann::ordered_json;
   Json list = Json::array();
   for (const BandwidthRow& row : rows) {
-    const auto number = [](const std::optional<double>& value) {
-      return value ? Json(*value) : Json(nullptr);
-    };
     const auto measured = [&](double value) { return row.missing.empty() ? Json(value) : Json(nullptr); };
     const bool is_peer = row.predictor.empty() && !row.codec.empty();
     const auto ours = [&](double value) { return is_peer ? Json(nullptr) : Json(value); };
     list.push_back({{"scene", row.scene},
-                    {"number", row.number ? Json(*row.number) : Json(nullptr)},
+                    {"number", json_of(row.number)},
                     {"bodies", row.bodies},
                     {"codec", row.codec},
                     {"predictor", row.predictor},
@@ -323,14 +316,14 @@ std::string to_json(std::span<const BandwidthRow> rows) {
                     {"frames", row.frames},
                     {"threshold", row.threshold},
                     {"mbit_per_s", measured(row.mbit_per_s)},
-                    {"paper_mbit_per_s", number(mbit_in_paper(row))},
+                    {"paper_mbit_per_s", json_of(mbit_in_paper(row))},
                     {"max_error", measured(row.max_error)},
                     {"rms_error", measured(row.rms_error)},
                     {"max_snap", ours(row.max_snap)},
                     {"rms_snap", ours(row.rms_snap)},
                     {"corrected_per_frame", ours(row.corrected_per_frame)},
-                    {"colliding_per_frame", number(row.colliding_per_frame)},
-                    {"paper_colliding_per_frame", number(colliding_in_paper(row))},
+                    {"colliding_per_frame", json_of(row.colliding_per_frame)},
+                    {"paper_colliding_per_frame", json_of(colliding_in_paper(row))},
                     {"step_ms", row.step_ms},
                     {"predict_ms", ours(row.predict_ms)},
                     {"encode_ms", ours(row.encode_ms)},

@@ -38,6 +38,9 @@ struct BandwidthRow {
   std::vector<std::uint32_t> colliding;  ///< bodies in contact in each frame
 };
 
+/// Mean of frames of `dt_s` seconds, not none.
+[[nodiscard]] double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s);
+
 /// Runs `replay` for `frames` frames. In each of `sessions`, which differ in codec and predictor and share
 /// the replay's lattice, a server's timeline encodes every frame, and a client's timeline decodes it and
 /// checks the hash. Fills the measured fields of a row per session; `progress` gets the frame. Errors: what

@@ -36,9 +36,7 @@ std::string file_name(const BandwidthRow& row) {
 
 /// Of `count` frames from `first` on.
 double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count) {
-  double bytes = 0;
-  for (std::size_t i = first; i < first + count; ++i) bytes += row.bytes[i];
-  return 8.0 * bytes / static_cast<double>(count) / row.dt_s / static_cast<double>(1U << 20U);
+  return tool::mbit_per_s(std::span(row.bytes).subspan(first, count), row.dt_s);
 }
 
 std::string rows_csv(Rows rows) {

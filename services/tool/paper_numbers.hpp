@@ -7,6 +7,9 @@
 
 namespace tandem::tool {
 
+/// Bits of the thesis's Mbit.
+inline constexpr double kBitsPerMbit = 1048576.0;
+
 /// Table 5.3 in Mbit/s, where it has this scene, size and codec.
 [[nodiscard]] std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec);
 

@@ -30,6 +30,15 @@ Columns columns_of(std::uint32_t bodies) {
   return columns;
 }
 
+double off_squared(const Columns& seen, const engine::Bodies& bodies, std::size_t body) {
+  double squared = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double off = seen[k][body] - double{bodies.position[k][body]};
+    squared += off * off;
+  }
+  return squared;
+}
+
 /// Dead reckoning (IEEE 1278.1): both sides extrapolate; a body that is off by more than the threshold is
 /// corrected. 24 bytes a correction, whatever it holds and without naming the body.
 class DeadReckoning : public Peer {
@@ -48,7 +57,7 @@ class DeadReckoning : public Peer {
     for (std::size_t body = 0; body < setting_.bodies; ++body) {
       if (bodies.alive[body] == 0) continue;
       extrapolate(body);
-      if (first_ || off_squared(bodies, body) > setting_.threshold * setting_.threshold) {
+      if (first_ || off_squared(position_, bodies, body) > setting_.threshold * setting_.threshold) {
         correct(bodies, body);
         ++corrections;
       }
@@ -68,14 +77,6 @@ class DeadReckoning : public Peer {
       position_[k][body] += velocity_[k][body] * dt + 0.5 * acceleration_[k][body] * dt * dt;
       velocity_[k][body] += acceleration_[k][body] * dt;
     }
-  }
-  [[nodiscard]] double off_squared(const engine::Bodies& bodies, std::size_t body) const {
-    double squared = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double off = position_[k][body] - double{bodies.position[k][body]};
-      squared += off * off;
-    }
-    return squared;
   }
   void correct(const engine::Bodies& bodies, std::size_t body) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -168,12 +169,7 @@ class Zfp : public Peer {
   [[nodiscard]] bool within(const engine::Bodies& bodies) const {
     for (std::size_t body = 0; body < setting_.bodies; ++body) {
       if (bodies.alive[body] == 0) continue;
-      double squared = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double off = next_[k][body] - double{bodies.position[k][body]};
-        squared += off * off;
-      }
-      if (squared > setting_.threshold * setting_.threshold) return false;
+      if (off_squared(next_, bodies, body) > setting_.threshold * setting_.threshold) return false;
     }
     return true;
   }

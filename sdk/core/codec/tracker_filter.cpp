@@ -1,12 +1,11 @@
 #include "sdk/core/codec/tracker_filter.hpp"
 
+#include "sdk/core/lattice/fixed_point.hpp"
+
 namespace tandem {
 namespace {
 
 constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
-
-// x * share / 65536, rounded half up.
-constexpr std::int64_t scaled(std::int64_t x, std::int64_t share) { return (x * share + 32768) >> 16; }
 
 // A position error that grew over k frames means a velocity error of d/k; beta of that is believed, and a
 // part gamma of what that would be as an acceleration. Below least_k frames one correction says too little
@@ -33,10 +32,6 @@ TrackerGains make_gains(const GainSet& set) {
   return gains;
 }
 
-std::int32_t limited(std::int64_t value, std::int64_t limit) {
-  return static_cast<std::int32_t>(std::clamp(value, -limit, limit));
-}
-
 }  // namespace
 
 const TrackerGains& tracker_gains(std::string_view predictor) {
@@ -61,7 +56,7 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
   const std::int64_t most_c = std::min<std::int64_t>(kVelocityLimit, std::int64_t{256} * threshold);
   for (std::size_t i = 0; i < 3; ++i) {
     const auto grown = [&](std::int64_t gain) {
-      return std::clamp((scaled(d[i], gain) * belief + 128) >> 8, -kMostGrowth, kMostGrowth);
+      return std::clamp((share_of(d[i], gain) * belief + 128) >> 8, -kMostGrowth, kMostGrowth);
     };
     std::int32_t& p = state.p(i)[slot];
     std::int32_t& v = state.v(i)[slot];

@@ -7,6 +7,7 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/contact_walls.hpp"
 
 namespace tandem {
@@ -16,13 +17,6 @@ constexpr std::uint32_t kReachBits = 14;  // two bodies that touch are less than
 constexpr std::uint32_t kRootShift = 16;
 constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
 constexpr std::uint32_t kDead = UINT32_MAX;
-
-std::int32_t limited(std::int64_t value, std::int64_t limit) {
-  return static_cast<std::int32_t>(std::clamp(value, -limit, limit));
-}
-
-// (x*k + 2^15) >> 16
-std::int64_t share_of(std::int64_t x, std::int64_t k) { return (x * k + 32768) >> 16; }
 
 // With n in 2^-14 and `overlap` in 1/64 lattice unit, both towards the body's own side: the change of v.
 // |u| <= 2^29, |n| < 2^15, gains <= 2^20, overlap < 2^38: every product stays below 2^60.
@@ -98,9 +92,8 @@ void Contact::sort_into_grid(const State& state) {
   std::copy(begin_.begin(), begin_.end(), end_.begin());
   for (Slot s = 0; s < capacity; ++s) {
     if (cell_[s] == kDead) continue;
-    const std::size_t type = std::min<std::size_t>(state.type()[s], constants_.types.size() - 1);
     Record& record = sorted_[end_[cell_[s]]++];
-    record.radius = constants_.types[type].radius;
+    record.radius = type_of(state, s).radius;
     record.slot = s;
     for (std::size_t i = 0; i < 3; ++i) {
       record.q[i] = state.p(i)[s] >> shift_;
@@ -115,8 +108,7 @@ void Contact::add_walls(const State& state) {
     Force& force = force_[s];
     force = {};
     if (state.alive()[s] == 0) continue;
-    const std::size_t type = std::min<std::size_t>(state.type()[s], constants_.types.size() - 1);
-    const std::int32_t radius = constants_.types[type].radius;
+    const std::int32_t radius = type_of(state, s).radius;
     const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
     const Force u{-std::int64_t{state.v(0)[s]}, -std::int64_t{state.v(1)[s]}, -std::int64_t{state.v(2)[s]}};
     const auto add = [&](const auto& shapes) {
@@ -221,8 +213,7 @@ void Contact::sum_forces(const State& state) {
 void Contact::integrate(State& state, const Drive& drive, bool first) const {
   for (Slot s = 0; s < state.capacity(); ++s) {
     if (state.alive()[s] == 0) continue;
-    const std::size_t type = std::min<std::size_t>(state.type()[s], constants_.types.size() - 1);
-    const std::int64_t mobility = constants_.types[type].mobility;
+    const std::int64_t mobility = type_of(state, s).mobility;
     for (std::size_t i = 0; i < 3; ++i) {
       std::int32_t& p = state.p(i)[s];
       std::int32_t& v = state.v(i)[s];

@@ -2,6 +2,7 @@
 // The tier `contact`: the engine's penalty contacts as integers. idl/PROTOCOL.md, "Predicted step", has the
 // formulas.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -40,6 +41,9 @@ class Contact final : public Predictor {
   };
   using Force = std::array<std::int64_t, 3>;
 
+  [[nodiscard]] const ContactConstants::Type& type_of(const State& state, Slot slot) const {
+    return constants_.types[std::min<std::size_t>(state.type()[slot], constants_.types.size() - 1)];
+  }
   void sum_forces(const State& state);
   void add_walls(const State& state);
   void sort_into_grid(const State& state);

@@ -247,20 +247,16 @@ bool Fabric::settle_front(Pair& pair, Index index) {
       pair.travelling.pop_front();
       return true;
     }
-    if (participants_[writer.participant].frozen_ns != kNever || is_cut(writer.participant, to) ||
-        random_.chance(model.loss)) {
-      front.due_ns = now_ns_ + std::max<std::int64_t>(1, model.repair_ns);
-      schedule(index, front.due_ns);
-      return false;
-    }
-    const auto squeezed_ns = squeeze_ns(model, *front.sample.message);
+    const bool lost = participants_[writer.participant].frozen_ns != kNever ||
+                      is_cut(writer.participant, to) || random_.chance(model.loss);
+    const auto squeezed_ns = lost ? std::nullopt : squeeze_ns(model, *front.sample.message);
+    if (squeezed_ns) ++counts_.repaired;
     if (!squeezed_ns || *squeezed_ns > 0) {
       front.to_repair = !squeezed_ns;
       front.due_ns = now_ns_ + squeezed_ns.value_or(std::max<std::int64_t>(1, model.repair_ns));
       schedule(index, front.due_ns);
       return false;
     }
-    ++counts_.repaired;
   }
   deliver(pair, front.sample);
   pair.travelling.pop_front();

@@ -44,9 +44,7 @@ struct FramerateOptions {
 };
 
 /// `tandemd` beside this program, as installed and as built, or else in PATH.
-std::string find_server() {
-  std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+std::string find_server(const fs::path& self) {
   std::vector<fs::path> places{self.parent_path() / "tandemd", self.parent_path() / "../server/tandemd"};
   const char* const search = std::getenv("PATH");
   std::istringstream folders(search == nullptr ? "" : search);
@@ -68,7 +66,7 @@ Result<void> prepare(FramerateOptions& options) {
   options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
   options.setup.tandem = fs::read_symlink("/proc/self/exe").string();
   if (!streams(options) || options.setup.kind == LinkKind::kMemory) return {};
-  options.setup.tandemd = options.tandemd.empty() ? find_server() : options.tandemd;
+  options.setup.tandemd = options.tandemd.empty() ? find_server(options.setup.tandem) : options.tandemd;
   if (access(options.setup.tandemd.c_str(), X_OK) != 0)
     return fail(ErrorCode::kInvalidArgument, "no tandemd found; say where it is with --server");
   if (const auto tried = make_enclave("10.77.0.1"); !tried) {
@@ -186,11 +184,8 @@ void add_framerate(CLI::App& bench, Run& run) {
                       "The program tandemd (default: beside this one, or in PATH)");
   command->add_flag("--json", options->json, "One JSON object: device, rows[...]");
   command->footer(
-      "Needs root unless with --link memory: server and users run in network namespaces of their own, joined "
-      "by one link. The thin "
-      "device\n"
-      "is given the share of a processor at which client-only makes the 4.4 updates/s of the thesis's "
-      "phone.");
+      "Needs root unless with --link memory: server and users run in network namespaces joined by one link.\n"
+      "The thin device gets the share of a processor at which client-only makes the thesis's 4.4 updates/s.");
   command->callback([options, &run] { run = [options] { return run_framerate(*options); }; });
 }
 

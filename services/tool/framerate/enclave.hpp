@@ -37,7 +37,7 @@ struct Enclave {
 [[nodiscard]] Result<Enclave> make_enclave(const std::string& address);
 
 struct LinkCounts {
-  std::uint64_t bytes_there = 0, bytes_back = 0, dropped = 0;
+  std::uint64_t bytes_there = 0, dropped = 0;
 };
 
 /// Carries packets between the devices of two enclaves, which must outlive it, in a thread of its own.
@@ -47,7 +47,7 @@ class Link {
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
-  /// Stops it; what it carried in its last `seconds`, and dropped in all its time.
+  /// Stops it; what it carried to the clients in its last `seconds`, and dropped in all its time.
   LinkCounts finish(double seconds);
 
  private:

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "services/tool/cells.hpp"
 #include "services/tool/framerate/child.hpp"
 #include "services/tool/framerate/enclave.hpp"
 #include "services/tool/paper_numbers.hpp"
@@ -16,7 +17,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kServerAddress = "10.77.0.1";
 constexpr const char* kUsersAddress = "10.77.0.2";
-constexpr double kBitsPerMbit = 1048576.0;
 // A thin device takes long to start a program and to read its first snapshot.
 constexpr std::chrono::seconds kStart{60};
 
@@ -118,15 +118,6 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device, FramerateRo
   return {};
 }
 
-template <class T>
-Json optional(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-std::string rounded(const std::optional<double>& value, int digits) {
-  return value ? fmt::format("{:.{}f}", *value, digits) : "-";
-}
-
 std::optional<double> in_paper(const FramerateRow& row) {
   return row.number ? paper_updates_per_s(*row.number, row.bodies, row.method) : std::nullopt;
 }
@@ -180,20 +171,20 @@ std::string to_json(std::span<const FramerateRow> rows, const std::string& devic
   Json list = Json::array();
   for (const FramerateRow& row : rows) {
     list.push_back({{"scene", row.scene},
-                    {"number", optional(row.number)},
+                    {"number", json_of(row.number)},
                     {"users", row.users},
                     {"bodies", row.bodies},
                     {"method", row.method},
                     {"device", row.device},
                     {"updates_per_s", row.missing.empty() ? Json(row.updates_per_s) : Json(nullptr)},
-                    {"paper_updates_per_s", optional(in_paper(row))},
+                    {"paper_updates_per_s", json_of(in_paper(row))},
                     {"seconds", row.seconds},
-                    {"client_cpu_ms", optional(row.client_cpu_ms)},
-                    {"client_ms_p50", optional(row.client_ms_p50)},
-                    {"latency_ms_p50", optional(row.latency_ms_p50)},
-                    {"link_mbit_per_s", optional(row.link_mbit_per_s)},
-                    {"dropped", optional(row.dropped)},
-                    {"resyncs", optional(row.resyncs)},
+                    {"client_cpu_ms", json_of(row.client_cpu_ms)},
+                    {"client_ms_p50", json_of(row.client_ms_p50)},
+                    {"latency_ms_p50", json_of(row.latency_ms_p50)},
+                    {"link_mbit_per_s", json_of(row.link_mbit_per_s)},
+                    {"dropped", json_of(row.dropped)},
+                    {"resyncs", json_of(row.resyncs)},
                     {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});
   }
   Json device(nullptr);

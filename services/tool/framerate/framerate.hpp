@@ -62,13 +62,15 @@ void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& 
 /// Fills the row as measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
 [[nodiscard]] Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row);
 
-/// Sets the device's share of a processor so that client-only makes `updates_per_s` of the paper's first
-/// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
-/// share. Errors: kIo.
+/// A thin device as it was set.
 struct Calibration {
   double share = 1, updates_per_s = 0;
   double slowdown = 1;  ///< against this machine's whole processor
 };
+
+/// Sets the device's share of a processor so that client-only makes `updates_per_s` of the paper's first
+/// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
+/// share. Errors: kIo.
 [[nodiscard]] Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device,
                                             double updates_per_s,
                                             const std::function<void(const std::string&)>& progress);

@@ -10,6 +10,7 @@
 #include "services/server/outbox.hpp"
 #include "services/server/session_plan.hpp"
 #include "services/tool/framerate/framerate.hpp"
+#include "services/tool/paper_numbers.hpp"
 #include "services/tool/scene_source.hpp"
 
 namespace tandem::tool {
@@ -19,7 +20,6 @@ using transport::simulated::Bottleneck;
 
 constexpr std::int64_t kTickNs = 100'000;
 constexpr std::int64_t kWallOffsetNs = 1'700'000'000'000'000'000;
-constexpr double kBitsPerMbit = 1048576.0;
 constexpr std::uint64_t kMostFrames = 1'000'000;
 // Of simulated time, until everybody plays.
 constexpr std::int64_t kStartNs = 60'000'000'000;

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
+#include <thread>
 
 namespace tandem::tool {
 namespace {
@@ -65,7 +65,7 @@ class StopAndGo final : public ThinDevice {
   StopAndGo() = default;
   StopAndGo(const StopAndGo&) = delete;
   StopAndGo& operator=(const StopAndGo&) = delete;
-  ~StopAndGo() override { end(); }
+  ~StopAndGo() override = default;
   [[nodiscard]] std::string name() const override { return "SIGSTOP and SIGCONT"; }
   [[nodiscard]] std::string procs() const override { return {}; }
   Result<void> set_share(double share) override {
@@ -73,7 +73,6 @@ class StopAndGo final : public ThinDevice {
     return {};
   }
   void hold(pid_t process) override {
-    release();
     thread_ = std::jthread([process, share = share_](const std::stop_token& stop) {
       const duration<double> turn(1e-6 * static_cast<double>(kTurnUs));
       while (!stop.stop_requested()) {
@@ -85,10 +84,9 @@ class StopAndGo final : public ThinDevice {
       kill(process, SIGCONT);
     });
   }
-  void release() override { end(); }
+  void release() override { thread_ = {}; }
 
  private:
-  void end() { thread_ = {}; }
   double share_ = 1;
   std::jthread thread_;
 };
