@@ -20,10 +20,10 @@ Vec3i scaled(const engine::Vec3f& v, double scale) {
 
 // Gains of one sub-step for a body of type 0.
 ContactMaterial material_of(const engine::Material& material, double mass, double dt_s, double substeps) {
-  const double damping = 65536.0 * dt_s / (mass * substeps);
-  return {rounded(static_cast<double>(material.spring) * dt_s * damping),
-          rounded(static_cast<double>(material.damping) * damping),
-          rounded(static_cast<double>(material.shear) * damping)};
+  const double share = dt_s / (mass * substeps);
+  return {rounded(16384.0 * static_cast<double>(material.spring) * dt_s * share),
+          rounded(8192.0 * static_cast<double>(material.damping) * share),
+          rounded(8192.0 * static_cast<double>(material.shear) * share)};
 }
 
 }  // namespace

@@ -8,27 +8,17 @@
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
-#include "sdk/core/predict/contact_walls.hpp"
+#include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
 namespace {
 
-constexpr std::uint32_t kReachBits = 14;  // two bodies that touch are less than 2^14 grid units apart
+constexpr std::uint32_t kReachBits = 14;
 constexpr std::uint32_t kRootShift = 16;
 constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
-constexpr std::uint32_t kDead = UINT32_MAX;
-
-// With n in 2^-14 and `overlap` in 1/64 lattice unit, both towards the body's own side: the change of v.
-// |u| <= 2^29, |n| < 2^15, gains <= 2^20, overlap < 2^38: every product stays below 2^60.
-std::array<std::int64_t, 3> penalty(const ContactMaterial& material, std::int64_t overlap, const Vec3i& n,
-                                    const std::array<std::int64_t, 3>& u) {
-  const std::int64_t closing = (u[0] * n[0] + u[1] * n[1] + u[2] * n[2]) >> 14;
-  const std::int64_t push = (material.spring * overlap - material.shear * closing) >> 16;
-  const std::int64_t drag = std::int64_t{material.damping} + material.shear;
-  std::array<std::int64_t, 3> force{};
-  for (std::size_t i = 0; i < 3; ++i) force[i] = ((push * n[i]) >> 14) + ((drag * u[i]) >> 16);
-  return force;
-}
+constexpr std::uint32_t kNearShift = 5;
+constexpr std::uint32_t kBeyond = 8;  // places a vector may read behind the last body
+constexpr std::uint32_t kPairsPerBody = 8;
 
 // Every grid needs four cells a side, or the cells before and behind one would be the same.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
@@ -37,7 +27,37 @@ std::uint32_t side_bits_for(std::uint32_t capacity) {
   return bits;
 }
 
-constexpr std::array<std::array<std::int32_t, 2>, 4> kRowsAhead{{{1, 0}, {-1, 1}, {0, 1}, {1, 1}}};  // y, z
+std::int32_t largest_radius_of(const ContactConstants& constants) {
+  std::int32_t largest = 1;
+  for (const auto& type : constants.types) largest = std::max(largest, type.radius);
+  return largest;
+}
+
+// Lattice units to grid units: two bodies that touch are less than 2^14 grid units apart.
+std::uint32_t shift_for(std::int32_t largest_radius) {
+  const auto bits =
+      static_cast<std::uint32_t>(std::bit_width(2 * static_cast<std::uint32_t>(largest_radius)));
+  return bits > kReachBits ? bits - kReachBits : 0;
+}
+
+ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
+  return {material.spring, material.damping + material.shear, material.shear, shift};
+}
+
+// Adds one axis to the cells' numbers.
+TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32_t* __restrict cell,
+                                   std::size_t count, std::uint32_t shift, std::int32_t cells_per,
+                                   std::uint32_t mask, std::uint32_t axis_shift) {
+  for (std::size_t s = 0; s < count; ++s) {
+    const auto along = static_cast<std::uint32_t>(std::int64_t{p[s] >> shift} * cells_per >> 32);
+    cell[s] |= (along & mask) << axis_shift;
+  }
+}
+
+// c -= (c*E + 2^15) >> 16, which is never larger than c.
+TANDEM_VECTOR_CLONES void decay(std::int32_t* c, std::size_t count, std::int64_t share) {
+  for (std::size_t s = 0; s < count; ++s) c[s] -= static_cast<std::int32_t>((c[s] * share + 32768) >> 16);
+}
 
 }  // namespace
 
@@ -50,20 +70,28 @@ Result<std::unique_ptr<Predictor>> Contact::create(std::uint32_t capacity,
 
 Contact::Contact(std::uint32_t capacity, ContactConstants constants)
     : constants_(std::move(constants)),
+      largest_radius_(largest_radius_of(constants_)),
+      shift_(shift_for(largest_radius_)),
+      pair_law_(law_of(constants_.pair, shift_)),
+      kernels_(fastest_contact_kernels()),
+      walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
       side_bits_(side_bits_for(capacity)),
       cell_(capacity),
+      rank_(capacity),
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
-      end_(begin_.size()),
-      sorted_(capacity),
-      force_(capacity),
+      bodies_(capacity),
+      forces_(capacity),
+      near_xy_(capacity + kBeyond),
+      near_z_(capacity + kBeyond),
+      first_(kPairsPerBody * capacity + ContactPairs::kMostOfCell),
+      second_(first_.size()),
       inverse_root_(kRoots) {
-  std::uint32_t largest = 1;
-  for (const auto& type : constants_.types)
-    largest = std::max(largest, static_cast<std::uint32_t>(type.radius));
-  const auto bits = static_cast<std::uint32_t>(std::bit_width(2 * largest));
-  shift_ = bits > kReachBits ? bits - kReachBits : 0;
-  cells_per_ = (std::int64_t{1} << 32) / ((std::int64_t{2} * largest >> shift_) + 1);
-  move_ = (65536 + constants_.substeps / 2) / constants_.substeps;
+  // Bodies that come to touch in a later sub-step are pairs from the first on.
+  const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
+  const std::uint32_t apart = constants_.substeps > 1 ? width + (width >> 3) : width;
+  cells_per_ = static_cast<std::int64_t>((std::uint64_t{1} << 32) / (apart + 1));
+  near_ = static_cast<std::int32_t>(apart >> kNearShift) + 3;
+  move_ = (32768 + constants_.substeps / 2) / constants_.substeps;
   for (std::size_t i = 0; i < kRoots; ++i) {
     // r at the middle of the entry, in 2^-8.
     const std::int64_t r = root(((2 * std::uint64_t{i} + 1) << (kRootShift - 1)) << 16U);
@@ -71,172 +99,90 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
   }
 }
 
-std::uint32_t Contact::cell_of(const State& state, Slot slot) const {
-  const std::uint32_t mask = (1U << side_bits_) - 1;
-  std::uint32_t cell = 0;
-  for (std::size_t i = 3; i-- > 0;) {
-    const auto along = static_cast<std::uint32_t>((state.p(i)[slot] >> shift_) * cells_per_ >> 32);
-    cell = (cell << side_bits_) | (along & mask);
-  }
-  return cell;
-}
-
-void Contact::sort_into_grid(const State& state) {
-  std::fill(begin_.begin(), begin_.end(), 0U);
+void Contact::sort(const State& state) {
   const std::uint32_t capacity = state.capacity();
-  for (Slot s = 0; s < capacity; ++s) {
-    cell_[s] = state.alive()[s] != 0 ? cell_of(state, s) : kDead;
-    if (cell_[s] != kDead) ++begin_[cell_[s] + 1];
+  std::fill(cell_.begin(), cell_.end(), 0U);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    add_axis(state.p(i).data(), cell_.data(), capacity, shift_, static_cast<std::int32_t>(cells_per_),
+             (1U << side_bits_) - 1, i * side_bits_);
   }
-  for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
-  std::copy(begin_.begin(), begin_.end(), end_.begin());
-  for (Slot s = 0; s < capacity; ++s) {
-    if (cell_[s] == kDead) continue;
-    Record& record = sorted_[end_[cell_[s]]++];
-    record.radius = type_of(state, s).radius;
-    record.slot = s;
-    for (std::size_t i = 0; i < 3; ++i) {
-      record.q[i] = state.p(i)[s] >> shift_;
-      record.v[i] = state.v(i)[s];
-    }
+  std::fill(begin_.begin(), begin_.end(), 0U);
+  const std::span<const std::uint8_t> alive = state.alive();
+  for (Slot s = 0; s < capacity; ++s) rank_[s] = (begin_[cell_[s]] += alive[s]) - 1;
+  std::uint32_t sum = 0;
+  for (std::uint32_t& begin : begin_) {
+    const std::uint32_t in_cell = std::min(begin, ContactGrid::kMostInCell);
+    begin = sum;
+    sum += in_cell;
   }
-  for (std::size_t c = 0; c + 1 < begin_.size(); ++c) end_[c] = std::min(end_[c], begin_[c] + kMostInCell);
-}
-
-void Contact::add_walls(const State& state) {
-  for (Slot s = 0; s < state.capacity(); ++s) {
-    Force& force = force_[s];
-    force = {};
-    if (state.alive()[s] == 0) continue;
-    const std::int32_t radius = type_of(state, s).radius;
+  count_ = sum;
+  const std::uint32_t near_shift = shift_ + kNearShift;
+  for (Slot s = 0; s < capacity; ++s) {
+    if (alive[s] == 0) continue;
+    const std::uint32_t place = rank_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + rank_[s] : count_++;
     const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
-    const Force u{-std::int64_t{state.v(0)[s]}, -std::int64_t{state.v(1)[s]}, -std::int64_t{state.v(2)[s]}};
-    const auto add = [&](const auto& shapes) {
-      for (const auto& shape : shapes) {
-        const WallTouch t = touch(shape, p, radius);
-        if (t.overlap <= 0) continue;
-        const Force f = penalty(constants_.wall, t.overlap << 6, t.out, u);
-        for (std::size_t i = 0; i < 3; ++i) force[i] += f[i];
-      }
-    };
-    add(constants_.planes);
-    add(constants_.boxes);
-    add(constants_.balls);
+    bodies_[place] = {p, type_of(state, s).radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
+    near_xy_[place] = (static_cast<std::uint32_t>(p[0] >> near_shift) & 0xFFFFU) |
+                      static_cast<std::uint32_t>(p[1] >> near_shift) << 16;
+    near_z_[place] = static_cast<std::uint32_t>(p[2] >> near_shift) & 0xFFFFU;
   }
 }
 
-// Seen from the lower slot, so that rounding does not depend on the order of the grid.
-void Contact::add_pair(std::uint32_t first, std::uint32_t second) {
-  if (sorted_[first].slot > sorted_[second].slot) std::swap(first, second);
-  const Record& a = sorted_[first];
-  const Record& b = sorted_[second];
-  std::uint32_t squared = 0;
-  Vec3i d{};
-  Force u{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    d[i] = a.q[i] - b.q[i];
-    squared += static_cast<std::uint32_t>(d[i] * d[i]);
-    u[i] = std::int64_t{b.v[i]} - a.v[i];
-  }
-  const std::int64_t inverse = inverse_root_[squared >> kRootShift];
-  const std::int64_t distance = squared * inverse >> 30;
-  const std::int64_t overlap = std::max<std::int64_t>(0, ((a.radius + b.radius) >> shift_) - distance);
-  Vec3i n{0, -(1 << 14), 0};
-  for (std::size_t i = 0; squared != 0 && i < 3; ++i) n[i] = static_cast<std::int32_t>(d[i] * inverse >> 16);
-  const Force f = penalty(constants_.pair, overlap << (shift_ + 6), n, u);
-  for (std::size_t i = 0; i < 3; ++i) {
-    force_[a.slot][i] += f[i];
-    force_[b.slot][i] -= f[i];
-  }
-}
-
-void Contact::add_pairs_of(std::uint32_t place, std::uint32_t cell_end,
-                           std::span<const std::array<std::uint32_t, 2>> runs) {
-  const Record& self = sorted_[place];
-  std::uint32_t count = 0;
-  const auto collect = [&](std::uint32_t from, std::uint32_t to) {
-    for (std::uint32_t j = from; j < to; ++j) {
-      const Record& other = sorted_[j];
-      // Wraps for bodies far apart that share a cell of the torus; the first test leaves them out.
-      std::uint32_t squared = 0;
-      std::uint32_t far = 0;
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::uint32_t d =
-            static_cast<std::uint32_t>(other.q[i]) - static_cast<std::uint32_t>(self.q[i]);
-        far |= (d + (1U << kReachBits)) >> (kReachBits + 1);
-        squared += d * d;
-      }
-      const std::uint32_t reach = static_cast<std::uint32_t>(self.radius + other.radius) >> shift_;
-      partners_[count] = j;
-      count += static_cast<std::uint32_t>(far == 0) & static_cast<std::uint32_t>(squared < reach * reach);
-    }
-  };
-  collect(place + 1, cell_end);
-  for (const auto& run : runs) collect(run[0], run[1]);
-  for (std::uint32_t k = 0; k < count; ++k) add_pair(place, partners_[k]);
-}
-
-void Contact::add_pairs() {
-  const std::uint32_t mask = (1U << side_bits_) - 1;
+void Contact::add_pairs(bool first) {
+  ContactPairs pairs{first_.data(), second_.data(), static_cast<std::uint32_t>(first_.size()), pair_count_};
+  if (!first && all_found_)
+    return kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(), pairs, forces_.data());
+  const auto near = static_cast<std::uint32_t>(near_);
+  const ContactGrid grid{side_bits_, begin_.data(), near_xy_.data(), near_z_.data(), near * near};
   const auto cells = static_cast<std::uint32_t>(begin_.size() - 1);
-  std::array<std::array<std::uint32_t, 2>, 13> runs{};
-  for (std::uint32_t cell = 0; cell < cells; ++cell) {
-    if (begin_[cell] == end_[cell]) continue;
-    const std::uint32_t x = cell & mask;
-    const std::uint32_t y = (cell >> side_bits_) & mask;
-    const std::uint32_t z = cell >> (2 * side_bits_);
-    std::size_t count = 0;
-    const auto look_at = [&](std::uint32_t other_x, std::uint32_t row) {
-      const std::uint32_t other = row | (other_x & mask);
-      runs[count] = {begin_[other], end_[other]};
-      count += static_cast<std::size_t>(begin_[other] != end_[other]);
-    };
-    look_at(x + 1, cell & ~mask);
-    for (const auto& ahead : kRowsAhead) {
-      const std::uint32_t row = (((z + static_cast<std::uint32_t>(ahead[1])) & mask) << (2 * side_bits_)) |
-                                (((y + static_cast<std::uint32_t>(ahead[0])) & mask) << side_bits_);
-      look_at(x - 1, row);
-      look_at(x, row);
-      look_at(x + 1, row);
-    }
-    for (std::uint32_t place = begin_[cell]; place < end_[cell]; ++place)
-      add_pairs_of(place, end_[cell], std::span(runs).first(count));
+  std::uint32_t parts = 0;
+  for (std::uint32_t cell = 0; cell < cells; ++parts) {
+    pairs.count = 0;
+    cell = kernels_.find(grid, cell, pairs);
+    kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(), pairs, forces_.data());
   }
+  all_found_ = parts == 1;
+  pair_count_ = pairs.count;
 }
 
-void Contact::sum_forces(const State& state) {
-  add_walls(state);
-  sort_into_grid(state);
-  add_pairs();
-}
-
-void Contact::integrate(State& state, const Drive& drive, bool first) const {
-  for (Slot s = 0; s < state.capacity(); ++s) {
-    if (state.alive()[s] == 0) continue;
-    const std::int64_t mobility = type_of(state, s).mobility;
+void Contact::integrate(const State& from, const Drive& drive, bool first) {
+  for (std::uint32_t place = 0; place < count_; ++place) {
+    ContactBody& body = bodies_[place];
+    const std::int64_t mobility = type_of(from, body.slot).mobility;
     for (std::size_t i = 0; i < 3; ++i) {
-      std::int32_t& p = state.p(i)[s];
-      std::int32_t& v = state.v(i)[s];
-      std::int32_t& c = state.c(i)[s];
-      const std::int64_t push = share_of(limited(force_[s][i], kVelocityLimit), mobility);
-      std::int64_t speed = v + push;
+      const std::int64_t force = std::int64_t{forces_[place].f[i]} << (shift_ + 2);
+      std::int64_t speed = body.v[i] + share_of(limited(force, kVelocityLimit), mobility);
       if (first) {
-        speed += std::int64_t{drive.gravity[i]} + c;
-        c = limited(c - share_of(c, drive.decay), kVelocityLimit);
+        speed += std::int64_t{drive.gravity[i]} + from.c(i)[body.slot];
         speed -= share_of(speed, drive.damping);
       }
-      v = limited(speed, kVelocityLimit);
-      p = limited(p + ((v * move_ + (1 << 21)) >> 22), kPositionLimit);
+      body.v[i] = limited(speed, kVelocityLimit);
+      body.p[i] = limited(body.p[i] + ((std::int64_t{body.v[i]} * move_ + (1 << 20)) >> 21), kPositionLimit);
     }
   }
+}
+
+void Contact::write(const Drive& drive, State& to) const {
+  for (std::uint32_t place = 0; place < count_; ++place) {
+    const ContactBody& body = bodies_[place];
+    for (std::size_t i = 0; i < 3; ++i) {
+      to.p(i)[body.slot] = body.p[i];
+      to.v(i)[body.slot] = body.v[i];
+    }
+  }
+  for (std::size_t i = 0; i < 3; ++i) decay(to.c(i).data(), to.c(i).size(), drive.decay);
 }
 
 void Contact::step(const State& from, State& to, const Drive& drive) {
-  if (&from != &to) to = from;
+  sort(from);
   for (std::int32_t i = 0; i < constants_.substeps; ++i) {
-    sum_forces(to);
-    integrate(to, drive, i == 0);
+    std::fill_n(forces_.begin(), count_, ContactForce{});
+    walls_.add_forces(std::span(bodies_).first(count_), forces_);
+    add_pairs(i == 0);
+    integrate(from, drive, i == 0);
   }
+  if (&from != &to) to = from;
+  write(drive, to);
 }
 
 void Contact::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> /*slots*/) {

@@ -30,8 +30,9 @@ class Values {
   }
   ContactMaterial take_material() {
     ContactMaterial material;
-    for (auto* gain : {&material.spring, &material.damping, &material.shear})
-      *gain = take(0, ContactConstants::kMostGain);
+    material.spring = take(0, ContactMaterial::kMostSpring);
+    material.damping = take(0, ContactMaterial::kMostDamping);
+    material.shear = take(0, ContactMaterial::kMostDamping);
     return material;
   }
   [[nodiscard]] bool good() const { return good_; }
@@ -98,7 +99,7 @@ Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> va
   constants.types.resize(types);
   for (auto& type : constants.types) {
     type.radius = in.take(1, C::kMostRadius);
-    type.mobility = in.take(0, C::kMostGain);
+    type.mobility = in.take(0, C::kMostMobility);
   }
   constants.planes.resize(planes);
   for (auto& plane : constants.planes) {

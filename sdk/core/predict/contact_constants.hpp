@@ -11,14 +11,16 @@
 
 namespace tandem {
 
-/// Changes of v in one sub-step, in 1/65536: by overlap (lattice units a frame), and by relative velocity.
+/// Changes of v in one sub-step: by overlap (lattice units a frame), in 1/16384, and by relative velocity, in
+/// 1/8192.
 struct ContactMaterial {
+  static constexpr std::int32_t kMostSpring = 1 << 16, kMostDamping = 1 << 13;
   std::int32_t spring = 0, damping = 0, shear = 0;
 };
 
 struct ContactConstants {
   static constexpr std::int32_t kMostSubsteps = 16;
-  static constexpr std::int32_t kMostGain = 1 << 20;
+  static constexpr std::int32_t kMostMobility = 1 << 20;
   static constexpr std::int32_t kMostRadius = 1 << 24;
   static constexpr std::int32_t kOne = 1 << 30;  ///< a component 1 of a unit vector
   static constexpr std::size_t kMostShapes = 256;

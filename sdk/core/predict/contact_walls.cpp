@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+
+#include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact_law.hpp"
 
 namespace tandem {
 namespace {
@@ -24,7 +28,116 @@ std::uint64_t squared(const Vec3l& d) {
   return sum;
 }
 
+constexpr std::size_t kBlock = 64;
+
+using Slab = ContactWalls::Slab;
+
+std::int64_t product(const Vec3i& a, const Vec3i& b) {
+  return std::int64_t{a[0]} * b[0] + std::int64_t{a[1]} * b[1] + std::int64_t{a[2]} * b[2];
+}
+
+// Of where a body of radius `r` may touch: for every body that does, low <= normal . p <= high. All of it
+// stays below 2^63: |normal . p| <= 3 * 2^60, and the limits are at most 4.1 * 2^60.
+void add_slabs(const ContactConstants::Plane& plane, std::int64_t r, std::vector<Slab>& slabs) {
+  slabs.push_back({plane.normal, -(std::int64_t{1} << 62), (plane.offset + r) * (1 << 30)});
+}
+
+void add_slabs(const ContactConstants::Box& box, std::int64_t r, std::vector<Slab>& slabs) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t centre = product(box.axes[i], box.centre);
+    const std::int64_t reach = (box.half[i] + r) * (1 << 30);
+    slabs.push_back({box.axes[i], centre - reach, centre + reach});
+  }
+}
+
+void add_slabs(const ContactConstants::Ball& ball, std::int64_t r, std::vector<Slab>& slabs) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    Slab slab;
+    slab.normal[i] = 1 << 30;
+    slab.low = (ball.centre[i] - ball.radius - r) * (1 << 30);
+    slab.high = (ball.centre[i] + ball.radius + r) * (1 << 30);
+    slabs.push_back(slab);
+  }
+}
+
+// Which of 64 bodies lie within all slabs, the first body in the lowest bit.
+TANDEM_VECTOR_CLONES std::uint64_t within(const Slab* slabs, std::size_t count, const std::int32_t* x,
+                                          const std::int32_t* y, const std::int32_t* z) {
+  std::uint64_t all = ~std::uint64_t{0};
+  for (std::size_t s = 0; s < count && all != 0; ++s) {
+    const Slab slab = slabs[s];
+    std::uint64_t outside = 0;
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      const std::int64_t along = std::int64_t{slab.normal[0]} * x[k] + std::int64_t{slab.normal[1]} * y[k] +
+                                 std::int64_t{slab.normal[2]} * z[k];
+      outside |= (static_cast<std::uint64_t>((along - slab.low) | (slab.high - along)) >> 63U) << k;
+    }
+    all &= ~outside;
+  }
+  return all;
+}
+
 }  // namespace
+
+// The positions of up to 64 bodies that follow each other.
+struct PlacesOf64 {
+  std::size_t first = 0;
+  std::uint64_t present = 0;
+  std::array<std::array<std::int32_t, kBlock>, 3> p{};
+};
+
+ContactWalls::ContactWalls(const ContactConstants& constants, const ContactLaw& law,
+                           std::int32_t largest_radius)
+    : constants_(constants), law_(law) {
+  for (const auto& plane : constants.planes) add_slabs(plane, largest_radius, planes_);
+  for (const auto& box : constants.boxes) add_slabs(box, largest_radius, boxes_);
+  for (const auto& ball : constants.balls) add_slabs(ball, largest_radius, balls_);
+}
+
+template <class Shape>
+void ContactWalls::add_shapes(std::span<const Shape> shapes, std::span<const Slab> slabs,
+                              const PlacesOf64& places, std::span<const ContactBody> bodies,
+                              std::span<ContactForce> forces) const {
+  constexpr std::int32_t kOne = 1 << 12;
+  const std::size_t each = shapes.empty() ? 0 : slabs.size() / shapes.size();
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    std::uint64_t near =
+        within(slabs.data() + s * each, each, places.p[0].data(), places.p[1].data(), places.p[2].data()) &
+        places.present;
+    for (; near != 0; near &= near - 1) {
+      const std::size_t place = places.first + static_cast<std::size_t>(std::countr_zero(near));
+      const ContactBody& body = bodies[place];
+      const WallTouch t = touch(shapes[s], body.p, body.radius);
+      if (t.overlap <= 0) continue;
+      Vec3i n{};
+      Vec3i u{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        n[i] = std::clamp(-t.out[i] >> 2, -kOne, kOne);
+        u[i] = contact_speed(law_, -body.v[i]);
+      }
+      const auto overlap =
+          static_cast<std::int32_t>(std::min<std::int64_t>(t.overlap >> law_.shift, kFarthest));
+      const Vec3i f = contact_force(law_, overlap, n, u);
+      for (std::size_t i = 0; i < 3; ++i) forces[place].f[i] += f[i];
+    }
+  }
+}
+
+void ContactWalls::add_forces(std::span<const ContactBody> bodies, std::span<ContactForce> forces) const {
+  using C = ContactConstants;
+  PlacesOf64 places;
+  for (std::size_t first = 0; first < bodies.size(); first += kBlock) {
+    const std::size_t count = std::min(kBlock, bodies.size() - first);
+    places.first = first;
+    places.present = ~std::uint64_t{0} >> (kBlock - count);
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t i = 0; i < 3; ++i) places.p[i][k] = bodies[first + k].p[i];
+    }
+    add_shapes<C::Plane>(constants_.planes, planes_, places, bodies, forces);
+    add_shapes<C::Box>(constants_.boxes, boxes_, places, bodies, forces);
+    add_shapes<C::Ball>(constants_.balls, balls_, places, bodies, forces);
+  }
+}
 
 std::int64_t root(std::uint64_t x) {
   std::uint64_t result = 0;

@@ -2,8 +2,11 @@
 // Where a body touches the static geometry of the tier `contact`.
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "sdk/core/predict/contact_constants.hpp"
+#include "sdk/core/predict/contact_pairs.hpp"
 
 namespace tandem {
 
@@ -16,6 +19,31 @@ struct WallTouch {
 [[nodiscard]] WallTouch touch(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t radius);
 [[nodiscard]] WallTouch touch(const ContactConstants::Box& box, const Vec3i& p, std::int32_t radius);
 [[nodiscard]] WallTouch touch(const ContactConstants::Ball& ball, const Vec3i& p, std::int32_t radius);
+
+/// The static geometry, and the forces of what touches it.
+class ContactWalls {
+ public:
+  /// `largest_radius` of all types; `constants` outlive this.
+  ContactWalls(const ContactConstants& constants, const ContactLaw& law, std::int32_t largest_radius);
+
+  /// `forces` by place, as `bodies`.
+  void add_forces(std::span<const ContactBody> bodies, std::span<ContactForce> forces) const;
+
+  /// Where low <= normal . p <= high, with p in lattice units; no wider than 2^63.
+  struct Slab {
+    Vec3i normal{};
+    std::int64_t low = 0, high = 0;
+  };
+
+ private:
+  template <class Shape>
+  void add_shapes(std::span<const Shape> shapes, std::span<const Slab> slabs, const struct PlacesOf64& places,
+                  std::span<const ContactBody> bodies, std::span<ContactForce> forces) const;
+
+  const ContactConstants& constants_;
+  ContactLaw law_;
+  std::vector<Slab> planes_, boxes_, balls_;  // one a plane, three each of the others
+};
 
 /// Largest r with r * r <= x.
 [[nodiscard]] std::int64_t root(std::uint64_t x);

@@ -16,7 +16,7 @@ constexpr std::int32_t kRadius = 2000;
 TimelineConfig contact_config(std::uint32_t max_lead) {
   TimelineConfig config = synthetic::config_for("tracker", kCapacity, max_lead);
   ContactConstants constants;
-  constants.pair = constants.wall = {14563, 3277, 3277};
+  constants.pair = constants.wall = {3641, 410, 410};
   constants.types = {{kRadius, 65536}};
   constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
   config.predictor = "contact";

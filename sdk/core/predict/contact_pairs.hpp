@@ -1,0 +1,73 @@
+#pragma once
+// Pairs of the tier `contact`: who is near whom at the start of a frame, and the forces between them.
+
+#include <cstdint>
+
+#include "sdk/core/lattice/state.hpp"
+
+#if defined(__AVX2__) && !defined(TANDEM_CONTACT_AVX2)
+#define TANDEM_CONTACT_AVX2
+#endif
+
+namespace tandem {
+
+/// A body while a frame is stepped: half a cache line.
+struct alignas(32) ContactBody {
+  Vec3i p;
+  std::int32_t radius;
+  Vec3i v;
+  Slot slot;
+};
+
+/// Changes of v, in 1/16 grid unit per frame.
+struct alignas(16) ContactForce {
+  Vec3i f;
+  std::int32_t unused;
+};
+
+/// The torus of cells, with the bodies that take part sorted by cell.
+struct ContactGrid {
+  static constexpr std::uint32_t kMostInCell = 16;
+
+  std::uint32_t side_bits;     ///< 2^side_bits cells a side, x lowest in a cell's number
+  const std::uint32_t* begin;  ///< by cell, and one more: places of its bodies
+  const std::uint32_t* xy;     ///< by place, x and y in 16 bits each of 2^5 grid units; readable 8 further
+  const std::uint32_t* z;      ///< likewise, the upper half zero
+  std::uint32_t near_squared;  ///< bodies nearer than this are a pair
+};
+
+/// Places of the two bodies of each pair, the one whose cell lies behind first.
+struct ContactPairs {
+  std::uint32_t* first;
+  std::uint32_t* second;
+  std::uint32_t room;  ///< at least kMostOfCell
+  std::uint32_t count;
+
+  /// What the bodies of one cell can add: 13 cells ahead and their own, and what a vector writes beyond.
+  static constexpr std::uint32_t kMostOfCell =
+      ContactGrid::kMostInCell * (13 * ContactGrid::kMostInCell + ContactGrid::kMostInCell) + 16;
+};
+
+/// What a contact does, besides where it is. Gains as in ContactMaterial.
+struct ContactLaw {
+  std::int32_t spring, drag, shear;  ///< drag: damping and shear
+  std::uint32_t shift;               ///< a grid unit is 2^shift lattice units
+};
+
+struct ContactKernels {
+  /// Adds the pairs of cells from `cell` on until the room is used up; returns the first cell not looked at.
+  std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t cell, ContactPairs& pairs);
+  /// Adds the forces of all pairs. `inverse_root`: 2^30 / r by r^2 >> 16.
+  void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
+                     const ContactPairs& pairs, ContactForce* forces);
+};
+
+/// Plain integers, for any machine.
+[[nodiscard]] ContactKernels portable_contact_kernels();
+#ifdef TANDEM_CONTACT_AVX2
+/// The same bits, eight at a time; only where the processor has AVX2.
+[[nodiscard]] ContactKernels avx2_contact_kernels();
+#endif
+[[nodiscard]] ContactKernels fastest_contact_kernels();
+
+}  // namespace tandem
