@@ -170,7 +170,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--session", flags.session, "Name that clients join by [default]");
   app.add_option("--domain", flags.domain, "DDS domain [0]");
   app.add_option("--codec", flags.codec, fmt::format("{} [entropy]", fmt::join(codec_names(), ", ")));
-  app.add_option("--predictor", flags.predictor, "Predicted step of server and clients: ballistic or contact [ballistic]");
+  app.add_option("--predictor", flags.predictor,
+                 "Predicted step of server and clients: ballistic, field or contact [ballistic]");
   app.add_option_function<std::string>(
          "--threshold",
          [&flags](const std::string& text) {

@@ -58,7 +58,7 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   config.codec_tables = codec_tables(choice.codec, table);
   config.budget = choice.codec == "limited" ? choice.budget_bytes : kNoBudget;
   config.predictor = choice.predictor;
-  if (choice.predictor == "contact") {
+  if (choice.predictor == "contact" || choice.predictor == "field") {
     auto constants = contact_constants(scene, *lattice);
     if (!constants) return tl::unexpected(constants.error());
     config.predictor_constants = std::move(*constants);

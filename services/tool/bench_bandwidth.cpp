@@ -200,7 +200,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->check(CLI::IsMember(options->codecs));
   command
       ->add_option("--predictor", options->choice.predictor,
-                   "Predicted step of `tracker`: ballistic or contact; the paper's codecs have ballistic")
+                   "Predicted step of `tracker`: ballistic, field or contact; the paper's codecs have ballistic")
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();

@@ -19,6 +19,7 @@ struct GainSet {
 constexpr GainSet kBallistic{52429, 9830, 3, 2};  // 0.8, 0.15
 // Contacts are predicted: what is left grows slower, and there is no force to learn.
 constexpr GainSet kContact{45875, 0, 3, 3};  // 0.7, 0
+constexpr GainSet kField{45875, 0, 3, 3};    // 0.7, 0: likewise
 
 TrackerGains make_gains(const GainSet& set) {
   TrackerGains gains;
@@ -36,7 +37,9 @@ TrackerGains make_gains(const GainSet& set) {
 
 const TrackerGains& tracker_gains(std::string_view predictor) {
   static const TrackerGains ballistic = make_gains(kBallistic);
+  static const TrackerGains field = make_gains(kField);
   static const TrackerGains contact = make_gains(kContact);
+  if (predictor == "field") return field;
   return predictor == "contact" ? contact : ballistic;
 }
 

@@ -81,6 +81,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
       bodies_(capacity),
       forces_(capacity),
+      place_cell_(capacity),
       near_xy_(capacity + kBeyond),
       near_z_(capacity + kBeyond),
       first_(kPairsPerBody * capacity + ContactPairs::kMostOfCell),
@@ -124,6 +125,7 @@ void Contact::sort(const State& state) {
     bodies_[place] = {p, type_of(state, s).radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
     near_xy_[place] = (static_cast<std::uint32_t>(p[0] >> near_shift) & 0xFFFFU) |
                       static_cast<std::uint32_t>(p[1] >> near_shift) << 16;
+    place_cell_[place] = cell_[s];
     near_z_[place] = static_cast<std::uint32_t>(p[2] >> near_shift) & 0xFFFFU;
   }
 }
@@ -133,12 +135,12 @@ void Contact::add_pairs(bool first) {
   if (!first && all_found_)
     return kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(), pairs, forces_.data());
   const auto near = static_cast<std::uint32_t>(near_);
-  const ContactGrid grid{side_bits_, begin_.data(), near_xy_.data(), near_z_.data(), near * near};
-  const auto cells = static_cast<std::uint32_t>(begin_.size() - 1);
+  const ContactGrid grid{side_bits_,      begin_.data(),  place_cell_.data(),
+                         near_xy_.data(), near_z_.data(), near * near};
   std::uint32_t parts = 0;
-  for (std::uint32_t cell = 0; cell < cells; ++parts) {
+  for (std::uint32_t place = 0; place < begin_.back() || parts == 0; ++parts) {
     pairs.count = 0;
-    cell = kernels_.find(grid, cell, pairs);
+    place = kernels_.find(grid, place, pairs);
     kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(), pairs, forces_.data());
   }
   all_found_ = parts == 1;

@@ -57,7 +57,7 @@ class Contact final : public Predictor {
   std::uint32_t count_ = 0;
   std::vector<ContactBody> bodies_;
   std::vector<ContactForce> forces_;
-  std::vector<std::uint32_t> near_xy_, near_z_;
+  std::vector<std::uint32_t> place_cell_, near_xy_, near_z_;
   std::vector<std::uint32_t> first_, second_;
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
   bool all_found_ = false;                   // first_ and second_ hold all pairs of the frame

@@ -8,22 +8,23 @@ namespace {
 
 std::int32_t apart(std::uint32_t a, std::uint32_t b) { return static_cast<std::int16_t>(a - b); }
 
-void collect(const ContactGrid& grid, std::uint32_t self, std::uint32_t from, std::uint32_t to,
-             ContactPairs& pairs) {
+std::uint32_t collect(const ContactGrid& grid, std::uint32_t self, std::uint32_t from, std::uint32_t to,
+                      std::uint32_t* first, std::uint32_t* second, std::uint32_t count) {
   for (std::uint32_t j = from; j < to; ++j) {
     const std::int32_t x = apart(grid.xy[j], grid.xy[self]);
     const std::int32_t y = apart(grid.xy[j] >> 16, grid.xy[self] >> 16);
     const std::int32_t z = apart(grid.z[j], grid.z[self]);
     const std::uint32_t squared = static_cast<std::uint32_t>(x * x) + static_cast<std::uint32_t>(y * y) +
                                   static_cast<std::uint32_t>(z * z);
-    pairs.first[pairs.count] = self;
-    pairs.second[pairs.count] = j;
-    pairs.count += static_cast<std::uint32_t>(squared < grid.near_squared);
+    first[count] = self;
+    second[count] = j;
+    count += static_cast<std::uint32_t>(squared < grid.near_squared);
   }
+  return count;
 }
 
-std::uint32_t find(const ContactGrid& grid, std::uint32_t cell, ContactPairs& pairs) {
-  return find_pairs(grid, cell, pairs, collect);
+std::uint32_t find(const ContactGrid& grid, std::uint32_t place, ContactPairs& pairs) {
+  return find_pairs(grid, place, pairs, [](auto... arguments) { return collect(arguments...); });
 }
 
 // b - a of what may be 2^31 apart; bodies that far apart do not touch, whatever the sign.

@@ -31,6 +31,7 @@ struct ContactGrid {
 
   std::uint32_t side_bits;     ///< 2^side_bits cells a side, x lowest in a cell's number
   const std::uint32_t* begin;  ///< by cell, and one more: places of its bodies
+  const std::uint32_t* cell;   ///< by place
   const std::uint32_t* xy;     ///< by place, x and y in 16 bits each of 2^5 grid units; readable 8 further
   const std::uint32_t* z;      ///< likewise, the upper half zero
   std::uint32_t near_squared;  ///< bodies nearer than this are a pair
@@ -55,8 +56,9 @@ struct ContactLaw {
 };
 
 struct ContactKernels {
-  /// Adds the pairs of cells from `cell` on until the room is used up; returns the first cell not looked at.
-  std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t cell, ContactPairs& pairs);
+  /// Adds the pairs of the bodies from `place` on, the first of a cell, until the room is used up; returns
+  /// the place of the first body not looked at.
+  std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, ContactPairs& pairs);
   /// Adds the forces of all pairs. `inverse_root`: 2^30 / r by r^2 >> 16.
   void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
                      const ContactPairs& pairs, ContactForce* forces);

@@ -35,28 +35,33 @@ inline Wide load(const std::uint32_t* from) {
 }
 inline void store(std::uint32_t* to, Wide x) { _mm256_storeu_si256(reinterpret_cast<__m256i_u*>(to), x); }
 
-inline void collect(const ContactGrid& grid, std::uint32_t self, std::uint32_t from, std::uint32_t to,
-                    ContactPairs& pairs) {
+inline std::uint32_t collect(const ContactGrid& grid, std::uint32_t self, std::uint32_t from,
+                             std::uint32_t to, std::uint32_t* first, std::uint32_t* second,
+                             std::uint32_t count) {
   const Wide self_xy = same(grid.xy[self]);
   const Wide self_z = same(grid.z[self]);
   const Wide most = same(grid.near_squared - 1);
-  for (std::uint32_t j = from; j < to; j += 8) {
+  std::uint32_t j = from;
+  do {
     const Wide xy = _mm256_sub_epi16(load(grid.xy + j), self_xy);
     const Wide z = _mm256_sub_epi16(load(grid.z + j), self_z);
     const Wide squared = _mm256_add_epi32(_mm256_madd_epi16(xy, xy), _mm256_madd_epi16(z, z));
     const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(squared, most), squared);
-    auto bits = static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near)));
-    if (to - j < 8) bits &= (1U << (to - j)) - 1;
+    // Without a branch: how many there are is as good as random.
+    const auto bits = static_cast<std::uint64_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) &
+                      ((std::uint64_t{1} << (to - j)) - 1);
     const Wide places =
         _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
-    store(pairs.first + pairs.count, same(self));
-    store(pairs.second + pairs.count, _mm256_add_epi32(places, same(j)));
-    pairs.count += static_cast<std::uint32_t>(__builtin_popcount(bits));
-  }
+    store(first + count, same(self));
+    store(second + count, _mm256_add_epi32(places, same(j)));
+    count += static_cast<std::uint32_t>(_mm_popcnt_u64(bits));
+    j += 8;
+  } while (j < to);
+  return count;
 }
 
-std::uint32_t find(const ContactGrid& grid, std::uint32_t cell, ContactPairs& pairs) {
-  return find_pairs(grid, cell, pairs, collect);
+std::uint32_t find(const ContactGrid& grid, std::uint32_t place, ContactPairs& pairs) {
+  return find_pairs(grid, place, pairs, [](auto... arguments) { return collect(arguments...); });
 }
 
 // Four rows of four, twice side by side, turned over.
@@ -85,6 +90,17 @@ inline void add(ContactForce& force, __m128i change) {
 inline void subtract(ContactForce& force, __m128i change) {
   auto* const f = reinterpret_cast<__m128i*>(&force);
   _mm_store_si128(f, _mm_sub_epi32(_mm_load_si128(f), change));
+}
+
+// The gather instruction takes longer where its results must not be guessed ahead.
+inline Wide looked_up(const std::uint32_t* table, Wide index) {
+  alignas(32) std::uint32_t at[8];
+  _mm256_store_si256(reinterpret_cast<Wide*>(at), index);
+  const auto four = [&](unsigned i) {
+    return _mm_set_epi32(static_cast<int>(table[at[i + 3]]), static_cast<int>(table[at[i + 2]]),
+                         static_cast<int>(table[at[i + 1]]), static_cast<int>(table[at[i]]));
+  };
+  return _mm256_inserti128_si256(_mm256_castsi128_si256(four(0)), four(4), 1);
 }
 
 // The forces of eight pairs on the first of each, as in contact_pairs.cpp.
@@ -118,8 +134,7 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
                        _mm256_mullo_epi32(d[2], d[2]));
   const Wide touching = _mm256_cmpgt_epi32(_mm256_mullo_epi32(reach, reach), squared);
   squared = _mm256_and_si256(squared, touching);
-  const Wide inverse =
-      _mm256_i32gather_epi32(reinterpret_cast<const int*>(inverse_root), _mm256_srli_epi32(squared, 16), 4);
+  const Wide inverse = looked_up(inverse_root, _mm256_srli_epi32(squared, 16));
   const Wide distance = _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(squared, 12), inverse), 18);
   const Wide overlap = _mm256_max_epi32(_mm256_sub_epi32(reach, distance), Wide{});
 

@@ -4,19 +4,22 @@
 
 #include "sdk/core/predict/ballistic.hpp"
 #include "sdk/core/predict/contact.hpp"
+#include "sdk/core/predict/field.hpp"
 
 namespace tandem {
 
 Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
                                                   std::span<const std::int32_t> constants) {
-  if (name == "contact") {
-    if (capacity == 0 || capacity > kMaxCapacity)
-      return fail(ErrorCode::kInvalidArgument, "predictor 'contact': capacity out of range");
-    return Contact::create(capacity, constants);
+  if (name == "contact" || name == "field") {
+    if (capacity == 0 || capacity > kMaxCapacity) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "predictor '" + std::string(name) + "': capacity out of range");
+    }
+    return name == "field" ? Field::create(capacity, constants) : Contact::create(capacity, constants);
   }
   if (name != "ballistic") {
     return fail(ErrorCode::kUnsupported,
-                "unknown predictor '" + std::string(name) + "' (known: ballistic, contact)");
+                "unknown predictor '" + std::string(name) + "' (known: ballistic, field, contact)");
   }
   if (!constants.empty()) return fail(ErrorCode::kMalformed, "predictor 'ballistic' takes no constants");
   return std::make_unique<Ballistic>();
