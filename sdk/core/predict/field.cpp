@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
-#include "sdk/core/predict/contact_walls.hpp"
+#include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
 namespace {
@@ -19,9 +19,64 @@ std::uint32_t side_bits_for(std::uint32_t capacity) {
   return bits;
 }
 
+FieldForces* fastest_forces() {
+#ifdef TANDEM_FIELD_AVX2
+  if (__builtin_cpu_supports("avx2") != 0) return add_field_forces_avx2;
+#endif
+  return add_field_forces;
+}
+
 std::int16_t gain16(std::int64_t x) { return static_cast<std::int16_t>(std::min<std::int64_t>(x, 32767)); }
 
 constexpr std::int32_t kMostPasses = 2;
+
+std::int32_t passes_of(const ContactConstants& constants) {
+  return std::min(kMostPasses, constants.substeps);
+}
+
+// Gains of a pass.
+ContactMaterial wall_gains(const ContactConstants& constants) {
+  const std::int32_t substeps = constants.substeps / passes_of(constants);
+  const ContactMaterial& wall = constants.wall;
+  return {wall.spring * substeps, wall.damping * substeps, wall.shear * substeps};
+}
+
+// Adds one axis to the cells' numbers.
+TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32_t* __restrict cell,
+                                   std::size_t count, std::uint32_t shift, std::int32_t cells_per,
+                                   std::uint32_t side_bits, std::uint32_t axis) {
+  const std::uint32_t mask = (1U << side_bits) - 1;
+  for (std::size_t s = 0; s < count; ++s) {
+    const auto along = static_cast<std::uint32_t>(std::int64_t{p[s] >> shift} * cells_per >> 32);
+    cell[s] |= (along & mask) << (axis * side_bits);
+  }
+}
+
+// The first pass of a frame: as `ballistic`, plus the force. A dead slot is all zero; it stays so without
+// gravity.
+TANDEM_VECTOR_CLONES void add_drive(std::int32_t* __restrict v, std::int32_t* __restrict c,
+                                    const std::int32_t* __restrict force,
+                                    const std::uint8_t* __restrict alive, std::size_t count,
+                                    std::int32_t gravity, std::int64_t damping, std::int64_t decay) {
+  for (std::size_t s = 0; s < count; ++s) {
+    const std::int32_t speed = v[s] + force[s] + c[s] + (gravity & -static_cast<std::int32_t>(alive[s]));
+    c[s] -= static_cast<std::int32_t>((c[s] * decay + 32768) >> 16);
+    const auto lost = static_cast<std::int32_t>((speed * damping + 32768) >> 16);
+    v[s] = std::clamp(speed - lost, -kVelocityLimit, kVelocityLimit);
+  }
+}
+
+TANDEM_VECTOR_CLONES void add_force(std::int32_t* __restrict v, const std::int32_t* __restrict force,
+                                    std::size_t count) {
+  for (std::size_t s = 0; s < count; ++s) v[s] = std::clamp(v[s] + force[s], -kVelocityLimit, kVelocityLimit);
+}
+
+TANDEM_VECTOR_CLONES void advance(std::int32_t* __restrict p, const std::int32_t* __restrict v,
+                                  std::size_t count, std::int32_t shift) {
+  const std::int32_t half = 1 << (shift - 1);
+  for (std::size_t s = 0; s < count; ++s)
+    p[s] = std::clamp(p[s] + ((v[s] + half) >> shift), -kPositionLimit, kPositionLimit);
+}
 
 }  // namespace
 
@@ -34,24 +89,29 @@ Result<std::unique_ptr<Predictor>> Field::create(std::uint32_t capacity,
 
 Field::Field(std::uint32_t capacity, ContactConstants constants)
     : constants_(std::move(constants)),
+      add_forces_(fastest_forces()),
+      walls_(constants_, wall_gains(constants_), capacity),
+      passes_(passes_of(constants_)),
       side_bits_(side_bits_for(capacity)),
       cell_(capacity),
       rank_(capacity),
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
       slot_(capacity) {
   for (auto* columns : {&p_, &v_, &f_})
-    for (auto& column : *columns) column.resize(capacity + 8);
-  for (auto& column : wall_force_) column.resize(capacity);
-  for (const auto& type : constants_.types) diameter_ = std::max(diameter_, 2 * type.radius);
+    for (auto& column : *columns) column.resize(capacity + FieldGrid::kBeyond);
+  for (auto& column : force_) column.resize(capacity);
+  for (const auto& type : constants_.types) {
+    diameter_ = std::max(diameter_, 2 * type.radius);
+    equal_masses_ = equal_masses_ && type.mobility == 65536;
+  }
   const auto bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint32_t>(diameter_)));
   shift_ = bits > 14 ? bits - 14 : 0;
-  const std::int64_t width = diameter_ >> shift_;
-  per_diameter_ = (std::int64_t{1} << (kDiameterBits + 16)) / width;
-  // Bodies apart that share a cell of the torus must not share the low bits of their positions.
-  const std::int64_t edge = 8192 + (26214 >> side_bits_);
-  cells_per_ = (std::int64_t{1} << 32) / edge;
-  passes_ = std::min(kMostPasses, constants_.substeps);
-  move_ = (65536 + passes_ / 2) / passes_;
+  const std::uint32_t width = static_cast<std::uint32_t>(diameter_) >> shift_;
+  per_diameter_ = (std::uint32_t{1} << 29) / width;
+  // A little wider than the largest bodies, so that bodies apart that share a cell of the torus do not share
+  // the low bits of their positions as well.
+  const std::uint64_t edge = 8192 + (26214U >> side_bits_);
+  cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 45) / (edge * width));
   const std::int64_t substeps = constants_.substeps / passes_;  // in a pass
   const auto& pair = constants_.pair;
   law_.spring = gain16(4 * substeps * pair.spring);
@@ -60,25 +120,16 @@ Field::Field(std::uint32_t capacity, ContactConstants constants)
   law_.shear_shift = 4;
   for (; law_.shear_shift > 0 && shear * 2 < 32768; --law_.shear_shift) shear *= 2;
   law_.shear = gain16(shear);
-  const auto gain = [&](std::int32_t per_substep) {
-    return static_cast<std::int32_t>(per_substep * substeps);
-  };
-  wall_ = {gain(constants_.wall.spring), gain(constants_.wall.damping), gain(constants_.wall.shear)};
 }
 
 void Field::sort(const State& state) {
+  const std::uint32_t capacity = state.capacity();
+  const std::span<const std::uint8_t> alive = state.alive();
+  std::fill(cell_.begin(), cell_.end(), 0U);
+  for (std::uint32_t i = 0; i < 3; ++i)
+    add_axis(state.p(i).data(), cell_.data(), capacity, shift_, cells_per_, side_bits_, i);
   std::fill(begin_.begin(), begin_.end(), 0U);
-  const std::uint32_t mask = (1U << side_bits_) - 1;
-  for (Slot s = 0; s < state.capacity(); ++s) {
-    if (state.alive()[s] == 0) continue;
-    std::uint32_t cell = 0;
-    for (std::size_t i = 3; i-- > 0;) {
-      const std::int64_t at = ((state.p(i)[s] >> shift_) * per_diameter_) >> 16;
-      cell = (cell << side_bits_) | (static_cast<std::uint32_t>(at * cells_per_ >> 32) & mask);
-    }
-    cell_[s] = cell;
-    rank_[s] = begin_[cell]++;
-  }
+  for (Slot s = 0; s < capacity; ++s) rank_[s] = (begin_[cell_[s]] += alive[s]) - 1;
   std::uint32_t sum = 0;
   for (std::uint32_t& begin : begin_) {
     const std::uint32_t in_cell = std::min(begin, FieldGrid::kMostInCell);
@@ -86,70 +137,52 @@ void Field::sort(const State& state) {
     sum += in_cell;
   }
   count_ = sum;
-  for (Slot s = 0; s < state.capacity(); ++s) {
-    if (state.alive()[s] == 0) continue;
-    const std::uint32_t place = rank_[s] < FieldGrid::kMostInCell ? begin_[cell_[s]] + rank_[s] : count_++;
-    slot_[place] = s;
+  for (Slot s = 0; s < capacity; ++s) {
+    if (alive[s] != 0 && rank_[s] < FieldGrid::kMostInCell) slot_[begin_[cell_[s]] + rank_[s]] = s;
   }
 }
 
-void Field::put_into_lanes(const State& state) {
+void Field::add_pairs(const State& state) {
+  const std::int32_t* const p[3] = {state.p(0).data(), state.p(1).data(), state.p(2).data()};
+  const std::int32_t* const v[3] = {state.v(0).data(), state.v(1).data(), state.v(2).data()};
+  const std::uint32_t positions = per_diameter_;
+  const auto speeds = static_cast<std::int32_t>(per_diameter_ >> 1);
+  const std::int32_t most = INT32_MAX / speeds;
   for (std::size_t i = 0; i < 3; ++i) {
-    const std::int32_t* const p = state.p(i).data();
-    const std::int32_t* const v = state.v(i).data();
     for (std::uint32_t place = 0; place < count_; ++place) {
       const Slot s = slot_[place];
-      p_[i][place] = static_cast<std::int16_t>((p[s] >> shift_) * per_diameter_ >> 16);
-      const std::int64_t speed = (v[s] >> shift_) * per_diameter_ >> 21;
-      v_[i][place] = static_cast<std::int16_t>(std::clamp<std::int64_t>(speed, -32768, 32767));
-      f_[i][place] = 0;
+      p_[i][place] =
+          static_cast<std::int16_t>((static_cast<std::uint32_t>(p[i][s] >> shift_) * positions) >> 16);
+      const std::int32_t speed = std::clamp(v[i][s] >> (shift_ + 5), -most, most);
+      v_[i][place] = static_cast<std::int16_t>(std::clamp((speed * speeds) >> 15, -32768, 32767));
     }
+    std::fill_n(f_[i].begin(), count_, std::int16_t{0});
+  }
+  const FieldGrid grid{side_bits_,
+                       begin_.data(),
+                       {p_[0].data(), p_[1].data(), p_[2].data()},
+                       {v_[0].data(), v_[1].data(), v_[2].data()}};
+  add_forces_(law_, grid, {f_[0].data(), f_[1].data(), f_[2].data()});
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::uint32_t place = 0; place < count_; ++place)
+      force_[i][slot_[place]] += limited((std::int64_t{f_[i][place]} * diameter_) >> 8, kVelocityLimit);
   }
 }
 
-template <class Shape>
-void Field::add_wall(const State& state, const Shape& shape, std::uint32_t place) {
-  const Slot s = slot_[place];
-  const WallTouch t = touch(shape, {state.p(0)[s], state.p(1)[s], state.p(2)[s]}, type_of(state, s).radius);
-  if (t.overlap <= 0) return;
-  std::int64_t closing = 0;
-  for (std::size_t i = 0; i < 3; ++i) closing -= std::int64_t{state.v(i)[s]} * t.out[i];
-  closing >>= 14;
-  const std::int64_t push = (wall_.spring * t.overlap >> 8) - (wall_.shear * closing >> 13);
-  const std::int64_t drag = std::int64_t{wall_.damping} + wall_.shear;
-  for (std::size_t i = 0; i < 3; ++i)
-    wall_force_[i][place] += ((push * t.out[i]) >> 14) - ((drag * state.v(i)[s]) >> 13);
-}
-
-void Field::add_walls(const State& state) {
-  for (auto& column : wall_force_) std::fill_n(column.begin(), count_, 0);
-  const auto add = [&](const auto& shapes) {
-    for (const auto& shape : shapes)
-      for (std::uint32_t place = 0; place < count_; ++place) add_wall(state, shape, place);
-  };
-  add(constants_.planes);
-  add(constants_.boxes);
-  add(constants_.balls);
-}
-
-void Field::integrate(State& state, const Drive& drive, bool first) const {
-  for (std::uint32_t place = 0; place < count_; ++place) {
-    const Slot s = slot_[place];
-    const std::int64_t mobility = type_of(state, s).mobility;
-    for (std::size_t i = 0; i < 3; ++i) {
-      std::int32_t& p = state.p(i)[s];
-      std::int32_t& v = state.v(i)[s];
-      std::int32_t& c = state.c(i)[s];
-      const std::int64_t force = ((std::int64_t{f_[i][place]} * diameter_) >> 8) + wall_force_[i][place];
-      std::int64_t speed = v + share_of(limited(force, kVelocityLimit), mobility);
-      if (first) {
-        speed += std::int64_t{drive.gravity[i]} + c;
-        c = limited(c - share_of(c, drive.decay), kVelocityLimit);
-        speed -= share_of(speed, drive.damping);
-      }
-      v = limited(speed, kVelocityLimit);
-      p = limited(p + ((std::int64_t{v} * move_ + (1 << 21)) >> 22), kPositionLimit);
+void Field::move(State& state, const Drive& drive, bool first) {
+  const std::uint32_t capacity = state.capacity();
+  const std::uint8_t* const alive = state.alive().data();
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::int32_t* const force = force_[i].data();
+    if (!equal_masses_) {
+      for (Slot s = 0; s < capacity; ++s)
+        force[s] = limited(share_of(force[s], type_of(state, s).mobility), kVelocityLimit);
     }
+    std::int32_t* const v = state.v(i).data();
+    if (first)
+      add_drive(v, state.c(i).data(), force, alive, capacity, drive.gravity[i], drive.damping, drive.decay);
+    if (!first) add_force(v, force, capacity);
+    advance(state.p(i).data(), v, capacity, passes_ == 2 ? 7 : 6);
   }
 }
 
@@ -157,15 +190,10 @@ void Field::step(const State& from, State& to, const Drive& drive) {
   if (&from != &to) to = from;
   sort(to);
   for (std::int32_t pass = 0; pass < passes_; ++pass) {
-    add_walls(to);
-    put_into_lanes(to);
-    add_field_forces(law_,
-                     {side_bits_,
-                      begin_.data(),
-                      {p_[0].data(), p_[1].data(), p_[2].data()},
-                      {v_[0].data(), v_[1].data(), v_[2].data()}},
-                     {f_[0].data(), f_[1].data(), f_[2].data()});
-    integrate(to, drive, pass == 0);
+    for (auto& column : force_) std::fill(column.begin(), column.end(), 0);
+    walls_.add_forces(to, {force_[0], force_[1], force_[2]});
+    add_pairs(to);
+    move(to, drive, pass == 0);
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "sdk/core/predict/contact_constants.hpp"
 #include "sdk/core/predict/field_pairs.hpp"
+#include "sdk/core/predict/field_walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
@@ -23,6 +24,9 @@ class Field final : public Predictor {
   static Result<std::unique_ptr<Predictor>> create(std::uint32_t capacity,
                                                    std::span<const std::int32_t> constants);
   Field(std::uint32_t capacity, ContactConstants constants);
+  ~Field() override = default;
+  Field(const Field&) = delete;
+  Field& operator=(const Field&) = delete;
 
   [[nodiscard]] std::string_view name() const override { return "field"; }
   void step(const State& from, State& to, const Drive& drive) override;
@@ -35,30 +39,28 @@ class Field final : public Predictor {
     return constants_.types[std::min<std::size_t>(state.type()[slot], constants_.types.size() - 1)];
   }
   void sort(const State& state);
-  void put_into_lanes(const State& state);
-  void add_walls(const State& state);
-  template <class Shape>
-  void add_wall(const State& state, const Shape& shape, std::uint32_t place);
-  void integrate(State& state, const Drive& drive, bool first) const;
+  void add_pairs(const State& state);
+  void move(State& state, const Drive& drive, bool first);
 
   ContactConstants constants_;
+  FieldForces* add_forces_;
+  FieldWalls walls_;
   std::int32_t passes_ = 1;
   FieldLaw law_;
-  ContactMaterial wall_;           // gains of a pass, K in 1/16384, others in 1/8192
-  std::int32_t diameter_ = 2;      // of the largest bodies
-  std::uint32_t shift_ = 0;        // lattice units of 2^shift_
-  std::int64_t per_diameter_ = 0;  // 1/8192 of a diameter to that, in 2^-16
-  std::int64_t cells_per_ = 0;     // cells to 1/8192 of a diameter, in 2^-32
-  std::int32_t move_ = 65536;      // share of v that a pass moves a body by, in 1/65536
+  bool equal_masses_ = true;
+  std::int32_t diameter_ = 2;       // of the largest bodies
+  std::uint32_t shift_ = 0;         // lattice units of 2^shift_ ...
+  std::uint32_t per_diameter_ = 0;  // ... to 1/8192 of a diameter, in 2^-16
+  std::int32_t cells_per_ = 0;      // ... to cells, in 2^-32
   std::uint32_t side_bits_ = 2;
 
-  std::uint32_t count_ = 0;                              // alive bodies
-  std::vector<std::uint32_t> cell_;                      // by slot
-  std::vector<std::uint32_t> rank_;                      // by slot: in its cell
-  std::vector<std::uint32_t> begin_;                     // by cell, and one more
-  std::vector<Slot> slot_;                               // by place
-  std::array<std::vector<std::int16_t>, 3> p_, v_, f_;   // by place, eight more
-  std::array<std::vector<std::int64_t>, 3> wall_force_;  // by place
+  std::uint32_t count_ = 0;                             // bodies in the grid
+  std::vector<std::uint32_t> cell_;                     // by slot
+  std::vector<std::uint32_t> rank_;                     // by slot: in its cell
+  std::vector<std::uint32_t> begin_;                    // by cell, and one more
+  std::vector<Slot> slot_;                              // by place
+  std::array<std::vector<std::int16_t>, 3> p_, v_, f_;  // by place
+  std::array<std::vector<std::int32_t>, 3> force_;      // by slot
 };
 
 }  // namespace tandem
