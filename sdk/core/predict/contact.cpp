@@ -7,8 +7,8 @@
 #include <bit>
 #include <utility>
 
-#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact_move.hpp"
 
 namespace tandem {
 namespace {
@@ -18,7 +18,8 @@ constexpr std::uint32_t kRootShift = 16;
 constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
 constexpr std::uint32_t kNearShift = 5;
 constexpr std::uint32_t kBeyond = 8;  // places a vector may read behind the last body
-constexpr std::uint32_t kPairsPerBody = 8;
+constexpr std::uint32_t kPairsPerBody = 6;
+constexpr std::uint32_t kPairsAtOnce = 1024;
 
 // Every grid needs four cells a side, or the cells before and behind one would be the same.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
@@ -54,6 +55,12 @@ TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32
   }
 }
 
+TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
+  std::int32_t all = 0;
+  for (std::size_t s = 0; s < count; ++s) all |= c[s];
+  return all != 0;
+}
+
 // c -= (c*E + 2^15) >> 16, which is never larger than c.
 TANDEM_VECTOR_CLONES void decay(std::int32_t* c, std::size_t count, std::int64_t share) {
   for (std::size_t s = 0; s < count; ++s) c[s] -= static_cast<std::int32_t>((c[s] * share + 32768) >> 16);
@@ -81,10 +88,11 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
       bodies_(capacity),
       forces_(capacity),
+      accelerations_(capacity),
       place_cell_(capacity),
       near_xy_(capacity + kBeyond),
       near_z_(capacity + kBeyond),
-      first_(kPairsPerBody * capacity + ContactPairs::kMostOfCell),
+      first_(kPairsPerBody * capacity + kPairsAtOnce + ContactPairs::kMostAtOnce),
       second_(first_.size()),
       inverse_root_(kRoots) {
   // Bodies that come to touch in a later sub-step are pairs from the first on.
@@ -92,7 +100,8 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
   const std::uint32_t apart = constants_.substeps > 1 ? width + (width >> 3) : width;
   cells_per_ = static_cast<std::int64_t>((std::uint64_t{1} << 32) / (apart + 1));
   near_ = static_cast<std::int32_t>(apart >> kNearShift) + 3;
-  move_ = (32768 + constants_.substeps / 2) / constants_.substeps;
+  one_mobility_ =
+      std::ranges::all_of(constants_.types, [](const auto& type) { return type.mobility == 65536; });
   for (std::size_t i = 0; i < kRoots; ++i) {
     // r at the middle of the entry, in 2^-8.
     const std::int64_t r = root(((2 * std::uint64_t{i} + 1) << (kRootShift - 1)) << 16U);
@@ -107,6 +116,8 @@ void Contact::sort(const State& state) {
     add_axis(state.p(i).data(), cell_.data(), capacity, shift_, static_cast<std::int32_t>(cells_per_),
              (1U << side_bits_) - 1, i * side_bits_);
   }
+  accelerated_ = any_of(state.c(0).data(), capacity) || any_of(state.c(1).data(), capacity) ||
+                 any_of(state.c(2).data(), capacity);
   std::fill(begin_.begin(), begin_.end(), 0U);
   const std::span<const std::uint8_t> alive = state.alive();
   for (Slot s = 0; s < capacity; ++s) rank_[s] = (begin_[cell_[s]] += alive[s]) - 1;
@@ -122,49 +133,55 @@ void Contact::sort(const State& state) {
     if (alive[s] == 0) continue;
     const std::uint32_t place = rank_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + rank_[s] : count_++;
     const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
-    bodies_[place] = {p, type_of(state, s).radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
+    const ContactConstants::Type& type = type_of(state, s);
+    bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
     near_xy_[place] = (static_cast<std::uint32_t>(p[0] >> near_shift) & 0xFFFFU) |
                       static_cast<std::uint32_t>(p[1] >> near_shift) << 16;
     place_cell_[place] = cell_[s];
+    forces_[place] = {{}, type.mobility};
+    if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};
     near_z_[place] = static_cast<std::uint32_t>(p[2] >> near_shift) & 0xFFFFU;
   }
 }
 
+// Those found are worked on while they are in the cache. They are kept for the later sub-steps as long as
+// there is room; else they are found again.
 void Contact::add_pairs(bool first) {
-  ContactPairs pairs{first_.data(), second_.data(), static_cast<std::uint32_t>(first_.size()), pair_count_};
-  if (!first && all_found_)
-    return kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(), pairs, forces_.data());
+  const auto add_forces = [this](std::uint32_t begin, std::uint32_t end) {
+    kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(),
+                        {first_.data() + begin, second_.data() + begin, end - begin}, forces_.data());
+  };
+  if (!first && all_kept_) return add_forces(0, kept_);
   const auto near = static_cast<std::uint32_t>(near_);
   const ContactGrid grid{side_bits_,      begin_.data(),  place_cell_.data(),
                          near_xy_.data(), near_z_.data(), near * near};
-  std::uint32_t parts = 0;
-  for (std::uint32_t place = 0; place < begin_.back() || parts == 0; ++parts) {
-    pairs.count = 0;
-    place = kernels_.find(grid, place, pairs);
-    kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(), pairs, forces_.data());
+  const auto room = static_cast<std::uint32_t>(first_.size());
+  all_kept_ = true;
+  kept_ = 0;
+  for (std::uint32_t place = 0; place < begin_.back();) {
+    if (constants_.substeps == 1 || room - kept_ < kPairsAtOnce + ContactPairs::kMostAtOnce) {
+      all_kept_ = kept_ == 0 && place == 0;
+      kept_ = 0;
+    }
+    ContactPairs pairs{first_.data() + kept_, second_.data() + kept_, 0};
+    place = kernels_.find(grid, place, kPairsAtOnce, pairs);
+    add_forces(kept_, kept_ + pairs.count);
+    kept_ += pairs.count;
   }
-  all_found_ = parts == 1;
-  pair_count_ = pairs.count;
 }
 
-void Contact::integrate(const State& from, const Drive& drive, bool first) {
-  for (std::uint32_t place = 0; place < count_; ++place) {
-    ContactBody& body = bodies_[place];
-    const std::int64_t mobility = type_of(from, body.slot).mobility;
+void Contact::write(const State& from, const Drive& drive, State& to) const {
+  if (&from != &to) {
+    std::ranges::copy(from.alive(), to.alive().begin());
+    std::ranges::copy(from.generation(), to.generation().begin());
+    std::ranges::copy(from.type(), to.type().begin());
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::int64_t force = std::int64_t{forces_[place].f[i]} << (shift_ + 2);
-      std::int64_t speed = body.v[i] + share_of(limited(force, kVelocityLimit), mobility);
-      if (first) {
-        speed += std::int64_t{drive.gravity[i]} + from.c(i)[body.slot];
-        speed -= share_of(speed, drive.damping);
-      }
-      body.v[i] = limited(speed, kVelocityLimit);
-      body.p[i] = limited(body.p[i] + ((std::int64_t{body.v[i]} * move_ + (1 << 20)) >> 21), kPositionLimit);
+      std::ranges::copy(from.c(i), to.c(i).begin());
+      if (count_ == to.capacity()) continue;
+      std::ranges::fill(to.p(i), 0);
+      std::ranges::fill(to.v(i), 0);
     }
   }
-}
-
-void Contact::write(const Drive& drive, State& to) const {
   for (std::uint32_t place = 0; place < count_; ++place) {
     const ContactBody& body = bodies_[place];
     for (std::size_t i = 0; i < 3; ++i) {
@@ -172,19 +189,22 @@ void Contact::write(const Drive& drive, State& to) const {
       to.v(i)[body.slot] = body.v[i];
     }
   }
-  for (std::size_t i = 0; i < 3; ++i) decay(to.c(i).data(), to.c(i).size(), drive.decay);
+  for (std::size_t i = 0; accelerated_ && i < 3; ++i) decay(to.c(i).data(), to.c(i).size(), drive.decay);
 }
 
 void Contact::step(const State& from, State& to, const Drive& drive) {
   sort(from);
   for (std::int32_t i = 0; i < constants_.substeps; ++i) {
-    std::fill_n(forces_.begin(), count_, ContactForce{});
     walls_.add_forces(std::span(bodies_).first(count_), forces_);
     add_pairs(i == 0);
-    integrate(from, drive, i == 0);
+    const bool first = i == 0;
+    const ContactMove move{shift_ + 2, one_mobility_, constants_.substeps, first ? drive.gravity : Vec3i{},
+                           first ? drive.damping : 0U};
+    const bool pushed = first && accelerated_;
+    move_bodies(move, std::span(bodies_).first(count_), forces_,
+                pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>());
   }
-  if (&from != &to) to = from;
-  write(drive, to);
+  write(from, drive, to);
 }
 
 void Contact::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> /*slots*/) {

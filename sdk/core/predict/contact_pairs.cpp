@@ -8,23 +8,26 @@ namespace {
 
 std::int32_t apart(std::uint32_t a, std::uint32_t b) { return static_cast<std::int16_t>(a - b); }
 
-std::uint32_t collect(const ContactGrid& grid, std::uint32_t self, std::uint32_t from, std::uint32_t to,
-                      std::uint32_t* first, std::uint32_t* second, std::uint32_t count) {
-  for (std::uint32_t j = from; j < to; ++j) {
-    const std::int32_t x = apart(grid.xy[j], grid.xy[self]);
-    const std::int32_t y = apart(grid.xy[j] >> 16, grid.xy[self] >> 16);
-    const std::int32_t z = apart(grid.z[j], grid.z[self]);
-    const std::uint32_t squared = static_cast<std::uint32_t>(x * x) + static_cast<std::uint32_t>(y * y) +
-                                  static_cast<std::uint32_t>(z * z);
-    first[count] = self;
-    second[count] = j;
-    count += static_cast<std::uint32_t>(squared < grid.near_squared);
+void collect(const ContactGrid& grid, const ContactRuns& runs, ContactPairs& pairs) {
+  std::uint32_t count = pairs.count;
+  for (std::uint32_t r = 0; r < runs.size(); ++r) {
+    const ContactRun run = runs[r];
+    for (std::uint32_t j = run.from; j < run.from + run.count; ++j) {
+      const std::int32_t x = apart(grid.xy[j], grid.xy[run.self]);
+      const std::int32_t y = apart(grid.xy[j] >> 16, grid.xy[run.self] >> 16);
+      const std::int32_t z = apart(grid.z[j], grid.z[run.self]);
+      const std::uint32_t squared = static_cast<std::uint32_t>(x * x) + static_cast<std::uint32_t>(y * y) +
+                                    static_cast<std::uint32_t>(z * z);
+      pairs.first[count] = run.self;
+      pairs.second[count] = j;
+      count += static_cast<std::uint32_t>(squared < grid.near_squared);
+    }
   }
-  return count;
+  pairs.count = count;
 }
 
-std::uint32_t find(const ContactGrid& grid, std::uint32_t place, ContactPairs& pairs) {
-  return find_pairs(grid, place, pairs, [](auto... arguments) { return collect(arguments...); });
+std::uint32_t find(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough, ContactPairs& pairs) {
+  return find_pairs(grid, place, enough, pairs, collect);
 }
 
 // b - a of what may be 2^31 apart; bodies that far apart do not touch, whatever the sign.

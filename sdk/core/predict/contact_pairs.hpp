@@ -19,10 +19,10 @@ struct alignas(32) ContactBody {
   Slot slot;
 };
 
-/// Changes of v, in 1/16 grid unit per frame.
+/// Changes of v, in 1/16 grid unit per frame. 0 between two sub-steps.
 struct alignas(16) ContactForce {
   Vec3i f;
-  std::int32_t unused;
+  std::int32_t mobility;  ///< of the body
 };
 
 /// The torus of cells, with the bodies that take part sorted by cell.
@@ -41,12 +41,10 @@ struct ContactGrid {
 struct ContactPairs {
   std::uint32_t* first;
   std::uint32_t* second;
-  std::uint32_t room;  ///< at least kMostOfCell
-  std::uint32_t count;
+  std::uint32_t count;  ///< a multiple of 8: filled up with pairs of a body and itself, which add nothing
 
-  /// What the bodies of one cell can add: 13 cells ahead and their own, and what a vector writes beyond.
-  static constexpr std::uint32_t kMostOfCell =
-      ContactGrid::kMostInCell * (13 * ContactGrid::kMostInCell + ContactGrid::kMostInCell) + 16;
+  /// How many more than enough may be found, and what a vector writes beyond.
+  static constexpr std::uint32_t kMostAtOnce = 32 * 14 * ContactGrid::kMostInCell + 16;
 };
 
 /// What a contact does, besides where it is. Gains as in ContactMaterial.
@@ -56,9 +54,10 @@ struct ContactLaw {
 };
 
 struct ContactKernels {
-  /// Adds the pairs of the bodies from `place` on, the first of a cell, until the room is used up; returns
-  /// the place of the first body not looked at.
-  std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, ContactPairs& pairs);
+  /// Writes the pairs of the bodies from `place` on until they are `enough`; there is room for kMostAtOnce
+  /// more. Returns the place of the first body not looked at.
+  std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
+                        ContactPairs& pairs);
   /// Adds the forces of all pairs. `inverse_root`: 2^30 / r by r^2 >> 16.
   void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
                      const ContactPairs& pairs, ContactForce* forces);

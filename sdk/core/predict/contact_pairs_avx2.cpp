@@ -35,33 +35,35 @@ inline Wide load(const std::uint32_t* from) {
 }
 inline void store(std::uint32_t* to, Wide x) { _mm256_storeu_si256(reinterpret_cast<__m256i_u*>(to), x); }
 
-inline std::uint32_t collect(const ContactGrid& grid, std::uint32_t self, std::uint32_t from,
-                             std::uint32_t to, std::uint32_t* first, std::uint32_t* second,
-                             std::uint32_t count) {
-  const Wide self_xy = same(grid.xy[self]);
-  const Wide self_z = same(grid.z[self]);
+// Without a branch: how many are near is as good as random.
+inline void collect(const ContactGrid& grid, const ContactRuns& runs, ContactPairs& pairs) {
+  const std::uint32_t* const xy = grid.xy;
+  const std::uint32_t* const z = grid.z;
+  std::uint32_t* const first = pairs.first;
+  std::uint32_t* const second = pairs.second;
+  std::uint32_t count = pairs.count;
   const Wide most = same(grid.near_squared - 1);
-  std::uint32_t j = from;
-  do {
-    const Wide xy = _mm256_sub_epi16(load(grid.xy + j), self_xy);
-    const Wide z = _mm256_sub_epi16(load(grid.z + j), self_z);
-    const Wide squared = _mm256_add_epi32(_mm256_madd_epi16(xy, xy), _mm256_madd_epi16(z, z));
+  const std::uint32_t size = runs.size();
+  for (std::uint32_t r = 0; r < size; ++r) {
+    const ContactRun& run = runs[r];
+    const Wide apart_xy = _mm256_sub_epi16(load(xy + run.from), same(xy[run.self]));
+    const Wide apart_z = _mm256_sub_epi16(load(z + run.from), same(z[run.self]));
+    const Wide squared =
+        _mm256_add_epi32(_mm256_madd_epi16(apart_xy, apart_xy), _mm256_madd_epi16(apart_z, apart_z));
     const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(squared, most), squared);
-    // Without a branch: how many there are is as good as random.
-    const auto bits = static_cast<std::uint64_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) &
-                      ((std::uint64_t{1} << (to - j)) - 1);
+    const std::uint32_t bits =
+        static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) & ((1U << run.count) - 1);
     const Wide places =
         _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
-    store(first + count, same(self));
-    store(second + count, _mm256_add_epi32(places, same(j)));
-    count += static_cast<std::uint32_t>(_mm_popcnt_u64(bits));
-    j += 8;
-  } while (j < to);
-  return count;
+    store(first + count, same(run.self));
+    store(second + count, _mm256_add_epi32(places, same(run.from)));
+    count += static_cast<std::uint32_t>(_mm_popcnt_u32(bits));
+  }
+  pairs.count = count;
 }
 
-std::uint32_t find(const ContactGrid& grid, std::uint32_t place, ContactPairs& pairs) {
-  return find_pairs(grid, place, pairs, [](auto... arguments) { return collect(arguments...); });
+std::uint32_t find(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough, ContactPairs& pairs) {
+  return find_pairs(grid, place, enough, pairs, collect);
 }
 
 // Four rows of four, twice side by side, turned over.
@@ -109,15 +111,15 @@ struct Forces {
 };
 
 inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
-                        const std::uint32_t* first, const std::uint32_t* second) {
+                        const std::uint32_t* first, const std::uint32_t* second, std::size_t stride) {
   // The radius of the first is negated, so that the difference of the radii is their sum.
   const Wide signs = _mm256_set_epi32(-1, 1, 1, 1, -1, 1, 1, 1);
   Wide d[4], u[4];
   for (unsigned k = 0; k < 4; ++k) {
-    const ContactBody& a = bodies[first[k]];
-    const ContactBody& b = bodies[second[k]];
-    const ContactBody& a4 = bodies[first[k + 4]];
-    const ContactBody& b4 = bodies[second[k + 4]];
+    const ContactBody& a = bodies[first[k * stride]];
+    const ContactBody& b = bodies[second[k * stride]];
+    const ContactBody& a4 = bodies[first[(k + 4) * stride]];
+    const ContactBody& b4 = bodies[second[(k + 4) * stride]];
     d[k] = _mm256_sub_epi32(halves(b, b4, 0), _mm256_sign_epi32(halves(a, a4, 0), signs));
     u[k] = _mm256_sub_epi32(halves(b, b4, 1), halves(a, a4, 1));
   }
@@ -168,19 +170,24 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
 
 void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
                 const ContactPairs& pairs, ContactForce* forces) {
-  // The last eight are filled up with pairs of a body with itself, which add up to nothing.
-  for (std::uint32_t k = pairs.count; k % 8 != 0; ++k) pairs.first[k] = pairs.second[k] = 0;
-  for (std::uint32_t k = 0; k < pairs.count; k += 8) {
-    const std::uint32_t* const first = pairs.first + k;
-    const std::uint32_t* const second = pairs.second + k;
-    const Forces f = forces_of(law, inverse_root, bodies, first, second);
-    for (unsigned i = 0; i < 4; ++i) {
-      const __m128i low = _mm256_castsi256_si128(f.row[i]);
-      const __m128i high = _mm256_extracti128_si256(f.row[i], 1);
-      add(forces[first[i]], low);
-      subtract(forces[second[i]], low);
-      add(forces[first[i + 4]], high);
-      subtract(forces[second[i + 4]], high);
+  // A body's pairs follow each other. Those worked on at once are from eight places far apart, or each would
+  // wait for the sum that the one before it stores.
+  constexpr std::uint32_t kAtOnce = 1024;
+  for (std::uint32_t begin = 0; begin < pairs.count; begin += kAtOnce) {
+    const std::uint32_t left = pairs.count - begin;
+    const std::size_t stride = (left < kAtOnce ? left : kAtOnce) / 8;
+    for (std::size_t k = 0; k < stride; ++k) {
+      const std::uint32_t* const first = pairs.first + begin + k;
+      const std::uint32_t* const second = pairs.second + begin + k;
+      const Forces f = forces_of(law, inverse_root, bodies, first, second, stride);
+      for (unsigned i = 0; i < 4; ++i) {
+        const __m128i low = _mm256_castsi256_si128(f.row[i]);
+        const __m128i high = _mm256_extracti128_si256(f.row[i], 1);
+        add(forces[first[i * stride]], low);
+        subtract(forces[second[i * stride]], low);
+        add(forces[first[(i + 4) * stride]], high);
+        subtract(forces[second[(i + 4) * stride]], high);
+      }
     }
   }
 }

@@ -60,6 +60,22 @@ void add_slabs(const ContactConstants::Ball& ball, std::int64_t r, std::vector<S
   }
 }
 
+// The box around a block of bodies.
+struct Extent {
+  Vec3i low{}, high{};
+};
+
+bool meets(const Slab& slab, const Extent& extent) {
+  std::int64_t least = 0;
+  std::int64_t most = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t n = slab.normal[i];
+    least += n * (n < 0 ? extent.high[i] : extent.low[i]);
+    most += n * (n < 0 ? extent.low[i] : extent.high[i]);
+  }
+  return most >= slab.low && least <= slab.high;
+}
+
 // Which of 64 bodies lie within all slabs, the first body in the lowest bit.
 TANDEM_VECTOR_CLONES std::uint64_t within(const Slab* slabs, std::size_t count, const std::int32_t* x,
                                           const std::int32_t* y, const std::int32_t* z) {
@@ -83,6 +99,7 @@ TANDEM_VECTOR_CLONES std::uint64_t within(const Slab* slabs, std::size_t count, 
 struct PlacesOf64 {
   std::size_t first = 0;
   std::uint64_t present = 0;
+  Extent extent;
   std::array<std::array<std::int32_t, kBlock>, 3> p{};
 };
 
@@ -101,9 +118,10 @@ void ContactWalls::add_shapes(std::span<const Shape> shapes, std::span<const Sla
   constexpr std::int32_t kOne = 1 << 12;
   const std::size_t each = shapes.empty() ? 0 : slabs.size() / shapes.size();
   for (std::size_t s = 0; s < shapes.size(); ++s) {
+    const auto own = slabs.subspan(s * each, each);
+    if (!std::ranges::all_of(own, [&](const Slab& slab) { return meets(slab, places.extent); })) continue;
     std::uint64_t near =
-        within(slabs.data() + s * each, each, places.p[0].data(), places.p[1].data(), places.p[2].data()) &
-        places.present;
+        within(own.data(), each, places.p[0].data(), places.p[1].data(), places.p[2].data()) & places.present;
     for (; near != 0; near &= near - 1) {
       const std::size_t place = places.first + static_cast<std::size_t>(std::countr_zero(near));
       const ContactBody& body = bodies[place];
@@ -130,9 +148,16 @@ void ContactWalls::add_forces(std::span<const ContactBody> bodies, std::span<Con
     const std::size_t count = std::min(kBlock, bodies.size() - first);
     places.first = first;
     places.present = ~std::uint64_t{0} >> (kBlock - count);
+    Extent extent{bodies[first].p, bodies[first].p};
     for (std::size_t k = 0; k < count; ++k) {
-      for (std::size_t i = 0; i < 3; ++i) places.p[i][k] = bodies[first + k].p[i];
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::int32_t p = bodies[first + k].p[i];
+        places.p[i][k] = p;
+        extent.low[i] = std::min(extent.low[i], p);
+        extent.high[i] = std::max(extent.high[i], p);
+      }
     }
+    places.extent = extent;
     add_shapes<C::Plane>(constants_.planes, planes_, places, bodies, forces);
     add_shapes<C::Box>(constants_.boxes, boxes_, places, bodies, forces);
     add_shapes<C::Ball>(constants_.balls, balls_, places, bodies, forces);

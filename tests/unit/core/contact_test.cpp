@@ -169,10 +169,11 @@ struct KernelResult {
 KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std::int32_t spread) {
   std::mt19937_64 random(seed);
   constexpr std::uint32_t kSideBits = 3, kCells = 1U << (3 * kSideBits), kBeyond = 8;
-  std::vector<std::uint32_t> begin{0};
+  std::vector<std::uint32_t> begin{0}, cells;
   for (std::uint32_t cell = 0; cell < kCells; ++cell) {
     const auto in_cell = random() % 50 == 0 ? ContactGrid::kMostInCell : random() % 3;
     begin.push_back(begin.back() + static_cast<std::uint32_t>(in_cell));
+    cells.resize(begin.back(), cell);
   }
   const std::uint32_t count = begin.back();
   std::vector<std::uint32_t> xy(count + kBeyond), z(count + kBeyond);
@@ -187,15 +188,14 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   std::vector<std::uint32_t> inverse_root(1U << 12U);
   for (std::uint32_t& x : inverse_root) x = 65536 + static_cast<std::uint32_t>(random() % (1U << 15U));
 
-  const ContactGrid grid{kSideBits, begin.data(), xy.data(), z.data(), 1U << 29U};
-  constexpr std::uint32_t kRoom = 2 * ContactPairs::kMostOfCell;
+  const ContactGrid grid{kSideBits, begin.data(), cells.data(), xy.data(), z.data(), 1U << 29U};
+  constexpr std::uint32_t kEnough = 500, kRoom = kEnough + ContactPairs::kMostAtOnce;
   std::vector<std::uint32_t> first(kRoom), second(kRoom);
   std::vector<ContactForce> forces(count);
   KernelResult result;
-  ContactPairs pairs{first.data(), second.data(), kRoom, 0};
-  for (std::uint32_t cell = 0; cell < kCells;) {
-    pairs.count = 0;
-    cell = kernels.find(grid, cell, pairs);
+  ContactPairs pairs{first.data(), second.data(), 0};
+  for (std::uint32_t place = 0; place < count;) {
+    place = kernels.find(grid, place, kEnough, pairs);
     for (std::uint32_t k = 0; k < pairs.count; ++k) {
       result.first.push_back(first[k]);
       result.second.push_back(second[k]);

@@ -1,0 +1,76 @@
+#include "sdk/core/predict/contact_move.hpp"
+
+#include <bit>
+#include <cstring>
+
+#include "sdk/core/lattice/vector_clones.hpp"
+
+namespace tandem {
+namespace {
+
+// Three axes at once, and what follows them in memory.
+using Four = std::int32_t __attribute__((vector_size(16)));
+using FourBits = std::uint32_t __attribute__((vector_size(16)));
+
+constexpr std::int32_t kForceLimit = 1 << 26;  // times a mobility of 16 a velocity stays below 2^31
+
+inline Four same(std::int32_t x) { return Four{x, x, x, x}; }
+inline Four clamped(Four x, std::int32_t limit) {
+  x = x < -limit ? same(-limit) : x;
+  return x > limit ? same(limit) : x;
+}
+template <class T>
+inline Four load(const T& from) {
+  Four x;
+  std::memcpy(&x, &from, sizeof x);
+  return x;
+}
+
+// (x * share + 2^(15 + bits)) >> (16 + bits) in 32 bits, for share < 2^16: the halves of x one by one.
+inline Four share_of(Four x, Four share, std::uint32_t bits) {
+  const auto low = reinterpret_cast<FourBits>(x) & 0xFFFFU;
+  const FourBits carry = (low * reinterpret_cast<FourBits>(share) + (0x8000U << bits)) >> 16U;
+  return ((x >> 16) * share + reinterpret_cast<Four>(carry)) >> static_cast<std::int32_t>(bits);
+}
+
+}  // namespace
+
+TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<ContactBody> bodies,
+                                      std::span<ContactForce> forces,
+                                      std::span<const ContactForce> accelerations) {
+  const auto shift = static_cast<std::int32_t>(move.force_shift);
+  const Four gravity{move.gravity[0], move.gravity[1], move.gravity[2], 0};
+  const Four damping = same(static_cast<std::int32_t>(move.damping));
+  const Four share = same((32768 + move.substeps / 2) / move.substeps);
+  const bool halved = std::has_single_bit(static_cast<std::uint32_t>(move.substeps));
+  const std::int32_t half = 32 * move.substeps;
+  const std::int32_t halvings = 6 + std::countr_zero(static_cast<std::uint32_t>(move.substeps));
+  const Four axes{-1, -1, -1, 0};
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    ContactBody& body = bodies[k];
+    ContactForce& force = forces[k];
+    const Four f = clamped(load(force.f), kForceLimit >> shift) << shift;
+    const Four p_and_radius = load(body.p);
+    const Four v_and_slot = load(body.v);
+    Four v = (v_and_slot & axes) + gravity;
+    if (move.one_mobility) {
+      v += f;
+    } else {
+      const Four mobility = same(force.mobility);
+      v += f * (mobility >> 16) + share_of(f, mobility & 0xFFFF, 0);
+    }
+    if (!accelerations.empty()) v += load(accelerations[k].f);
+    if (move.damping != 0) v -= share_of(v, damping, 0);
+    v = clamped(v, kVelocityLimit);
+    // The same where N is a power of two.
+    const Four way = halved ? (v + half) >> halvings : share_of(v, share, 5);
+    const Four p = clamped(p_and_radius + way, kPositionLimit);
+    const Four new_v = (v & axes) | (v_and_slot & ~axes);
+    const Four new_p = (p & axes) | (p_and_radius & ~axes);
+    std::memcpy(&body.v, &new_v, sizeof new_v);
+    std::memcpy(&body.p, &new_p, sizeof new_p);
+    force.f = {};
+  }
+}
+
+}  // namespace tandem
