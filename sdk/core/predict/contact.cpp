@@ -45,14 +45,17 @@ ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
   return {material.spring, material.damping + material.shear, material.shear, shift};
 }
 
+// The lower 16 bits of each.
+std::uint32_t words(std::int32_t low, std::int32_t high) {
+  return (static_cast<std::uint32_t>(low) & 0xFFFFU) | static_cast<std::uint32_t>(high) << 16U;
+}
+
 // Adds one axis to the cells' numbers.
 TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32_t* __restrict cell,
                                    std::size_t count, std::uint32_t shift, std::int32_t cells_per,
-                                   std::uint32_t mask, std::uint32_t axis_shift) {
-  for (std::size_t s = 0; s < count; ++s) {
-    const auto along = static_cast<std::uint32_t>(std::int64_t{p[s] >> shift} * cells_per >> 32);
-    cell[s] |= (along & mask) << axis_shift;
-  }
+                                   std::uint32_t axis_shift) {
+  for (std::size_t s = 0; s < count; ++s)
+    cell[s] += static_cast<std::uint32_t>(std::int64_t{p[s] >> shift} * cells_per >> 32) << axis_shift;
 }
 
 TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
@@ -87,19 +90,20 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
       rank_(capacity),
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
       bodies_(capacity),
+      views_(capacity),
       forces_(capacity),
       accelerations_(capacity),
       place_cell_(capacity),
       near_xy_(capacity + kBeyond),
-      near_z_(capacity + kBeyond),
+      later_xy_(near_xy_.size()),
+      near_z_(near_xy_.size()),
       first_(kPairsPerBody * capacity + kPairsAtOnce + ContactPairs::kMostAtOnce),
       second_(first_.size()),
       inverse_root_(kRoots) {
-  // Bodies that come to touch in a later sub-step are pairs from the first on.
   const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
-  const std::uint32_t apart = constants_.substeps > 1 ? width + (width >> 3) : width;
-  cells_per_ = static_cast<std::int64_t>((std::uint64_t{1} << 32) / (apart + 1));
-  near_ = static_cast<std::int32_t>(apart >> kNearShift) + 3;
+  cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 32) / (width + 1));
+  near_ = (width >> kNearShift) + 3;
+  later_share_ = 32768 - (32768 + constants_.substeps / 2) / constants_.substeps;
   one_mobility_ =
       std::ranges::all_of(constants_.types, [](const auto& type) { return type.mobility == 65536; });
   for (std::size_t i = 0; i < kRoots; ++i) {
@@ -113,14 +117,17 @@ void Contact::sort(const State& state) {
   const std::uint32_t capacity = state.capacity();
   std::fill(cell_.begin(), cell_.end(), 0U);
   for (std::uint32_t i = 0; i < 3; ++i) {
-    add_axis(state.p(i).data(), cell_.data(), capacity, shift_, static_cast<std::int32_t>(cells_per_),
-             (1U << side_bits_) - 1, i * side_bits_);
+    add_axis(state.p(i).data(), cell_.data(), capacity, shift_, cells_per_, i * side_bits_);
   }
   accelerated_ = any_of(state.c(0).data(), capacity) || any_of(state.c(1).data(), capacity) ||
                  any_of(state.c(2).data(), capacity);
   std::fill(begin_.begin(), begin_.end(), 0U);
   const std::span<const std::uint8_t> alive = state.alive();
-  for (Slot s = 0; s < capacity; ++s) rank_[s] = (begin_[cell_[s]] += alive[s]) - 1;
+  const std::uint32_t last = (1U << (3 * side_bits_)) - 1;
+  for (Slot s = 0; s < capacity; ++s) {
+    cell_[s] &= last;
+    rank_[s] = (begin_[cell_[s]] += alive[s]) - 1;
+  }
   std::uint32_t sum = 0;
   for (std::uint32_t& begin : begin_) {
     const std::uint32_t in_cell = std::min(begin, ContactGrid::kMostInCell);
@@ -128,6 +135,7 @@ void Contact::sort(const State& state) {
     sum += in_cell;
   }
   count_ = sum;
+  const bool several = constants_.substeps > 1;
   const std::uint32_t near_shift = shift_ + kNearShift;
   for (Slot s = 0; s < capacity; ++s) {
     if (alive[s] == 0) continue;
@@ -135,12 +143,17 @@ void Contact::sort(const State& state) {
     const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
     const ContactConstants::Type& type = type_of(state, s);
     bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
-    near_xy_[place] = (static_cast<std::uint32_t>(p[0] >> near_shift) & 0xFFFFU) |
-                      static_cast<std::uint32_t>(p[1] >> near_shift) << 16;
+    near_xy_[place] = words(p[0] >> near_shift, p[1] >> near_shift);
+    Vec3i later = p;
+    if (several) {
+      for (std::size_t i = 0; i < 3; ++i)
+        later[i] += static_cast<std::int32_t>((std::int64_t{state.v(i)[s]} * later_share_) >> 21);
+      later_xy_[place] = words(later[0] >> near_shift, later[1] >> near_shift);
+    }
     place_cell_[place] = cell_[s];
     forces_[place] = {{}, type.mobility};
     if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};
-    near_z_[place] = static_cast<std::uint32_t>(p[2] >> near_shift) & 0xFFFFU;
+    near_z_[place] = words(p[2] >> near_shift, later[2] >> near_shift);
   }
 }
 
@@ -148,13 +161,17 @@ void Contact::sort(const State& state) {
 // there is room; else they are found again.
 void Contact::add_pairs(bool first) {
   const auto add_forces = [this](std::uint32_t begin, std::uint32_t end) {
-    kernels_.add_forces(pair_law_, inverse_root_.data(), bodies_.data(),
+    kernels_.add_forces(pair_law_, inverse_root_.data(), views_.data(),
                         {first_.data() + begin, second_.data() + begin, end - begin}, forces_.data());
   };
   if (!first && all_kept_) return add_forces(0, kept_);
-  const auto near = static_cast<std::uint32_t>(near_);
-  const ContactGrid grid{side_bits_,      begin_.data(),  place_cell_.data(),
-                         near_xy_.data(), near_z_.data(), near * near};
+  const ContactGrid grid{side_bits_,
+                         begin_.data(),
+                         place_cell_.data(),
+                         near_xy_.data(),
+                         constants_.substeps > 1 ? later_xy_.data() : nullptr,
+                         near_z_.data(),
+                         near_ * near_};
   const auto room = static_cast<std::uint32_t>(first_.size());
   all_kept_ = true;
   kept_ = 0;
@@ -194,15 +211,17 @@ void Contact::write(const State& from, const Drive& drive, State& to) const {
 
 void Contact::step(const State& from, State& to, const Drive& drive) {
   sort(from);
+  write_views(std::span(bodies_).first(count_), shift_, views_);
   for (std::int32_t i = 0; i < constants_.substeps; ++i) {
     walls_.add_forces(std::span(bodies_).first(count_), forces_);
     add_pairs(i == 0);
     const bool first = i == 0;
-    const ContactMove move{shift_ + 2, one_mobility_, constants_.substeps, first ? drive.gravity : Vec3i{},
+    const ContactMove move{shift_, one_mobility_, constants_.substeps, first ? drive.gravity : Vec3i{},
                            first ? drive.damping : 0U};
     const bool pushed = first && accelerated_;
     move_bodies(move, std::span(bodies_).first(count_), forces_,
-                pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>());
+                pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>(),
+                views_);
   }
   write(from, drive, to);
 }

@@ -46,19 +46,21 @@ class Contact final : public Predictor {
   ContactLaw pair_law_;
   ContactKernels kernels_;
   ContactWalls walls_;
-  std::uint32_t side_bits_ = 2;             // the grid is a torus of 2^side_bits cells a side
-  std::int64_t cells_per_ = 0;              // cells per grid unit, in 2^-32
-  std::int32_t near_ = 0;                   // in 2^5 grid units
-  bool one_mobility_ = false;               // all bodies have that of type 0
+  std::uint32_t side_bits_ = 2;   // the grid is a torus of 2^side_bits cells a side
+  std::int32_t cells_per_ = 0;    // cells per grid unit, in 2^-32
+  std::uint32_t near_ = 0;        // in 2^5 grid units
+  std::int32_t later_share_ = 0;  // of v, in 1/32768: what the sub-steps before the last move a body by
+  bool one_mobility_ = false;     // all bodies have that of type 0
   std::vector<std::uint32_t> cell_, rank_;  // by slot; among the bodies of the cell
   std::vector<std::uint32_t> begin_;        // by cell, and one more
   // By place: bodies that take part in pairs by cell, then the rest.
   std::uint32_t count_ = 0;
   std::vector<ContactBody> bodies_;
+  std::vector<ContactView> views_;
   std::vector<ContactForce> forces_;
   std::vector<ContactForce> accelerations_;  // c, where any is not zero
   bool accelerated_ = false;
-  std::vector<std::uint32_t> place_cell_, near_xy_, near_z_;
+  std::vector<std::uint32_t> place_cell_, near_xy_, later_xy_, near_z_;
   std::vector<std::uint32_t> first_, second_;
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
   bool all_kept_ = false;                    // first_ and second_ hold all pairs of the frame

@@ -4,12 +4,14 @@
 #include <cstring>
 
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact_law.hpp"
 
 namespace tandem {
 namespace {
 
 // Three axes at once, and what follows them in memory.
 using Four = std::int32_t __attribute__((vector_size(16)));
+using FourWords = std::int16_t __attribute__((vector_size(8)));
 using FourBits = std::uint32_t __attribute__((vector_size(16)));
 
 constexpr std::int32_t kForceLimit = 1 << 26;  // times a mobility of 16 a velocity stays below 2^31
@@ -33,12 +35,23 @@ inline Four share_of(Four x, Four share, std::uint32_t bits) {
   return ((x >> 16) * share + reinterpret_cast<Four>(carry)) >> static_cast<std::int32_t>(bits);
 }
 
+inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
+  const FourWords places = __builtin_convertvector(p_and_radius >> shift, FourWords);
+  const FourWords speeds = __builtin_convertvector(clamped(v >> (shift + 6), kMostSpeed), FourWords);
+  ContactView view;
+  std::memcpy(&view.q, &places, sizeof places);
+  std::memcpy(&view.v, &speeds, sizeof speeds);
+  return view;
+}
+
 }  // namespace
 
 TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<ContactBody> bodies,
                                       std::span<ContactForce> forces,
-                                      std::span<const ContactForce> accelerations) {
-  const auto shift = static_cast<std::int32_t>(move.force_shift);
+                                      std::span<const ContactForce> accelerations,
+                                      std::span<ContactView> views) {
+  const auto shift = static_cast<std::int32_t>(move.shift);
+  const std::int32_t force_shift = shift + 2;
   const Four gravity{move.gravity[0], move.gravity[1], move.gravity[2], 0};
   const Four damping = same(static_cast<std::int32_t>(move.damping));
   const Four share = same((32768 + move.substeps / 2) / move.substeps);
@@ -49,7 +62,7 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     ContactBody& body = bodies[k];
     ContactForce& force = forces[k];
-    const Four f = clamped(load(force.f), kForceLimit >> shift) << shift;
+    const Four f = clamped(load(force.f), kForceLimit >> force_shift) << force_shift;
     const Four p_and_radius = load(body.p);
     const Four v_and_slot = load(body.v);
     Four v = (v_and_slot & axes) + gravity;
@@ -70,7 +83,15 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
     std::memcpy(&body.v, &new_v, sizeof new_v);
     std::memcpy(&body.p, &new_p, sizeof new_p);
     force.f = {};
+    views[k] = view(new_p, v & axes, shift);
   }
+}
+
+TANDEM_VECTOR_CLONES void write_views(std::span<const ContactBody> bodies, std::uint32_t shift,
+                                      std::span<ContactView> views) {
+  for (std::size_t k = 0; k < bodies.size(); ++k)
+    views[k] =
+        view(load(bodies[k].p), load(bodies[k].v) & Four{-1, -1, -1, 0}, static_cast<std::int32_t>(shift));
 }
 
 }  // namespace tandem

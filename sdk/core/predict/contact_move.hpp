@@ -9,15 +9,19 @@
 namespace tandem {
 
 struct ContactMove {
-  std::uint32_t force_shift;  ///< forces times 2^force_shift are changes of v
-  bool one_mobility;          ///< the mobility of all bodies is 65536
+  std::uint32_t shift;  ///< a grid unit is 2^shift lattice units
+  bool one_mobility;    ///< the mobility of all bodies is 65536
   std::int32_t substeps;
   Vec3i gravity;
   std::uint32_t damping;
 };
 
-/// Moves bodies by the forces on them and takes those back to 0. `accelerations`, by place: none or all.
+/// Moves bodies by the forces on them, which go back to 0, and writes what others see of them.
+/// `accelerations`, by place: none or all.
 void move_bodies(const ContactMove& move, std::span<ContactBody> bodies, std::span<ContactForce> forces,
-                 std::span<const ContactForce> accelerations);
+                 std::span<const ContactForce> accelerations, std::span<ContactView> views);
+
+/// What others see of bodies that have not moved yet.
+void write_views(std::span<const ContactBody> bodies, std::uint32_t shift, std::span<ContactView> views);
 
 }  // namespace tandem

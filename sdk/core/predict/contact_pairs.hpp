@@ -1,6 +1,7 @@
 #pragma once
 // Pairs of the tier `contact`: who is near whom at the start of a frame, and the forces between them.
 
+#include <array>
 #include <cstdint>
 
 #include "sdk/core/lattice/state.hpp"
@@ -19,6 +20,14 @@ struct alignas(32) ContactBody {
   Slot slot;
 };
 
+/// What other bodies see of one. Differences wrap, as places far apart do not matter.
+struct alignas(16) ContactView {
+  std::array<std::int16_t, 3> q;  ///< p in grid units, the lower 16 bits
+  std::int16_t radius;            ///< grid units
+  std::array<std::int16_t, 3> v;  ///< grid units per frame, limited
+  std::int16_t unused;
+};
+
 /// Changes of v, in 1/16 grid unit per frame. 0 between two sub-steps.
 struct alignas(16) ContactForce {
   Vec3i f;
@@ -32,9 +41,12 @@ struct ContactGrid {
   std::uint32_t side_bits;     ///< 2^side_bits cells a side, x lowest in a cell's number
   const std::uint32_t* begin;  ///< by cell, and one more: places of its bodies
   const std::uint32_t* cell;   ///< by place
-  const std::uint32_t* xy;     ///< by place, x and y in 16 bits each of 2^5 grid units; readable 8 further
-  const std::uint32_t* z;      ///< likewise, the upper half zero
-  std::uint32_t near_squared;  ///< bodies nearer than this are a pair
+  // By place, each coordinate in 16 bits of 2^5 grid units; readable 8 further.
+  const std::uint32_t* xy;  ///< x below, y above
+  const std::uint32_t*
+      later_xy;            ///< where the last sub-step finds it if nothing pushes it; none for one sub-step
+  const std::uint32_t* z;  ///< now below, later above
+  std::uint32_t near_squared;  ///< bodies nearer than this, now or later, are a pair
 };
 
 /// Places of the two bodies of each pair, the one whose cell lies behind first.
@@ -59,7 +71,7 @@ struct ContactKernels {
   std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                         ContactPairs& pairs);
   /// Adds the forces of all pairs. `inverse_root`: 2^30 / r by r^2 >> 16.
-  void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
+  void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                      const ContactPairs& pairs, ContactForce* forces);
 };
 

@@ -27,6 +27,18 @@ constexpr Compressions make_compressions() {
 }
 constexpr Compressions kCompressions = make_compressions();
 
+// By a number up to three full cells: as many bits, at most eight.
+struct Firsts {
+  std::uint8_t of[3 * ContactGrid::kMostInCell + 1];
+};
+constexpr Firsts make_firsts() {
+  Firsts table{};
+  for (unsigned i = 0; i < sizeof table.of; ++i)
+    table.of[i] = static_cast<std::uint8_t>(i < 8 ? (1U << i) - 1 : 255);
+  return table;
+}
+constexpr Firsts kFirsts = make_firsts();
+
 inline Wide same(std::int32_t x) { return _mm256_set1_epi32(x); }
 inline Wide same(std::uint32_t x) { return _mm256_set1_epi32(static_cast<int>(x)); }
 inline Wide clamped(Wide x, Wide low, Wide high) { return _mm256_min_epi32(_mm256_max_epi32(x, low), high); }
@@ -35,9 +47,19 @@ inline Wide load(const std::uint32_t* from) {
 }
 inline void store(std::uint32_t* to, Wide x) { _mm256_storeu_si256(reinterpret_cast<__m256i_u*>(to), x); }
 
-// Without a branch: how many are near is as good as random.
-inline void collect(const ContactGrid& grid, const ContactRuns& runs, ContactPairs& pairs) {
+inline Wide squared(Wide words) { return _mm256_madd_epi16(words, words); }
+
+// Also where bodies are later.
+template <bool kLater>
+struct Avx2 {
+  static void collect(const ContactGrid& grid, const ContactRuns<Avx2>& runs, ContactPairs& pairs);
+};
+
+// How many are near is as good as random: no branch depends on it.
+template <bool kLater>
+void Avx2<kLater>::collect(const ContactGrid& grid, const ContactRuns<Avx2>& runs, ContactPairs& pairs) {
   const std::uint32_t* const xy = grid.xy;
+  const std::uint32_t* const later_xy = grid.later_xy;
   const std::uint32_t* const z = grid.z;
   std::uint32_t* const first = pairs.first;
   std::uint32_t* const second = pairs.second;
@@ -45,25 +67,39 @@ inline void collect(const ContactGrid& grid, const ContactRuns& runs, ContactPai
   const Wide most = same(grid.near_squared - 1);
   const std::uint32_t size = runs.size();
   for (std::uint32_t r = 0; r < size; ++r) {
-    const ContactRun& run = runs[r];
-    const Wide apart_xy = _mm256_sub_epi16(load(xy + run.from), same(xy[run.self]));
-    const Wide apart_z = _mm256_sub_epi16(load(z + run.from), same(z[run.self]));
-    const Wide squared =
-        _mm256_add_epi32(_mm256_madd_epi16(apart_xy, apart_xy), _mm256_madd_epi16(apart_z, apart_z));
-    const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(squared, most), squared);
-    const std::uint32_t bits =
-        static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) & ((1U << run.count) - 1);
-    const Wide places =
-        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
-    store(first + count, same(run.self));
-    store(second + count, _mm256_add_epi32(places, same(run.from)));
-    count += static_cast<std::uint32_t>(_mm_popcnt_u32(bits));
+    const std::uint32_t self = runs[r].self();
+    std::uint32_t from = runs[r].from();
+    std::uint32_t left = runs[r].count();
+    const Wide self_xy = same(xy[self]);
+    const Wide self_z = same(z[self]);
+    while (true) {
+      const Wide apart_xy = _mm256_sub_epi16(load(xy + from), self_xy);
+      const Wide apart_z = _mm256_sub_epi16(load(z + from), self_z);
+      Wide apart = _mm256_add_epi32(squared(apart_xy), squared(_mm256_and_si256(apart_z, same(0xFFFF))));
+      if constexpr (kLater) {
+        const Wide later = _mm256_sub_epi16(load(later_xy + from), same(later_xy[self]));
+        const Wide later_apart = _mm256_add_epi32(squared(later), squared(_mm256_srli_epi32(apart_z, 16)));
+        apart = _mm256_min_epu32(apart, later_apart);
+      }
+      const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(apart, most), apart);
+      const std::uint32_t bits =
+          static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) & kFirsts.of[left];
+      const Wide places =
+          _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
+      store(first + count, same(self));
+      store(second + count, _mm256_add_epi32(places, same(from)));
+      count += static_cast<std::uint32_t>(_mm_popcnt_u32(bits));
+      if (left <= 8) break;
+      from += 8;
+      left -= 8;
+    }
   }
   pairs.count = count;
 }
 
 std::uint32_t find(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough, ContactPairs& pairs) {
-  return find_pairs(grid, place, enough, pairs, collect);
+  return grid.later_xy != nullptr ? find_pairs<Avx2<true>>(grid, place, enough, pairs)
+                                  : find_pairs<Avx2<false>>(grid, place, enough, pairs);
 }
 
 // Four rows of four, twice side by side, turned over.
@@ -78,12 +114,16 @@ inline void transpose(Wide& a, Wide& b, Wide& c, Wide& d) {
   d = _mm256_unpackhi_epi64(ab_high, cd_high);
 }
 
-// Half a body of each of two: the first half is p and the radius, the second v and the slot.
-inline Wide halves(const ContactBody& a, const ContactBody& b, unsigned half) {
-  const auto* low = reinterpret_cast<const __m128i*>(&a) + half;
-  const auto* high = reinterpret_cast<const __m128i*>(&b) + half;
-  return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_load_si128(low)), _mm_load_si128(high), 1);
+inline Wide both(const ContactView& a, const ContactView& b) {
+  return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_load_si128(reinterpret_cast<const __m128i*>(&a))),
+                                 _mm_load_si128(reinterpret_cast<const __m128i*>(&b)), 1);
 }
+
+// Words in the lower halves; what is in the upper half of either does not count where the other's is 0.
+inline Wide product(Wide a, Wide b) { return _mm256_madd_epi16(a, b); }
+inline Wide lower(Wide words) { return _mm256_unpacklo_epi16(words, Wide{}); }
+inline Wide upper(Wide words) { return _mm256_unpackhi_epi16(words, Wide{}); }
+inline Wide with_sign(Wide word) { return _mm256_srai_epi32(_mm256_slli_epi32(word, 16), 16); }
 
 inline void add(ContactForce& force, __m128i change) {
   auto* const f = reinterpret_cast<__m128i*>(&force);
@@ -110,65 +150,61 @@ struct Forces {
   Wide row[4];  // pair k in the lower half of row k, pair k + 4 in the upper half
 };
 
-inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
+inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                         const std::uint32_t* first, const std::uint32_t* second, std::size_t stride) {
   // The radius of the first is negated, so that the difference of the radii is their sum.
-  const Wide signs = _mm256_set_epi32(-1, 1, 1, 1, -1, 1, 1, 1);
-  Wide d[4], u[4];
+  const Wide signs = _mm256_set_epi16(1, 1, 1, 1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, 1, 1);
+  Wide rows[4];
   for (unsigned k = 0; k < 4; ++k) {
-    const ContactBody& a = bodies[first[k * stride]];
-    const ContactBody& b = bodies[second[k * stride]];
-    const ContactBody& a4 = bodies[first[(k + 4) * stride]];
-    const ContactBody& b4 = bodies[second[(k + 4) * stride]];
-    d[k] = _mm256_sub_epi32(halves(b, b4, 0), _mm256_sign_epi32(halves(a, a4, 0), signs));
-    u[k] = _mm256_sub_epi32(halves(b, b4, 1), halves(a, a4, 1));
+    const Wide a = both(views[first[k * stride]], views[first[(k + 4) * stride]]);
+    const Wide b = both(views[second[k * stride]], views[second[(k + 4) * stride]]);
+    rows[k] = _mm256_sub_epi16(b, _mm256_sign_epi16(a, signs));
   }
-  transpose(d[0], d[1], d[2], d[3]);
-  transpose(u[0], u[1], u[2], u[3]);
+  const Wide places01 = _mm256_unpacklo_epi16(rows[0], rows[1]);
+  const Wide places23 = _mm256_unpacklo_epi16(rows[2], rows[3]);
+  const Wide speeds01 = _mm256_unpackhi_epi16(rows[0], rows[1]);
+  const Wide speeds23 = _mm256_unpackhi_epi16(rows[2], rows[3]);
+  const Wide d_xy = _mm256_unpacklo_epi32(places01, places23);
+  const Wide d_z_reach = _mm256_unpackhi_epi32(places01, places23);
+  const Wide u_xy = _mm256_unpacklo_epi32(speeds01, speeds23);
+  const Wide u_z = _mm256_unpackhi_epi32(speeds01, speeds23);
+  // Words in the lower halves, the upper ones 0.
+  const Wide d[3] = {lower(d_xy), upper(d_xy), lower(d_z_reach)};
+  const Wide u[3] = {lower(u_xy), upper(u_xy), lower(u_z)};
+  const Wide reach = upper(d_z_reach);
 
-  const Wide shift = same(law.shift);
-  const Wide farthest = same(1 << 14);
-  for (unsigned i = 0; i < 3; ++i)
-    d[i] = clamped(_mm256_srav_epi32(d[i], shift), _mm256_sub_epi32(Wide{}, farthest), farthest);
-  const Wide reach = _mm256_srav_epi32(d[3], shift);
   Wide squared =
-      _mm256_add_epi32(_mm256_add_epi32(_mm256_mullo_epi32(d[0], d[0]), _mm256_mullo_epi32(d[1], d[1])),
-                       _mm256_mullo_epi32(d[2], d[2]));
-  const Wide touching = _mm256_cmpgt_epi32(_mm256_mullo_epi32(reach, reach), squared);
+      _mm256_add_epi32(_mm256_add_epi32(product(d[0], d[0]), product(d[1], d[1])), product(d[2], d[2]));
+  const Wide most = _mm256_sub_epi32(product(reach, reach), same(1));
+  const Wide touching = _mm256_cmpeq_epi32(_mm256_min_epu32(squared, most), squared);
   squared = _mm256_and_si256(squared, touching);
   const Wide inverse = looked_up(inverse_root, _mm256_srli_epi32(squared, 16));
   const Wide distance = _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(squared, 12), inverse), 18);
   const Wide overlap = _mm256_max_epi32(_mm256_sub_epi32(reach, distance), Wide{});
-
-  const Wide speed_shift = same(law.shift + 4);
-  const Wide fastest = same(1 << 16);
   Wide n[3];
-  for (unsigned i = 0; i < 3; ++i) {
-    n[i] = _mm256_srai_epi32(_mm256_mullo_epi32(d[i], inverse), 18);
-    u[i] = clamped(_mm256_srav_epi32(u[i], speed_shift), _mm256_sub_epi32(Wide{}, fastest), fastest);
-  }
+  for (unsigned i = 0; i < 3; ++i) n[i] = _mm256_srai_epi32(_mm256_mullo_epi32(with_sign(d[i]), inverse), 18);
   n[1] = _mm256_add_epi32(n[1], _mm256_and_si256(_mm256_cmpeq_epi32(squared, Wide{}), same(1 << 12)));
 
   const Wide along = _mm256_srai_epi32(
-      _mm256_add_epi32(_mm256_add_epi32(_mm256_mullo_epi32(u[0], n[0]), _mm256_mullo_epi32(u[1], n[1])),
-                       _mm256_mullo_epi32(u[2], n[2])),
-      12);
-  const Wide hardest = same(1 << 18);
+      _mm256_add_epi32(_mm256_add_epi32(product(u[0], n[0]), product(u[1], n[1])), product(u[2], n[2])), 11);
+  const Wide hardest = same((1 << 15) - 1);
   const Wide push =
-      clamped(_mm256_add_epi32(_mm256_srai_epi32(_mm256_mullo_epi32(same(law.spring), overlap), 10),
+      clamped(_mm256_add_epi32(_mm256_srai_epi32(_mm256_mullo_epi32(same(law.spring), overlap), 11),
                                _mm256_srai_epi32(_mm256_mullo_epi32(same(law.shear), along), 11)),
               _mm256_sub_epi32(Wide{}, hardest), hardest);
+  const Wide push_word = _mm256_and_si256(push, same(0xFFFF));
+  const Wide drag = same(law.drag);
   Forces f{};
   for (unsigned i = 0; i < 3; ++i) {
-    const Wide drag = _mm256_srai_epi32(_mm256_mullo_epi32(same(law.drag), u[i]), 11);
-    const Wide along_n = _mm256_srai_epi32(_mm256_mullo_epi32(push, n[i]), 12);
-    f.row[i] = _mm256_and_si256(_mm256_sub_epi32(drag, along_n), touching);
+    f.row[i] = _mm256_and_si256(_mm256_sub_epi32(_mm256_srai_epi32(product(u[i], drag), 9),
+                                                 _mm256_srai_epi32(product(push_word, n[i]), 11)),
+                                touching);
   }
   transpose(f.row[0], f.row[1], f.row[2], f.row[3]);
   return f;
 }
 
-void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactBody* bodies,
+void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                 const ContactPairs& pairs, ContactForce* forces) {
   // A body's pairs follow each other. Those worked on at once are from eight places far apart, or each would
   // wait for the sum that the one before it stores.
@@ -179,7 +215,7 @@ void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const 
     for (std::size_t k = 0; k < stride; ++k) {
       const std::uint32_t* const first = pairs.first + begin + k;
       const std::uint32_t* const second = pairs.second + begin + k;
-      const Forces f = forces_of(law, inverse_root, bodies, first, second, stride);
+      const Forces f = forces_of(law, inverse_root, views, first, second, stride);
       for (unsigned i = 0; i < 4; ++i) {
         const __m128i low = _mm256_castsi256_si128(f.row[i]);
         const __m128i high = _mm256_extracti128_si256(f.row[i], 1);

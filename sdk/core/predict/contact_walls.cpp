@@ -131,10 +131,10 @@ void ContactWalls::add_shapes(std::span<const Shape> shapes, std::span<const Sla
       Vec3i u{};
       for (std::size_t i = 0; i < 3; ++i) {
         n[i] = std::clamp(-t.out[i] >> 2, -kOne, kOne);
-        u[i] = contact_speed(law_, -body.v[i]);
+        u[i] = -contact_speed(law_, body.v[i]);
       }
       const auto overlap =
-          static_cast<std::int32_t>(std::min<std::int64_t>(t.overlap >> law_.shift, kFarthest));
+          static_cast<std::int32_t>(std::min<std::int64_t>(t.overlap >> law_.shift, kMostOverlap));
       const Vec3i f = contact_force(law_, overlap, n, u);
       for (std::size_t i = 0; i < 3; ++i) forces[place].f[i] += f[i];
     }

@@ -139,7 +139,7 @@ TEST(Contact, ABodyOnThePlaneComesToRest) {
   state.spawn(0, 0, 0, {{0, 3 * kRadius, 0}, {}});
   for (int frame = 0; frame < 600; ++frame) predictor->step(state, state, kFalling);
   EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20);
-  EXPECT_NEAR(state.v(1)[0], 0, 100);
+  EXPECT_NEAR(state.v(1)[0], 0, 300);
 }
 
 TEST(Contact, AMixedRunKeepsItsHash) {
@@ -156,7 +156,7 @@ TEST(Contact, AMixedRunKeepsItsHash) {
   }
   for (int frame = 0; frame < 50; ++frame) predictor->step(state, state, kFalling);
   StateHasher hasher;
-  EXPECT_EQ(to_hex(hasher.hash(state, {})), "8f9d52b894b1be6b");
+  EXPECT_EQ(to_hex(hasher.hash(state, {})), "9d3a5db3f528f099");
 }
 
 // What the kernels leave: the pairs of a heap in a grid of 8 cells a side, and the forces between them.
@@ -166,7 +166,8 @@ struct KernelResult {
   friend bool operator==(const KernelResult&, const KernelResult&) = default;
 };
 
-KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std::int32_t spread) {
+KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std::int32_t spread,
+                         bool later_too) {
   std::mt19937_64 random(seed);
   constexpr std::uint32_t kSideBits = 3, kCells = 1U << (3 * kSideBits), kBeyond = 8;
   std::vector<std::uint32_t> begin{0}, cells;
@@ -176,19 +177,25 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
     cells.resize(begin.back(), cell);
   }
   const std::uint32_t count = begin.back();
-  std::vector<std::uint32_t> xy(count + kBeyond), z(count + kBeyond);
-  std::vector<ContactBody> bodies(count);
+  std::vector<std::uint32_t> xy(count + kBeyond), later(xy), z(xy);
+  std::vector<ContactView> views(count);
   for (std::uint32_t place = 0; place < count; ++place) {
     xy[place] = static_cast<std::uint32_t>(random());
-    z[place] = static_cast<std::uint32_t>(random() & 0xFFFFU);
-    const bool same = place > 0 && random() % 20 == 0;
-    bodies[place] = {same ? bodies[place - 1].p : vector_within(random, spread), kRadius,
-                     vector_within(random, place % 2 == 0 ? kVelocityLimit : kRadius), place};
+    later[place] = static_cast<std::uint32_t>(random());
+    z[place] = static_cast<std::uint32_t>(random());
+    ContactView& view = views[place];
+    for (std::size_t i = 0; i < 3; ++i) {
+      view.q[i] = static_cast<std::int16_t>(vector_within(random, spread)[i]);
+      view.v[i] = static_cast<std::int16_t>(vector_within(random, (1 << 14) - 1)[i]);
+    }
+    if (place > 0 && random() % 20 == 0) view.q = views[place - 1].q;
+    view.radius = (1 << 13) - 1;
   }
   std::vector<std::uint32_t> inverse_root(1U << 12U);
   for (std::uint32_t& x : inverse_root) x = 65536 + static_cast<std::uint32_t>(random() % (1U << 15U));
 
-  const ContactGrid grid{kSideBits, begin.data(), cells.data(), xy.data(), z.data(), 1U << 29U};
+  const ContactGrid grid{kSideBits, begin.data(), cells.data(), xy.data(), later_too ? later.data() : nullptr,
+                         z.data(),  1U << 29U};
   constexpr std::uint32_t kEnough = 500, kRoom = kEnough + ContactPairs::kMostAtOnce;
   std::vector<std::uint32_t> first(kRoom), second(kRoom);
   std::vector<ContactForce> forces(count);
@@ -200,7 +207,7 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
       result.first.push_back(first[k]);
       result.second.push_back(second[k]);
     }
-    kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), bodies.data(), pairs, forces.data());
+    kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), views.data(), pairs, forces.data());
   }
   for (const ContactForce& force : forces)
     result.forces.insert(result.forces.end(), force.f.begin(), force.f.end());
@@ -210,10 +217,12 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
 TEST(Contact, TheFastestKernelsEqualThePortableOnes) {
   for (const std::uint64_t seed : {71U, 72U, 73U}) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    for (const std::int32_t spread : {0, kRadius, 3 * kRadius, kPositionLimit}) {
-      const KernelResult portable = run_kernels(portable_contact_kernels(), seed, spread);
-      EXPECT_GT(portable.first.size(), 1000U);
-      EXPECT_EQ(run_kernels(fastest_contact_kernels(), seed, spread), portable);
+    for (const bool later : {false, true}) {
+      for (const std::int32_t spread : {0, 1 << 13, 1 << 14, 1 << 15}) {
+        const KernelResult portable = run_kernels(portable_contact_kernels(), seed, spread, later);
+        EXPECT_GT(portable.first.size(), 1000U);
+        EXPECT_EQ(run_kernels(fastest_contact_kernels(), seed, spread, later), portable);
+      }
     }
   }
 }
