@@ -21,24 +21,36 @@ std::uint32_t side_bits_for(std::uint32_t capacity) {
 
 FieldForces* fastest_forces() {
 #ifdef TANDEM_FIELD_AVX2
-  if (__builtin_cpu_supports("avx2") != 0) return add_field_forces_avx2;
+  if (__builtin_cpu_supports("avx2") != 0) return set_field_forces_avx2;
 #endif
-  return add_field_forces;
+  return set_field_forces;
 }
 
 std::int16_t gain16(std::int64_t x) { return static_cast<std::int16_t>(std::min<std::int64_t>(x, 32767)); }
 
-constexpr std::int32_t kMostPasses = 2;
+// A frame is one step whatever the sub-steps of the world. A stiffer spring than this would shake in it: an
+// overlap gives at most half of itself a frame.
+constexpr std::int64_t kMostSpring = 1 << 15;  // in 2^-16
 
-std::int32_t passes_of(const ContactConstants& constants) {
-  return std::min(kMostPasses, constants.substeps);
+// Gains of a frame.
+ContactMaterial wall_gains(const ContactConstants& constants) {
+  const std::int32_t substeps = constants.substeps;
+  const ContactMaterial& wall = constants.wall;
+  const std::int64_t spring = std::min<std::int64_t>(std::int64_t{wall.spring} * substeps, kMostSpring >> 2);
+  return {static_cast<std::int32_t>(spring), wall.damping * substeps, wall.shear * substeps};
 }
 
-// Gains of a pass.
-ContactMaterial wall_gains(const ContactConstants& constants) {
-  const std::int32_t substeps = constants.substeps / passes_of(constants);
-  const ContactMaterial& wall = constants.wall;
-  return {wall.spring * substeps, wall.damping * substeps, wall.shear * substeps};
+FieldLaw pair_law(const ContactConstants& constants) {
+  const std::int64_t substeps = constants.substeps;
+  const ContactMaterial& pair = constants.pair;
+  FieldLaw law;
+  law.spring = gain16(std::min(4 * substeps * pair.spring, kMostSpring));
+  law.drag = gain16(8 * substeps * (pair.damping + pair.shear));
+  std::int64_t shear = 8 * substeps * pair.shear;
+  law.shear_shift = 4;
+  for (; law.shear_shift > 0 && shear * 2 <= 32767; --law.shear_shift) shear *= 2;
+  law.shear = gain16(shear);
+  return law;
 }
 
 // Adds one axis to the cells' numbers.
@@ -52,30 +64,20 @@ TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32
   }
 }
 
-// The first pass of a frame: as `ballistic`, plus the force. A dead slot is all zero; it stays so without
-// gravity.
-TANDEM_VECTOR_CLONES void add_drive(std::int32_t* __restrict v, std::int32_t* __restrict c,
-                                    const std::int32_t* __restrict force,
-                                    const std::uint8_t* __restrict alive, std::size_t count,
-                                    std::int32_t gravity, std::int64_t damping, std::int64_t decay) {
+// As `ballistic`, plus the force. A dead slot is all zero; it stays so without gravity. A body that moved in
+// several sub-steps did not move by all of the force: a quarter is left out where `late` is -1.
+TANDEM_VECTOR_CLONES void move(std::int32_t* __restrict p, std::int32_t* __restrict v,
+                               std::int32_t* __restrict c, const std::int32_t* __restrict force,
+                               const std::uint8_t* __restrict alive, std::size_t count, std::int32_t gravity,
+                               std::int64_t damping, std::int64_t decay, std::int32_t late) {
   for (std::size_t s = 0; s < count; ++s) {
-    const std::int32_t speed = v[s] + force[s] + c[s] + (gravity & -static_cast<std::int32_t>(alive[s]));
+    std::int32_t speed = v[s] + force[s] + c[s] + (gravity & -static_cast<std::int32_t>(alive[s]));
     c[s] -= static_cast<std::int32_t>((c[s] * decay + 32768) >> 16);
-    const auto lost = static_cast<std::int32_t>((speed * damping + 32768) >> 16);
-    v[s] = std::clamp(speed - lost, -kVelocityLimit, kVelocityLimit);
+    speed -= static_cast<std::int32_t>((speed * damping + 32768) >> 16);
+    speed = std::clamp(speed, -kVelocityLimit, kVelocityLimit);
+    v[s] = speed;
+    p[s] = std::clamp(p[s] + ((speed - ((force[s] >> 2) & late) + 32) >> 6), -kPositionLimit, kPositionLimit);
   }
-}
-
-TANDEM_VECTOR_CLONES void add_force(std::int32_t* __restrict v, const std::int32_t* __restrict force,
-                                    std::size_t count) {
-  for (std::size_t s = 0; s < count; ++s) v[s] = std::clamp(v[s] + force[s], -kVelocityLimit, kVelocityLimit);
-}
-
-TANDEM_VECTOR_CLONES void advance(std::int32_t* __restrict p, const std::int32_t* __restrict v,
-                                  std::size_t count, std::int32_t shift) {
-  const std::int32_t half = 1 << (shift - 1);
-  for (std::size_t s = 0; s < count; ++s)
-    p[s] = std::clamp(p[s] + ((v[s] + half) >> shift), -kPositionLimit, kPositionLimit);
 }
 
 }  // namespace
@@ -89,16 +91,17 @@ Result<std::unique_ptr<Predictor>> Field::create(std::uint32_t capacity,
 
 Field::Field(std::uint32_t capacity, ContactConstants constants)
     : constants_(std::move(constants)),
-      add_forces_(fastest_forces()),
+      set_forces_(fastest_forces()),
       walls_(constants_, wall_gains(constants_), capacity),
-      passes_(passes_of(constants_)),
+      law_(pair_law(constants_)),
       side_bits_(side_bits_for(capacity)),
       cell_(capacity),
       rank_(capacity),
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
       slot_(capacity) {
-  for (auto* columns : {&p_, &v_, &f_})
+  for (auto* columns : {&p_, &v_})
     for (auto& column : *columns) column.resize(capacity + FieldGrid::kBeyond);
+  for (auto& column : f_) column.resize(capacity);
   for (auto& column : force_) column.resize(capacity);
   for (const auto& type : constants_.types) {
     diameter_ = std::max(diameter_, 2 * type.radius);
@@ -112,14 +115,6 @@ Field::Field(std::uint32_t capacity, ContactConstants constants)
   // the low bits of their positions as well.
   const std::uint64_t edge = 8192 + (26214U >> side_bits_);
   cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 45) / (edge * width));
-  const std::int64_t substeps = constants_.substeps / passes_;  // in a pass
-  const auto& pair = constants_.pair;
-  law_.spring = gain16(4 * substeps * pair.spring);
-  law_.drag = gain16(8 * substeps * (pair.damping + pair.shear));
-  std::int64_t shear = 8 * substeps * pair.shear;
-  law_.shear_shift = 4;
-  for (; law_.shear_shift > 0 && shear * 2 < 32768; --law_.shear_shift) shear *= 2;
-  law_.shear = gain16(shear);
 }
 
 void Field::sort(const State& state) {
@@ -156,44 +151,33 @@ void Field::add_pairs(const State& state) {
       const std::int32_t speed = std::clamp(v[i][s] >> (shift_ + 5), -most, most);
       v_[i][place] = static_cast<std::int16_t>(std::clamp((speed * speeds) >> 15, -32768, 32767));
     }
-    std::fill_n(f_[i].begin(), count_, std::int16_t{0});
   }
   const FieldGrid grid{side_bits_,
                        begin_.data(),
                        {p_[0].data(), p_[1].data(), p_[2].data()},
                        {v_[0].data(), v_[1].data(), v_[2].data()}};
-  add_forces_(law_, grid, {f_[0].data(), f_[1].data(), f_[2].data()});
+  set_forces_(law_, grid, {f_[0].data(), f_[1].data(), f_[2].data()});
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::uint32_t place = 0; place < count_; ++place)
-      force_[i][slot_[place]] += limited((std::int64_t{f_[i][place]} * diameter_) >> 8, kVelocityLimit);
-  }
-}
-
-void Field::move(State& state, const Drive& drive, bool first) {
-  const std::uint32_t capacity = state.capacity();
-  const std::uint8_t* const alive = state.alive().data();
-  for (std::size_t i = 0; i < 3; ++i) {
-    std::int32_t* const force = force_[i].data();
-    if (!equal_masses_) {
-      for (Slot s = 0; s < capacity; ++s)
-        force[s] = limited(share_of(force[s], type_of(state, s).mobility), kVelocityLimit);
-    }
-    std::int32_t* const v = state.v(i).data();
-    if (first)
-      add_drive(v, state.c(i).data(), force, alive, capacity, drive.gravity[i], drive.damping, drive.decay);
-    if (!first) add_force(v, force, capacity);
-    advance(state.p(i).data(), v, capacity, passes_ == 2 ? 7 : 6);
+      force_[i][slot_[place]] += limited((std::int64_t{f_[i][place]} * diameter_) >> 24, kVelocityLimit);
   }
 }
 
 void Field::step(const State& from, State& to, const Drive& drive) {
   if (&from != &to) to = from;
   sort(to);
-  for (std::int32_t pass = 0; pass < passes_; ++pass) {
-    for (auto& column : force_) std::fill(column.begin(), column.end(), 0);
-    walls_.add_forces(to, {force_[0], force_[1], force_[2]});
-    add_pairs(to);
-    move(to, drive, pass == 0);
+  for (auto& column : force_) std::fill(column.begin(), column.end(), 0);
+  walls_.add_forces(to, {force_[0], force_[1], force_[2]});
+  add_pairs(to);
+  const std::int32_t late = constants_.substeps > 1 ? -1 : 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::int32_t* const force = force_[i].data();
+    if (!equal_masses_) {
+      for (Slot s = 0; s < to.capacity(); ++s)
+        force[s] = limited(share_of(force[s], type_of(to, s).mobility), kVelocityLimit);
+    }
+    move(to.p(i).data(), to.v(i).data(), to.c(i).data(), force, to.alive().data(), to.capacity(),
+         drive.gravity[i], drive.damping, drive.decay, late);
   }
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// The tier `field`: contacts in 16 bits, one or two passes a frame. idl/PROTOCOL.md, "Predicted step", has
+// The tier `field`: contacts in 16 bits, one step a frame. idl/PROTOCOL.md, "Predicted step", has
 // the formulas.
 
 #include <algorithm>
@@ -40,12 +40,10 @@ class Field final : public Predictor {
   }
   void sort(const State& state);
   void add_pairs(const State& state);
-  void move(State& state, const Drive& drive, bool first);
 
   ContactConstants constants_;
-  FieldForces* add_forces_;
+  FieldForces* set_forces_;
   FieldWalls walls_;
-  std::int32_t passes_ = 1;
   FieldLaw law_;
   bool equal_masses_ = true;
   std::int32_t diameter_ = 2;       // of the largest bodies
@@ -54,13 +52,14 @@ class Field final : public Predictor {
   std::int32_t cells_per_ = 0;      // ... to cells, in 2^-32
   std::uint32_t side_bits_ = 2;
 
-  std::uint32_t count_ = 0;                             // bodies in the grid
-  std::vector<std::uint32_t> cell_;                     // by slot
-  std::vector<std::uint32_t> rank_;                     // by slot: in its cell
-  std::vector<std::uint32_t> begin_;                    // by cell, and one more
-  std::vector<Slot> slot_;                              // by place
-  std::array<std::vector<std::int16_t>, 3> p_, v_, f_;  // by place
-  std::array<std::vector<std::int32_t>, 3> force_;      // by slot
+  std::uint32_t count_ = 0;                         // bodies in the grid
+  std::vector<std::uint32_t> cell_;                 // by slot
+  std::vector<std::uint32_t> rank_;                 // by slot: in its cell
+  std::vector<std::uint32_t> begin_;                // by cell, and one more
+  std::vector<Slot> slot_;                          // by place
+  std::array<std::vector<std::int16_t>, 3> p_, v_;  // by place
+  std::array<std::vector<std::int32_t>, 3> f_;      // by place
+  std::array<std::vector<std::int32_t>, 3> force_;  // by slot
 };
 
 }  // namespace tandem

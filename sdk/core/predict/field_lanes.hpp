@@ -23,6 +23,12 @@ constexpr std::uint32_t kLanes = 16;
 struct Lanes {
   __m256i x;
 };
+struct Sums {
+  __m256i x;
+};
+inline Sums no_sums() { return {_mm256_setzero_si256()}; }
+inline Sums operator+(Sums a, Sums b) { return {_mm256_add_epi32(a.x, b.x)}; }
+inline Sums product(Lanes a, Lanes b) { return {_mm256_madd_epi16(a.x, b.x)}; }
 inline Lanes load(const std::int16_t* from) {
   return {_mm256_loadu_si256(reinterpret_cast<const __m256i_u*>(from))};
 }
@@ -42,6 +48,12 @@ inline Lanes saturated_difference(Lanes a, Lanes b) { return {_mm256_subs_epi16(
 struct Lanes {
   __m128i x, y;
 };
+struct Sums {
+  __m128i x, y;
+};
+inline Sums no_sums() { return {_mm_setzero_si128(), _mm_setzero_si128()}; }
+inline Sums operator+(Sums a, Sums b) { return {_mm_add_epi32(a.x, b.x), _mm_add_epi32(a.y, b.y)}; }
+inline Sums product(Lanes a, Lanes b) { return {_mm_madd_epi16(a.x, b.x), _mm_madd_epi16(a.y, b.y)}; }
 inline Lanes load(const std::int16_t* from) {
   const auto* const halves = reinterpret_cast<const __m128i_u*>(from);
   return {_mm_loadu_si128(halves), _mm_loadu_si128(halves + 1)};
@@ -70,6 +82,15 @@ inline Lanes saturated_difference(Lanes a, Lanes b) {
 struct Lanes {
   int16x8_t x, y;
 };
+struct Sums {
+  int32x4_t x, y;
+};
+inline Sums no_sums() { return {vdupq_n_s32(0), vdupq_n_s32(0)}; }
+inline Sums operator+(Sums a, Sums b) { return {vaddq_s32(a.x, b.x), vaddq_s32(a.y, b.y)}; }
+inline int32x4_t product(int16x8_t a, int16x8_t b) {
+  return vaddq_s32(vmull_s16(vget_low_s16(a), vget_low_s16(b)), vmull_high_s16(a, b));
+}
+inline Sums product(Lanes a, Lanes b) { return {product(a.x, b.x), product(a.y, b.y)}; }
 inline Lanes load(const std::int16_t* from) { return {vld1q_s16(from), vld1q_s16(from + 8)}; }
 inline void store(std::int16_t* to, Lanes a) {
   vst1q_s16(to, a.x);
@@ -99,6 +120,23 @@ inline Lanes saturated_difference(Lanes a, Lanes b) { return {vqsubq_s16(a.x, b.
 struct Lanes {
   std::int16_t lane[kLanes];
 };
+struct Sums {
+  std::uint32_t lane[kLanes / 2];
+};
+inline Sums no_sums() { return {}; }
+inline Sums operator+(const Sums& a, const Sums& b) {
+  Sums sums;
+  for (std::uint32_t i = 0; i < kLanes / 2; ++i) sums.lane[i] = a.lane[i] + b.lane[i];
+  return sums;
+}
+inline Sums product(const Lanes& a, const Lanes& b) {
+  Sums sums;
+  for (std::uint32_t i = 0; i < kLanes / 2; ++i) {
+    sums.lane[i] = static_cast<std::uint32_t>(a.lane[2 * i] * b.lane[2 * i]) +
+                   static_cast<std::uint32_t>(a.lane[2 * i + 1] * b.lane[2 * i + 1]);
+  }
+  return sums;
+}
 template <class F>
 inline Lanes each(F f) {
   Lanes result;
@@ -143,23 +181,22 @@ inline Lanes saturated_difference(const Lanes& a, const Lanes& b) {
 #endif
 
 /// Sum of all, wrapped.
-inline std::int16_t sum_of(Lanes a) {
+inline std::int32_t sum_of(const Sums& a) {
 #if defined(__AVX2__) || defined(__SSE2__)
 #if defined(__AVX2__)
-  __m128i sum = _mm_add_epi16(_mm256_castsi256_si128(a.x), _mm256_extracti128_si256(a.x, 1));
+  __m128i sum = _mm_add_epi32(_mm256_castsi256_si128(a.x), _mm256_extracti128_si256(a.x, 1));
 #else
-  __m128i sum = _mm_add_epi16(a.x, a.y);
+  __m128i sum = _mm_add_epi32(a.x, a.y);
 #endif
-  sum = _mm_add_epi16(sum, _mm_unpackhi_epi64(sum, sum));
-  sum = _mm_add_epi16(sum, _mm_shuffle_epi32(sum, 1));
-  sum = _mm_add_epi16(sum, _mm_srli_epi32(sum, 16));
-  return static_cast<std::int16_t>(_mm_cvtsi128_si32(sum));
+  sum = _mm_add_epi32(sum, _mm_unpackhi_epi64(sum, sum));
+  sum = _mm_add_epi32(sum, _mm_shuffle_epi32(sum, 1));
+  return _mm_cvtsi128_si32(sum);
 #elif defined(__aarch64__)
-  return vaddvq_s16(vaddq_s16(a.x, a.y));
+  return vaddvq_s32(vaddq_s32(a.x, a.y));
 #else
-  std::int32_t sum = 0;
-  for (const std::int16_t x : a.lane) sum += x;
-  return static_cast<std::int16_t>(sum);
+  std::uint32_t sum = 0;
+  for (const std::uint32_t x : a.lane) sum += x;
+  return static_cast<std::int32_t>(sum);
 #endif
 }
 

@@ -4,8 +4,8 @@
 
 namespace tandem {
 
-void add_field_forces(const FieldLaw& law, const FieldGrid& grid, std::int16_t* const (&f)[3]) {
-  add_forces(law, grid, f);
+void set_field_forces(const FieldLaw& law, const FieldGrid& grid, std::int32_t* const (&f)[3]) {
+  set_forces(law, grid, f);
 }
 
 }  // namespace tandem

@@ -24,13 +24,14 @@ struct FieldGrid {
   const std::int16_t* v[3];
 };
 
-using FieldForces = void(const FieldLaw& law, const FieldGrid& grid, std::int16_t* const (&f)[3]);
+using FieldForces = void(const FieldLaw& law, const FieldGrid& grid, std::int32_t* const (&f)[3]);
 
-/// Adds to `f`, by place, what the pairs change of v; sums wrap at 16 bits.
-FieldForces add_field_forces;
+/// Sets `f`, by place, to what the pairs change of v, in 2^-30 of the largest
+/// diameter per frame; sums wrap at 32 bits.
+FieldForces set_field_forces;
 #ifdef TANDEM_FIELD_AVX2
 /// The same bits; only where the processor has AVX2.
-FieldForces add_field_forces_avx2;
+FieldForces set_field_forces_avx2;
 #endif
 
 }  // namespace tandem
