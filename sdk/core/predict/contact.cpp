@@ -45,11 +45,6 @@ ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
   return {material.spring, material.damping + material.shear, material.shear, shift};
 }
 
-// The lower 16 bits of each.
-std::uint32_t words(std::int32_t low, std::int32_t high) {
-  return (static_cast<std::uint32_t>(low) & 0xFFFFU) | static_cast<std::uint32_t>(high) << 16U;
-}
-
 // Adds one axis to the cells' numbers.
 TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32_t* __restrict cell,
                                    std::size_t count, std::uint32_t shift, std::int32_t cells_per,
@@ -87,7 +82,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
       walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
       side_bits_(side_bits_for(capacity)),
       cell_(capacity),
-      rank_(capacity),
+      place_(capacity),
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
       bodies_(capacity),
       views_(capacity),
@@ -126,7 +121,7 @@ void Contact::sort(const State& state) {
   const std::uint32_t last = (1U << (3 * side_bits_)) - 1;
   for (Slot s = 0; s < capacity; ++s) {
     cell_[s] &= last;
-    rank_[s] = (begin_[cell_[s]] += alive[s]) - 1;
+    place_[s] = (begin_[cell_[s]] += alive[s]) - 1;
   }
   std::uint32_t sum = 0;
   for (std::uint32_t& begin : begin_) {
@@ -135,26 +130,18 @@ void Contact::sort(const State& state) {
     sum += in_cell;
   }
   count_ = sum;
-  const bool several = constants_.substeps > 1;
-  const std::uint32_t near_shift = shift_ + kNearShift;
   for (Slot s = 0; s < capacity; ++s) {
     if (alive[s] == 0) continue;
-    const std::uint32_t place = rank_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + rank_[s] : count_++;
+    const std::uint32_t place =
+        place_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + place_[s] : count_++;
+    place_[s] = place;
     const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
     const ContactConstants::Type& type = type_of(state, s);
     bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
-    near_xy_[place] = words(p[0] >> near_shift, p[1] >> near_shift);
-    Vec3i later = p;
-    if (several) {
-      for (std::size_t i = 0; i < 3; ++i)
-        later[i] += static_cast<std::int32_t>((std::int64_t{state.v(i)[s]} * later_share_) >> 21);
-      later_xy_[place] = words(later[0] >> near_shift, later[1] >> near_shift);
-    }
-    place_cell_[place] = cell_[s];
-    forces_[place] = {{}, type.mobility};
+    if (!one_mobility_) forces_[place].mobility = type.mobility;
     if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};
-    near_z_[place] = words(p[2] >> near_shift, later[2] >> near_shift);
   }
+  for (std::uint32_t place = 0; place < count_; ++place) place_cell_[place] = cell_[bodies_[place].slot];
 }
 
 // Those found are worked on while they are in the cache. They are kept for the later sub-steps as long as
@@ -192,18 +179,14 @@ void Contact::write(const State& from, const Drive& drive, State& to) const {
     std::ranges::copy(from.alive(), to.alive().begin());
     std::ranges::copy(from.generation(), to.generation().begin());
     std::ranges::copy(from.type(), to.type().begin());
-    for (std::size_t i = 0; i < 3; ++i) {
-      std::ranges::copy(from.c(i), to.c(i).begin());
-      if (count_ == to.capacity()) continue;
-      std::ranges::fill(to.p(i), 0);
-      std::ranges::fill(to.v(i), 0);
-    }
+    for (std::size_t i = 0; i < 3; ++i) std::ranges::copy(from.c(i), to.c(i).begin());
   }
-  for (std::uint32_t place = 0; place < count_; ++place) {
-    const ContactBody& body = bodies_[place];
+  static constexpr ContactBody kDead{};
+  for (Slot s = 0; s < to.capacity(); ++s) {
+    const ContactBody& body = to.alive()[s] != 0 ? bodies_[place_[s]] : kDead;
     for (std::size_t i = 0; i < 3; ++i) {
-      to.p(i)[body.slot] = body.p[i];
-      to.v(i)[body.slot] = body.v[i];
+      to.p(i)[s] = body.p[i];
+      to.v(i)[s] = body.v[i];
     }
   }
   for (std::size_t i = 0; accelerated_ && i < 3; ++i) decay(to.c(i).data(), to.c(i).size(), drive.decay);
@@ -211,7 +194,8 @@ void Contact::write(const State& from, const Drive& drive, State& to) const {
 
 void Contact::step(const State& from, State& to, const Drive& drive) {
   sort(from);
-  write_views(std::span(bodies_).first(count_), shift_, views_);
+  place_bodies(std::span(bodies_).first(count_),
+               {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_);
   for (std::int32_t i = 0; i < constants_.substeps; ++i) {
     walls_.add_forces(std::span(bodies_).first(count_), forces_);
     add_pairs(i == 0);

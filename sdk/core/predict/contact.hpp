@@ -51,8 +51,8 @@ class Contact final : public Predictor {
   std::uint32_t near_ = 0;        // in 2^5 grid units
   std::int32_t later_share_ = 0;  // of v, in 1/32768: what the sub-steps before the last move a body by
   bool one_mobility_ = false;     // all bodies have that of type 0
-  std::vector<std::uint32_t> cell_, rank_;  // by slot; among the bodies of the cell
-  std::vector<std::uint32_t> begin_;        // by cell, and one more
+  std::vector<std::uint32_t> cell_, place_;  // by slot; first the rank in the cell, then the place
+  std::vector<std::uint32_t> begin_;         // by cell, and one more
   // By place: bodies that take part in pairs by cell, then the rest.
   std::uint32_t count_ = 0;
   std::vector<ContactBody> bodies_;

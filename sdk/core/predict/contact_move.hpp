@@ -21,7 +21,15 @@ struct ContactMove {
 void move_bodies(const ContactMove& move, std::span<ContactBody> bodies, std::span<ContactForce> forces,
                  std::span<const ContactForce> accelerations, std::span<ContactView> views);
 
-/// What others see of bodies that have not moved yet.
-void write_views(std::span<const ContactBody> bodies, std::uint32_t shift, std::span<ContactView> views);
+/// Where bodies are when a frame starts, for the search of pairs: columns of ContactGrid, by place.
+struct ContactPlaces {
+  std::uint32_t shift, near_shift;  ///< of lattice units: to grid units, to those of the search
+  std::int32_t later_share;         ///< of v, in 1/32768, that moves a body up to the last sub-step
+  std::span<std::uint32_t> xy, later_xy, z;
+};
+
+/// Writes these and what others see of bodies that have not moved yet.
+void place_bodies(std::span<const ContactBody> bodies, const ContactPlaces& places,
+                  std::span<ContactView> views);
 
 }  // namespace tandem
