@@ -114,6 +114,7 @@ Result<HostConfig> configure(const scenes::Scene& scene, const Options& options)
   choice.target_mbit_per_s = options.target_mbit_per_s;
   choice.max_error_m = options.max_error_m;
   choice.budget_bytes = options.budget_bytes;
+  choice.threads = options.threads;
   return plan_session(scene, choice).map([&](HostConfig config) {
     config.session = options.session;
     config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);

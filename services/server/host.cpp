@@ -101,6 +101,7 @@ TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity)
   timeline.predictor = config.predictor;
   timeline.predictor_constants = config.predictor_constants;
   timeline.max_lead = config.lead;
+  timeline.run_blocks = config.run_blocks;
   return timeline;
 }
 

@@ -51,6 +51,7 @@ struct HostConfig {
   std::optional<QualityGoal> quality;  ///< empty: parameters change only by set_parameters()
   std::string predictor = "ballistic";
   std::vector<std::int32_t> predictor_constants;
+  RunBlocks run_blocks;  ///< threads for the codec; empty: none of its own
 
   std::uint32_t client_cost_ns = 2;
   std::string scene;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/core/codec/training.hpp"
+#include "services/server/block_threads.hpp"
 #include "services/server/contact_plan.hpp"
 
 namespace tandem::server {
@@ -63,7 +64,11 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
     if (!constants) return tl::unexpected(constants.error());
     config.predictor_constants = std::move(*constants);
   }
-  config.decay = recommended_decay(choice.codec);
+  config.run_blocks = blocks_on_threads(choice.threads);
+  // Only the tier `ballistic` learns contact forces, so only there it matters how fast they are forgotten.
+  const bool has_decay =
+      choice.codec == "tracker" && choice.predictor == "ballistic" && table.tracker_decay != 0;
+  config.decay = has_decay ? table.tracker_decay : recommended_decay(choice.codec);
   config.scene = scene.name;
   config.scene_description = scene.text;
   config.types.clear();

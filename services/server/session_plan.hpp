@@ -23,6 +23,7 @@ struct SessionChoice {
   double target_mbit_per_s = 0;  ///< with `automatic`; 0: the threshold stays
   std::optional<double> max_error_m;             ///< with `automatic`; empty: four times the threshold
   std::size_t budget_bytes = kPaperBudgetBytes;  ///< of corrections per frame; for `limited` only
+  std::uint32_t threads = 1;                     ///< of the codec, where a session has several blocks
 };
 
 /// The part of a host's configuration that follows from scene and choice: lattice, codec with tables,

@@ -44,6 +44,7 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
                                           const std::function<void(Frame)>& progress) {
   server::SessionChoice choice = options.choice;
   choice.bodies = source.simulation->capacity();
+  choice.threads = options.run.threads;
   std::vector<server::HostConfig> sessions;
   for (const std::string& codec : options.codecs) {
     choice.codec = codec;
@@ -114,7 +115,7 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   server::SessionChoice choice = options.choice;
   choice.bodies = (*opened)->capacity();
   {
-    Progress progress(fmt::format("{}: training, frame", options.trajectory), 2 * frames);
+    Progress progress(fmt::format("{}: training, frame", options.trajectory), kTrainingPasses * frames);
     auto table = train(scene, choice, make, frames, [&](Frame frame) { progress.at(frame); });
     if (!table) return fail(table.error().code, options.trajectory + ": " + table.error().message);
     scene.trained = {std::move(*table)};
@@ -205,7 +206,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
   add_threshold_options(*command, options->choice);
-  command->add_option("--threads", options->run.threads, "Of the engine")
+  command->add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")

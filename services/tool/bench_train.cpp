@@ -31,7 +31,8 @@ Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const Train
   run.frames = options.frames;
   server::SessionChoice choice = options.choice;
   choice.bodies = bodies;
-  Progress progress(fmt::format("{}, {} bodies: training, frame", scene.name, bodies), 2 * options.frames);
+  Progress progress(fmt::format("{}, {} bodies: training, frame", scene.name, bodies),
+                    kTrainingPasses * options.frames);
   auto table = train(
       scene, choice, [&] { return make_source(scene, run); }, options.frames,
       [&](Frame frame) { progress.at(frame); });
@@ -49,15 +50,17 @@ int run_train(const TrainOptions& options) {
       if (!table) return report("bench train", table.error());
       if (!options.json) {
         fmt::print(
-            "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  -> {}\n",
+            "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  decay {}  "
+            "-> {}\n",
             scene.name, bodies, table->threshold_m, table->position_range_m, table->velocity_range_m_per_s,
-            scenes::trained_path(scene.path));
+            table->tracker_decay, scenes::trained_path(scene.path));
       }
       rows.push_back({{"scene", scene.name},
                       {"bodies", bodies},
                       {"threshold", table->threshold_m},
                       {"position_range", table->position_range_m},
                       {"velocity_range", table->velocity_range_m_per_s},
+                      {"tracker_decay", table->tracker_decay},
                       {"file", scenes::trained_path(scene.path)}});
     }
   }
@@ -77,7 +80,6 @@ void add_train(CLI::App& bench, Run& run) {
   command->add_option("--frames", options->frames, "Frames, from the start block on")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
       ->capture_default_str();
-  command->add_option("--predictor", options->choice.predictor, "Predicted step")->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the training run")->capture_default_str();
   add_threshold_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine")

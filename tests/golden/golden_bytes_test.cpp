@@ -104,7 +104,7 @@ TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger err
 }
 
 TEST(GoldenBytes, OfTracker) {  // Positions alone; v and c follow from them on both sides.
-  expect_bytes("tracker", "0380 08000000 0000 b5c5400bdc98", predicted(), target());
+  expect_bytes("tracker", "0380 07000000 0000 2f2643e622", predicted(), target());
 }
 
 TEST(GoldenBytes, OfLifecycleAndParameters) {

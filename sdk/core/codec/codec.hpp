@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -34,6 +35,9 @@ inline constexpr std::int32_t kMaxStep = 1 << 24;
 /// Budget that never binds.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
 
+/// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done.
+using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
+
 /// The corrections part of a delta: one implementation a codec name (paper, sections 3.3.1 and 3.3.2).
 ///
 /// encode() and parse()+apply() leave the same state on both sides. Both see the state after the delta's
@@ -48,6 +52,9 @@ class Codec {
 
   /// The predicted step of the session, by name, before anything else. For codecs whose gains depend on it.
   virtual void predicted_by(std::string_view /*predictor*/) {}
+
+  /// How to code blocks side by side; one after the other without it. For codecs that can. Changes no byte.
+  virtual void run_blocks_on(RunBlocks /*run*/) {}
 
   /// The frame to come: `predicted` stays valid until the end of encode() or apply(); `slots` (ascending,
   /// each once) are those that lifecycle records spawned, despawned or teleported in it. Comes before
@@ -70,7 +77,10 @@ class Codec {
   /// kMalformed with the reason.
   virtual Result<void> parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
                              const CodecParameters& parameters) = 0;
-  /// Applies all collected corrections. Only after every section of the delta parsed.
+  /// After the last section, if all parsed: refuses what can be seen only now. Changes no state. Errors:
+  /// kMalformed with the reason.
+  virtual Result<void> parse_end() { return {}; }
+  /// Applies all collected corrections. Only after every section of the delta parsed, and parse_end().
   virtual void apply(State& state) = 0;
   /// Slots corrected by the last encode() or apply(), each once, ascending.
   [[nodiscard]] virtual std::span<const Slot> corrected() const = 0;

@@ -202,7 +202,7 @@ Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const S
     if (auto section = parse_section(type, body, state, parsed); !section) return section;
   }
   if (!parsed.renewed) renew(state);
-  return {};
+  return codec->parse_end();
 }
 
 Result<void> DeltaCodec::decode(State& state, std::span<const std::byte> payload) {

@@ -8,37 +8,6 @@
 
 namespace tandem {
 
-/// A probability of 1 that adapts: mean of a fast and a slow running average, both faster while young.
-class AdaptiveBit {
- public:
-  /// Decisions seen, saturating; what it may hold at most.
-  static constexpr std::uint8_t kMostSeen = 31;
-  /// Least and most probability, so that no decision costs more than 11 bits.
-  static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
-
-  /// Of 1, in 1/65536: kLeast .. kMost.
-  [[nodiscard]] std::uint32_t p1() const {
-    const std::uint32_t p = (std::uint32_t{fast} + slow) >> 1U;
-    return p < kLeast ? kLeast : (p > kMost ? kMost : p);
-  }
-  void update(bool bit) {
-    static constexpr std::uint8_t kShift[kMostSeen + 1] = {1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5,
-                                                           5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5};
-    const unsigned fast_shift = kShift[seen];
-    const unsigned slow_shift = seen < kMostSeen ? fast_shift : 8U;
-    seen = static_cast<std::uint8_t>(seen + (seen < kMostSeen ? 1 : 0));
-    // Without a branch, because the bit is hard to guess: a 1 moves the complement towards zero.
-    const unsigned flip = bit ? 65535U : 0U;
-    const unsigned quick = fast ^ flip;
-    const unsigned steady = slow ^ flip;
-    fast = static_cast<std::uint16_t>((quick - (quick >> fast_shift)) ^ flip);
-    slow = static_cast<std::uint16_t>((steady - (steady >> slow_shift)) ^ flip);
-  }
-
-  std::uint16_t fast = 32768, slow = 32768;
-  std::uint8_t seen = 0;
-};
-
 /// Writes decisions into caller memory. Past its end nothing is written and overflow() is set.
 class RangeEncoder {
  public:
@@ -57,16 +26,6 @@ class RangeEncoder {
       low_ <<= 8U;
       range_ <<= 8U;
     }
-  }
-  /// Codes with the model's probability and teaches it.
-  bool code(bool bit, AdaptiveBit& model) {
-    put(bit, model.p1());
-    model.update(bit);
-    return bit;
-  }
-  bool code_even(bool bit) {
-    put(bit, 32768);
-    return bit;
   }
 
   /// Fewest bytes that decode to what was put, zeros at the end left out. Returns the size.
@@ -133,13 +92,6 @@ class RangeDecoder {
     }
     return bit;
   }
-  /// The argument is what an encoder would code: so that one text describes both sides.
-  bool code(bool /*bit*/, AdaptiveBit& model) {
-    const bool bit = get(model.p1());
-    model.update(bit);
-    return bit;
-  }
-  bool code_even(bool /*bit*/) { return get(32768); }
 
   /// True when every byte was used and the last one is not a zero that could have been left out.
   [[nodiscard]] bool at_end() const { return at_ == end_ && !padded_; }

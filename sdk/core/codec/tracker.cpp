@@ -10,35 +10,33 @@
 namespace tandem {
 namespace {
 
-constexpr std::size_t kModelBytes = 5;
+constexpr std::size_t kModelBytes = 3;
 constexpr std::size_t kTrackerBlockHeaderBytes = 2;
-// The encoder keeps to this as to a budget. Bodies that all jump at once take about a third of it.
-constexpr std::size_t kMostBytesPerBody = 24;
-constexpr std::size_t kSlackBytes = 64;
 
 }  // namespace
 
 Tracker::Tracker(std::uint32_t capacity)
     : capacity_(capacity),
       bodies_(kColumns * std::size_t{capacity}),
-      models_(block_count(capacity)),
-      work_(block_count(capacity)),
-      worked_(block_count(capacity)),
+      history_(capacity),
+      flags_(capacity),
       corrected_(capacity),
-      steps_(capacity) {
+      steps_(capacity),
+      work_(block_count(capacity)) {
   renewed_.reserve(capacity);
 }
 Tracker::~Tracker() = default;
 
 std::size_t Tracker::bound() const {
-  return block_count(capacity_) * (kSectionHeaderBytes + kTrackerBlockHeaderBytes + kSlackBytes) +
-         kMostBytesPerBody * capacity_;
+  return block_count(capacity_) * (kSectionHeaderBytes + kTrackerBlockHeaderBytes + kTrackerSlackBytes) +
+         kMostTrackerBytesPerBody * capacity_;
 }
 
 void Tracker::set_body(Slot slot, const TrackerBody& body) {
   column(0)[slot] = static_cast<std::byte>(body.age);
   column(1)[slot] = static_cast<std::byte>(body.interval);
   for (std::size_t i = 0; i < 3; ++i) column(2 + i)[slot] = static_cast<std::byte>(body.steps[i]);
+  history_[slot] = flag_history(body);
 }
 
 void Tracker::renew(const State& predicted, std::span<const Slot> slots) {
@@ -51,10 +49,9 @@ std::uint32_t Tracker::encode(State& state, const State& target, const CodecPara
   predicted_ = &state;
   if (!search_) search_ = std::make_unique<TrackerSearch>(capacity_);
   budget = std::min({budget, bound(), out.rest().size()});
-  const TrackerSteppings steppings(parameters.threshold);
-  search_->encode(*this, target, parameters.threshold, budget, out);
   threshold_ = parameters.threshold;
-  finish_frame(state, steppings);
+  search_->encode(*this, target, budget, out);
+  finish_frame(state, TrackerSteppings(threshold_));
   return static_cast<std::uint32_t>(count_);
 }
 
@@ -63,92 +60,143 @@ void Tracker::begin() {
   renewed_.clear();
   count_ = 0;
   next_block_ = 0;
-  std::fill(worked_.begin(), worked_.end(), std::uint8_t{0});
+  for (Work& work : work_) {
+    work.stream = {};
+    work.corrected = 0;
+  }
 }
 
 Result<void> Tracker::parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
                             const CodecParameters& parameters) {
   TANDEM_ASSERT(alive.size() == capacity_ && predicted_ != nullptr);
   threshold_ = parameters.threshold;
+  alive_ = alive;
   ByteReader in(section);
   const std::uint32_t index = in.get<std::uint16_t>();
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
-  if (index >= block_count(capacity_))
-    return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
+  if (index >= work_.size()) return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
   if (index < next_block_) return fail(ErrorCode::kMalformed, "blocks do not ascend");
   next_block_ = index + 1;
-  return parse_block(block_at(index, capacity_), alive, in.get_bytes(in.remaining()));
+  work_[index].stream = in.get_bytes(in.remaining());
+  if (work_[index].stream.empty()) return fail(ErrorCode::kMalformed, "corrections section without a body");
+  return {};
 }
 
-Result<void> Tracker::parse_block(const Block& block, std::span<const std::uint8_t> alive,
-                                  std::span<const std::byte> bytes) {
-  TrackerModels& models = work_[block.index];
-  models = models_[block.index];
-  RangeDecoder coder(bytes);
-  const std::size_t first = count_;
-  std::size_t count = count_;
-  std::uint32_t previous = 0;
-  bool good = true;
-  for_each_body(block, alive, [&](Slot slot, bool renewed, std::uint32_t flag) {
-    previous = static_cast<std::uint32_t>(coder.code(false, models.flag[flag + previous]));
-    if (previous == 0) return;
-    RangeDecoder values = coder;  // a copy, so that the call leaves `coder` in registers
-    good &= code_steps(values, models, context(slot, renewed, threshold_), steps_[count]);
-    coder = values;
-    corrected_[count++] = slot;
+Result<void> Tracker::parse_end() {
+  for_each_block([this](const Block& block) {
+    Work& work = work_[block.index];
+    work.broken = work.stream.empty() ? nullptr : decode_block(block, work);
   });
-  count_ = count;
-  if (!good) return fail(ErrorCode::kMalformed, "correction beyond any lattice");
-  if (!coder.at_end()) return fail(ErrorCode::kMalformed, "bytes after the code stream");
-  if (count_ == first) return fail(ErrorCode::kMalformed, "corrections section without a body");
-  worked_[block.index] = 1;
+  for (const Work& work : work_) {
+    if (work.broken != nullptr) return fail(ErrorCode::kMalformed, work.broken);
+  }
   return {};
+}
+
+void Tracker::list_flags(const Block& block, std::span<const std::uint8_t> alive, Work& work) {
+  work.counts = {};
+  const Slot end = block.first + block.slots;
+  for (Slot slot = block.first; slot < end; ++slot) {
+    const std::uint32_t model = alive[slot] != 0
+                                    ? flag_model(std::to_integer<std::uint8_t>(bodies_[slot]), history_[slot])
+                                    : TrackerModelIndex::kDead;
+    flags_[slot] = static_cast<std::uint16_t>(model);
+    ++work.counts[model][0];
+  }
+  auto renewed = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
+  for (; renewed != renewed_.end() && *renewed < end; ++renewed) {
+    if (alive[*renewed] == 0) continue;
+    --work.counts[flags_[*renewed]][0];
+    flags_[*renewed] = static_cast<std::uint16_t>(flag_model(0, 0));
+    ++work.counts[flags_[*renewed]][0];
+  }
+}
+
+const char* Tracker::decode_block(const Block& block, Work& work) {
+  list_flags(block, alive_, work);
+  Slot* const corrected = corrected_.data() + block.first;
+  const std::uint16_t* const flags = flags_.data();
+  const std::uint16_t* const p1 = models_.p1.data();
+  std::uint32_t count = 0;
+  RangeDecoder range(work.stream);
+  const Slot end = block.first + block.slots;
+  for (Slot slot = block.first; slot < end; ++slot) {
+    if (!range.get(p1[flags[slot]])) continue;
+    work.count_one(flags[slot]);
+    corrected[count++] = slot;
+  }
+  if (count == 0) return "corrections section without a body";
+  TrackerDecoder coder{range, &models_, &work.counts};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (!code_steps(coder, context(corrected[i], threshold_), steps_[block.first + i]))
+      return "correction beyond any lattice";
+  }
+  if (!coder.range.at_end()) return "bytes after the code stream";
+  work.corrected = count;
+  return nullptr;
 }
 
 void Tracker::apply(State& state) { finish_frame(state, TrackerSteppings(threshold_)); }
 
-void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
-  for (const Slot slot : renewed_) set_body(slot, {});
+void Tracker::finish_block(State& state, const Block& block, const TrackerSteppings& steppings) {
   // Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
   std::byte* age = column(0).data();
   const std::uint8_t* alive = state.alive().data();
-  for (std::size_t i = 0; i < count_; ++i) {
-    TrackerBody body = this->body(corrected_[i]);
-    correct_body(state, corrected_[i], steps_[i], steppings, threshold_, *gains_, body);
-    set_body(corrected_[i], body);
-    age[corrected_[i]] = std::byte{0xFF};
+  for (std::uint32_t i = block.first; i < block.first + work_[block.index].corrected; ++i) {
+    const Slot slot = corrected_[i];
+    TrackerBody body = this->body(slot);
+    correct_body(state, slot, steps_[i], steppings, threshold_, *gains_, body);
+    set_body(slot, body);
+    age[slot] = std::byte{0xFF};
   }
-  for (const Slot slot : renewed_) age[slot] = std::byte{0xFF};
+  const auto first = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
+  for (auto at = first; at != renewed_.end() && *at < block.first + block.slots; ++at)
+    age[*at] = std::byte{0xFF};
   // 255 wraps to 0; what was 254 stays there.
-  const std::uint32_t slots = capacity_;  // a local, as in mark_suspects()
-  for (std::uint32_t slot = 0; slot < slots; ++slot) {
+  const Slot end = block.first + block.slots;  // a local, as in mark_suspects()
+  for (Slot slot = block.first; slot < end; ++slot) {
     const auto was = std::to_integer<std::uint8_t>(age[slot]);
     const auto older = static_cast<std::uint8_t>(was + (was != kMostAge - 1 ? 1 : 0));
     age[slot] = static_cast<std::byte>(alive[slot] != 0 ? older : 0);
   }
-  for (std::size_t b = 0; b < worked_.size(); ++b) {
-    if (worked_[b] != 0) models_[b] = work_[b];
+}
+
+void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
+  for (const Slot slot : renewed_) set_body(slot, {});
+  for_each_block([&](const Block& block) { finish_block(state, block, steppings); });
+  // One list of all blocks, one sum of what they saw.
+  Work* sum = nullptr;
+  count_ = 0;
+  for (std::uint32_t b = 0; b < work_.size(); ++b) {
+    Work& work = work_[b];
+    if (work.corrected == 0) continue;
+    const auto first = corrected_.begin() + block_at(b, capacity_).first;
+    std::copy(first, first + work.corrected, corrected_.begin() + static_cast<std::ptrdiff_t>(count_));
+    count_ += work.corrected;
+    work.corrected = 0;
+    if (sum == nullptr) {
+      sum = &work;
+      continue;
+    }
+    for (std::size_t i = 0; i < work.counts.size(); ++i) {
+      for (std::size_t bit = 0; bit < 2; ++bit) sum->counts[i][bit] += work.counts[i][bit];
+    }
   }
+  if (sum != nullptr) models_.learn(sum->counts);
   predicted_ = nullptr;
   renewed_.clear();
 }
 
-// Snapshot: columns of all slots, then per block and model: seen, and where that is not zero the averages.
+// Snapshot: columns of all slots, then per model: weight, and where that is not zero the probability.
 void Tracker::save(ByteWriter& out) const {
   out.put_bytes(bodies_);
-  for (const TrackerModels& models : models_) {
-    TrackerModels::for_each(models, [&out](const AdaptiveBit& bit) {
-      out.put(bit.seen);
-      if (bit.seen == 0) return;
-      out.put(bit.fast);
-      out.put(bit.slow);
-    });
+  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+    out.put(models_.weight[i]);
+    if (models_.weight[i] != 0) out.put(models_.p1[i]);
   }
 }
 
-std::size_t Tracker::save_bound() const {
-  return bodies_.size() + models_.size() * TrackerModels::kCount * kModelBytes;
-}
+std::size_t Tracker::save_bound() const { return bodies_.size() + TrackerModelIndex::kCount * kModelBytes; }
 
 Result<void> Tracker::load(std::span<const std::byte> bytes) {
   ByteReader in(bytes);
@@ -159,19 +207,17 @@ Result<void> Tracker::load(std::span<const std::byte> bytes) {
     return fail(ErrorCode::kMalformed, "coder state with an impossible age");
   }
   bool good = true;
-  for (TrackerModels& models : work_) {
-    TrackerModels::for_each(models, [&](AdaptiveBit& bit) {
-      bit = {};
-      bit.seen = in.get<std::uint8_t>();
-      good &= bit.seen <= AdaptiveBit::kMostSeen;
-      if (bit.seen == 0) return;
-      bit.fast = in.get<std::uint16_t>();
-      bit.slow = in.get<std::uint16_t>();
-    });
+  TrackerModels models;
+  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+    models.weight[i] = in.get<std::uint8_t>();
+    if (models.weight[i] == 0) continue;
+    models.p1[i] = in.get<std::uint16_t>();
+    good &= models.p1[i] >= TrackerModels::kLeast && models.p1[i] <= TrackerModels::kMost;
   }
   if (!good || !in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length or content");
   std::copy(bodies.begin(), bodies.end(), bodies_.begin());
-  models_ = work_;
+  for (Slot slot = 0; slot < capacity_; ++slot) history_[slot] = flag_history(body(slot));
+  models_ = models;
   begin();
   return {};
 }

@@ -1,11 +1,13 @@
 #pragma once
 // The codec `tracker`: both sides treat each body as a tracking filter that small position corrections steer;
-// no velocity is sent (tracker_filter.hpp). Which bodies, and how far, is range coded in adaptive contexts
-// (tracker_models.hpp). Bytes: idl/PROTOCOL.md, "Tracker".
+// no velocity is sent (tracker_filter.hpp). Which bodies, and how far, is range coded with probabilities that
+// learn from delta to delta (tracker_models.hpp). Bytes: idl/PROTOCOL.md, "Tracker".
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
@@ -16,9 +18,9 @@ namespace tandem {
 
 class TrackerSearch;
 
-/// See Codec. Coder state of a block lives across frames. Corrects every body that is off by more than the
-/// threshold, and a few that soon would be. Where a budget binds, bodies go by error^2 * (frames they have
-/// waited + 1)^2, so that none waits for ever; ties by slot.
+/// See Codec. Blocks are coded side by side where run_blocks_on() says how. Corrects every body that is off
+/// by more than the threshold, and a few that soon would be. Where a budget binds, bodies go by error^2 *
+/// (frames they have waited + 1)^2, so that none waits for ever; ties by slot.
 class Tracker final : public Codec {
  public:
   /// `capacity` in 1 .. kMaxCapacity.
@@ -30,12 +32,14 @@ class Tracker final : public Codec {
   [[nodiscard]] std::string_view name() const override { return "tracker"; }
   [[nodiscard]] std::size_t bound() const override;
   void predicted_by(std::string_view predictor) override { gains_ = &tracker_gains(predictor); }
+  void run_blocks_on(RunBlocks run) override { run_ = std::move(run); }
   void renew(const State& predicted, std::span<const Slot> slots) override;
   std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
                        std::size_t budget, ByteWriter& out) override;
   void begin() override;
   Result<void> parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
                      const CodecParameters& parameters) override;
+  Result<void> parse_end() override;
   void apply(State& state) override;
   [[nodiscard]] std::span<const Slot> corrected() const override {
     return std::span(corrected_).first(count_);
@@ -48,36 +52,61 @@ class Tracker final : public Codec {
  private:
   friend class TrackerSearch;
 
+  /// A block in the frame at hand. Its corrected slots and their steps stand from `block.first` on in
+  /// corrected_ and steps_.
+  struct Work {
+    std::span<const std::byte> stream;  // decoder: the section's code stream
+    std::uint32_t corrected = 0;
+    const char* broken = nullptr;  // decoder: why the stream is none
+    TrackerCounts counts{};
+    /// A decision that list_flags() counted as a zero is a one.
+    void count_one(std::uint32_t model) {
+      --counts[model][0];
+      ++counts[model][1];
+    }
+  };
+
   static constexpr std::size_t kColumns = 5;  // age, interval, steps x, y, z
   [[nodiscard]] std::span<std::byte> column(std::size_t i) {
     return std::span(bodies_).subspan(i * capacity_, capacity_);
   }
-  [[nodiscard]] std::uint8_t remembered(std::size_t i, Slot slot) const {
-    return std::to_integer<std::uint8_t>(bodies_[i * capacity_ + slot]);
-  }
   [[nodiscard]] TrackerBody body(Slot slot) const;
   void set_body(Slot slot, const TrackerBody& body);
-  [[nodiscard]] TrackerContext context(Slot slot, bool renewed, std::int32_t threshold) const;
+  [[nodiscard]] bool is_renewed(Slot slot) const {
+    return !renewed_.empty() && std::binary_search(renewed_.begin(), renewed_.end(), slot);
+  }
+  [[nodiscard]] std::uint32_t flag_of(Slot slot) const {
+    return is_renewed(slot) ? flag_model(0, 0)
+                            : flag_model(std::to_integer<std::uint8_t>(bodies_[slot]), history_[slot]);
+  }
+  [[nodiscard]] TrackerContext context(Slot slot, std::int32_t threshold) const;
 
-  /// Calls f(slot, renewed, flag context without the previous flag) for the alive slots of a block.
-  template <class F>
-  void for_each_body(const Block& block, std::span<const std::uint8_t> alive, F&& f) const;
-  Result<void> parse_block(const Block& block, std::span<const std::uint8_t> alive,
-                           std::span<const std::byte> bytes);
-  /// Forgets the renewed bodies, corrects the collected ones, takes over coder states, ages the others.
+  /// Calls job(block) for all blocks, perhaps on several threads.
+  template <class Job>
+  void for_each_block(const Job& job) const;
+  /// Fills flags_ of a block, and counts its flags as zeros. Dead slots have a model that is never a one and
+  /// takes no bits, so that loops need not ask.
+  void list_flags(const Block& block, std::span<const std::uint8_t> alive, Work& work);
+  /// Null, or why the stream is none.
+  const char* decode_block(const Block& block, Work& work);
+  /// Forgets the renewed bodies, corrects the collected ones, learns, ages the others.
   void finish_frame(State& state, const TrackerSteppings& steppings);
+  void finish_block(State& state, const Block& block, const TrackerSteppings& steppings);
 
   std::uint32_t capacity_;
   std::vector<std::byte> bodies_;      // columns of capacity bytes each
-  std::vector<TrackerModels> models_;  // of each block
-  std::vector<TrackerModels> work_;    // what models_ becomes if the delta is good
-  std::vector<std::uint8_t> worked_;   // 1: take over work_ of this block
+  std::vector<std::uint8_t> history_;  // flag_history() of each body
+  TrackerModels models_;
+  RunBlocks run_;
   // Of the frame at hand.
   const State* predicted_ = nullptr;
+  std::span<const std::uint8_t> alive_;
+  std::vector<std::uint16_t> flags_;  // model of each slot's flag
   std::vector<Slot> renewed_;
   std::vector<Slot> corrected_;
-  std::vector<TrackerSteps> steps_;  // of corrected_
-  std::size_t count_ = 0;
+  std::vector<TrackerSteps> steps_;
+  std::vector<Work> work_;  // by block
+  std::size_t count_ = 0;   // corrected_, once it is whole
   std::uint32_t next_block_ = 0;
   std::int32_t threshold_ = 1;
   const TrackerGains* gains_ = &tracker_gains("ballistic");
@@ -93,31 +122,21 @@ inline TrackerBody Tracker::body(Slot slot) const {
   return body;
 }
 
-inline TrackerContext Tracker::context(Slot slot, bool renewed, std::int32_t threshold) const {
-  if (renewed) return value_context({}, {}, {}, threshold);
+inline TrackerContext Tracker::context(Slot slot, std::int32_t threshold) const {
+  if (is_renewed(slot)) return value_context({}, {}, {}, threshold);
   const State& state = *predicted_;
   return value_context(body(slot), {state.v(0)[slot], state.v(1)[slot], state.v(2)[slot]},
                        {state.c(0)[slot], state.c(1)[slot], state.c(2)[slot]}, threshold);
 }
 
-template <class F>
-void Tracker::for_each_body(const Block& block, std::span<const std::uint8_t> alive, F&& f) const {
-  const auto first = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
-  const Slot* renewed = renewed_.data() + (first - renewed_.begin());
-  const Slot* const renewed_end = renewed_.data() + renewed_.size();
-  // Locals, because f writes bytes, which could be any member for all a compiler knows.
-  const std::byte* const age = bodies_.data();
-  const std::byte* const interval = age + capacity_;
-  const std::uint8_t* const living = alive.data();
-  const Slot end = block.first + block.slots;
-  for (Slot slot = block.first; slot < end; ++slot) {
-    const bool is_renewed = renewed != renewed_end && *renewed == slot;
-    if (is_renewed) ++renewed;
-    if (living[slot] == 0) continue;
-    f(slot, is_renewed,
-      is_renewed ? flag_context(0, 0)
-                 : flag_context(std::to_integer<std::uint8_t>(age[slot]),
-                                std::to_integer<std::uint8_t>(interval[slot])));
+template <class Job>
+void Tracker::for_each_block(const Job& job) const {
+  const auto blocks = static_cast<std::uint32_t>(work_.size());
+  const auto run = [&](std::uint32_t b) { job(block_at(b, capacity_)); };
+  if (run_ && blocks > 1) {
+    run_(blocks, run);
+  } else {
+    for (std::uint32_t b = 0; b < blocks; ++b) run(b);
   }
 }
 

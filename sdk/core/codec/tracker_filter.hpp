@@ -45,48 +45,44 @@ class TrackerSteppings {
     const auto share = [threshold](std::int64_t of_65536) {
       return static_cast<std::int32_t>(std::max<std::int64_t>(1, (threshold * of_65536) >> 16));
     };
-    step_ = share(kStep);
-    for (std::size_t i = 0; i < kSmall.size(); ++i) small_[i] = share(kSmall[i]);
+    for (std::size_t i = 0; i < kUnits.size(); ++i) units_[i] = share(kUnits[i]);
   }
 
   /// Lattice units of a correction, |each| <= 2^31.
   [[nodiscard]] std::array<std::int64_t, 3> distance(const TrackerSteps& steps) const {
-    const std::int64_t one = unit(steps, small_, step_);
+    const std::int64_t one = units_[unit_of(steps)];
     std::array<std::int64_t, 3> d{};
     for (std::size_t i = 0; i < 3; ++i) d[i] = std::clamp(steps[i] * one, -kMostDistance, kMostDistance);
     return d;
   }
-  [[nodiscard]] std::int32_t step() const { return step_; }
-  /// What one step is worth where all |steps| <= 1 and `moved` (1 .. 3) of them are not zero.
-  [[nodiscard]] std::int32_t small(std::size_t moved) const { return small_[moved - 1]; }
+  /// What one step is worth: where an axis moves by more than one (0), or where all |steps| <= 1 and so many
+  /// (1 .. 3) of them are not zero.
+  [[nodiscard]] std::int32_t unit(std::size_t moved) const { return units_[moved]; }
 
   /// The same in 1/256 of the threshold; steps within +-127.
   [[nodiscard]] static std::array<std::int32_t, 3> relative(const TrackerSteps& steps) {
-    static constexpr std::array<std::int32_t, 3> kRelative{kSmall[0] >> 8, kSmall[1] >> 8, kSmall[2] >> 8};
-    const auto one = static_cast<std::int32_t>(unit(steps, kRelative, kStep >> 8));
+    const std::int32_t one = kUnits[unit_of(steps)] >> 8;
     return {steps[0] * one, steps[1] * one, steps[2] * one};
   }
 
  private:
   // In 1/65536 of the threshold. A step of 0.95 keeps the worst rounding error, sqrt(3)/2 steps, inside the
-  // error ball.
-  static constexpr std::int32_t kStep = 62259;
-  // Where all |steps| <= 1 and 1, 2 or 3 of them are not zero: such corrections are a little longer than the
-  // threshold, so their points lie at 0.92, 0.69 * sqrt(2), 0.59 * sqrt(3) of it.
-  static constexpr std::array<std::int32_t, 3> kSmall{60293, 45220, 38666};
+  // error ball. Where all |steps| <= 1 and 1, 2 or 3 of them are not zero, corrections are a little longer
+  // than the threshold, so their points lie at 0.92, 0.69 * sqrt(2), 0.59 * sqrt(3) of it.
+  static constexpr std::array<std::int32_t, 4> kUnits{62259, 60293, 45220, 38666};
 
-  static std::int64_t unit(const TrackerSteps& steps, const std::array<std::int32_t, 3>& small,
-                           std::int32_t step) {
+  // Index of the unit; without branches, which would be hard to guess. No steps at all are of any unit.
+  static std::size_t unit_of(const TrackerSteps& steps) {
     std::size_t moved = 0;
+    std::size_t is_small = 1;
     for (const std::int32_t s : steps) {
-      if (s < -1 || s > 1) return step;
       moved += static_cast<std::size_t>(s != 0);
+      is_small &= static_cast<std::size_t>(s >= -1) & static_cast<std::size_t>(s <= 1);
     }
-    return moved == 0 ? 0 : small[moved - 1];
+    return moved * is_small;
   }
 
-  std::int32_t step_ = 1;
-  std::array<std::int32_t, 3> small_{1, 1, 1};
+  std::array<std::int32_t, 4> units_{1, 1, 1, 1};
 };
 
 /// Corrects a body by `steps` and updates what is remembered of it:

@@ -1,5 +1,7 @@
 #include "sdk/core/codec/tracker_models.hpp"
 
+#include <algorithm>
+
 namespace tandem {
 namespace {
 
@@ -16,5 +18,23 @@ constexpr std::array<std::uint8_t, 256> make_age_buckets() {
 }  // namespace
 
 const std::array<std::uint8_t, 256> tracker_age_buckets = make_age_buckets();
+
+TrackerModels::TrackerModels() {
+  std::fill(p1.begin(), p1.begin() + TrackerModelIndex::kZero, kRare);
+  std::fill(p1.begin() + TrackerModelIndex::kZero, p1.end(), std::uint16_t{32768});
+  p1[TrackerModelIndex::kDead] = 0;
+}
+
+void TrackerModels::learn(const TrackerCounts& counts) {
+  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+    const std::uint64_t ones = counts[i][1];
+    const std::uint64_t seen = counts[i][0] + ones;
+    if (seen == 0) continue;
+    const std::uint64_t before = std::uint64_t{weight[i]} + 1;
+    const std::uint64_t mean = (before * p1[i] + (ones << 16U)) / (before + seen);
+    p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));
+    weight[i] = static_cast<std::uint8_t>(std::min<std::uint64_t>(before - 1 + seen, 255));
+  }
+}
 
 }  // namespace tandem

@@ -4,14 +4,45 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
 
 #include "sdk/core/codec/range_coder.hpp"
 #include "sdk/core/codec/tracker_filter.hpp"
 
 namespace tandem {
 
-/// What the contexts of one body see of it, on both sides the same.
+/// Indices of the models, and the decisions seen in one delta: zeros and ones of each model.
+struct TrackerModelIndex {
+  static constexpr std::uint32_t kAges = 15, kLengths = 3, kShortAges = 5, kIntervals = 4, kUnary = 14;
+
+  static constexpr std::uint32_t kFlag = 0;
+  static constexpr std::uint32_t kZero = kFlag + kAges * kAges * kLengths;
+  static constexpr std::uint32_t kSign = kZero + 3 * kShortAges * kIntervals * 3 * 2;
+  static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
+  static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
+  static constexpr std::uint32_t kCount = kEscape + 32;
+  static constexpr std::uint32_t kDead = kCount;  ///< of slots without a body: never a 1
+};
+using TrackerCounts = std::array<std::array<std::uint32_t, 2>, TrackerModelIndex::kCount + 1>;
+
+/// The probability of a 1 of each model, in 1/65536, and how much is behind it. All blocks share them, and
+/// they stay the same within a delta, so that blocks are coded side by side; they learn when the delta is
+/// done.
+struct TrackerModels {
+  /// So that no decision costs more than 11 bits.
+  static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
+  /// What a flag starts with: most bodies need no correction.
+  static constexpr std::uint16_t kRare = 4096;
+
+  TrackerModels();
+  /// p1 becomes the mean of what it was, counted weight + 1 times, and of the decisions; the weight grows by
+  /// their number, up to 255.
+  void learn(const TrackerCounts& counts);
+
+  std::array<std::uint16_t, TrackerModelIndex::kCount + 1> p1;
+  std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
+};
+
+/// What the contexts of a corrected body see of it, on both sides the same.
 struct TrackerContext {
   std::uint32_t zero = 0;                     ///< part of the index of "is this axis untouched"
   std::uint32_t magnitude = 0;                ///< part of the index of "is it longer"
@@ -19,37 +50,8 @@ struct TrackerContext {
   std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
 };
 
-/// Adaptive probabilities of one block. Plain data: copied to try things, saved in snapshots.
-struct TrackerModels {
-  static constexpr std::uint32_t kAges = 15, kShortAges = 5, kIntervals = 4, kUnary = 14;
-
-  std::array<AdaptiveBit, std::size_t{kAges} * kAges * 2> flag;
-  std::array<AdaptiveBit, std::size_t{kShortAges} * kIntervals * 3 * 3 * 2> zero;
-  std::array<AdaptiveBit, std::size_t{kIntervals} * 3 * 3 * 3 * 3> sign;
-  std::array<AdaptiveBit, std::size_t{kIntervals} * 3 * kUnary> magnitude;
-  std::array<AdaptiveBit, 32> escape;
-
-  /// Calls f(AdaptiveBit&) for every probability, in the order of snapshots.
-  template <class Models, class F>
-  static void for_each(Models& models, F&& f) {
-    for (auto& bit : models.flag) f(bit);
-    for (auto& bit : models.zero) f(bit);
-    for (auto& bit : models.sign) f(bit);
-    for (auto& bit : models.magnitude) f(bit);
-    for (auto& bit : models.escape) f(bit);
-  }
-  static constexpr std::size_t kCount =
-      std::size_t{kAges} * kAges * 2 + std::size_t{kShortAges} * kIntervals * 3 * 3 * 2 +
-      std::size_t{81} * kIntervals + std::size_t{kIntervals} * 3 * kUnary + 32;
-};
-
 /// Buckets of frame counts 0 .. 255; see tracker_models.cpp.
 extern const std::array<std::uint8_t, 256> tracker_age_buckets;
-
-/// Index of the flag by age and by the interval before; add 1 where the body coded before it was corrected.
-[[nodiscard]] inline std::uint32_t flag_context(std::uint8_t age, std::uint8_t interval) {
-  return (tracker_age_buckets[age + 1U] * TrackerModels::kAges + tracker_age_buckets[interval]) * 2U;
-}
 
 namespace tracker_detail {
 
@@ -63,9 +65,28 @@ inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t 
          static_cast<std::uint32_t>(count > c);
 }
 
+// Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
+inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
+  std::int32_t longest = 0;
+  for (const std::int32_t step : steps)
+    longest = step < 0 ? (longest > -step ? longest : -step) : (longest > step ? longest : step);
+  return static_cast<std::uint32_t>(longest > 1) + static_cast<std::uint32_t>(longest > 2);
+}
+
 }  // namespace tracker_detail
 
-/// The rest of a corrected body's context. `v`, `c`: of its predicted state; zero for a body renewed in this
+/// The part of a flag's index that changes only when its body is corrected: 0 .. 44.
+[[nodiscard]] inline std::uint8_t flag_history(const TrackerBody& body) {
+  return static_cast<std::uint8_t>(tracker_age_buckets[body.interval] * TrackerModelIndex::kLengths +
+                                   tracker_detail::length_class(body.steps));
+}
+/// The flag's index.
+[[nodiscard]] inline std::uint32_t flag_model(std::uint8_t age, std::uint8_t history) {
+  return TrackerModelIndex::kFlag +
+         tracker_age_buckets[age + 1U] * (TrackerModelIndex::kAges * TrackerModelIndex::kLengths) + history;
+}
+
+/// The context of a corrected body's steps. `v`, `c`: of its predicted state; zero for a body renewed in this
 /// frame.
 [[nodiscard]] inline TrackerContext value_context(const TrackerBody& body, const Vec3i& v, const Vec3i& c,
                                                   std::int32_t threshold) {
@@ -74,8 +95,9 @@ inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t 
   TrackerContext context;
   const std::uint32_t k = body.age + 1U;
   const std::uint32_t short_age = bucket(k, 2, 4, 8) + static_cast<std::uint32_t>(k > 20);
-  context.zero = short_age * TrackerModels::kIntervals + bucket(body.interval, 2, 6, 20);
-  context.magnitude = bucket(k, 1, 4, 20);
+  context.zero = short_age * TrackerModelIndex::kIntervals + bucket(body.interval, 2, 6, 20);
+  context.magnitude =
+      bucket(k, 1, 4, 20) * TrackerModelIndex::kLengths + tracker_detail::length_class(body.steps);
   const std::uint32_t sign_age = bucket(k, 2, 6, 20);
   // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
   const std::int32_t slow = threshold + threshold / 4;
@@ -84,8 +106,9 @@ inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t 
     const std::uint32_t last = side(body.steps[axis], 0);
     context.moved_last[axis] = static_cast<std::uint32_t>(body.steps[axis] != 0);
     const std::uint32_t seen = (last * 3 + side(c[axis], faint)) * 3 + side(v[axis], slow);
-    context.sign[axis] =
-        (static_cast<std::uint32_t>(axis) * 27 + seen) * TrackerModels::kIntervals + sign_age;
+    context.sign[axis] = TrackerModelIndex::kSign +
+                         (static_cast<std::uint32_t>(axis) * 27 + seen) * TrackerModelIndex::kIntervals +
+                         sign_age;
   }
   return context;
 }
@@ -93,78 +116,103 @@ inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t 
 /// Index of "is this axis untouched", after `moved` axes that are not.
 [[nodiscard]] inline std::uint32_t zero_model(const TrackerContext& context, std::uint32_t axis,
                                               std::uint32_t moved) {
-  return ((axis * TrackerModels::kShortAges * TrackerModels::kIntervals + context.zero) * 3 + moved) * 2 +
+  using Index = TrackerModelIndex;
+  return Index::kZero + ((axis * Index::kShortAges * Index::kIntervals + context.zero) * 3 + moved) * 2 +
          context.moved_last[axis];
 }
 /// Index of "is it longer than 1", after `moved` axes that are not zero; those of longer ones follow it.
 [[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t moved) {
-  return (context.magnitude * 3 + moved) * TrackerModels::kUnary;
+  return TrackerModelIndex::kMagnitude + (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
 }
 
-/// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
-/// returning the bit; for a decoder the argument means nothing and `steps` is filled. False: a decoder read
-/// steps beyond kMostTrackerSteps.
-template <class Coder, class Models>
-bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps);
+/// Decisions into bytes; counts them.
+struct TrackerEncoder {
+  bool code(bool bit, std::uint32_t model) {
+    range.put(bit, models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_even(bool bit) {
+    range.put(bit, 32768);
+    return bit;
+  }
+  RangeEncoder range;
+  const TrackerModels* models;
+  TrackerCounts* counts;
+};
+
+/// Bytes into decisions; counts them. The first argument is what an encoder would code.
+struct TrackerDecoder {
+  bool code(bool /*bit*/, std::uint32_t model) {
+    const bool bit = range.get(models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_even(bool /*bit*/) { return range.get(32768); }
+  RangeDecoder range;
+  const TrackerModels* models;
+  TrackerCounts* counts;
+};
 
 /// Most bits code_steps() takes.
-inline constexpr std::size_t kMostStepsBits = 3 * (22 + (std::size_t{TrackerModels::kUnary} + 31) * 11 + 31);
+inline constexpr std::size_t kMostStepsBits =
+    3 * (22 + (std::size_t{TrackerModelIndex::kUnary} + 31) * 11 + 31);
 
 namespace tracker_detail {
 
 // x >= 0 as the number of bits of x + 1, in unary, then those bits without the first.
-template <class Coder, class Models>
-bool code_escape(Coder& coder, Models& models, std::uint32_t& x) {
+template <class Coder>
+bool code_escape(Coder& coder, std::uint32_t& x) {
   const std::uint64_t wanted = std::uint64_t{x} + 1;
   unsigned bits = 0;
-  while (bits < 31 && coder.code((wanted >> (bits + 1)) != 0, models.escape[bits])) ++bits;
+  while (bits < 31 && coder.code((wanted >> (bits + 1)) != 0, TrackerModelIndex::kEscape + bits)) ++bits;
   std::uint64_t value = 1;
   for (unsigned i = bits; i-- > 0;) {
     value = value << 1U | static_cast<std::uint64_t>(coder.code_even(((wanted >> i) & 1U) != 0));
   }
   x = static_cast<std::uint32_t>(value - 1);
-  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - TrackerModels::kUnary - 1;
+  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - TrackerModelIndex::kUnary - 1;
 }
 
 }  // namespace tracker_detail
 
 /// Codes one axis. `moved`: how many earlier axes are not zero. Returns as code_steps().
-template <class Coder, class Models>
-bool code_axis(Coder& coder, Models& models, const TrackerContext& context, std::uint32_t axis,
-               std::uint32_t moved, std::int32_t& steps) {
+template <class Coder>
+bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis, std::uint32_t moved,
+               std::int32_t& steps) {
   const std::int32_t wanted = steps;
   const bool is_last_hope = axis == 2 && moved == 0;
-  if (!is_last_hope) {
-    if (!coder.code(wanted != 0, models.zero[zero_model(context, axis, moved)])) {
-      steps = 0;
-      return true;
-    }
+  if (!is_last_hope && !coder.code(wanted != 0, zero_model(context, axis, moved))) {
+    steps = 0;
+    return true;
   }
-  const bool negative = coder.code(wanted < 0, models.sign[context.sign[axis]]);
+  const bool negative = coder.code(wanted < 0, context.sign[axis]);
   const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
   const std::uint32_t base = magnitude_model(context, moved);
   std::uint32_t size = 1;
-  while (size <= TrackerModels::kUnary && coder.code(length > size, models.magnitude[base + size - 1]))
-    ++size;
-  if (size > TrackerModels::kUnary) {
-    std::uint32_t beyond = length > TrackerModels::kUnary ? length - TrackerModels::kUnary - 1 : 0;
+  while (size <= TrackerModelIndex::kUnary && coder.code(length > size, base + size - 1)) ++size;
+  if (size > TrackerModelIndex::kUnary) {
+    std::uint32_t beyond = length > TrackerModelIndex::kUnary ? length - TrackerModelIndex::kUnary - 1 : 0;
     Coder rare = coder;  // a copy, so that a call that is not inlined leaves `coder` in registers
-    const bool good = tracker_detail::code_escape(rare, models, beyond);
+    const bool good = tracker_detail::code_escape(rare, beyond);
     coder = rare;
     if (!good) return false;
-    size = TrackerModels::kUnary + 1 + beyond;
+    size = TrackerModelIndex::kUnary + 1 + beyond;
   }
   steps = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
   return true;
 }
 
-template <class Coder, class Models>
-bool code_steps(Coder& coder, Models& models, const TrackerContext& context, TrackerSteps& steps) {
-  Coder local = coder;  // in registers: models are written through pointers in between
+/// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
+/// returning the bit; for a decoder the argument means nothing and `steps` is filled. False: a decoder read
+/// steps beyond kMostTrackerSteps.
+template <class Coder>
+bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps) {
+  Coder local = coder;  // in registers: counts are written through pointers in between
   std::uint32_t moved = 0;
   bool good = true;
   for (std::uint32_t axis = 0; axis < 3 && good; ++axis) {
-    good = code_axis(local, models, context, axis, moved, steps[axis]);
+    good = code_axis(local, context, axis, moved, steps[axis]);
     moved += static_cast<std::uint32_t>(steps[axis] != 0);
   }
   coder = local;

@@ -41,16 +41,17 @@ constexpr auto kBits = [] {
 }();
 
 // What a decision would cost, in 1/256 bits.
-std::uint32_t cost_of(bool bit, const AdaptiveBit& model) {
-  const std::uint32_t p1 = model.p1() >> 4U;
-  return kBits[bit ? p1 : 4095U - p1];
+std::uint32_t cost_of(bool bit, std::uint16_t p1) {
+  const std::uint32_t p = p1 >> 4U;
+  return kBits[bit ? p : 4095U - p];
 }
 
 // Adds up what decisions would cost.
 struct CostCoder {
+  const TrackerModels* models;
   std::uint32_t cost = 0;
-  bool code(bool bit, const AdaptiveBit& model) {
-    cost += cost_of(bit, model);
+  bool code(bool bit, std::uint32_t model) {
+    cost += cost_of(bit, models->p1[model]);
     return bit;
   }
   bool code_even(bool bit) {
@@ -90,7 +91,7 @@ class Choices {
   static Lengths length_costs(const TrackerModels& models, const TrackerContext& context) {
     Lengths lengths{};
     for (std::uint32_t moved = 0; moved < 3; ++moved) {
-      const AdaptiveBit* longer = &models.magnitude[magnitude_model(context, moved)];
+      const std::uint16_t* longer = &models.p1[magnitude_model(context, moved)];
       lengths[moved] = {cost_of(false, longer[0]), cost_of(true, longer[0]) + cost_of(false, longer[1])};
     }
     return lengths;
@@ -110,18 +111,18 @@ class Choices {
 
 void Choices::fill_costs(const TrackerModels& models, const TrackerContext& context, const Lengths& lengths,
                          std::uint32_t axis) {
-  const AdaptiveBit& sign = models.sign[context.sign[axis]];
+  const std::uint16_t sign = models.p1[context.sign[axis]];
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
     std::array<std::uint32_t, 2> is_moved{0, 0};
     if (axis != 2 || moved != 0) {
-      const AdaptiveBit& zero = models.zero[zero_model(context, axis, moved)];
+      const std::uint16_t zero = models.p1[zero_model(context, axis, moved)];
       is_moved = {cost_of(false, zero), cost_of(true, zero)};
     }
     for (std::size_t i = 0; i < 2; ++i) {
       std::int32_t steps = value(axis, i);
       if (steps < -2 || steps > 2) {
-        CostCoder coder;
-        code_axis(coder, models, context, axis, moved, steps);
+        CostCoder coder{&models};
+        code_axis(coder, context, axis, moved, steps);
         cost_[axis][moved][i] = coder.cost;
         continue;
       }
@@ -134,7 +135,7 @@ void Choices::fill_costs(const TrackerModels& models, const TrackerContext& cont
 void Choices::fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
                           std::int64_t threshold) {
   for (std::size_t unit = 0; unit < 4; ++unit) {
-    const std::int64_t one = unit == 0 ? steppings.step() : steppings.small(unit);
+    const std::int64_t one = steppings.unit(unit);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < 2; ++i) {
         const std::int64_t off = d[axis] - std::clamp(value(axis, i) * one, -kMostDistance, kMostDistance);
@@ -194,8 +195,8 @@ bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& st
   TrackerSteps lower{};
   for (std::size_t i = 0; i < 3; ++i) {
     d[i] = std::int64_t{to[i]} - from[i];
-    steps[i] = nearest(from[i], to[i], steppings.step());
-    lower[i] = steps[i] - (std::int64_t{steps[i]} * steppings.step() > d[i] ? 1 : 0);
+    steps[i] = nearest(from[i], to[i], steppings.unit(0));
+    lower[i] = steps[i] - (std::int64_t{steps[i]} * steppings.unit(0) > d[i] ? 1 : 0);
   }
   Choices choices(models, context, lower);
   choices.fill_errors(steppings, d, worth.threshold);
@@ -203,52 +204,77 @@ bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& st
 }
 
 TrackerSearch::TrackerSearch(std::uint32_t capacity)
-    : waiting_(capacity), waiting_next_(capacity), marks_(kBlockSlots) {
-  candidates_.reserve(capacity);
+    : candidates_(capacity),
+      parts_(block_count(capacity)),
+      waiting_(capacity),
+      marks_(std::size_t{block_count(capacity)} * kBlockSlots) {
+  std::size_t bytes = 0;
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    parts_[b].first_byte = bytes;
+    bytes += kMostTrackerBytesPerBody * block_at(b, capacity).slots + kTrackerSlackBytes;
+  }
+  bytes_.resize(bytes);
   order_.reserve(capacity);
 }
 
-void TrackerSearch::encode(Tracker& tracker, const State& target, std::int32_t threshold, std::size_t budget,
-                           ByteWriter& out) {
-  threshold_ = threshold;
-  scan(*tracker.predicted_, target, threshold);
-  const std::span<std::byte> room = out.rest().first(budget);
-  std::size_t size_bytes = 0;
-  if (!write(tracker, target, must_, true, room, size_bytes)) {
+void TrackerSearch::encode(Tracker& tracker, const State& target, std::size_t budget, ByteWriter& out) {
+  tracker.for_each_block([&](const Block& block) { choose(tracker, target, block); });
+  must_ = 0;
+  for (const Part& part : parts_) must_ += part.must;
+  if (!write(tracker, must_, true, budget)) {
     rank();
     std::uint32_t fits = 0;
     std::uint32_t too_many = must_ + 1;
     std::uint32_t tried = must_ + 1;
     while (too_many - fits > 1 + fits / kTryPrecision) {
       tried = fits + (too_many - fits) / 2;
-      (write(tracker, target, tried, false, room, size_bytes) ? fits : too_many) = tried;
+      (write(tracker, tried, false, budget) ? fits : too_many) = tried;
     }
-    if (tried != fits) write(tracker, target, fits, false, room, size_bytes);
+    if (tried != fits) write(tracker, fits, false, budget);
   }
-  out.advance(size_bytes);
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    if (tracker.work_[b].corrected == 0) continue;
+    out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
+    out.put(static_cast<std::uint32_t>(parts_[b].coded_bytes + 2));
+    out.put(static_cast<std::uint16_t>(b));
+    out.put_bytes(std::span(bytes_).subspan(parts_[b].first_byte, parts_[b].coded_bytes));
+  }
   remember_waiting(tracker);
 }
 
-void TrackerSearch::scan(const State& predicted, const State& target, std::int32_t threshold) {
-  candidates_.clear();
-  must_ = 0;
-  const auto limit = static_cast<std::uint64_t>(threshold) * static_cast<std::uint64_t>(threshold);
+void TrackerSearch::choose(const Tracker& tracker, const State& target, const Block& block) {
+  const State& predicted = *tracker.predicted_;
+  const std::int32_t threshold = tracker.threshold_;
+  const TrackerSteppings steppings(threshold);
+  const ErrorWorth worth(threshold);
   const auto early = static_cast<std::int32_t>((threshold * kEarlyShare) >> 8);
-  for (std::uint32_t b = 0; b < block_count(predicted.capacity()); ++b) {
-    for_each_beyond(predicted, target, block_at(b, predicted.capacity()), early,
-                    std::span<std::uint8_t, kBlockSlots>(marks_.data(), kBlockSlots),
-                    [&](Slot slot, std::uint64_t error) {
-                      const bool must = error > limit;
-                      candidates_.push_back({error, slot, 0, must});
-                      must_ += static_cast<std::uint32_t>(must);
-                    });
-  }
+  Candidate* at = candidates_.data() + block.first;
+  std::uint32_t must = 0;
+  const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
+                                                   kBlockSlots);
+  for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
+    Candidate candidate{error, slot, 0, error > worth.limit, {}};
+    if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= kEarlyProbability) {
+      return;
+    }
+    const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth,
+                                     tracker.models_, tracker.context(slot, threshold), candidate.steps);
+    if (!inside && (!candidate.must || candidate.steps == TrackerSteps{})) return;
+    must += static_cast<std::uint32_t>(candidate.must);
+    *at++ = candidate;
+  });
+  Part& part = parts_[block.index];
+  part.candidates = static_cast<std::uint32_t>(at - (candidates_.data() + block.first));
+  part.must = must;
 }
 
 void TrackerSearch::rank() {
   order_.clear();
-  for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
-    if (candidates_[i].must) order_.push_back(i);
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    const std::uint32_t first = b * kBlockSlots;
+    for (std::uint32_t i = first; i < first + parts_[b].candidates; ++i) {
+      if (candidates_[i].must) order_.push_back(i);
+    }
   }
   const auto urgency = [this](std::uint32_t i) {
     constexpr std::uint64_t kMostError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
@@ -263,75 +289,67 @@ void TrackerSearch::rank() {
   for (std::uint32_t r = 0; r < order_.size(); ++r) candidates_[order_[r]].rank = r;
 }
 
-bool TrackerSearch::write(Tracker& tracker, const State& target, std::uint32_t limit, bool early,
-                          std::span<std::byte> out, std::size_t& size_bytes) {
-  tracker.count_ = 0;
-  std::fill(tracker.worked_.begin(), tracker.worked_.end(), std::uint8_t{0});
-  size_bytes = 0;
-  std::size_t at = 0;
-  for (std::uint32_t b = 0; b < block_count(tracker.capacity_); ++b) {
-    if (!write_block(tracker, target, block_at(b, tracker.capacity_), at, limit, early, out, size_bytes)) {
-      return false;
-    }
+bool TrackerSearch::write(Tracker& tracker, std::uint32_t limit, bool early, std::size_t budget) {
+  tracker.for_each_block([&](const Block& block) { write_block(tracker, block, limit, early); });
+  std::size_t size_bytes = 0;
+  bool fits = true;
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    fits = fits && parts_[b].fits;
+    if (tracker.work_[b].corrected != 0) size_bytes += kHeaderBytes + parts_[b].coded_bytes;
   }
-  return true;
+  return fits && size_bytes <= budget;
 }
 
-bool TrackerSearch::write_block(Tracker& tracker, const State& target, const Block& block, std::size_t& at,
-                                std::uint32_t limit, bool early, std::span<std::byte> out,
-                                std::size_t& size_bytes) {
-  const State& predicted = *tracker.predicted_;
-  TrackerModels& models = tracker.work_[block.index];
-  models = tracker.models_[block.index];
-  const TrackerSteppings steppings(threshold_);
-  const ErrorWorth worth(threshold_);
-  const std::span<std::byte> rest = out.subspan(size_bytes);
-  const std::size_t header = std::min(kHeaderBytes, rest.size());
-  RangeEncoder coder(rest.subspan(header));
-  const std::size_t first = tracker.count_;
-  bool previous = false;
-  tracker.for_each_body(block, predicted.alive(), [&](Slot slot, bool renewed, std::uint32_t flag) {
-    AdaptiveBit& model = models.flag[flag + static_cast<std::uint32_t>(previous)];
-    previous = false;
-    TrackerSteps steps{};
-    TrackerContext context;
-    if (at < candidates_.size() && candidates_[at].slot == slot) {
-      const Candidate& candidate = candidates_[at++];
-      if (candidate.must ? candidate.rank < limit : early && model.p1() > kEarlyProbability) {
-        context = tracker.context(slot, renewed, threshold_);
-        const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth,
-                                         models, context, steps);
-        previous = inside || (candidate.must && steps != TrackerSteps{});
-      }
-    }
-    coder.code(previous, model);
-    if (!previous) return;
-    RangeEncoder values = coder;  // a copy, so that the call leaves `coder` in registers
-    code_steps(values, models, context, steps);
-    coder = values;
-    tracker.corrected_[tracker.count_] = slot;
-    tracker.steps_[tracker.count_++] = steps;
-  });
-  if (tracker.count_ == first) return true;
-  const std::size_t coded = coder.finish();
-  if (coder.overflow() || rest.size() < kHeaderBytes) return false;
-  ByteWriter head(rest.first(kHeaderBytes));
-  head.put(static_cast<std::uint16_t>(SectionType::kCorrections));
-  head.put(static_cast<std::uint32_t>(coded + 2));
-  head.put(static_cast<std::uint16_t>(block.index));
-  size_bytes += kHeaderBytes + coded;
-  tracker.worked_[block.index] = 1;
-  return true;
+void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint32_t limit, bool early) {
+  Tracker::Work& work = tracker.work_[block.index];
+  Part& part = parts_[block.index];
+  Slot* const corrected = tracker.corrected_.data() + block.first;
+  TrackerSteps* const steps = tracker.steps_.data() + block.first;
+  std::uint32_t count = 0;
+  for (std::uint32_t i = block.first; i < block.first + part.candidates; ++i) {
+    const Candidate& candidate = candidates_[i];
+    if (candidate.must ? candidate.rank >= limit : !early) continue;
+    corrected[count] = candidate.slot;
+    steps[count++] = candidate.steps;
+  }
+  work.corrected = count;
+  part.coded_bytes = 0;
+  part.fits = true;
+  if (count == 0) return;
+  const std::size_t room = kMostTrackerBytesPerBody * block.slots + kTrackerSlackBytes;
+  RangeEncoder flags{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
+  tracker.list_flags(block, tracker.predicted_->alive(), work);
+  std::uint32_t next = 0;
+  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
+    const bool bit = next < count && corrected[next] == slot;
+    flags.put(bit, tracker.models_.p1[tracker.flags_[slot]]);
+    if (!bit) continue;
+    work.count_one(tracker.flags_[slot]);
+    ++next;
+  }
+  TrackerEncoder coder{flags, &tracker.models_, &work.counts};
+  for (std::uint32_t i = 0; i < count; ++i)
+    code_steps(coder, tracker.context(corrected[i], tracker.threshold_), steps[i]);
+  part.coded_bytes = coder.range.finish();
+  part.fits = !coder.range.overflow();
 }
 
 void TrackerSearch::remember_waiting(const Tracker& tracker) {
-  std::fill(waiting_next_.begin(), waiting_next_.end(), std::uint8_t{0});
-  for (const Candidate& candidate : candidates_) {
-    if (!candidate.must) continue;
-    waiting_next_[candidate.slot] = static_cast<std::uint8_t>(std::min(waiting_[candidate.slot] + 1, 255));
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    const Slot* sent = tracker.corrected_.data() + b * kBlockSlots;
+    const Slot* const sent_end = sent + tracker.work_[b].corrected;
+    const Candidate* candidate = candidates_.data() + b * kBlockSlots;
+    const Candidate* const end = candidate + parts_[b].candidates;
+    const Slot slots_end = static_cast<Slot>(std::min<std::size_t>((b + 1) * kBlockSlots, waiting_.size()));
+    for (Slot slot = b * kBlockSlots; slot < slots_end; ++slot) {
+      const bool is_candidate = candidate != end && candidate->slot == slot;
+      const bool is_sent = sent != sent_end && *sent == slot;
+      const bool waits = is_candidate && candidate->must && !is_sent;
+      waiting_[slot] = waits ? static_cast<std::uint8_t>(std::min(waiting_[slot] + 1, 255)) : std::uint8_t{0};
+      candidate += is_candidate ? 1 : 0;
+      sent += is_sent ? 1 : 0;
+    }
   }
-  for (const Slot slot : tracker.corrected()) waiting_next_[slot] = 0;
-  waiting_.swap(waiting_next_);
 }
 
 }  // namespace tandem

@@ -10,39 +10,52 @@
 
 namespace tandem {
 
+/// What the encoder keeps to, as to a budget. Bodies that all jump at once take about a third of it.
+inline constexpr std::size_t kMostTrackerBytesPerBody = 24;
+inline constexpr std::size_t kTrackerSlackBytes = 64;
+
 class TrackerSearch {
  public:
   explicit TrackerSearch(std::uint32_t capacity);
 
-  /// Writes at most `budget` bytes of sections; leaves bodies, steps and coder states in `tracker` as parse()
+  /// Writes at most `budget` bytes of sections; leaves bodies, steps and counts in `tracker` as parse_end()
   /// would.
-  void encode(Tracker& tracker, const State& target, std::int32_t threshold, std::size_t budget,
-              ByteWriter& out);
+  void encode(Tracker& tracker, const State& target, std::size_t budget, ByteWriter& out);
 
  private:
+  /// A body that may be corrected, and how.
   struct Candidate {
     std::uint64_t error = 0;  // squared
     Slot slot = 0;
     std::uint32_t rank = 0;  // among those that must go, the most urgent first
     bool must = false;       // beyond the threshold
+    TrackerSteps steps{};
+  };
+  /// A block's share of candidates_, and of bytes_.
+  struct Part {
+    std::uint32_t candidates = 0;
+    std::uint32_t must = 0;
+    std::size_t first_byte = 0, coded_bytes = 0;
+    bool fits = true;
   };
 
-  void scan(const State& predicted, const State& target, std::int32_t threshold);
+  /// Candidates of a block with their steps. Models are the same for a whole delta, so the choice does not
+  /// depend on what else is sent.
+  void choose(const Tracker& tracker, const State& target, const Block& block);
   void rank();
-  /// Sections of all blocks with the bodies of rank < limit, and early ones if `early`. False: beyond budget.
-  bool write(Tracker& tracker, const State& target, std::uint32_t limit, bool early, std::span<std::byte> out,
-             std::size_t& size_bytes);
-  bool write_block(Tracker& tracker, const State& target, const Block& block, std::size_t& at,
-                   std::uint32_t limit, bool early, std::span<std::byte> out, std::size_t& size_bytes);
+  /// Code streams of all blocks with the bodies of rank < limit, and early ones if `early`. False: beyond
+  /// budget.
+  bool write(Tracker& tracker, std::uint32_t limit, bool early, std::size_t budget);
+  void write_block(Tracker& tracker, const Block& block, std::uint32_t limit, bool early);
   void remember_waiting(const Tracker& tracker);
 
-  std::vector<Candidate> candidates_;  // ascending by slot
-  std::vector<std::uint32_t> order_;
+  std::vector<Candidate> candidates_;  // of each block from its first slot on, ascending
+  std::vector<Part> parts_;            // by block
+  std::vector<std::byte> bytes_;       // of each block from its first_byte on
+  std::vector<std::uint64_t> order_;
   std::vector<std::uint8_t> waiting_;  // frames that a body was beyond the threshold and not corrected
-  std::vector<std::uint8_t> waiting_next_;
   std::vector<std::uint8_t> marks_;
   std::uint32_t must_ = 0;
-  std::int32_t threshold_ = 1;
 };
 
 /// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.

@@ -20,6 +20,7 @@ Result<TimelineParts> make_parts(const TimelineConfig& config, std::unique_ptr<P
   auto codec = make_codec(config.codec, config.capacity, config.codec_tables);
   if (!codec) return tl::unexpected<Error>(codec.error());
   (*codec)->predicted_by(predictor->name());
+  (*codec)->run_blocks_on(config.run_blocks);
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), config.capacity, config.parameters, config.type_count)};
 }

@@ -116,21 +116,47 @@ TEST(RangeCoder, TheDecoderReadsZerosBeyondItsBytesAndSeesLeftOnes) {
   EXPECT_FALSE(RangeDecoder(padded).at_end());
 }
 
-TEST(AdaptiveBit, LearnsItsDecisionsAndStaysInItsRange) {
-  AdaptiveBit always;
-  AdaptiveBit never;
-  AdaptiveBit quarter;
-  std::mt19937_64 random(3);
-  for (int i = 0; i < 20'000; ++i) {
-    always.update(true);
-    never.update(false);
-    quarter.update(random() % 4 == 0);
-  }
-  EXPECT_GT(always.p1(), 65'200U);
-  EXPECT_LE(always.p1(), AdaptiveBit::kMost);
-  EXPECT_LT(never.p1(), 400U);
-  EXPECT_GE(never.p1(), AdaptiveBit::kLeast);
-  EXPECT_NEAR(quarter.p1(), 16384, 6000);
+TEST(TrackerModels, LearnTheShareOfOnesAndStayInTheirRange) {
+  TrackerModels models;
+  TrackerCounts counts{};
+  counts[0] = {0, 500};
+  counts[1] = {500, 0};
+  counts[2] = {375, 125};
+  for (int delta = 0; delta < 40; ++delta) models.learn(counts);
+  EXPECT_EQ(models.p1[0], TrackerModels::kMost);
+  EXPECT_EQ(models.p1[1], TrackerModels::kLeast);
+  EXPECT_NEAR(models.p1[2], 16384, 16);
+  EXPECT_EQ(models.p1[3], TrackerModels::kRare);
+  EXPECT_EQ(models.weight[3], 0);
+  EXPECT_EQ(models.weight[2], 255);
+}
+
+TEST(TrackerModels, YoungOnesLearnFasterThanThoseThatHaveSeenMuch) {
+  TrackerModels models;
+  TrackerCounts once{};
+  once[TrackerModelIndex::kSign] = {0, 3};
+  models.learn(once);
+  EXPECT_EQ(models.p1[TrackerModelIndex::kSign], (32768 + 3 * 65536) / 4);
+  TrackerCounts often{};
+  often[TrackerModelIndex::kSign] = {1000, 0};
+  models.learn(often);
+  models.learn(once);
+  EXPECT_LT(models.p1[TrackerModelIndex::kSign], 1500);
+}
+
+struct Coded {
+  Bytes bytes;
+  TrackerCounts counts{};
+};
+
+template <class Code>
+Coded coded(std::size_t room, const TrackerModels& models, const Code& code) {
+  Coded result{Bytes(room), {}};
+  TrackerEncoder coder{RangeEncoder(result.bytes), &models, &result.counts};
+  code(coder);
+  result.bytes.resize(coder.range.finish());
+  EXPECT_FALSE(coder.range.overflow());
+  return result;
 }
 
 TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
@@ -143,28 +169,28 @@ TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
     for (std::int32_t& s : steps) s = std::clamp(s, -kMostTrackerSteps, kMostTrackerSteps);
     if (steps != TrackerSteps{}) all.push_back(steps);
   }
-  Bytes out(all.size() * (kMostStepsBits / 8 + 1));
-  TrackerModels models;
-  RangeEncoder encoder(out);
-  for (TrackerSteps steps : all) code_steps(encoder, models, {}, steps);
-  out.resize(encoder.finish());
-  ASSERT_FALSE(encoder.overflow());
-  TrackerModels learned;
-  RangeDecoder decoder(out);
+  const TrackerModels models;
+  const Coded out = coded(all.size() * (kMostStepsBits / 8 + 1), models, [&all](TrackerEncoder& coder) {
+    for (TrackerSteps steps : all) code_steps(coder, {}, steps);
+  });
+  TrackerCounts counts{};
+  TrackerDecoder decoder{RangeDecoder(out.bytes), &models, &counts};
   for (const TrackerSteps& expected : all) {
     TrackerSteps steps{};
-    ASSERT_TRUE(code_steps(decoder, learned, {}, steps));
+    ASSERT_TRUE(code_steps(decoder, {}, steps));
     ASSERT_EQ(steps, expected);
   }
-  EXPECT_TRUE(decoder.at_end());
+  EXPECT_TRUE(decoder.range.at_end());
+  EXPECT_EQ(counts, out.counts);
 }
 
 // Adds up the ideal lengths of decisions under the models that the range coder is given.
 struct IdealCoder {
+  const TrackerModels* models;
   double bits = 0;
-  bool code(bool bit, AdaptiveBit& model) {
-    bits -= std::log2((bit ? model.p1() : 65536 - model.p1()) / 65536.0);
-    model.update(bit);
+  bool code(bool bit, std::uint32_t model) {
+    const double p1 = models->p1[model] / 65536.0;
+    bits -= std::log2(bit ? p1 : 1 - p1);
     return bit;
   }
   bool code_even(bool bit) {
@@ -175,20 +201,21 @@ struct IdealCoder {
 
 // Bodies of a block, one in `corrected_one_in` corrected by short steps; as Tracker codes them.
 template <class Coder>
-void code_block(Coder& coder, TrackerModels& models, std::mt19937_64& random,
-                std::uint64_t corrected_one_in) {
-  std::uint32_t previous = 0;
-  for (std::uint32_t body = 0; body < 2000; ++body) {
-    const auto age = static_cast<std::uint8_t>(random() % 20U);
-    const auto interval = static_cast<std::uint8_t>(random() % 20U);
+void code_block(Coder& coder, std::uint64_t seed, std::uint64_t corrected_one_in) {
+  std::mt19937_64 random(seed);
+  std::vector<TrackerBody> corrected;
+  for (std::uint32_t i = 0; i < 2000; ++i) {
+    const TrackerBody body{
+        static_cast<std::uint8_t>(random() % 20U), static_cast<std::uint8_t>(random() % 20U), {}};
     const bool is_corrected = random() % corrected_one_in == 0;
-    coder.code(is_corrected, models.flag[flag_context(age, interval) + previous]);
-    previous = static_cast<std::uint32_t>(is_corrected);
-    if (!is_corrected) continue;
+    coder.code(is_corrected, flag_model(body.age, flag_history(body)));
+    if (is_corrected) corrected.push_back(body);
+  }
+  for (const TrackerBody& body : corrected) {
     TrackerSteps steps{1, 0, 0};
     for (std::int32_t& step : steps) step = static_cast<std::int32_t>(random() % 5U) - 2;
     if (steps == TrackerSteps{}) steps[0] = 20;
-    code_steps(coder, models, value_context({age, interval, {}}, {}, {}, 100), steps);
+    code_steps(coder, value_context(body, {}, {}, 100), steps);
   }
 }
 
@@ -197,23 +224,22 @@ TEST(TrackerModels, SectionsStayWithinOnePercentOfTheIdealLengthOfTheirModels) {
     constexpr std::uint64_t kSeed = 5;
     SCOPED_TRACE(testing::Message() << "seed " << kSeed << ", one in " << corrected_one_in);
     TrackerModels models;
-    TrackerModels ideal_models;
-    IdealCoder ideal;
-    double real = 0;
+    double ideal_bits = 0;
+    double real_bits = 0;
     for (std::uint64_t frame = 0; frame < 50; ++frame) {
-      Bytes out(100'000);
-      RangeEncoder encoder(out);
-      std::mt19937_64 random(kSeed + frame);
-      code_block(encoder, models, random, corrected_one_in);
-      real += 8.0 * static_cast<double>(encoder.finish());
-      ASSERT_FALSE(encoder.overflow());
-      std::mt19937_64 again(kSeed + frame);
-      code_block(ideal, ideal_models, again, corrected_one_in);
+      IdealCoder ideal{&models};
+      code_block(ideal, kSeed + frame, corrected_one_in);
+      ideal_bits += ideal.bits;
+      const Coded out = coded(100'000, models, [&](TrackerEncoder& coder) {
+        code_block(coder, kSeed + frame, corrected_one_in);
+      });
+      real_bits += 8.0 * static_cast<double>(out.bytes.size());
+      models.learn(out.counts);
     }
-    EXPECT_GE(real, ideal.bits);
-    EXPECT_LT(real, 1.01 * ideal.bits);
+    EXPECT_GE(real_bits, ideal_bits);
+    EXPECT_LT(real_bits, 1.01 * ideal_bits);
     RecordProperty("excess_ppm_one_in_" + std::to_string(corrected_one_in),
-                   static_cast<int>(1e6 * (real / ideal.bits - 1)));
+                   static_cast<int>(1e6 * (real_bits / ideal_bits - 1)));
   }
 }
 

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <thread>
+#include <vector>
+
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 
@@ -55,6 +59,42 @@ TEST(Tracker, ASnapshotInMidStreamContinuesToTheBit) {
       const auto applied = client.apply(delta.frame, delta.last_input, delta.hash, delta.payload);
       ASSERT_TRUE(applied) << applied.error().message;
     }
+  }
+}
+
+TEST(Tracker, BlocksCodedSideBySideGiveTheSameBytes) {
+  constexpr std::uint64_t kSeed = 35;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  Random random(kSeed);
+  constexpr std::uint32_t kCapacity = 3 * kBlockSlots + 100;
+  const RunBlocks in_reverse_on_threads = [](std::uint32_t count,
+                                             const std::function<void(std::uint32_t)>& job) {
+    std::vector<std::jthread> threads;
+    for (std::uint32_t i = count; i-- > 0;) threads.emplace_back(job, i);
+  };
+  DeltaCodec alone = synthetic::make_delta("tracker", kCapacity, kParameters);
+  DeltaCodec together = synthetic::make_delta("tracker", kCapacity, kParameters);
+  DeltaCodec client = synthetic::make_delta("tracker", kCapacity, kParameters);
+  together.codec().run_blocks_on(in_reverse_on_threads);
+  client.codec().run_blocks_on(in_reverse_on_threads);
+  Bytes out(alone.bound());
+  Bytes same(alone.bound());
+  State agreed = synthetic::random_state(random, kCapacity);
+  State also = agreed;
+  State held = agreed;
+  for (int frame = 0; frame < 6; ++frame) {
+    State target = synthetic::random_target(random, agreed, 4);
+    const auto lifecycle = synthetic::random_lifecycle(random, agreed, target, 300);
+    const std::size_t budget = frame == 3 ? 5000 : kNoBudget;
+    const auto encoded = alone.encode(agreed, target, lifecycle, budget, out);
+    ASSERT_EQ(together.encode(also, target, lifecycle, budget, same).size_bytes, encoded.size_bytes);
+    const auto payload = std::span(out).first(encoded.size_bytes);
+    ASSERT_TRUE(std::ranges::equal(payload, std::span(same).first(encoded.size_bytes)));
+    ASSERT_TRUE(client.decode(held, payload));
+    ASSERT_EQ(held, agreed);
+    ASSERT_EQ(also, agreed);
+    ASSERT_TRUE(std::ranges::equal(client.touched(), alone.touched()));
+    ASSERT_EQ(coder_state(client), coder_state(alone));
   }
 }
 
