@@ -4,10 +4,13 @@
 #include <time.h>
 
 #include <algorithm>
+#include <chrono>
+#include <string>
 #include <vector>
 
 #include "sdk/core/predict/ballistic.hpp"
 #include "sdk/core/timeline/timeline.hpp"
+#include "services/server/block_threads.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {
@@ -133,6 +136,42 @@ void client_frame(benchmark::State& bench, std::string_view codec) {
   bench.counters["apply_us"] = median(apply_us);
 }
 
+// Blocks side by side: wall time of encode() and decode() at 65,536 bodies in four blocks.
+void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
+  constexpr std::uint32_t kMany = 4 * kBlockSlots;
+  constexpr CodecParameters kParameters{4096, 256, 1024};
+  synthetic::Random random(kSeed);
+  State state(kMany);
+  for (Slot slot = 0; slot < kMany; ++slot)
+    state.spawn(slot, 0, 0, {{random.even(1 << 22), random.even(1 << 22), random.even(1 << 22)}, {}});
+  DeltaCodec server = synthetic::make_delta("tracker", kMany, kParameters);
+  DeltaCodec client = synthetic::make_delta("tracker", kMany, kParameters);
+  const RunBlocks run = server::blocks_on_threads(threads);
+  server.codec().run_blocks_on(run);
+  client.codec().run_blocks_on(run);
+  std::vector<std::byte> out(server.bound());
+  State held = state;
+  State target = state;
+  std::vector<double> encode_us, decode_us;
+  const auto us_since = [](std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
+  };
+  for (auto _ : bench) {
+    for (Slot slot = 0; slot < kMany; ++slot) {
+      if (random.one_in(10)) target.p(random.below(3))[slot] += random.one_in(2) ? 5000 : -5000;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const auto encoded = server.encode(state, target, {}, kNoBudget, out);
+    encode_us.push_back(us_since(start));
+    const auto middle = std::chrono::steady_clock::now();
+    const bool good = client.decode(held, std::span(out).first(encoded.size_bytes)).has_value();
+    decode_us.push_back(us_since(middle));
+    if (!good || held != state) bench.SkipWithError("client differs");
+  }
+  bench.counters["encode_us"] = median(encode_us);
+  bench.counters["decode_us"] = median(decode_us);
+}
+
 const bool kRegistered = [] {
   for (const std::string_view codec : codec_names()) {
     benchmark::RegisterBenchmark(("server/" + std::string(codec)).c_str(), server_frame, codec)
@@ -141,6 +180,11 @@ const bool kRegistered = [] {
     benchmark::RegisterBenchmark(("client/" + std::string(codec)).c_str(), client_frame, codec)
         ->UseManualTime()
         ->Unit(benchmark::kMicrosecond);
+  }
+  for (const std::uint32_t threads : {1U, 2U}) {
+    benchmark::RegisterBenchmark(("blocks/threads:" + std::to_string(threads)).c_str(), blocks_frame, threads)
+        ->Unit(benchmark::kMillisecond)
+        ->UseRealTime();
   }
   return true;
 }();
