@@ -5,6 +5,7 @@
 #include <map>
 
 #include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/predict/contact_constants.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 
@@ -42,9 +43,27 @@ class Chained final : public Predictor {
   Ballistic ballistic_;
 };
 
-std::unique_ptr<Predictor> make(bool interacting, std::uint32_t capacity) {
-  if (interacting) return std::make_unique<Chained>(capacity);
-  return std::make_unique<Ballistic>();
+enum class Kind { kBallistic, kChained, kContact };
+
+// Bodies so large that those of a random state meet.
+std::vector<std::int32_t> contact_constants() {
+  ContactConstants constants;
+  constants.substeps = 2;
+  constants.pair = constants.wall = {7000, 300, 200};
+  constants.types = {{ContactConstants::kMostRadius, 65536}, {ContactConstants::kMostRadius / 2, 131072}};
+  constants.planes = {{{0, ContactConstants::kOne, 0}, -(1 << 26)}};
+  return write_contact_constants(constants);
+}
+
+std::unique_ptr<Predictor> make(Kind kind, std::uint32_t capacity) {
+  switch (kind) {
+    case Kind::kChained:
+      return std::make_unique<Chained>(capacity);
+    case Kind::kContact:
+      return *make_predictor("contact", capacity, contact_constants());
+    default:
+      return std::make_unique<Ballistic>();
+  }
 }
 
 struct Delta {
@@ -57,16 +76,16 @@ struct Delta {
 /// A server, what it has published, and one client.
 class Scenario {
  public:
-  Scenario(Random& random, bool interacting, std::uint32_t lead) : random_(random) {
+  Scenario(Random& random, Kind kind, std::uint32_t lead) : random_(random) {
     config_.capacity = static_cast<std::uint32_t>(1 + random.below(60));
     config_.type_count = synthetic::kTypes;
     config_.codec = codec_names()[random.below(codec_names().size())];
     config_.codec_tables = synthetic::tables_for(config_.codec);
     config_.parameters = {200, 16, 64};
     config_.max_lead = lead;
-    server_.emplace(*ServerTimeline::create(config_, 1, make(interacting, config_.capacity)));
-    client_.emplace(*ClientTimeline::create(config_, make(interacting, config_.capacity)));
-    reference_ = make(interacting, config_.capacity);
+    server_.emplace(*ServerTimeline::create(config_, 1, make(kind, config_.capacity)));
+    client_.emplace(*ClientTimeline::create(config_, make(kind, config_.capacity)));
+    reference_ = make(kind, config_.capacity);
     server_->start(random.below(1000), synthetic::random_state(random, config_.capacity), random_drive());
   }
 
@@ -166,9 +185,9 @@ class Scenario {
   std::deque<Delta> deltas_;
 };
 
-void any_interleaving(bool interacting) {
+void any_interleaving(Kind kind) {
   Random random(*rc::gen::arbitrary<std::uint64_t>());
-  Scenario scenario(random, interacting, static_cast<std::uint32_t>(random.below(5)));
+  Scenario scenario(random, kind, static_cast<std::uint32_t>(random.below(5)));
   for (std::uint64_t before = random.below(5); before > 0; --before) scenario.server_frame();
   scenario.join();
   for (int turn = 0; turn < 120; ++turn) {
@@ -197,8 +216,11 @@ void any_interleaving(bool interacting) {
   scenario.drain();
 }
 
-RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesDoNotInteract, ()) { any_interleaving(false); }
-RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesInteract, ()) { any_interleaving(true); }
+RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesDoNotInteract, ()) {
+  any_interleaving(Kind::kBallistic);
+}
+RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesInteract, ()) { any_interleaving(Kind::kChained); }
+RC_GTEST_PROP(Timeline, EndsWithTheServersStateWhereBodiesTouch, ()) { any_interleaving(Kind::kContact); }
 
 }  // namespace
 }  // namespace tandem

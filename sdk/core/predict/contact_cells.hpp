@@ -26,7 +26,7 @@ class ContactRuns {
     [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(bits_ >> 32U) & 63U; }
 
    private:
-    std::uint64_t bits_;
+    std::uint64_t bits_ = 0;
   };
 
   void clear() { count_ = 0; }
@@ -67,7 +67,7 @@ class ContactRuns {
   }
 
   std::uint32_t count_ = 0;
-  Run runs_[kBodies * 10 + 1];
+  Run runs_[kBodies * 10 + 1] = {};
 };
 
 /// ContactKernels::find. `Build::collect(grid, runs, pairs)` adds the pairs of all runs.

@@ -42,7 +42,7 @@ inline Four share_of(Four x, Four share, std::uint32_t bits, std::uint32_t half)
 inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
   const FourWords places = __builtin_convertvector(p_and_radius >> shift, FourWords);
   const FourWords speeds = __builtin_convertvector(clamped(v >> (shift + 6), same(kMostSpeed)), FourWords);
-  ContactView view;
+  ContactView view{};
   std::memcpy(&view.q, &places, sizeof places);
   std::memcpy(&view.v, &speeds, sizeof speeds);
   return view;
