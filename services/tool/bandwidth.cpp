@@ -92,10 +92,15 @@ class Snaps {
 
 /// One session's server and client, and what they were seen to do.
 struct Lane {
-  Lane(const server::HostConfig& config, ServerTimeline server_side, ClientTimeline client_side)
-      : session(&config), server(std::move(server_side)), client(std::move(client_side)) {}
+  Lane(const server::HostConfig& config, std::unique_ptr<CodeAccount> books, ServerTimeline server_side,
+       ClientTimeline client_side)
+      : session(&config),
+        account(std::move(books)),
+        server(std::move(server_side)),
+        client(std::move(client_side)) {}
 
   const server::HostConfig* session;
+  std::unique_ptr<CodeAccount> account;
   ServerTimeline server;
   ClientTimeline client;
   std::vector<std::uint32_t> bytes;
@@ -112,9 +117,12 @@ Drive drive_of(const server::HostConfig& session, Drive drive) {
 }
 
 Result<Lane> make_lane(const server::HostConfig& session, const Replay& replay) {
-  const TimelineConfig config = server::timeline_config(session, replay.simulation().capacity());
+  TimelineConfig config = server::timeline_config(session, replay.simulation().capacity());
+  auto account = std::make_unique<CodeAccount>();
+  config.account = account.get();
   auto server = ServerTimeline::create(config, kEpoch);
   if (!server) return tl::unexpected(server.error());
+  config.account = nullptr;
   auto client = ClientTimeline::create(config);
   if (!client) return tl::unexpected(client.error());
   server->set_clock(&steady_ns);
@@ -123,7 +131,7 @@ Result<Lane> make_lane(const server::HostConfig& session, const Replay& replay) 
   std::vector<std::byte> snapshot;
   server->snapshot(snapshot);
   if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
-  return Lane(session, std::move(*server), std::move(*client));
+  return Lane(session, std::move(account), std::move(*server), std::move(*client));
 }
 
 /// One frame of one session: the server's half, then the client's.
@@ -154,6 +162,18 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   return {};
 }
 
+/// Bits of all decisions at the best fixed probability of each context.
+double conditional_entropy(const CodeAccount& account) {
+  double bits = 0;
+  for (const auto& [zeros, ones] : account.decisions) {
+    const auto all = static_cast<double>(zeros + ones);
+    for (const std::uint64_t some : {zeros, ones}) {
+      if (some != 0) bits += static_cast<double>(some) * std::log2(all / static_cast<double>(some));
+    }
+  }
+  return bits;
+}
+
 /// What a lane measured over `frames` frames.
 BandwidthRow row_of(Lane& lane, double frames) {
   const server::HostConfig& session = *lane.session;
@@ -162,6 +182,11 @@ BandwidthRow row_of(Lane& lane, double frames) {
   row.predictor = session.predictor;
   row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
+  if (!lane.account->decisions.empty()) {
+    const double per_s = frames * session.lattice.dt_s * kBitsPerMbit;
+    row.ideal_mbit_per_s = lane.account->ideal_bits / per_s;
+    row.bound_mbit_per_s = conditional_entropy(*lane.account) / per_s;
+  }
   lane.errors.fill(row);
   lane.snaps.fill(row, session.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
@@ -317,6 +342,8 @@ std::string to_json(std::span<const BandwidthRow> rows) {
                     {"threshold", row.threshold},
                     {"mbit_per_s", measured(row.mbit_per_s)},
                     {"paper_mbit_per_s", json_of(mbit_in_paper(row))},
+                    {"ideal_mbit_per_s", json_of(row.ideal_mbit_per_s)},
+                    {"bound_mbit_per_s", json_of(row.bound_mbit_per_s)},
                     {"max_error", measured(row.max_error)},
                     {"rms_error", measured(row.rms_error)},
                     {"max_snap", ours(row.max_snap)},
@@ -336,9 +363,10 @@ std::string to_json(std::span<const BandwidthRow> rows) {
 
 std::string to_table(std::span<const BandwidthRow> rows) {
   std::string text = fmt::format(
-      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} "
+      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} "
+      "{:>8} "
       "{:>8}\n",
-      "scene", "bodies", "codec", "Mbit/s", "paper", "max err", "rms err", "threshold", "rms snap",
+      "scene", "bodies", "codec", "Mbit/s", "paper", "bound", "max err", "rms err", "threshold", "rms snap",
       "corrected", "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
   for (const BandwidthRow& row : rows) {
     if (!row.missing.empty()) {
@@ -347,20 +375,20 @@ std::string to_table(std::span<const BandwidthRow> rows) {
       continue;
     }
     if (row.predictor.empty()) {
-      text += fmt::format("{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n", row.scene,
-                          row.bodies, row.codec, row.mbit_per_s, "-", row.max_error, row.rms_error,
+      text += fmt::format("{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n", row.scene,
+                          row.bodies, row.codec, row.mbit_per_s, "-", "-", row.max_error, row.rms_error,
                           row.threshold);
       continue;
     }
     text += fmt::format(
-        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>7} "
+        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>7} "
         "{:>8.3f} "
         "{:>8.3f} "
         "{:>8.3f} {:>8.3f} {:>8.3f}\n",
-        row.scene, row.bodies, row.codec, row.mbit_per_s, rounded(mbit_in_paper(row), 2), row.max_error,
-        row.rms_error, row.threshold, row.rms_snap, row.corrected_per_frame,
-        rounded(row.colliding_per_frame, 0), rounded(colliding_in_paper(row), 0), row.step_ms, row.predict_ms,
-        row.encode_ms, row.decode_ms, row.apply_ms);
+        row.scene, row.bodies, row.codec, row.mbit_per_s, rounded(mbit_in_paper(row), 2),
+        rounded(row.bound_mbit_per_s, 3), row.max_error, row.rms_error, row.threshold, row.rms_snap,
+        row.corrected_per_frame, rounded(row.colliding_per_frame, 0), rounded(colliding_in_paper(row), 0),
+        row.step_ms, row.predict_ms, row.encode_ms, row.decode_ms, row.apply_ms);
   }
   return text;
 }

@@ -25,12 +25,14 @@ struct BandwidthRow {
   std::uint32_t threads = 1;
   std::uint64_t seed = 0;
   std::uint64_t frames = 0;
-  double dt_s = 0;                            ///< a frame
-  double threshold = 0;                       ///< scene units
-  double mbit_per_s = 0;                      ///< payload only, at the nominal rate; 2^20 bits to the Mbit
-  double max_error = 0, rms_error = 0;        ///< scene units; agreed state against the simulation's floats
-  double max_snap = 0, rms_snap = 0;          ///< scene units; how far a correction moves a body at once
-  double corrected_per_frame = 0;             ///< bodies
+  double dt_s = 0;                         ///< a frame
+  double threshold = 0;                    ///< scene units
+  double mbit_per_s = 0;                   ///< payload only, at the nominal rate; 2^20 bits to the Mbit
+  std::optional<double> ideal_mbit_per_s;  ///< code length of adaptive models, without rounding and headers
+  std::optional<double> bound_mbit_per_s;  ///< their decisions at the best fixed probability of each context
+  double max_error = 0, rms_error = 0;     ///< scene units; agreed state against the simulation's floats
+  double max_snap = 0, rms_snap = 0;       ///< scene units; how far a correction moves a body at once
+  double corrected_per_frame = 0;          ///< bodies
   std::optional<double> colliding_per_frame;  ///< bodies; not known for recorded trajectories
   double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;
   std::string missing;                   ///< not empty: nothing was measured, for want of this Debian package

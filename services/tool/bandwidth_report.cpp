@@ -41,22 +41,25 @@ double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count)
 
 std::string rows_csv(Rows rows) {
   std::string text =
-      "scene,number,bodies,codec,predictor,seed,frames,threshold,mbit_per_s,paper_mbit_per_s,max_error,"
+      "scene,number,bodies,codec,predictor,seed,frames,threshold,mbit_per_s,paper_mbit_per_s,ideal_mbit_per_"
+      "s,"
+      "bound_mbit_per_s,max_error,"
       "rms_error,max_snap,rms_snap,corrected_per_frame,colliding_per_frame,missing\n";
   const auto number = [](const std::optional<double>& value) {
     return value ? fmt::format("{}", *value) : std::string();
   };
   for (const BandwidthRow& row : rows) {
     const auto measured = [&](double value) { return row.missing.empty() ? fmt::format("{}", value) : ""; };
-    text += fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
-        row.number ? fmt::format("{}", *row.number) : "", row.bodies, row.codec, row.predictor, row.seed,
-        row.frames, row.threshold, measured(row.mbit_per_s),
-        number(row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt),
-        measured(row.max_error), measured(row.rms_error), row.predictor.empty() ? "" : measured(row.max_snap),
-        row.predictor.empty() ? "" : measured(row.rms_snap),
-        row.predictor.empty() ? "" : measured(row.corrected_per_frame), number(row.colliding_per_frame),
-        row.missing);
+    text +=
+        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
+                    row.number ? fmt::format("{}", *row.number) : "", row.bodies, row.codec, row.predictor,
+                    row.seed, row.frames, row.threshold, measured(row.mbit_per_s),
+                    number(row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt),
+                    number(row.ideal_mbit_per_s), number(row.bound_mbit_per_s), measured(row.max_error),
+                    measured(row.rms_error), row.predictor.empty() ? "" : measured(row.max_snap),
+                    row.predictor.empty() ? "" : measured(row.rms_snap),
+                    row.predictor.empty() ? "" : measured(row.corrected_per_frame),
+                    number(row.colliding_per_frame), row.missing);
   }
   return text;
 }

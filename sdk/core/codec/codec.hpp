@@ -1,6 +1,7 @@
 #pragma once
 // The codec interface: what turns the difference between a predicted and a target state into bytes.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -35,6 +36,12 @@ inline constexpr std::int32_t kMaxStep = 1 << 24;
 /// Budget that never binds.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
 
+/// Adaptive codecs' own books: what their decisions took, and what they would have taken at best.
+struct CodeAccount {
+  double ideal_bits = 0;  ///< sum of -log2 of the probability that each decision had
+  std::vector<std::array<std::uint64_t, 2>> decisions;  ///< zeros and ones by context
+};
+
 /// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
@@ -55,6 +62,10 @@ class Codec {
 
   /// How to code blocks side by side; one after the other without it. For codecs that can. Changes no byte.
   virtual void run_blocks_on(RunBlocks /*run*/) {}
+
+  /// Adds every encoded frame to `account`, which stays until this is called again; null: to none. For codecs
+  /// with adaptive contexts; others do nothing.
+  virtual void account_to(CodeAccount* /*account*/) {}
 
   /// The frame to come: `predicted` stays valid until the end of encode() or apply(); `slots` (ascending,
   /// each once) are those that lifecycle records spawned, despawned or teleported in it. Comes before

@@ -182,6 +182,7 @@ void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
       for (std::size_t bit = 0; bit < 2; ++bit) sum->counts[i][bit] += work.counts[i][bit];
     }
   }
+  if (sum != nullptr && account_ != nullptr) models_.account(sum->counts, *account_);
   if (sum != nullptr) models_.learn(sum->counts);
   predicted_ = nullptr;
   renewed_.clear();

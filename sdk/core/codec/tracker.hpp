@@ -33,6 +33,7 @@ class Tracker final : public Codec {
   [[nodiscard]] std::size_t bound() const override;
   void predicted_by(std::string_view predictor) override { gains_ = &tracker_gains(predictor); }
   void run_blocks_on(RunBlocks run) override { run_ = std::move(run); }
+  void account_to(CodeAccount* account) override { account_ = account; }
   void renew(const State& predicted, std::span<const Slot> slots) override;
   std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
                        std::size_t budget, ByteWriter& out) override;
@@ -98,6 +99,7 @@ class Tracker final : public Codec {
   std::vector<std::uint8_t> history_;  // flag_history() of each body
   TrackerModels models_;
   RunBlocks run_;
+  CodeAccount* account_ = nullptr;
   // Of the frame at hand.
   const State* predicted_ = nullptr;
   std::span<const std::uint8_t> alive_;

@@ -1,6 +1,7 @@
 #include "sdk/core/codec/tracker_models.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tandem {
 namespace {
@@ -34,6 +35,15 @@ void TrackerModels::learn(const TrackerCounts& counts) {
     const std::uint64_t mean = (before * p1[i] + (ones << 16U)) / (before + seen);
     p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));
     weight[i] = static_cast<std::uint8_t>(std::min<std::uint64_t>(before - 1 + seen, 255));
+  }
+}
+
+void TrackerModels::account(const TrackerCounts& counts, CodeAccount& account) const {
+  account.decisions.resize(TrackerModelIndex::kDead);
+  for (std::size_t i = 0; i < TrackerModelIndex::kDead; ++i) {
+    const double p = p1[i] / 65536.0;
+    account.ideal_bits -= counts[i][0] * std::log2(1 - p) + counts[i][1] * std::log2(p);
+    for (std::size_t bit = 0; bit < 2; ++bit) account.decisions[i][bit] += counts[i][bit];
   }
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/range_coder.hpp"
 #include "sdk/core/codec/tracker_filter.hpp"
 
@@ -20,9 +21,11 @@ struct TrackerModelIndex {
   static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
   static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
   static constexpr std::uint32_t kCount = kEscape + 32;
-  static constexpr std::uint32_t kDead = kCount;  ///< of slots without a body: never a 1
+  static constexpr std::uint32_t kEven = kCount;     ///< of decisions without a model
+  static constexpr std::uint32_t kDead = kEven + 1;  ///< of slots without a body: never a 1
+  static constexpr std::uint32_t kAll = kDead + 1;
 };
-using TrackerCounts = std::array<std::array<std::uint32_t, 2>, TrackerModelIndex::kCount + 1>;
+using TrackerCounts = std::array<std::array<std::uint32_t, 2>, TrackerModelIndex::kAll>;
 
 /// The probability of a 1 of each model, in 1/65536, and how much is behind it. All blocks share them, and
 /// they stay the same within a delta, so that blocks are coded side by side; they learn when the delta is
@@ -37,8 +40,10 @@ struct TrackerModels {
   /// p1 becomes the mean of what it was, counted weight + 1 times, and of the decisions; the weight grows by
   /// their number, up to 255.
   void learn(const TrackerCounts& counts);
+  /// Before learn().
+  void account(const TrackerCounts& counts, CodeAccount& account) const;
 
-  std::array<std::uint16_t, TrackerModelIndex::kCount + 1> p1;
+  std::array<std::uint16_t, TrackerModelIndex::kAll> p1;
   std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
 };
 
@@ -132,10 +137,7 @@ struct TrackerEncoder {
     ++(*counts)[model][bit ? 1 : 0];
     return bit;
   }
-  bool code_even(bool bit) {
-    range.put(bit, 32768);
-    return bit;
-  }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
   RangeEncoder range;
   const TrackerModels* models;
   TrackerCounts* counts;
@@ -148,7 +150,7 @@ struct TrackerDecoder {
     ++(*counts)[model][bit ? 1 : 0];
     return bit;
   }
-  bool code_even(bool /*bit*/) { return range.get(32768); }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
   RangeDecoder range;
   const TrackerModels* models;
   TrackerCounts* counts;

@@ -21,6 +21,7 @@ Result<TimelineParts> make_parts(const TimelineConfig& config, std::unique_ptr<P
   if (!codec) return tl::unexpected<Error>(codec.error());
   (*codec)->predicted_by(predictor->name());
   (*codec)->run_blocks_on(config.run_blocks);
+  (*codec)->account_to(config.account);
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), config.capacity, config.parameters, config.type_count)};
 }

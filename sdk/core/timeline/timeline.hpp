@@ -26,8 +26,9 @@ struct TimelineConfig {
   CodecParameters parameters;
   std::string predictor;
   std::vector<std::int32_t> predictor_constants;
-  std::uint32_t max_lead = 1;  ///< A: frames a client may simulate beyond its last delta
-  RunBlocks run_blocks;        ///< not agreed on: how this side codes blocks side by side; see Codec
+  std::uint32_t max_lead = 1;      ///< A: frames a client may simulate beyond its last delta
+  RunBlocks run_blocks;            ///< not agreed on: how this side codes blocks side by side; see Codec
+  CodeAccount* account = nullptr;  ///< not agreed on: books of this side's codec; see Codec
 };
 
 /// An input that changes the predicted step. `number` counts 1, 2, ... within an epoch.

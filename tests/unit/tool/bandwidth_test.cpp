@@ -101,6 +101,20 @@ TEST(Bandwidth, knows_the_papers_table) {
   EXPECT_EQ(paper_colliding_per_frame(4, 20000), std::nullopt);
 }
 
+TEST(Bandwidth, adaptive_codecs_show_what_their_decisions_took_and_the_bound_beside_it) {
+  Bouncing simulation(kBodies);
+  const auto all = sessions({"entropy", "tracker"});
+  auto replay = Replay::create(simulation, {}, all[0].lattice, 1);
+  ASSERT_TRUE(replay);
+  const auto rows = measure_bandwidth(*replay, all, 120, [](Frame) {});
+  ASSERT_TRUE(rows) << rows.error().message;
+  EXPECT_FALSE((*rows)[0].ideal_mbit_per_s);
+  const BandwidthRow& row = (*rows)[1];
+  ASSERT_TRUE(row.ideal_mbit_per_s && row.bound_mbit_per_s);
+  EXPECT_LE(*row.bound_mbit_per_s, *row.ideal_mbit_per_s);
+  EXPECT_LE(*row.ideal_mbit_per_s, row.mbit_per_s);
+}
+
 TEST(Bandwidth, rows_have_the_agreed_fields) {
   BandwidthRow row;
   row.scene = "half_pipe";
@@ -110,9 +124,10 @@ TEST(Bandwidth, rows_have_the_agreed_fields) {
   for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
   EXPECT_THAT(keys, ::testing::UnorderedElementsAre(
                         "scene", "number", "bodies", "codec", "predictor", "threads", "seed", "frames",
-                        "threshold", "mbit_per_s", "max_error", "rms_error", "max_snap", "rms_snap",
-                        "corrected_per_frame", "colliding_per_frame", "step_ms", "predict_ms", "encode_ms",
-                        "decode_ms", "apply_ms", "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
+                        "threshold", "mbit_per_s", "ideal_mbit_per_s", "bound_mbit_per_s", "max_error",
+                        "rms_error", "max_snap", "rms_snap", "corrected_per_frame", "colliding_per_frame",
+                        "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms", "paper_mbit_per_s",
+                        "paper_colliding_per_frame", "missing"));
   EXPECT_TRUE(json["rows"][0]["number"].is_null());
   EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
 }
