@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::uint32_t kDiameterBits = 13;
 
-// Every grid needs four cells a side, or the cells before and behind one would be the same.
+// Eight cells a side or more, so that a way round the torus is a whole number of times 2^16 but for the edge.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
-  std::uint32_t bits = 2;
+  std::uint32_t bits = 3;
   while ((1U << (3 * bits)) < 2 * capacity) ++bits;
   return bits;
 }
@@ -32,12 +32,22 @@ std::int16_t gain16(std::int64_t x) { return static_cast<std::int16_t>(std::min<
 // overlap gives at most half of itself a frame.
 constexpr std::int64_t kMostSpring = 1 << 15;  // in 2^-16
 
+// Shear in 2^-(16 - bits), so that drag less shear, what slows bodies down along the normal, takes out at
+// least what moving late (see `move`) puts in.
+std::int64_t least_shear(std::int64_t shear, std::int64_t drag, std::int64_t spring, int bits,
+                         std::int64_t substeps) {
+  return substeps == 1 ? shear : std::min(shear, drag - (spring >> (3 + bits)));
+}
+
 // Gains of a frame.
 ContactMaterial wall_gains(const ContactConstants& constants) {
   const std::int32_t substeps = constants.substeps;
   const ContactMaterial& wall = constants.wall;
   const std::int64_t spring = std::min<std::int64_t>(std::int64_t{wall.spring} * substeps, kMostSpring >> 2);
-  return {static_cast<std::int32_t>(spring), wall.damping * substeps, wall.shear * substeps};
+  const std::int32_t drag = (wall.damping + wall.shear) * substeps;
+  const auto shear =
+      static_cast<std::int32_t>(least_shear(wall.shear * substeps, drag, spring << 2, 3, substeps));
+  return {static_cast<std::int32_t>(spring), drag - shear, shear};
 }
 
 FieldLaw pair_law(const ContactConstants& constants) {
@@ -46,9 +56,9 @@ FieldLaw pair_law(const ContactConstants& constants) {
   FieldLaw law;
   law.spring = gain16(std::min(4 * substeps * pair.spring, kMostSpring));
   law.drag = gain16(8 * substeps * (pair.damping + pair.shear));
-  std::int64_t shear = 8 * substeps * pair.shear;
+  std::int64_t shear = least_shear(8 * substeps * pair.shear, law.drag, law.spring, 0, substeps);
   law.shear_shift = 4;
-  for (; law.shear_shift > 0 && shear * 2 <= 32767; --law.shear_shift) shear *= 2;
+  for (; law.shear_shift > 0 && std::abs(shear) * 2 <= 32767; --law.shear_shift) shear *= 2;
   law.shear = gain16(shear);
   return law;
 }
@@ -65,7 +75,7 @@ TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32
 }
 
 // As `ballistic`, plus the force. A dead slot is all zero; it stays so without gravity. A body that moved in
-// several sub-steps did not move by all of the force: a quarter is left out where `late` is -1.
+// several sub-steps did not move by all of the force: an eighth is left out where `late` is -1.
 TANDEM_VECTOR_CLONES void move(std::int32_t* __restrict p, std::int32_t* __restrict v,
                                std::int32_t* __restrict c, const std::int32_t* __restrict force,
                                const std::uint8_t* __restrict alive, std::size_t count, std::int32_t gravity,
@@ -76,7 +86,7 @@ TANDEM_VECTOR_CLONES void move(std::int32_t* __restrict p, std::int32_t* __restr
     speed -= static_cast<std::int32_t>((speed * damping + 32768) >> 16);
     speed = std::clamp(speed, -kVelocityLimit, kVelocityLimit);
     v[s] = speed;
-    p[s] = std::clamp(p[s] + ((speed - ((force[s] >> 2) & late) + 32) >> 6), -kPositionLimit, kPositionLimit);
+    p[s] = std::clamp(p[s] + ((speed - ((force[s] >> 3) & late) + 32) >> 6), -kPositionLimit, kPositionLimit);
   }
 }
 

@@ -7,7 +7,7 @@
 namespace tandem {
 namespace {
 
-/// The bodies of a cell and of its 26 neighbours, side by side. What follows the last one is far away.
+/// The bodies of a cell and of its 26 neighbours, side by side.
 struct Around {
   static constexpr std::uint32_t kMost = 27 * FieldGrid::kMostInCell;
 
@@ -15,41 +15,44 @@ struct Around {
   alignas(32) std::int16_t v[3][kMost + 2 * kLanes];
 };
 
+/// load(kFirst + kLanes - n): the first n lanes.
+constexpr std::int16_t kFirst[2 * kLanes] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+
 struct Pass {
   Lanes spring, shear, drag;
   int shear_shift;
 
-  // Adds to `sum` what the bodies around do to the one at p with v.
-  inline void meet(const Around& around, std::uint32_t count, const Lanes (&p)[3], const Lanes (&v)[3],
-                   Sums (&sum)[3]) const {
-    for (std::uint32_t at = 0; at < count; at += kLanes) {
-      Lanes d[3], u[3];
-      for (unsigned i = 0; i < 3; ++i) {
-        d[i] = p[i] - load(around.p[i] + at);
-        d[i] = saturated_sum(d[i], d[i]);
-        u[i] = saturated_difference(load(around.v[i] + at), v[i]);
-      }
-      const Lanes squared = saturated_sum(saturated_sum(high_product(d[0], d[0]), high_product(d[1], d[1])),
-                                          high_product(d[2], d[2]));
-      const Lanes x = all(4094) - squared;
-      const Lanes touching = x > all(0);
-      const Lanes x8 = x << 3;
-      const Lanes xx = high_product(x8, x8);
-      const Lanes curve = high_product(xx + xx, all(11469) + (x << 2));
-      const Lanes along = high_product(u[0], d[0]) + high_product(u[1], d[1]) + high_product(u[2], d[2]);
-      const Lanes push = saturated_difference(high_product(saturated_sum(x8, curve << 2), spring),
-                                              high_product(along, shear) << shear_shift) &
-                         touching;
-      const Lanes rub = drag & touching;
-      for (unsigned i = 0; i < 3; ++i) sum[i] = sum[i] + product(push, d[i]) + product(u[i], rub);
+  // Adds to `sum` what the bodies around, from `at` on, do to the one at p with v.
+  template <bool kAll>
+  inline void meet(const Around& around, std::uint32_t at, Lanes lanes, const Lanes (&p)[3],
+                   const Lanes (&v)[3], Sums (&sum)[3]) const {
+    Lanes d[3], u[3];
+    for (unsigned i = 0; i < 3; ++i) {
+      d[i] = p[i] - load(around.p[i] + at);
+      d[i] = saturated_sum(d[i], d[i]);
+      u[i] = saturated_difference(load(around.v[i] + at), v[i]);
     }
+    const Lanes squared = saturated_sum(saturated_sum(high_product(d[0], d[0]), high_product(d[1], d[1])),
+                                        high_product(d[2], d[2]));
+    const Lanes x = all(4094) - squared;
+    Lanes touching = x > all(0);
+    if (!kAll) touching = touching & lanes;
+    const Lanes x8 = x << 3;
+    const Lanes xx = high_product(x8, x8);
+    const Lanes curve = high_product(xx + xx, all(11469) + (x << 2));
+    const Lanes along = high_product(u[0], d[0]) + high_product(u[1], d[1]) + high_product(u[2], d[2]);
+    const Lanes push = saturated_difference(high_product(saturated_sum(x8, curve << 2), spring),
+                                            high_product(along, shear) << shear_shift) &
+                       touching;
+    const Lanes rub = drag & touching;
+    for (unsigned i = 0; i < 3; ++i) sum[i] = sum[i] + product(push, d[i]) + product(u[i], rub);
   }
 
-  // The bodies of a cell, at first .. last; `count` are around.
-  inline void cell(Around& around, std::uint32_t count, std::uint32_t first, std::uint32_t last,
+  // The bodies of a cell, at first .. last; `count`, at least one, are around.
+  inline void cell(const Around& around, std::uint32_t count, std::uint32_t first, std::uint32_t last,
                    const FieldGrid& grid, std::int32_t* const (&f)[3]) const {
-    // Half way round from the cell.
-    store(around.p[0] + count, all(static_cast<std::int16_t>(grid.p[0][first] ^ INT16_MIN)));
+    const std::uint32_t end = (count - 1) / kLanes * kLanes;
+    const Lanes lanes = load(kFirst + kLanes - (count - end));
     for (std::uint32_t place = first; place < last; ++place) {
       Lanes p[3], v[3];
       Sums sum[3] = {no_sums(), no_sums(), no_sums()};
@@ -57,7 +60,8 @@ struct Pass {
         p[i] = all(grid.p[i][place]);
         v[i] = all(grid.v[i][place]);
       }
-      meet(around, count, p, v, sum);
+      for (std::uint32_t at = 0; at < end; at += kLanes) meet<true>(around, at, lanes, p, v, sum);
+      meet<false>(around, end, lanes, p, v, sum);
       for (unsigned i = 0; i < 3; ++i) f[i][place] = sum_of(sum[i]);
     }
   }

@@ -1,0 +1,213 @@
+#include "sdk/core/predict/field.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "sdk/core/lattice/hash.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::int32_t kRadius = 20000;
+
+ContactConstants constants_of(std::int32_t substeps) {
+  ContactConstants constants;
+  constants.substeps = substeps;
+  constants.pair = {3640 / substeps, 410 / substeps, 410 / substeps};
+  constants.wall = constants.pair;
+  constants.types = {{kRadius, 65536}, {kRadius / 2, 131072}};
+  constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
+  constants.boxes = {
+      {{200000, 0, 0},
+       {50000, 50000, 50000},
+       {{{ContactConstants::kOne, 0, 0}, {0, ContactConstants::kOne, 0}, {0, 0, ContactConstants::kOne}}}}};
+  constants.balls = {{{-200000, 0, 0}, 60000}};
+  return constants;
+}
+
+std::unique_ptr<Predictor> field(std::uint32_t capacity, const ContactConstants& constants) {
+  return *make_predictor("field", capacity, write_contact_constants(constants));
+}
+
+Vec3i vector_within(std::mt19937_64& random, std::int32_t limit) {
+  Vec3i v{};
+  for (std::int32_t& x : v)
+    x = static_cast<std::int32_t>(random() % (2 * static_cast<std::uint64_t>(limit) + 1)) - limit;
+  return v;
+}
+
+State bodies_within(std::mt19937_64& random, std::uint32_t capacity, std::int32_t p, std::int32_t v) {
+  State state(capacity);
+  for (Slot s = 0; s < capacity; ++s) {
+    if (random() % 7 == 0) continue;
+    const TypeId type = static_cast<TypeId>(random() % 3);  // one more than the constants know
+    state.spawn(s, 0, type, {vector_within(random, p), vector_within(random, v)});
+    for (std::size_t i = 0; i < 3; ++i) state.c(i)[s] = vector_within(random, v)[i];
+  }
+  return state;
+}
+
+const Drive kFalling{{0, -3000, 0}, 200, 800};
+
+TEST(Field, InPlaceEqualsApartForAnyState) {
+  constexpr std::uint64_t kSeed = 71;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  for (const std::int32_t reach : {0, 10, kRadius, 20 * kRadius, kPositionLimit}) {
+    for (const std::int32_t speed : {0, 100000, kVelocityLimit}) {
+      for (const std::int32_t substeps : {1, 2, 16}) {
+        const auto predictor = field(300, constants_of(substeps));
+        State state = bodies_within(random, 300, reach, speed);
+        State apart(300);
+        for (int frame = 0; frame < 4; ++frame) {
+          predictor->step(state, apart, kFalling);
+          predictor->step(state, state, kFalling);
+          ASSERT_EQ(state, apart);
+        }
+        for (Slot s = 0; s < 300; ++s) {
+          for (std::size_t i = 0; i < 3; ++i) {
+            ASSERT_LE(std::abs(state.p(i)[s]), kPositionLimit);
+            ASSERT_LE(std::abs(state.v(i)[s]), kVelocityLimit);
+            ASSERT_TRUE(state.alive()[s] != 0 || (state.p(i)[s] | state.v(i)[s] | state.c(i)[s]) == 0);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Field, ExtremeConstantsMeetExtremeStates) {
+  constexpr std::uint64_t kSeed = 72;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  ContactConstants constants = constants_of(16);
+  constants.pair = constants.wall = {ContactMaterial::kMostSpring, ContactMaterial::kMostDamping,
+                                     ContactMaterial::kMostDamping};
+  const Vec3i ones{ContactConstants::kOne, ContactConstants::kOne, ContactConstants::kOne};
+  const Vec3i corner{kPositionLimit, -kPositionLimit, kPositionLimit};
+  constants.planes = {{ones, kPositionLimit}, {ones, -kPositionLimit}};
+  constants.boxes = {{corner, {kPositionLimit, kPositionLimit, kPositionLimit}, {ones, ones, ones}}};
+  constants.balls = {{corner, kPositionLimit}, {{}, 0}};
+  for (const std::int32_t radius : {1, 2, 100, ContactConstants::kMostRadius}) {
+    constants.types = {{radius, ContactConstants::kMostMobility}};
+    const auto predictor = field(200, constants);
+    for (const std::int32_t reach : {0, 1, kPositionLimit}) {
+      State state = bodies_within(random, 200, reach, kVelocityLimit);
+      for (int frame = 0; frame < 5; ++frame) predictor->step(state, state, kFalling);
+      EXPECT_GT(state.alive_count(), 0U);
+    }
+  }
+}
+
+TEST(Field, EveryProcessorHasTheSameBits) {
+#ifdef TANDEM_FIELD_AVX2
+  if (__builtin_cpu_supports("avx2") == 0) return;
+  constexpr std::uint64_t kSeed = 73;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  constexpr std::uint32_t kBodies = 500, kSideBits = 2, kCells = 1U << (3 * kSideBits);
+  for (int round = 0; round < 20; ++round) {
+    std::vector<std::uint32_t> begin(kCells + 1);
+    std::uint32_t sum = 0;
+    for (std::uint32_t& place : begin) {
+      place = sum;
+      sum = std::min(kBodies, sum + static_cast<std::uint32_t>(random() % (FieldGrid::kMostInCell + 1)));
+    }
+    std::array<std::vector<std::int16_t>, 6> columns;
+    for (auto& column : columns) {
+      for (std::uint32_t i = 0; i < kBodies + FieldGrid::kBeyond; ++i)
+        column.push_back(static_cast<std::int16_t>(random() >> (round % 4)));
+    }
+    const FieldGrid grid{kSideBits,
+                         begin.data(),
+                         {columns[0].data(), columns[1].data(), columns[2].data()},
+                         {columns[3].data(), columns[4].data(), columns[5].data()}};
+    const FieldLaw law{static_cast<std::int16_t>(random() & 32767U),
+                       static_cast<std::int16_t>(random() & 32767U),
+                       static_cast<std::int16_t>(random() & 32767U), round % 5};
+    std::array<std::vector<std::int32_t>, 3> portable, fast;
+    for (auto* all : {&portable, &fast})
+      for (auto& column : *all) column.resize(kBodies);
+    set_field_forces(law, grid, {portable[0].data(), portable[1].data(), portable[2].data()});
+    set_field_forces_avx2(law, grid, {fast[0].data(), fast[1].data(), fast[2].data()});
+    ASSERT_EQ(portable, fast) << "round " << round;
+  }
+#endif
+}
+
+TEST(Field, TwoBodiesPartWithEqualAndOppositeSpeed) {
+  ContactConstants constants = constants_of(1);
+  constants.planes.clear();
+  const auto predictor = field(2, constants);
+  for (const double distance : {1.5, 1.7, 1.9}) {
+    State state(2);
+    state.spawn(0, 0, 0, {{0, 0, 0}, {}});
+    state.spawn(1, 0, 0, {{static_cast<std::int32_t>(distance * kRadius), 0, 0}, {}});
+    predictor->step(state, state, {});
+    EXPECT_LT(state.v(0)[0], 0);
+    EXPECT_NEAR(state.v(0)[0], -state.v(0)[1], 64);
+    const double expected = 64.0 * (2 - distance) * kRadius * 3640 / 16384;
+    EXPECT_NEAR(state.v(0)[1], expected, expected / 50 + 64) << distance;
+  }
+}
+
+TEST(Field, BodiesApartMoveAsBallistic) {
+  std::mt19937_64 random(74);
+  ContactConstants constants = constants_of(1);
+  constants.planes.clear();
+  constants.boxes.clear();
+  constants.balls.clear();
+  constexpr std::uint32_t kCapacity = 20000;
+  State state(kCapacity);
+  for (Slot s = 0; s < 64; ++s) {
+    const auto x = static_cast<std::int32_t>(s) * 3 * kRadius;  // more than once round the torus
+    state.spawn(s, 0, 0, {{x, 0, -x}, vector_within(random, 100000)});
+    state.c(1)[s] = 77;
+  }
+  State expected = state;
+  const auto ballistic = *make_predictor("ballistic", kCapacity, {});
+  field(kCapacity, constants)->step(state, state, kFalling);
+  ballistic->step(expected, expected, kFalling);
+  EXPECT_EQ(state, expected);
+}
+
+TEST(Field, ABodyOnThePlaneComesToRest) {
+  for (const std::int32_t substeps : {1, 2}) {
+    const auto predictor = field(1, constants_of(substeps));
+    State state(1);
+    state.spawn(0, 0, 0, {{0, 3 * kRadius, 0}, {}});
+    for (int frame = 0; frame < 600; ++frame) predictor->step(state, state, kFalling);
+    EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20);
+    EXPECT_LT(std::abs(state.v(1)[0]), 1000);  // 16 lattice units a frame
+  }
+}
+
+TEST(Field, AMixedRunKeepsItsHash) {
+  const auto predictor = field(200, constants_of(2));
+  State state(200);
+  std::uint32_t x = 1;
+  const auto next = [&x](std::int32_t limit) {
+    x = x * 1664525U + 1013904223U;
+    return static_cast<std::int32_t>((x >> 8U) % (2 * static_cast<std::uint32_t>(limit))) - limit;
+  };
+  for (Slot s = 0; s < 200; ++s) {
+    const Vec3i p{next(8 * kRadius), next(3 * kRadius) + 4 * kRadius, next(4 * kRadius)};
+    state.spawn(s, 0, static_cast<TypeId>(s % 2), {p, {next(99999), next(99999), next(99999)}});
+  }
+  for (int frame = 0; frame < 50; ++frame) predictor->step(state, state, kFalling);
+  StateHasher hasher;
+  EXPECT_EQ(to_hex(hasher.hash(state, {})), "299c71fed196b44c");
+}
+
+TEST(Field, BadConstantsAreRefused) {
+  const auto good = write_contact_constants(constants_of(2));
+  for (std::size_t size = 0; size < good.size(); ++size)
+    EXPECT_FALSE(make_predictor("field", 10, std::span(good).first(size)));
+  EXPECT_TRUE(make_predictor("field", 10, good));
+  EXPECT_FALSE(make_predictor("field", 0, good));
+  EXPECT_FALSE(make_predictor("field", kMaxCapacity + 1, good));
+}
+
+}  // namespace
+}  // namespace tandem
