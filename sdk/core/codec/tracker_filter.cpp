@@ -15,14 +15,16 @@ struct GainSet {
   std::int64_t gamma;  // in 1/65536
   std::int64_t least_k;
   std::int64_t k_of_the_hit;
+  std::uint32_t early;
 };
-constexpr GainSet kBallistic{52429, 9830, 3, 2};  // 0.8, 0.15
+constexpr GainSet kBallistic{52429, 9830, 3, 2, 19661};  // 0.8, 0.15
 // Contacts are predicted: what is left grows slower, and there is no force to learn.
-constexpr GainSet kContact{45875, 0, 3, 3};  // 0.7, 0
-constexpr GainSet kField{45875, 0, 3, 3};    // 0.7, 0: likewise
+constexpr GainSet kContact{45875, 0, 3, 3, 19661};  // 0.7, 0
+constexpr GainSet kField{45875, 0, 3, 3, 6554};    // 0.7, 0: likewise
 
 TrackerGains make_gains(const GainSet& set) {
   TrackerGains gains;
+  gains.early = set.early;
   for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
     const std::int64_t k = std::max(i, set.least_k);
     const auto at = static_cast<std::size_t>(i);
@@ -55,18 +57,24 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
   const std::int64_t belief = 256 + (std::clamp<std::int64_t>(dot >> 8, -256, 256) >> 1);
 
   const std::uint32_t k = std::min(body.age + 1U, kMostAge);
-  const auto d = steppings.distance(steps);
+  const std::int64_t one = steppings.unit_for(steps);
+  const auto growth_of_one = [&](std::int64_t gain) {
+    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
+  };
+  const std::int64_t v_of_one = growth_of_one(gains.velocity[k]);
+  const std::int64_t c_of_one = growth_of_one(gains.acceleration[k]);
   const std::int64_t most_c = std::min<std::int64_t>(kVelocityLimit, std::int64_t{256} * threshold);
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto grown = [&](std::int64_t gain) {
-      return std::clamp((share_of(d[i], gain) * belief + 128) >> 8, -kMostGrowth, kMostGrowth);
+    // |steps| < 2^31 and what one of them is worth is at most 2^30: products fit.
+    const auto times = [&](std::int64_t worth, std::int64_t most) {
+      return std::clamp(steps[i] * worth, -most, most);
     };
     std::int32_t& p = state.p(i)[slot];
     std::int32_t& v = state.v(i)[slot];
     std::int32_t& c = state.c(i)[slot];
-    p = limited(p + d[i], kPositionLimit);
-    v = limited(v + grown(gains.velocity[k]), kVelocityLimit);
-    c = limited(c + grown(gains.acceleration[k]), most_c);
+    p = limited(p + times(one, TrackerSteppings::kMostDistance), kPositionLimit);
+    v = limited(v + times(v_of_one, kMostGrowth), kVelocityLimit);
+    c = limited(c + times(c_of_one, kMostGrowth), most_c);
     body.steps[i] = static_cast<std::int8_t>(now[i]);
   }
   body.interval = static_cast<std::uint8_t>(k);

@@ -30,6 +30,8 @@ struct TrackerBody {
 struct TrackerGains {
   std::array<std::int64_t, kMostAge + 1> velocity{};
   std::array<std::int64_t, kMostAge + 1> acceleration{};
+  /// Encoder only: how likely, in 1/65536, a correction must be for a body to be corrected before it has to be.
+  std::uint32_t early = 19661;
 };
 
 /// The gains that belong to a predictor; those of `ballistic` for a name not known here.
@@ -48,13 +50,8 @@ class TrackerSteppings {
     for (std::size_t i = 0; i < kUnits.size(); ++i) units_[i] = share(kUnits[i]);
   }
 
-  /// Lattice units of a correction, |each| <= 2^31.
-  [[nodiscard]] std::array<std::int64_t, 3> distance(const TrackerSteps& steps) const {
-    const std::int64_t one = units_[unit_of(steps)];
-    std::array<std::int64_t, 3> d{};
-    for (std::size_t i = 0; i < 3; ++i) d[i] = std::clamp(steps[i] * one, -kMostDistance, kMostDistance);
-    return d;
-  }
+  /// Lattice units that one of these steps is worth.
+  [[nodiscard]] std::int32_t unit_for(const TrackerSteps& steps) const { return units_[unit_of(steps)]; }
   /// What one step is worth: where an axis moves by more than one (0), or where all |steps| <= 1 and so many
   /// (1 .. 3) of them are not zero.
   [[nodiscard]] std::int32_t unit(std::size_t moved) const { return units_[moved]; }
@@ -86,7 +83,7 @@ class TrackerSteppings {
 };
 
 /// Corrects a body by `steps` and updates what is remembered of it:
-///   k = min(age + 1, 255);  d = distance(steps);  u = clamp(d . d_last / e^2, -1, 1)
+///   k = min(age + 1, 255);  d = steps * unit;  u = clamp(d . d_last / e^2, -1, 1)
 ///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2), H(1) = 0
 void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
                   std::int32_t threshold, const TrackerGains& gains, TrackerBody& body);

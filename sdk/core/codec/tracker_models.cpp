@@ -28,13 +28,16 @@ TrackerModels::TrackerModels() {
 
 void TrackerModels::learn(const TrackerCounts& counts) {
   for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
-    const std::uint64_t ones = counts[i][1];
-    const std::uint64_t seen = counts[i][0] + ones;
+    const std::uint32_t ones = counts[i][1];
+    const std::uint32_t seen = counts[i][0] + ones;
     if (seen == 0) continue;
-    const std::uint64_t before = std::uint64_t{weight[i]} + 1;
-    const std::uint64_t mean = (before * p1[i] + (ones << 16U)) / (before + seen);
+    const std::uint32_t before = weight[i] + 1U;
+    const std::uint64_t sum = std::uint64_t{before} * p1[i] + (std::uint64_t{ones} << 16U);
+    // Two divisions, because the short one takes a third of the time and nearly always does.
+    const std::uint64_t mean =
+        sum >> 32U == 0 ? static_cast<std::uint32_t>(sum) / (before + seen) : sum / (before + seen);
     p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));
-    weight[i] = static_cast<std::uint8_t>(std::min<std::uint64_t>(before - 1 + seen, 255));
+    weight[i] = static_cast<std::uint8_t>(std::min(before - 1 + seen, 255U));
   }
 }
 

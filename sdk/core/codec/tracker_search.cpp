@@ -12,7 +12,6 @@ namespace {
 // A body within the threshold but beyond this share of it (1/256) goes early if the model half expects it
 // anyway: a few more bits, a much smaller RMS error (RESEARCH.md).
 constexpr std::int64_t kEarlyShare = 218;
-constexpr std::uint32_t kEarlyProbability = 19661;
 // Bits that an error of one threshold is worth.
 constexpr std::uint64_t kErrorWorth = 14;
 constexpr std::int64_t kMostDistance = TrackerSteppings::kMostDistance;
@@ -254,7 +253,7 @@ void TrackerSearch::choose(const Tracker& tracker, const State& target, const Bl
                                                    kBlockSlots);
   for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
     Candidate candidate{error, slot, 0, error > worth.limit, {}};
-    if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= kEarlyProbability) {
+    if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_->early) {
       return;
     }
     const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth,

@@ -73,11 +73,10 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
 
 TEST(TrackerFilter, SmallStepsAreShorterTheMoreAxesMove) {
   const TrackerSteppings steppings(1000);
-  EXPECT_EQ(steppings.distance({1, 0, 0}), (std::array<std::int64_t, 3>{919, 0, 0}));
-  EXPECT_EQ(steppings.distance({0, -1, 1}), (std::array<std::int64_t, 3>{0, -690, 690}));
-  EXPECT_EQ(steppings.distance({1, 1, -1}), (std::array<std::int64_t, 3>{589, 589, -589}));
-  EXPECT_EQ(steppings.distance({2, 1, 0}), (std::array<std::int64_t, 3>{1898, 949, 0}));
-  EXPECT_EQ(steppings.distance({0, 0, 0}), (std::array<std::int64_t, 3>{0, 0, 0}));
+  EXPECT_EQ(steppings.unit_for({1, 0, 0}), 919);
+  EXPECT_EQ(steppings.unit_for({0, -1, 1}), 690);
+  EXPECT_EQ(steppings.unit_for({1, 1, -1}), 589);
+  EXPECT_EQ(steppings.unit_for({2, 1, 0}), 949);
 }
 
 TEST(TrackerSearch, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
