@@ -39,24 +39,15 @@ constexpr auto kBits = [] {
   return table;
 }();
 
-// What a decision would cost, in 1/256 bits.
-std::uint32_t cost_of(bool bit, std::uint16_t p1) {
-  const std::uint32_t p = p1 >> 4U;
-  return kBits[bit ? p : 4095U - p];
-}
-
 // Adds up what decisions would cost.
 struct CostCoder {
-  const TrackerModels* models;
+  const TrackerCosts* costs;
   std::uint32_t cost = 0;
   bool code(bool bit, std::uint32_t model) {
-    cost += cost_of(bit, models->p1[model]);
+    cost += costs->of[model][bit ? 1 : 0];
     return bit;
   }
-  bool code_even(bool bit) {
-    cost += 256;
-    return bit;
-  }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
 };
 
 std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
@@ -71,10 +62,10 @@ std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
 // to guess. (The third value around the nearest, on its far side, does not pay: RESEARCH.md.)
 class Choices {
  public:
-  Choices(const TrackerModels& models, const TrackerContext& context, const TrackerSteps& lower)
+  Choices(const TrackerCosts& costs, const TrackerContext& context, const TrackerSteps& lower)
       : lower_(lower) {
-    const Lengths lengths = length_costs(models, context);
-    for (std::uint32_t axis = 0; axis < 3; ++axis) fill_costs(models, context, lengths, axis);
+    const Lengths lengths = length_costs(costs, context);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) fill_costs(costs, context, lengths, axis);
   }
 
   void fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
@@ -87,15 +78,15 @@ class Choices {
   // Costs of the lengths 1 and 2 after so many axes that are not zero.
   using Lengths = std::array<std::array<std::uint32_t, 2>, 3>;
 
-  static Lengths length_costs(const TrackerModels& models, const TrackerContext& context) {
+  static Lengths length_costs(const TrackerCosts& costs, const TrackerContext& context) {
     Lengths lengths{};
     for (std::uint32_t moved = 0; moved < 3; ++moved) {
-      const std::uint16_t* longer = &models.p1[magnitude_model(context, moved)];
-      lengths[moved] = {cost_of(false, longer[0]), cost_of(true, longer[0]) + cost_of(false, longer[1])};
+      const auto* longer = &costs.of[magnitude_model(context, moved)];
+      lengths[moved] = {longer[0][0], std::uint32_t{longer[0][1]} + longer[1][0]};
     }
     return lengths;
   }
-  void fill_costs(const TrackerModels& models, const TrackerContext& context, const Lengths& lengths,
+  void fill_costs(const TrackerCosts& costs, const TrackerContext& context, const Lengths& lengths,
                   std::uint32_t axis);
   [[nodiscard]] std::int32_t value(std::size_t axis, std::size_t i) const {
     return lower_[axis] + static_cast<std::int32_t>(i);
@@ -108,25 +99,22 @@ class Choices {
   std::array<std::array<std::array<std::uint32_t, 2>, 3>, 3> cost_{};
 };
 
-void Choices::fill_costs(const TrackerModels& models, const TrackerContext& context, const Lengths& lengths,
+void Choices::fill_costs(const TrackerCosts& costs, const TrackerContext& context, const Lengths& lengths,
                          std::uint32_t axis) {
-  const std::uint16_t sign = models.p1[context.sign[axis]];
+  const auto sign = costs.of[context.sign[axis]];
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
-    std::array<std::uint32_t, 2> is_moved{0, 0};
-    if (axis != 2 || moved != 0) {
-      const std::uint16_t zero = models.p1[zero_model(context, axis, moved)];
-      is_moved = {cost_of(false, zero), cost_of(true, zero)};
-    }
+    std::array<std::uint16_t, 2> is_moved{0, 0};
+    if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
     for (std::size_t i = 0; i < 2; ++i) {
       std::int32_t steps = value(axis, i);
       if (steps < -2 || steps > 2) {
-        CostCoder coder{&models};
+        CostCoder coder{&costs};
         code_axis(coder, context, axis, moved, steps);
         cost_[axis][moved][i] = coder.cost;
         continue;
       }
       const std::uint32_t length = lengths[moved][steps == 2 || steps == -2 ? 1 : 0];
-      cost_[axis][moved][i] = steps == 0 ? is_moved[0] : is_moved[1] + cost_of(steps < 0, sign) + length;
+      cost_[axis][moved][i] = steps == 0 ? is_moved[0] : is_moved[1] + sign[steps < 0 ? 1U : 0U] + length;
     }
   }
 }
@@ -181,6 +169,13 @@ bool Choices::cheapest(const ErrorWorth& worth, TrackerSteps& steps) const {
 
 }  // namespace
 
+void TrackerCosts::learn(const TrackerModels& models) {
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const std::uint32_t p = models.p1[i] >> 4U;
+    of[i] = {kBits[4095U - p], kBits[p]};
+  }
+}
+
 ErrorWorth::ErrorWorth(std::int32_t e)
     : threshold(e),
       limit(static_cast<std::uint64_t>(e) * static_cast<std::uint64_t>(e)),
@@ -188,7 +183,7 @@ ErrorWorth::ErrorWorth(std::int32_t e)
       worth((kErrorWorth * 256U << 24U) / (limit >> shift)) {}
 
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
-                  const ErrorWorth& worth, const TrackerModels& models, const TrackerContext& context,
+                  const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
                   TrackerSteps& steps) {
   std::array<std::int64_t, 3> d{};
   TrackerSteps lower{};
@@ -197,7 +192,7 @@ bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& st
     steps[i] = nearest(from[i], to[i], steppings.unit(0));
     lower[i] = steps[i] - (std::int64_t{steps[i]} * steppings.unit(0) > d[i] ? 1 : 0);
   }
-  Choices choices(models, context, lower);
+  Choices choices(costs, context, lower);
   choices.fill_errors(steppings, d, worth.threshold);
   return choices.cheapest(worth, steps);
 }
@@ -217,10 +212,12 @@ TrackerSearch::TrackerSearch(std::uint32_t capacity)
 }
 
 void TrackerSearch::encode(Tracker& tracker, const State& target, std::size_t budget, ByteWriter& out) {
+  costs_.learn(tracker.models_);
   tracker.for_each_block([&](const Block& block) { choose(tracker, target, block); });
   must_ = 0;
   for (const Part& part : parts_) must_ += part.must;
-  if (!write(tracker, must_, true, budget)) {
+  const bool all_fit = write(tracker, must_, true, budget);
+  if (!all_fit) {
     rank();
     std::uint32_t fits = 0;
     std::uint32_t too_many = must_ + 1;
@@ -238,7 +235,7 @@ void TrackerSearch::encode(Tracker& tracker, const State& target, std::size_t bu
     out.put(static_cast<std::uint16_t>(b));
     out.put_bytes(std::span(bytes_).subspan(parts_[b].first_byte, parts_[b].coded_bytes));
   }
-  remember_waiting(tracker);
+  if (!all_fit || some_wait_) remember_waiting(tracker);
 }
 
 void TrackerSearch::choose(const Tracker& tracker, const State& target, const Block& block) {
@@ -256,8 +253,8 @@ void TrackerSearch::choose(const Tracker& tracker, const State& target, const Bl
     if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_->early) {
       return;
     }
-    const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth,
-                                     tracker.models_, tracker.context(slot, threshold), candidate.steps);
+    const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth, costs_,
+                                     tracker.context(slot, threshold), candidate.steps);
     if (!inside && (!candidate.must || candidate.steps == TrackerSteps{})) return;
     must += static_cast<std::uint32_t>(candidate.must);
     *at++ = candidate;
@@ -334,6 +331,7 @@ void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint3
 }
 
 void TrackerSearch::remember_waiting(const Tracker& tracker) {
+  some_wait_ = false;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     const Slot* sent = tracker.corrected_.data() + b * kBlockSlots;
     const Slot* const sent_end = sent + tracker.work_[b].corrected;
@@ -345,6 +343,7 @@ void TrackerSearch::remember_waiting(const Tracker& tracker) {
       const bool is_sent = sent != sent_end && *sent == slot;
       const bool waits = is_candidate && candidate->must && !is_sent;
       waiting_[slot] = waits ? static_cast<std::uint8_t>(std::min(waiting_[slot] + 1, 255)) : std::uint8_t{0};
+      some_wait_ = some_wait_ || waits;
       candidate += is_candidate ? 1 : 0;
       sent += is_sent ? 1 : 0;
     }

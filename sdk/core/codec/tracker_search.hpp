@@ -2,6 +2,7 @@
 // The tracker's encoder: which bodies to correct and by which of the points inside the error ball. Nothing
 // here is on the wire.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -13,6 +14,12 @@ namespace tandem {
 /// What the encoder keeps to, as to a budget. Bodies that all jump at once take about a third of it.
 inline constexpr std::size_t kMostTrackerBytesPerBody = 24;
 inline constexpr std::size_t kTrackerSlackBytes = 64;
+
+/// What decisions would cost, in 1/256 bits: of each model a zero and a one.
+struct TrackerCosts {
+  void learn(const TrackerModels& models);
+  std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
+};
 
 class TrackerSearch {
  public:
@@ -56,6 +63,8 @@ class TrackerSearch {
   std::vector<std::uint8_t> waiting_;  // frames that a body was beyond the threshold and not corrected
   std::vector<std::uint8_t> marks_;
   std::uint32_t must_ = 0;
+  bool some_wait_ = false;
+  TrackerCosts costs_;
 };
 
 /// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.
@@ -71,7 +80,7 @@ struct ErrorWorth {
 /// an error of at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none
 /// does; `steps` is then the nearest.
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
-                  const ErrorWorth& worth, const TrackerModels& models, const TrackerContext& context,
+                  const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
                   TrackerSteps& steps);
 
 }  // namespace tandem

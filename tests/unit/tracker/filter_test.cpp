@@ -80,7 +80,8 @@ TEST(TrackerFilter, SmallStepsAreShorterTheMoreAxesMove) {
 }
 
 TEST(TrackerSearch, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
-  const TrackerModels models;
+  TrackerCosts costs;
+  costs.learn(TrackerModels());
   for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11}) {
     const TrackerSteppings steppings(threshold);
     const ErrorWorth worth(threshold);
@@ -90,7 +91,7 @@ TEST(TrackerSearch, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
         for (std::int32_t z = 0; z <= y; ++z) {
           if (x * x + y * y + z * z <= threshold * threshold) continue;
           TrackerSteps steps{};
-          ASSERT_TRUE(choose_steps({}, {x, y, z}, steppings, worth, models, {}, steps))
+          ASSERT_TRUE(choose_steps({}, {x, y, z}, steppings, worth, costs, {}, steps))
               << threshold << ": " << x << " " << y << " " << z;
         }
       }
