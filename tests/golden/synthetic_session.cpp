@@ -13,7 +13,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0xA2C4B012212C57D5;
+constexpr std::uint64_t kGolden = 0xBD4683B52A52F665;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact";
 constexpr std::pair<std::string_view, std::string_view> kSessions[] = {

@@ -45,12 +45,21 @@ ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
   return {material.spring, material.damping + material.shear, material.shear, shift};
 }
 
-// Adds one axis to the cells' numbers.
-TANDEM_VECTOR_CLONES void add_axis(const std::int32_t* __restrict p, std::uint32_t* __restrict cell,
-                                   std::size_t count, std::uint32_t shift, std::int32_t cells_per,
-                                   std::uint32_t axis_shift) {
-  for (std::size_t s = 0; s < count; ++s)
-    cell[s] += static_cast<std::uint32_t>(std::int64_t{p[s] >> shift} * cells_per >> 32) << axis_shift;
+struct CellNumbers {
+  std::uint32_t shift, side_bits;
+  std::int32_t cells_per;
+};
+
+TANDEM_VECTOR_CLONES void number_cells(const CellNumbers& how, const std::int32_t* __restrict x,
+                                       const std::int32_t* __restrict y, const std::int32_t* __restrict z,
+                                       std::uint32_t* __restrict cell, std::size_t count) {
+  const std::uint32_t last = (1U << (3 * how.side_bits)) - 1;
+  const auto along = [shift = how.shift, cells_per = how.cells_per](std::int32_t p) {
+    return static_cast<std::uint32_t>(std::int64_t{p >> shift} * cells_per >> 32);
+  };
+  for (std::size_t s = 0; s < count; ++s) {
+    cell[s] = (along(x[s]) + (along(y[s]) << how.side_bits) + (along(z[s]) << (2 * how.side_bits))) & last;
+  }
 }
 
 TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
@@ -97,7 +106,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
       inverse_root_(kRoots) {
   const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
   cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 32) / (width + 1));
-  near_ = (width >> kNearShift) + 3;
+  near_ = ((width + (constants_.substeps > 1 ? width >> 5 : 0)) >> kNearShift) + 3;
   later_share_ = 32768 - (32768 + constants_.substeps / 2) / constants_.substeps;
   one_mobility_ =
       std::ranges::all_of(constants_.types, [](const auto& type) { return type.mobility == 65536; });
@@ -110,19 +119,13 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
 
 void Contact::sort(const State& state) {
   const std::uint32_t capacity = state.capacity();
-  std::fill(cell_.begin(), cell_.end(), 0U);
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    add_axis(state.p(i).data(), cell_.data(), capacity, shift_, cells_per_, i * side_bits_);
-  }
+  number_cells({shift_, side_bits_, cells_per_}, state.p(0).data(), state.p(1).data(), state.p(2).data(),
+               cell_.data(), capacity);
   accelerated_ = any_of(state.c(0).data(), capacity) || any_of(state.c(1).data(), capacity) ||
                  any_of(state.c(2).data(), capacity);
   std::fill(begin_.begin(), begin_.end(), 0U);
   const std::span<const std::uint8_t> alive = state.alive();
-  const std::uint32_t last = (1U << (3 * side_bits_)) - 1;
-  for (Slot s = 0; s < capacity; ++s) {
-    cell_[s] &= last;
-    place_[s] = (begin_[cell_[s]] += alive[s]) - 1;
-  }
+  for (Slot s = 0; s < capacity; ++s) place_[s] = (begin_[cell_[s]] += alive[s]) - 1;
   std::uint32_t sum = 0;
   for (std::uint32_t& begin : begin_) {
     const std::uint32_t in_cell = std::min(begin, ContactGrid::kMostInCell);
@@ -179,7 +182,13 @@ void Contact::write(const State& from, const Drive& drive, State& to) const {
     std::ranges::copy(from.alive(), to.alive().begin());
     std::ranges::copy(from.generation(), to.generation().begin());
     std::ranges::copy(from.type(), to.type().begin());
-    for (std::size_t i = 0; i < 3; ++i) std::ranges::copy(from.c(i), to.c(i).begin());
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (accelerated_) {
+        std::ranges::copy(from.c(i), to.c(i).begin());
+      } else {
+        std::ranges::fill(to.c(i), 0);
+      }
+    }
   }
   static constexpr ContactBody kDead{};
   for (Slot s = 0; s < to.capacity(); ++s) {

@@ -54,7 +54,9 @@ void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const 
     const std::int32_t reach = a.radius + b.radius;
     if (squared >= static_cast<std::uint32_t>(reach * reach)) continue;
     const std::uint32_t inverse = inverse_root[squared >> 16];
-    const auto distance = static_cast<std::int32_t>((squared >> 12) * inverse >> 18);
+    // Half way to the middle of the table's entry: its slope is twice the root's.
+    const std::uint32_t middle = (squared + ((squared & 0xFFFF0000U) | 0x8000U)) >> 1;
+    const auto distance = static_cast<std::int32_t>((middle >> 12) * inverse >> 18);
     Vec3i n{0, squared == 0 ? 1 << 12 : 0, 0};
     Vec3i u{};
     for (std::size_t i = 0; i < 3; ++i) {

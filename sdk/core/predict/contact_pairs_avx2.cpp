@@ -179,7 +179,9 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
   const Wide touching = _mm256_cmpeq_epi32(_mm256_min_epu32(squared, most), squared);
   squared = _mm256_and_si256(squared, touching);
   const Wide inverse = looked_up(inverse_root, _mm256_srli_epi32(squared, 16));
-  const Wide distance = _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(squared, 12), inverse), 18);
+  const Wide entry = _mm256_or_si256(_mm256_and_si256(squared, same(0xFFFF0000U)), same(1 << 15));
+  const Wide middle = _mm256_srli_epi32(_mm256_add_epi32(squared, entry), 1);
+  const Wide distance = _mm256_srli_epi32(_mm256_mullo_epi32(_mm256_srli_epi32(middle, 12), inverse), 18);
   const Wide overlap = _mm256_max_epi32(_mm256_sub_epi32(reach, distance), Wide{});
   Wide n[3];
   for (unsigned i = 0; i < 3; ++i) n[i] = _mm256_srai_epi32(_mm256_mullo_epi32(with_sign(d[i]), inverse), 18);
