@@ -1,5 +1,7 @@
 #include "services/server/contact_plan.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -28,10 +30,12 @@ ContactMaterial material_of(const engine::Material& material, double mass, doubl
 
 }  // namespace
 
-Result<std::vector<std::int32_t>> contact_constants(const scenes::Scene& scene, const Lattice& lattice) {
+Result<std::vector<std::int32_t>> contact_constants(const scenes::Scene& scene, const Lattice& lattice,
+                                                    std::string_view predictor) {
   const engine::World& world = scene.world;
   if (world.types.empty())
-    return fail(ErrorCode::kInvalidArgument, "predictor 'contact' needs a scene with body types");
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("predictor '{}' needs a scene with body types", predictor));
   const double scale = lattice.position_scale();
   const double one = ContactConstants::kOne;
   const auto mass = static_cast<double>(world.types.front().mass);
@@ -58,7 +62,8 @@ Result<std::vector<std::int32_t>> contact_constants(const scenes::Scene& scene, 
         {scaled(ball.centre, scale), rounded(static_cast<double>(ball.radius) * scale)});
   std::vector<std::int32_t> values = write_contact_constants(constants);
   if (!read_contact_constants(values))
-    return fail(ErrorCode::kInvalidArgument, "predictor 'contact': the world does not fit the lattice");
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("predictor '{}': the world does not fit the lattice", predictor));
   return values;
 }
 

@@ -1,7 +1,8 @@
 #pragma once
-// The scene's world as the constants of the predictor `contact`.
+// The scene's world as the constants of the predictors `contact` and `field`.
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "services/scenes/scene.hpp"
@@ -10,9 +11,10 @@
 
 namespace tandem::server {
 
-/// The integers that travel in the session. Errors: kInvalidArgument for a scene without body types (a
-/// recorded trajectory) or one that does not fit the lattice.
+/// The integers that travel in the session. `predictor` is named in errors: kInvalidArgument for a scene
+/// without body types (a recorded trajectory) or one that does not fit the lattice.
 [[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const scenes::Scene& scene,
-                                                                  const Lattice& lattice);
+                                                                  const Lattice& lattice,
+                                                                  std::string_view predictor);
 
 }  // namespace tandem::server

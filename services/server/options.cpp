@@ -171,7 +171,9 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--domain", flags.domain, "DDS domain [0]");
   app.add_option("--codec", flags.codec, fmt::format("{} [entropy]", fmt::join(codec_names(), ", ")));
   app.add_option("--predictor", flags.predictor,
-                 "Predicted step of server and clients: ballistic, field or contact [ballistic]");
+                 "Predicted step of server and clients: ballistic, field, contact, or auto: field with codec "
+                 "tracker and "
+                 "at most 50,000 bodies, else ballistic [auto]");
   app.add_option_function<std::string>(
          "--threshold",
          [&flags](const std::string& text) {

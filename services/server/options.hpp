@@ -20,7 +20,7 @@ struct Settings {
 
 /// Checked and complete.
 struct Options {
-  std::string scene, session = "default", codec = "entropy", predictor = "ballistic", hash_log;
+  std::string scene, session = "default", codec = "entropy", predictor = "auto", hash_log;
   std::uint32_t bodies = 0, domain = 0, budget_bytes = 0, lead = 1, client_limit = 256, wait_for = 0,
                 threads = 1, users = 0;
   std::uint64_t seed = 1;

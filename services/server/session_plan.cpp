@@ -16,6 +16,8 @@ namespace {
 // Automatic quality moves between these multiples of the threshold it starts from.
 constexpr double kFinest = 0.25;
 constexpr double kCoarsest = 4;
+// Beyond, even a fast client would spend most of a frame on its predicted step.
+constexpr std::uint32_t kMostBodiesOfField = 50'000;
 
 std::vector<std::byte> codec_tables(const std::string& codec, const scenes::TrainedTable& table) {
   std::vector<std::byte> bytes;
@@ -24,6 +26,24 @@ std::vector<std::byte> codec_tables(const std::string& codec, const scenes::Trai
     for (const std::uint8_t length : *lengths) bytes.push_back(std::byte{length});
   }
   return bytes.empty() ? default_code_tables() : bytes;
+}
+
+// Sets the predictor and its constants.
+Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice, const Lattice& lattice,
+                              HostConfig& config) {
+  const bool automatic = choice.predictor == "auto";
+  const bool field_pays = choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField;
+  config.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
+  if (config.predictor != "field" && config.predictor != "contact") return {};
+  auto constants = contact_constants(scene, lattice, config.predictor);
+  if (constants) {
+    config.predictor_constants = std::move(*constants);
+  } else if (automatic) {
+    config.predictor = "ballistic";
+  } else {
+    return tl::unexpected(constants.error());
+  }
+  return {};
 }
 
 }  // namespace
@@ -58,16 +78,12 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   config.codec = choice.codec;
   config.codec_tables = codec_tables(choice.codec, table);
   config.budget = choice.codec == "limited" ? choice.budget_bytes : kNoBudget;
-  config.predictor = choice.predictor;
-  if (choice.predictor == "contact" || choice.predictor == "field") {
-    auto constants = contact_constants(scene, *lattice);
-    if (!constants) return tl::unexpected(constants.error());
-    config.predictor_constants = std::move(*constants);
-  }
+  if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
+    return tl::unexpected(chosen.error());
   config.run_blocks = blocks_on_threads(choice.threads);
   // Only the tier `ballistic` learns contact forces, so only there it matters how fast they are forgotten.
   const bool has_decay =
-      choice.codec == "tracker" && choice.predictor == "ballistic" && table.tracker_decay != 0;
+      choice.codec == "tracker" && config.predictor == "ballistic" && table.tracker_decay != 0;
   config.decay = has_decay ? table.tracker_decay : recommended_decay(choice.codec);
   config.scene = scene.name;
   config.scene_description = scene.text;

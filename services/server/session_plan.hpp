@@ -16,7 +16,8 @@ namespace tandem::server {
 struct SessionChoice {
   std::uint32_t bodies = 0;
   std::string codec = "entropy";
-  std::string predictor = "ballistic";
+  /// auto: `field` for `tracker` with at most 50,000 bodies in a scene that has body types, else `ballistic`
+  std::string predictor = "auto";
   std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
   double threshold_scale = 1;
   bool automatic = false;        ///< quality follows the scene at run time, from a quarter of that threshold

@@ -200,9 +200,9 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->delimiter(',')
       ->check(CLI::IsMember(options->codecs));
   command
-      ->add_option(
-          "--predictor", options->choice.predictor,
-          "Predicted step of `tracker`: ballistic, field or contact; the paper's codecs have ballistic")
+      ->add_option("--predictor", options->choice.predictor,
+                   "Predicted step of `tracker`: ballistic, field, contact, or auto; the paper's codecs have "
+                   "ballistic")
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();

@@ -235,6 +235,24 @@ TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
   }
 }
 
+TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
+  auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  const auto predictor = [&](const char* codec, std::uint32_t bodies) {
+    SessionChoice choice;
+    choice.bodies = bodies;
+    choice.codec = codec;
+    const auto config = *plan_session(*scene, choice);
+    EXPECT_EQ(config.predictor_constants.empty(), config.predictor == "ballistic");
+    return config.predictor;
+  };
+  EXPECT_EQ(predictor("tracker", 50000), "field");
+  EXPECT_EQ(predictor("tracker", 50001), "ballistic");
+  EXPECT_EQ(predictor("entropy", 1000), "ballistic");
+  scene->world.types.clear();  // as of a recorded trajectory
+  EXPECT_EQ(predictor("tracker", 1000), "ballistic");
+}
+
 TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
   const auto scene = scenes::load_scene("cube");
   ASSERT_TRUE(scene);
