@@ -20,7 +20,7 @@ struct GainSet {
 constexpr GainSet kBallistic{52429, 9830, 3, 2, 19661};  // 0.8, 0.15
 // Contacts are predicted: what is left grows slower, and there is no force to learn.
 constexpr GainSet kContact{45875, 0, 3, 3, 19661};  // 0.7, 0
-constexpr GainSet kField{45875, 0, 3, 3, 6554};    // 0.7, 0: likewise
+constexpr GainSet kField{45875, 0, 3, 3, 5243};     // 0.7, 0: likewise
 
 TrackerGains make_gains(const GainSet& set) {
   TrackerGains gains;
