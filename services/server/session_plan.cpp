@@ -28,11 +28,19 @@ std::vector<std::byte> codec_tables(const std::string& codec, const scenes::Trai
   return bytes.empty() ? default_code_tables() : bytes;
 }
 
+// `field` takes all bodies for as large as the largest.
+bool alike(const std::vector<engine::ParticleType>& types) {
+  if (types.empty()) return false;
+  const auto [smallest, largest] = std::ranges::minmax(types, {}, &engine::ParticleType::radius);
+  return smallest.radius > 0.9F * largest.radius;
+}
+
 // Sets the predictor and its constants.
 Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice, const Lattice& lattice,
                               HostConfig& config) {
   const bool automatic = choice.predictor == "auto";
-  const bool field_pays = choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField;
+  const bool field_pays =
+      choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
   config.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
   if (config.predictor != "field" && config.predictor != "contact") return {};
   auto constants = contact_constants(scene, lattice, config.predictor);

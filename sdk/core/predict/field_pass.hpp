@@ -40,10 +40,12 @@ struct Pass {
     const Lanes x8 = x << 3;
     const Lanes xx = high_product(x8, x8);
     const Lanes curve = high_product(xx + xx, all(11469) + (x << 2));
+    const Lanes twice = saturated_sum(curve, curve);
     const Lanes along = high_product(u[0], d[0]) + high_product(u[1], d[1]) + high_product(u[2], d[2]);
-    const Lanes push = saturated_difference(high_product(saturated_sum(x8, curve << 2), spring),
-                                            high_product(along, shear) << shear_shift) &
-                       touching;
+    const Lanes push =
+        saturated_difference(high_product(saturated_sum(x8, saturated_sum(twice, twice)), spring),
+                             high_product(along, shear) << shear_shift) &
+        touching;
     const Lanes rub = drag & touching;
     for (unsigned i = 0; i < 3; ++i) sum[i] = sum[i] + product(push, d[i]) + product(u[i], rub);
   }
