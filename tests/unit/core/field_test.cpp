@@ -152,6 +152,19 @@ TEST(Field, TwoBodiesPartWithEqualAndOppositeSpeed) {
   }
 }
 
+TEST(Field, DeepOverlapsPartToo) {
+  ContactConstants constants = constants_of(1);
+  constants.planes.clear();
+  const auto predictor = field(2, constants);
+  for (std::int32_t distance = kRadius / 100; distance < 2 * kRadius; distance += kRadius / 100) {
+    State state(2);
+    state.spawn(0, 0, 0, {{0, 0, 0}, {}});
+    state.spawn(1, 0, 0, {{0, distance, 0}, {}});
+    predictor->step(state, state, {});
+    ASSERT_GE(state.v(1)[1], distance < 19 * kRadius / 10 ? 1 : 0) << distance;
+  }
+}
+
 TEST(Field, BodiesApartMoveAsBallistic) {
   std::mt19937_64 random(74);
   ContactConstants constants = constants_of(1);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <tuple>
 
 #include "sdk/core/predict/contact_constants.hpp"
 #include "tests/unit/timeline/session.hpp"
@@ -13,13 +14,13 @@ namespace {
 constexpr std::uint32_t kCapacity = 120;
 constexpr std::int32_t kRadius = 2000;
 
-TimelineConfig contact_config(std::uint32_t max_lead) {
+TimelineConfig contact_config(const char* predictor, std::uint32_t max_lead) {
   TimelineConfig config = synthetic::config_for("tracker", kCapacity, max_lead);
   ContactConstants constants;
   constants.pair = constants.wall = {3641, 410, 410};
   constants.types = {{kRadius, 65536}};
   constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
-  config.predictor = "contact";
+  config.predictor = predictor;
   config.predictor_constants = write_contact_constants(constants);
   return config;
 }
@@ -34,22 +35,23 @@ State heap(std::mt19937_64& random) {
   return state;
 }
 
-class ContactSession : public testing::TestWithParam<std::uint32_t> {};
+class ContactSession : public testing::TestWithParam<std::tuple<const char*, std::uint32_t>> {};
 
 TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
   constexpr std::uint64_t kSeed = 61;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
-  const TimelineConfig config = contact_config(2);
+  const auto [name, lead] = GetParam();
+  const TimelineConfig config = contact_config(name, 2);
   auto server = synthetic::server_of(config);
   auto client = synthetic::client_of(config);
   State target = heap(random);
   server.start(0, target, {{0, -300, 0}, 200, 800});
   ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
-  const auto predictor = *make_predictor("contact", kCapacity, config.predictor_constants);
+  const auto predictor = *make_predictor(name, kCapacity, config.predictor_constants);
   std::uint32_t corrected = 0;
   for (int frame = 0; frame < 100; ++frame) {
-    while (client.step(GetParam())) {
+    while (client.step(lead)) {
     }
     predictor->step(target, target, {{0, -300, 0}, 200, 0});
     const Slot pushed = static_cast<Slot>(random() % kCapacity);
@@ -67,7 +69,8 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
   EXPECT_GE(corrected, 100U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Leads, ContactSession, testing::Values(0U, 1U, 2U));
+INSTANTIATE_TEST_SUITE_P(PredictorsAndLeads, ContactSession,
+                         testing::Combine(testing::Values("contact", "field"), testing::Values(0U, 1U, 2U)));
 
 }  // namespace
 }  // namespace tandem
