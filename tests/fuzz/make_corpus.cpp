@@ -1,5 +1,6 @@
 // Writes the seed corpus: make_corpus FOLDER. Small states, so that a fuzzer runs fast.
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -45,6 +46,35 @@ bool write_deltas(const std::filesystem::path& folder) {
   return true;
 }
 
+// Streams for fuzz_tracker: a few deltas in a row, with an edit of the coder's state between them.
+bool write_streams(const std::filesystem::path& folder) {
+  constexpr std::uint32_t kBodies = 12;  // as in fuzz_tracker
+  for (const std::uint64_t moved_one_in : {2U, 6U}) {
+    synthetic::Random random(1);
+    State state = synthetic::random_state(random, kBodies);
+    DeltaCodec delta = synthetic::make_delta("tracker", kBodies, kParameters);
+    std::vector<std::byte> payload(delta.bound());
+    std::vector<std::byte> stream;
+    for (int frame = 0; frame < 4; ++frame) {
+      State target = state;
+      for (Slot slot = 0; slot < kBodies; ++slot) {
+        if (state.alive()[slot] == 0 || !random.one_in(moved_one_in)) continue;
+        BodyState body = state.body(slot);
+        for (std::int32_t& p : body.p) p = std::clamp(p + random.even(500), -kPositionLimit, kPositionLimit);
+        target.set_body(slot, body);
+      }
+      const auto size = delta.encode(state, target, {}, kNoBudget, payload).size_bytes;
+      if (size >= 128) return false;
+      stream.push_back(static_cast<std::byte>(size));
+      stream.insert(stream.end(), payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(size));
+      for (const int byte : {129, frame, 0, 7}) stream.push_back(static_cast<std::byte>(byte));
+    }
+    if (!write_file(folder / "tracker" / ("moved-one-in-" + std::to_string(moved_one_in)), stream))
+      return false;
+  }
+  return true;
+}
+
 bool write_snapshots(const std::filesystem::path& folder) {
   TimelineConfig config;
   config.capacity = kCapacity;
@@ -77,7 +107,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder(argv[1]);
-  if (tandem::write_deltas(folder) && tandem::write_snapshots(folder)) return 0;
+  if (tandem::write_deltas(folder) && tandem::write_streams(folder) && tandem::write_snapshots(folder))
+    return 0;
   std::fprintf(stderr, "could not write to %s\n", argv[1]);
   return 1;
 }
