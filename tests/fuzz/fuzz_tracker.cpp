@@ -20,52 +20,58 @@ void require(bool holds) {
   if (!holds) std::abort();
 }
 
+struct Side {
+  Side() : delta(synthetic::make_delta("tracker", kCapacity, kParameters)), state(kCapacity) {}
+  void save(std::vector<std::byte>& bytes) const {
+    bytes.resize(delta.codec().save_bound());
+    ByteWriter out(bytes);
+    delta.codec().save(out);
+    bytes.resize(out.size());
+  }
+  DeltaCodec delta;
+  State state;
+};
+
+// A decoder that is given everything, and a twin that is given only what the first one took: they end alike.
 class Stream {
  public:
-  Stream() : delta_(synthetic::make_delta("tracker", kCapacity, kParameters)), state_(kCapacity) {
+  Stream() {
     synthetic::Random random(1);
-    state_ = start_ = synthetic::random_state(random, kCapacity);
-    fresh_ = saved();
+    start_ = synthetic::random_state(random, kCapacity);
+    side_.save(fresh_);
   }
   void restart() {
-    require(delta_.codec().load(fresh_).has_value());
-    delta_.restore_parameters(kParameters);
-    state_ = start_;
+    for (Side* side : {&side_, &twin_}) {
+      require(side->delta.codec().load(fresh_).has_value());
+      side->delta.restore_parameters(kParameters);
+      side->state = start_;
+    }
   }
   void payload(std::span<const std::byte> bytes) {
-    const auto before = saved();
-    const State held = state_;
-    const CodecParameters parameters = delta_.parameters();
-    if (delta_.decode(state_, bytes)) {
-      require(synthetic::broken_invariant(state_) == nullptr);
-      return;
-    }
-    require(state_ == held && delta_.parameters() == parameters && saved() == before);
+    if (!side_.delta.decode(side_.state, bytes)) return;
+    require(synthetic::broken_invariant(side_.state) == nullptr);
+    require(twin_.delta.decode(twin_.state, bytes).has_value());
   }
   void edit(std::span<const std::byte> edits) {
-    const auto before = saved();
-    auto edited = before;
+    side_.save(edited_);
     ByteReader in(edits);
     while (in.remaining() >= 3) {
       const std::size_t at = in.get<std::uint16_t>();
-      edited[at % edited.size()] = static_cast<std::byte>(in.get<std::uint8_t>());
+      edited_[at % edited_.size()] = static_cast<std::byte>(in.get<std::uint8_t>());
     }
-    const bool taken = delta_.codec().load(edited).has_value();
-    require(saved() == (taken ? edited : before));
+    if (side_.delta.codec().load(edited_)) require(twin_.delta.codec().load(edited_).has_value());
+  }
+  void end() {
+    side_.save(edited_);
+    twin_.save(saved_);
+    require(edited_ == saved_ && side_.state == twin_.state);
+    require(side_.delta.parameters() == twin_.delta.parameters());
   }
 
  private:
-  std::vector<std::byte> saved() const {
-    std::vector<std::byte> bytes(delta_.codec().save_bound());
-    ByteWriter out(bytes);
-    delta_.codec().save(out);
-    bytes.resize(out.size());
-    return bytes;
-  }
-  DeltaCodec delta_;
+  Side side_, twin_;
   State start_{kCapacity};
-  State state_;
-  std::vector<std::byte> fresh_;
+  std::vector<std::byte> fresh_, edited_, saved_;
 };
 
 void try_stream(std::span<const std::byte> input) {
@@ -79,6 +85,7 @@ void try_stream(std::span<const std::byte> input) {
     is_payload ? stream.payload(body) : stream.edit(body);
     input = input.subspan(1 + size);
   }
+  stream.end();
 }
 
 }  // namespace
