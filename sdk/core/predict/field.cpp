@@ -10,7 +10,6 @@
 namespace tandem {
 namespace {
 
-
 // Eight cells a side or more, so that a way round the torus is a whole number of times 2^16 but for the edge.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
   std::uint32_t bits = 3;
