@@ -54,8 +54,8 @@ void add_slabs(const ContactConstants::Ball& ball, std::int64_t r, std::vector<S
   for (std::size_t i = 0; i < 3; ++i) {
     Slab slab;
     slab.normal[i] = 1 << 30;
-    slab.low = (ball.centre[i] - ball.radius - r) * (1 << 30);
-    slab.high = (ball.centre[i] + ball.radius + r) * (1 << 30);
+    slab.low = (ball.centre[i] - (ball.radius + r)) * (1 << 30);
+    slab.high = (ball.centre[i] + (ball.radius + r)) * (1 << 30);
     slabs.push_back(slab);
   }
 }

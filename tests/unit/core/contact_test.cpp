@@ -7,6 +7,7 @@
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/predict/contact_pairs.hpp"
+#include "sdk/core/predict/contact_walls.hpp"
 
 namespace tandem {
 namespace {
@@ -225,6 +226,32 @@ TEST(Contact, TheFastestKernelsEqualThePortableOnes) {
       }
     }
   }
+}
+
+TEST(Contact, WallsPushManyBodiesAsEachOfThemAlone) {
+  constexpr std::uint64_t kSeed = 74;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  constexpr std::size_t kCount = 300;
+  const ContactConstants constants = constants_of(1);
+  const ContactWalls walls(constants, {3641, 820, 410, 2}, kRadius);
+  std::vector<ContactBody> bodies(kCount);
+  std::vector<ContactForce> forces(kCount);
+  for (std::size_t k = 0; k < kCount; ++k) {
+    bodies[k] = {vector_within(random, 15 * kRadius), kRadius, vector_within(random, 100000), 0};
+    // Blocks that no shape meets, too.
+    if (k / 64 % 2 == 1) bodies[k].p[1] += 30 * kRadius;
+  }
+  walls.add_forces(bodies, forces);
+  std::size_t touching = 0;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    ContactForce alone{};
+    walls.add_forces(std::span(bodies).subspan(k, 1), std::span(&alone, 1));
+    EXPECT_EQ(forces[k].f, alone.f) << "body " << k;
+    touching += alone.f != Vec3i{} ? 1U : 0U;
+  }
+  EXPECT_GT(touching, 50U);
+  EXPECT_LT(touching, kCount - 50U);
 }
 
 TEST(Contact, ConstantsReadBackAsTheyWereWritten) {
