@@ -2,14 +2,14 @@
 
 #include <memory>
 
-#include "services/engine/particles/workers.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::server {
 
 RunBlocks blocks_on_threads(std::uint32_t threads) {
   if (threads <= 1) return {};
-  return [workers = std::make_shared<engine::Workers>(threads)](
-             std::uint32_t count, const std::function<void(std::uint32_t)>& job) {
+  return [workers = std::make_shared<Workers>(threads)](std::uint32_t count,
+                                                        const std::function<void(std::uint32_t)>& job) {
     workers->run(count, 1, [&job](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t i = begin; i < end; ++i) job(i);
     });

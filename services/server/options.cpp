@@ -75,9 +75,9 @@ Result<void> check_numbers(const Settings& settings, const Options& options) {
     return refuse("target-bandwidth", "Mbit/s, at least 0.001");
   if (options.max_error_m && !within(*options.max_error_m, 1e-9, 1e9))
     return refuse("max-error", "a positive length");
-  if (settings.budget_bytes && options.codec != "limited")
-    return refuse("budget", "only with --codec limited");
-  if (options.budget_bytes < 64) return refuse("budget", "at least 64 bytes");
+  if (options.budget_bytes && options.codec != "limited" && options.codec != "tracker")
+    return refuse("budget", "only with --codec limited or tracker");
+  if (options.budget_bytes && *options.budget_bytes < 64) return refuse("budget", "at least 64 bytes");
   return {};
 }
 
@@ -123,7 +123,6 @@ Result<Options> check_settings(const Settings& settings) {
   Options options;
   if (!settings.scene || settings.scene->empty()) return refuse("scene", "a scene's name or file is needed");
   if (!settings.bodies) return refuse("bodies", "how many are needed");
-  options.budget_bytes = kPaperBudgetBytes;
   take(options.scene, settings.scene);
   take(options.session, settings.session);
   take(options.codec, settings.codec);
@@ -131,7 +130,7 @@ Result<Options> check_settings(const Settings& settings) {
   take(options.hash_log, settings.hash_log);
   take(options.bodies, settings.bodies);
   take(options.domain, settings.domain);
-  take(options.budget_bytes, settings.budget_bytes);
+  options.budget_bytes = settings.budget_bytes;
   take(options.lead, settings.lead);
   take(options.client_limit, settings.client_limit);
   take(options.wait_for, settings.wait_for);
@@ -169,7 +168,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--bodies", flags.bodies, "Number of bodies");
   app.add_option("--session", flags.session, "Name that clients join by [default]");
   app.add_option("--domain", flags.domain, "DDS domain [0]");
-  app.add_option("--codec", flags.codec, fmt::format("{} [entropy]", fmt::join(codec_names(), ", ")));
+  app.add_option("--codec", flags.codec, fmt::format("{} [tracker]", fmt::join(codec_names(), ", ")));
   app.add_option("--predictor", flags.predictor,
                  "Predicted step of server and clients: ballistic, field, contact, or auto: field with codec "
                  "tracker and "
@@ -192,7 +191,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
                  "Largest threshold of --threshold auto, in metres [four times the scene's]");
   app.add_option("--threshold-scale", flags.threshold_scale, "The scene's threshold times this [1]");
   app.add_option("--budget", flags.budget_bytes,
-                 "Bytes of corrections per frame with --codec limited [6553]");
+                 "Bytes of corrections per frame with --codec limited [6553] or tracker [no limit]");
   app.add_option("--window", flags.window,
                  "Frames the server may run ahead of its slowest participant, or auto [auto]");
   app.add_option("--lead", flags.lead, "Frames a client may simulate beyond its last delta: 0 or 1 [1]");

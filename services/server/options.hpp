@@ -20,10 +20,10 @@ struct Settings {
 
 /// Checked and complete.
 struct Options {
-  std::string scene, session = "default", codec = "entropy", predictor = "auto", hash_log;
-  std::uint32_t bodies = 0, domain = 0, budget_bytes = 0, lead = 1, client_limit = 256, wait_for = 0,
-                threads = 1, users = 0;
+  std::string scene, session = "default", codec = "tracker", predictor = "auto", hash_log;
+  std::uint32_t bodies = 0, domain = 0, lead = 1, client_limit = 256, wait_for = 0, threads = 1, users = 0;
   std::uint64_t seed = 1;
+  std::optional<std::uint32_t> budget_bytes;
   std::optional<double> threshold_m;
   double threshold_scale = 1;
   bool automatic = false;  ///< --threshold auto

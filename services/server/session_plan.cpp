@@ -85,7 +85,8 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   config.frame_rate_hz = 1 / scene.dt_s;
   config.codec = choice.codec;
   config.codec_tables = codec_tables(choice.codec, table);
-  config.budget = choice.codec == "limited" ? choice.budget_bytes : kNoBudget;
+  if (choice.codec == "limited") config.budget = choice.budget_bytes.value_or(kPaperBudgetBytes);
+  if (choice.codec == "tracker") config.budget = choice.budget_bytes.value_or(kNoBudget);
   if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
     return tl::unexpected(chosen.error());
   config.run_blocks = blocks_on_threads(choice.threads);

@@ -15,16 +15,17 @@ namespace tandem::server {
 /// What an operator chooses on top of the scene.
 struct SessionChoice {
   std::uint32_t bodies = 0;
-  std::string codec = "entropy";
+  std::string codec = "tracker";
   /// auto: `field` for `tracker` with at most 50,000 bodies in a scene that has body types, else `ballistic`
   std::string predictor = "auto";
   std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
   double threshold_scale = 1;
   bool automatic = false;        ///< quality follows the scene at run time, from a quarter of that threshold
   double target_mbit_per_s = 0;  ///< with `automatic`; 0: the threshold stays
-  std::optional<double> max_error_m;             ///< with `automatic`; empty: four times the threshold
-  std::size_t budget_bytes = kPaperBudgetBytes;  ///< of corrections per frame; for `limited` only
-  std::uint32_t threads = 1;                     ///< of the codec, where a session has several blocks
+  std::optional<double> max_error_m;  ///< with `automatic`; empty: four times the threshold
+  /// Of corrections per frame, for `limited` and `tracker`; empty: the paper's and none.
+  std::optional<std::size_t> budget_bytes;
+  std::uint32_t threads = 1;  ///< of the codec, where a session has several blocks
 };
 
 /// The part of a host's configuration that follows from scene and choice: lattice, codec with tables,

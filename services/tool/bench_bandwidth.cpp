@@ -212,7 +212,10 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->capture_default_str();
   command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
       ->check(CLI::Range(1U, scenes::kMaxUsers));
-  command->add_option("--budget", options->choice.budget_bytes, "Bytes of corrections a frame for `limited`")
+  command
+      ->add_option(
+          "--budget", options->choice.budget_bytes,
+          "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
       ->capture_default_str();
   command
       ->add_option("--trajectory", options->trajectory,

@@ -29,11 +29,12 @@ EDGES = {
     "sdk/transport/dds": CORE + ["sdk/transport"],
     "sdk/client": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds"],
     "sdk/examples": ["public"],
+    "services/workers": [],
     "services/engine": [],
-    "services/engine/particles": ["public/result.hpp", "services/engine/simulation.hpp"],
+    "services/engine/particles": ["public/result.hpp", "services/engine/simulation.hpp", "services/workers"],
     "services/scenes": ["public/result.hpp", "services/engine", "services/engine/particles"],
     "services/server": TIMELINE
-    + ["sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp", "services/scenes"],
+    + ["sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp", "services/scenes", "services/workers"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
     + ["services/engine/simulation.hpp"]

@@ -9,8 +9,9 @@
 
 #include "services/engine/particles/check.hpp"
 #include "services/engine/particles/columns.hpp"
+#include "services/engine/particles/float_environment.hpp"
 #include "services/engine/particles/grid.hpp"
-#include "services/engine/particles/workers.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 namespace {
@@ -96,7 +97,7 @@ Particles::Particles(const World& world, std::uint32_t threads)
       fingerprint_(fingerprint(world)),
       columns_(world.capacity),
       grid_(world.low, world.high, 2 * kCellSlack * largest_radius(world), world.capacity),
-      workers_(threads),
+      workers_(threads, [] { std::fesetenv(FE_DFL_ENV); }),
       sums_(world.capacity),
       contact_block_(contact_block(world.capacity, threads)) {
   for (const ParticleType& type : world.types) inverse_mass_.push_back(1.0F / type.mass);

@@ -42,13 +42,13 @@ TEST(Options, DefaultsAreThoseOfTheManual) {
   const auto options = check_settings(least());
   ASSERT_TRUE(options);
   EXPECT_EQ(options->session, "default");
-  EXPECT_EQ(options->codec, "entropy");
+  EXPECT_EQ(options->codec, "tracker");
   EXPECT_EQ(options->lead, 1U);
   EXPECT_FALSE(options->window);
   EXPECT_FALSE(options->free_rate);
   EXPECT_EQ(options->stall_timeout_s, 0.5);
   EXPECT_FALSE(options->duration_s);
-  EXPECT_EQ(options->budget_bytes, kPaperBudgetBytes);
+  EXPECT_FALSE(options->budget_bytes);
 }
 
 TEST(Options, WordsAndNumbersAreBothUnderstood) {
@@ -101,7 +101,12 @@ TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
   }
   EXPECT_NE(refusal([](Settings& s) { s.duration = -1; }).find("--duration"), std::string::npos);
   EXPECT_NE(refusal([](Settings& s) { s.duration = std::nan(""); }).find("--duration"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.budget_bytes = 1000; }).find("--budget"), std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) {
+              s.codec = "entropy";
+              s.budget_bytes = 1000;
+            }).find("--budget"),
+            std::string::npos);
+  EXPECT_NE(refusal([](Settings& s) { s.budget_bytes = 63; }).find("--budget"), std::string::npos);
   EXPECT_NE(refusal([](Settings& s) {
               s.threshold = 1;
               s.threshold_scale = 1;
@@ -211,6 +216,20 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       EXPECT_GT(*largest, 0U);
     }
   }
+}
+
+TEST(SessionPlan, ABudgetBindsTheCodecsThatServeWhoWaits) {
+  const auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  SessionChoice choice;
+  choice.bodies = 1000;
+  EXPECT_EQ(plan_session(*scene, choice)->budget, kNoBudget);
+  choice.budget_bytes = 200;
+  EXPECT_EQ(plan_session(*scene, choice)->budget, 200U);
+  choice.codec = "limited";
+  EXPECT_EQ(plan_session(*scene, choice)->budget, 200U);
+  choice.codec = "entropy";
+  EXPECT_EQ(plan_session(*scene, choice)->budget, kNoBudget);
 }
 
 TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {

@@ -1,20 +1,15 @@
-#include "services/engine/particles/workers.hpp"
+#include "services/workers/workers.hpp"
 
 #include <algorithm>
+#include <utility>
 
-namespace tandem::engine {
+namespace tandem {
 
-FloatEnvironment::FloatEnvironment() {
-  std::fegetenv(&saved_);
-  std::fesetenv(FE_DFL_ENV);
-}
-
-FloatEnvironment::~FloatEnvironment() { std::fesetenv(&saved_); }
-
-Workers::Workers(std::uint32_t threads) : barrier_(static_cast<std::ptrdiff_t>(std::max(threads, 1U))) {
+Workers::Workers(std::uint32_t threads, std::function<void()> prepare)
+    : barrier_(static_cast<std::ptrdiff_t>(std::max(threads, 1U))) {
   for (std::uint32_t i = 1; i < threads; ++i) {
-    threads_.emplace_back([this] {
-      const FloatEnvironment environment;
+    threads_.emplace_back([this, prepare] {
+      if (prepare) prepare();
       for (;;) {
         barrier_.arrive_and_wait();
         if (stop_) return;
@@ -47,4 +42,4 @@ void Workers::take_blocks() {
   }
 }
 
-}  // namespace tandem::engine
+}  // namespace tandem

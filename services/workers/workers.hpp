@@ -3,19 +3,20 @@
 
 #include <atomic>
 #include <barrier>
-#include <cfenv>
 #include <cstdint>
+#include <functional>
 #include <thread>
 #include <vector>
 
-namespace tandem::engine {
+namespace tandem {
 
 /// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
 /// because a static split waits for the thread whose core somebody else is using. Jobs write to places of
 /// their own.
 class Workers {
  public:
-  explicit Workers(std::uint32_t threads);
+  /// `prepare` is called first on each thread of its own.
+  explicit Workers(std::uint32_t threads, std::function<void()> prepare = {});
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
   Workers(Workers&&) = delete;
@@ -50,19 +51,4 @@ class Workers {
   std::vector<std::jthread> threads_;
 };
 
-/// Sets the default rounding mode and full denormals for its lifetime: a plug-in linked with fast-math may
-/// have changed them for this thread, and with them every result.
-class FloatEnvironment {
- public:
-  FloatEnvironment();
-  FloatEnvironment(const FloatEnvironment&) = delete;
-  FloatEnvironment& operator=(const FloatEnvironment&) = delete;
-  FloatEnvironment(FloatEnvironment&&) = delete;
-  FloatEnvironment& operator=(FloatEnvironment&&) = delete;
-  ~FloatEnvironment();
-
- private:
-  std::fenv_t saved_{};
-};
-
-}  // namespace tandem::engine
+}  // namespace tandem
