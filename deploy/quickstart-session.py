@@ -151,7 +151,7 @@ def live_line(second, top):
     ]
     return (
         f"{second:4d} s  frame {server['frame']:5d}  {server['mbit_per_s']:5.2f} of {server['raw_mbit_per_s']:.2f} Mbit/s "
-        f"({share:.1f} %)  corrected {server['corrected_per_frame']:5.0f}  lag: {', '.join(lags) or 'no client yet'}"
+        f"({share:.2f} %)  corrected {server['corrected_per_frame']:5.0f}  lag: {', '.join(lags) or 'no client yet'}"
     )
 
 
@@ -233,7 +233,7 @@ def report(session, options):
               f" {figures['inputs_sent']:>7} {latency['p50']:>9.2f} ms {latency['p99']:>5.2f} ms {work['p50']:>6.2f} ms")  # fmt: skip
     frame_ms = server["frame_ms"]
     print(f"\nserver: {options.bodies} bodies, {server['frames']} frames, {frame_ms['p50']:.2f} ms a frame (p99 {frame_ms['p99']:.2f}),"
-          f" {server['mbit_per_s']:.2f} Mbit/s, {100 * server['mbit_per_s'] / raw:.1f} % of raw")  # fmt: skip
+          f" {server['mbit_per_s']:.3f} Mbit/s, {100 * server['mbit_per_s'] / raw:.2f} % of raw")  # fmt: skip
     for problem in problems:
         print(f"FAILED  {problem}")
         good = False
