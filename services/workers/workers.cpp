@@ -1,11 +1,10 @@
 #include "services/workers/workers.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace tandem {
 
-Workers::Workers(std::uint32_t threads, std::function<void()> prepare)
+Workers::Workers(std::uint32_t threads, const std::function<void()>& prepare)
     : barrier_(static_cast<std::ptrdiff_t>(std::max(threads, 1U))) {
   for (std::uint32_t i = 1; i < threads; ++i) {
     threads_.emplace_back([this, prepare] {

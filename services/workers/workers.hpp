@@ -16,7 +16,7 @@ namespace tandem {
 class Workers {
  public:
   /// `prepare` is called first on each thread of its own.
-  explicit Workers(std::uint32_t threads, std::function<void()> prepare = {});
+  explicit Workers(std::uint32_t threads, const std::function<void()>& prepare = {});
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
   Workers(Workers&&) = delete;

@@ -61,7 +61,7 @@ class Codec {
   virtual void predicted_by(std::string_view /*predictor*/) {}
 
   /// How to code blocks side by side; one after the other without it. For codecs that can. Changes no byte.
-  virtual void run_blocks_on(RunBlocks /*run*/) {}
+  virtual void run_blocks_on(const RunBlocks& /*run*/) {}
 
   /// Adds every encoded frame to `account`, which stays until this is called again; null: to none. For codecs
   /// with adaptive contexts; others do nothing.

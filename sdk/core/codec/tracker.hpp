@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
@@ -32,7 +31,7 @@ class Tracker final : public Codec {
   [[nodiscard]] std::string_view name() const override { return "tracker"; }
   [[nodiscard]] std::size_t bound() const override;
   void predicted_by(std::string_view predictor) override { gains_ = &tracker_gains(predictor); }
-  void run_blocks_on(RunBlocks run) override { run_ = std::move(run); }
+  void run_blocks_on(const RunBlocks& run) override { run_ = run; }
   void account_to(CodeAccount* account) override { account_ = account; }
   void renew(const State& predicted, std::span<const Slot> slots) override;
   std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,

@@ -30,7 +30,8 @@ struct TrackerBody {
 struct TrackerGains {
   std::array<std::int64_t, kMostAge + 1> velocity{};
   std::array<std::int64_t, kMostAge + 1> acceleration{};
-  /// Encoder only: how likely, in 1/65536, a correction must be for a body to be corrected before it has to be.
+  /// Encoder only: how likely, in 1/65536, a correction must be for a body to be corrected before it has to
+  /// be.
   std::uint32_t early = 19661;
 };
 

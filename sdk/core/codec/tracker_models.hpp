@@ -2,8 +2,10 @@
 // The tracker codec's probabilities: which decisions a block codes, each in which context. One text for the
 // encoder, the decoder and the encoder's estimate of costs.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/range_coder.hpp"
@@ -43,7 +45,7 @@ struct TrackerModels {
   /// Before learn().
   void account(const TrackerCounts& counts, CodeAccount& account) const;
 
-  std::array<std::uint16_t, TrackerModelIndex::kAll> p1;
+  std::array<std::uint16_t, TrackerModelIndex::kAll> p1{};
   std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
 };
 
@@ -72,9 +74,8 @@ inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t 
 
 // Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
 inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
-  std::int32_t longest = 0;
-  for (const std::int32_t step : steps)
-    longest = step < 0 ? (longest > -step ? longest : -step) : (longest > step ? longest : step);
+  int longest = 0;
+  for (const std::int8_t step : steps) longest = std::max(longest, std::abs(int{step}));
   return static_cast<std::uint32_t>(longest > 1) + static_cast<std::uint32_t>(longest > 2);
 }
 
@@ -139,8 +140,8 @@ struct TrackerEncoder {
   }
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
   RangeEncoder range;
-  const TrackerModels* models;
-  TrackerCounts* counts;
+  const TrackerModels* models = nullptr;
+  TrackerCounts* counts = nullptr;
 };
 
 /// Bytes into decisions; counts them. The first argument is what an encoder would code.
@@ -152,8 +153,8 @@ struct TrackerDecoder {
   }
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
   RangeDecoder range;
-  const TrackerModels* models;
-  TrackerCounts* counts;
+  const TrackerModels* models = nullptr;
+  TrackerCounts* counts = nullptr;
 };
 
 /// Most bits code_steps() takes.

@@ -333,12 +333,12 @@ void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint3
 void TrackerSearch::remember_waiting(const Tracker& tracker) {
   some_wait_ = false;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
-    const Slot* sent = tracker.corrected_.data() + b * kBlockSlots;
+    const Block block = block_at(b, static_cast<std::uint32_t>(waiting_.size()));
+    const Slot* sent = tracker.corrected_.data() + block.first;
     const Slot* const sent_end = sent + tracker.work_[b].corrected;
-    const Candidate* candidate = candidates_.data() + b * kBlockSlots;
+    const Candidate* candidate = candidates_.data() + block.first;
     const Candidate* const end = candidate + parts_[b].candidates;
-    const Slot slots_end = static_cast<Slot>(std::min<std::size_t>((b + 1) * kBlockSlots, waiting_.size()));
-    for (Slot slot = b * kBlockSlots; slot < slots_end; ++slot) {
+    for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
       const bool is_candidate = candidate != end && candidate->slot == slot;
       const bool is_sent = sent != sent_end && *sent == slot;
       const bool waits = is_candidate && candidate->must && !is_sent;
