@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/range_coder.hpp"
@@ -75,7 +74,7 @@ inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t 
 // Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
 inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
   int longest = 0;
-  for (const std::int8_t step : steps) longest = std::max(longest, std::abs(int{step}));
+  for (const std::int8_t step : steps) longest = std::max({longest, int{step}, -int{step}});
   return static_cast<std::uint32_t>(longest > 1) + static_cast<std::uint32_t>(longest > 2);
 }
 

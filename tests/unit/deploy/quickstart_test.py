@@ -64,7 +64,7 @@ class LiveLine(unittest.TestCase):
             ],
         }
         line = quickstart.live_line(2, top)
-        self.assertIn("1.50 of 50.00 Mbit/s (3.0 %)", line)
+        self.assertIn("1.50 of 50.00 Mbit/s (3.00 %)", line)
         self.assertIn("participant 2 ms, observer 3 ms", line)
 
 
