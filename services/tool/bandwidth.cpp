@@ -305,6 +305,7 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     row.bodies = replay.simulation().capacity();
     row.frames = frames;
     row.dt_s = dt_s;
+    row.lattice_unit = sessions.empty() ? 0 : sessions.front().lattice.unit;
     row.colliding_per_frame = static_cast<double>(contacts) / static_cast<double>(frames);
     row.colliding = colliding;
     row.step_ms = step_ms;
@@ -339,7 +340,9 @@ std::string to_json(std::span<const BandwidthRow> rows) {
                     {"threads", row.threads},
                     {"seed", row.seed},
                     {"frames", row.frames},
+                    {"dt_s", row.dt_s},
                     {"threshold", row.threshold},
+                    {"lattice_unit", row.lattice_unit},
                     {"mbit_per_s", measured(row.mbit_per_s)},
                     {"paper_mbit_per_s", json_of(mbit_in_paper(row))},
                     {"ideal_mbit_per_s", json_of(row.ideal_mbit_per_s)},

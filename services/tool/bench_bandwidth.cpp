@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <iterator>
 #include <memory>
@@ -88,8 +89,9 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   return rows;
 }
 
-/// What a session needs to know about a trajectory, in the shape of a scene.
-scenes::Scene scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
+/// What a session needs to know about a trajectory, in the shape of a scene. Errors: kMalformed where
+/// the scene that it names is none.
+Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
   scenes::Scene scene;
   scene.name = path;
   scene.dt_s = trajectory.dt_s();
@@ -97,7 +99,29 @@ scenes::Scene scene_of(const RecordedTrajectory& trajectory, const std::string& 
   // A file without any motion has no extent of its own.
   scene.extent_m = std::max(trajectory.position_bound(), trajectory.info().threshold);
   scene.types.resize(1);
+  if (trajectory.info().scene.empty()) return scene;
+  auto named = scenes::load_scene(trajectory.info().scene);
+  if (!named) {
+    return fail(ErrorCode::kMalformed,
+                fmt::format("{}: \"scene\": {}", sidecar_path(path).value(), named.error().message));
+  }
+  scene.extent_m = std::max(scene.extent_m, named->extent_m);
+  scene.world = std::move(named->world);
+  // A recording does not say which body is of which type.
+  scene.world.types.resize(1);
   return scene;
+}
+
+/// The tiers that compute contacts need to know what the bodies are and where the walls stand.
+Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const BandwidthOptions& options) {
+  const std::string& predictor = options.choice.predictor;
+  const bool asked = (predictor == "field" || predictor == "contact") &&
+                     std::ranges::find(options.codecs, "tracker") != options.codecs.end();
+  if (!asked || !trajectory.info().scene.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("{}: no \"scene\"; --predictor {} needs one for radius, materials and walls (see "
+                          "`tandem export --help`)",
+                          sidecar_path(options.trajectory).value(), predictor));
 }
 
 /// There is no other run to train on, so a trajectory trains the paper's codecs itself, in their favour.
@@ -110,7 +134,10 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   };
   const auto opened = RecordedTrajectory::open(options.trajectory);
   if (!opened) return tl::unexpected(opened.error());
-  scenes::Scene scene = scene_of(**opened, options.trajectory);
+  if (auto known = check_world_is_known(**opened, options); !known) return tl::unexpected(known.error());
+  auto scene_or = scene_of(**opened, options.trajectory);
+  if (!scene_or) return tl::unexpected(scene_or.error());
+  scenes::Scene& scene = *scene_or;
   const std::uint64_t frames = std::min(options.frames, (*opened)->frames());
   server::SessionChoice choice = options.choice;
   choice.bodies = (*opened)->capacity();
@@ -219,7 +246,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->capture_default_str();
   command
       ->add_option("--trajectory", options->trajectory,
-                   "X.npy with X.json in the place of a scene; trains on itself")
+                   "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
       ->excludes("--scene");
   command->add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
       ->check(CLI::Range(1, 64))

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 
 #include "services/server/session_plan.hpp"
@@ -33,7 +34,10 @@ Result<void> export_trajectory(const ExportOptions& options) {
   auto replay = Replay::create(*source->simulation, std::move(source->script), session->lattice,
                                static_cast<TypeId>(session->types.size()));
   if (!replay) return tl::unexpected(replay.error());
-  TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m, {}};
+  TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m,
+                      {},          options.scene};
+  // A scene by its path is found from everywhere.
+  if (scene->path == options.scene) info.scene = std::filesystem::absolute(scene->path).string();
   Progress progress(fmt::format("{}, {} bodies: frame", scene->name, options.run.bodies), options.run.frames);
   for (Frame frame = 0;; ++frame) {
     info.gravity.push_back(replay->simulation().gravity());
@@ -51,6 +55,7 @@ void add_export(CLI::App& app, Run& run) {
   CLI::App* command = app.add_subcommand(
       "export",
       "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity), and X.json.");
+  command->footer(kTrajectoryFormat);
   const auto options = std::make_shared<ExportOptions>();
   options->run.bodies = 10000;
   options->run.frames = 1000;

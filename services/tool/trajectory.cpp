@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <stdexcept>
@@ -79,6 +80,20 @@ Result<std::vector<engine::Vec3>> gravity_rows(const nlohmann::json& json, const
   return gravity;
 }
 
+Result<std::string> scene_reference(const nlohmann::json& json, const std::string& path) {
+  const auto found = json.find("scene");
+  if (found == json.end()) return std::string();
+  if (!found->is_string() || found->get_ref<const std::string&>().empty()) {
+    return fail(ErrorCode::kMalformed,
+                fmt::format("{}: \"scene\" is {}; expected the name of a scene, or the path of a .textproto "
+                            "file from this file's folder",
+                            path, found->dump()));
+  }
+  const auto& reference = found->get_ref<const std::string&>();
+  const bool is_name = reference.find('/') == std::string::npos && !reference.ends_with(".textproto");
+  return is_name ? reference : (std::filesystem::path(path).parent_path() / reference).string();
+}
+
 Result<TrajectoryInfo> read_info(const std::string& path, std::uint64_t rows) {
   std::ifstream file(path);
   if (!file)
@@ -104,6 +119,9 @@ Result<TrajectoryInfo> read_info(const std::string& path, std::uint64_t rows) {
   auto gravity = gravity_rows(json, path, rows);
   if (!gravity) return tl::unexpected(gravity.error());
   info.gravity = std::move(*gravity);
+  auto scene = scene_reference(json, path);
+  if (!scene) return tl::unexpected(scene.error());
+  info.scene = std::move(*scene);
   return info;
 }
 
@@ -146,11 +164,12 @@ Result<void> TrajectoryWriter::append(const engine::Bodies& bodies) {
 }
 
 Result<void> TrajectoryWriter::finish(const TrajectoryInfo& info) {
-  const nlohmann::ordered_json json{{"dt_s", info.dt_s},
-                                    {"damping_per_s", info.damping_per_s},
-                                    {"radius", info.radius},
-                                    {"threshold", info.threshold},
-                                    {"gravity", info.gravity}};
+  nlohmann::ordered_json json{{"dt_s", info.dt_s},
+                              {"damping_per_s", info.damping_per_s},
+                              {"radius", info.radius},
+                              {"threshold", info.threshold}};
+  if (!info.scene.empty()) json["scene"] = info.scene;
+  json["gravity"] = info.gravity;
   return npy_.rewrite_start(bytes_of(header(rows_, bodies_)))
       .and_then([&] { return sidecar_.write(bytes_of(json.dump() + '\n')); })
       .and_then([&] { return npy_.close(); })

@@ -15,6 +15,23 @@
 
 namespace tandem::tool {
 
+/// For people who write one: the end of `tandem export --help`.
+inline constexpr const char* kTrajectoryFormat =
+    "X.npy: row 0 is the start; little-endian float32 as numpy saves it, in any unit of length, and "
+    "seconds.\n"
+    "X.json: an object with\n"
+    "  dt_s           seconds between rows\n"
+    "  damping_per_s  share of its velocity that a free body loses in a second, 0 for none\n"
+    "  radius         of the smallest body\n"
+    "  threshold      error of a position that a codec may leave\n"
+    "  gravity        [x, y, z] for each row: what acts in the step that leads to it\n"
+    "  scene          optional: a scene's name, or the path of a .textproto from the folder of X.json. Its "
+    "first\n"
+    "                 body type, pair, wall, substeps, planes, boxes and spheres are what the predictors "
+    "field\n"
+    "                 and contact compute with; without it, only ballistic is possible.\n"
+    "Any program may write the pair; `tandem bench bandwidth --trajectory X.npy` measures it.";
+
 /// X.json: what the numbers alone do not say. Scene units and seconds.
 struct TrajectoryInfo {
   double dt_s = 0;           ///< > 0
@@ -23,6 +40,9 @@ struct TrajectoryInfo {
   double threshold = 0;      ///< > 0, the error that a codec may leave
   /// gravity[f] is in force in the step that produces frame f; gravity[0] is what holds at the start.
   std::vector<engine::Vec3> gravity;
+  /// Scene that tells radius, materials and walls, for predictors that need them: a name, or the path of a
+  /// .textproto. Empty: none. In the file a relative path starts at the file's folder.
+  std::string scene;
 };
 
 /// The name of the sidecar that belongs to a .npy file. Errors: kInvalidArgument when `npy` does not end in

@@ -92,7 +92,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn(b"(41, 200, 6)", header)
         self.assertEqual(npy.stat().st_size, 128 + 41 * 200 * 6 * 4)
         sidecar = json.loads(self.path("x.json").read_text(encoding="utf-8"))
-        self.assertEqual(set(sidecar), {"dt_s", "damping_per_s", "radius", "threshold", "gravity"})
+        self.assertEqual(set(sidecar), {"dt_s", "damping_per_s", "radius", "threshold", "scene", "gravity"})
         self.assertEqual(len(sidecar["gravity"]), 41)
 
         bench = ("bench", "bandwidth", "--frames", "40", "--codec", "none,selective", "--json")
@@ -102,8 +102,63 @@ class CommandLine(unittest.TestCase):
             self.assertIsNone(one["colliding_per_frame"])
             self.assertEqual(one["bodies"], other["bodies"])
             self.assertEqual(one["threshold"], other["threshold"])
-            # The lattice follows from the bounds, which a recording knows only as far as bodies went.
-            self.assertAlmostEqual(one["mbit_per_s"], other["mbit_per_s"], delta=0.02 * other["mbit_per_s"])
+            self.assertEqual(one["lattice_unit"], other["lattice_unit"])
+            self.assertEqual(one["mbit_per_s"], other["mbit_per_s"])
+
+    def test_a_trajectory_that_names_its_scene_is_predicted_as_the_scene_itself(self):
+        source = pathlib.Path(__file__).resolve().parents[3] / "services/scenes/cube.textproto"
+        scene = self.path("mine.textproto")
+        scene.write_bytes(source.read_bytes())
+        npy = self.path("x.npy")
+        size = ("--bodies", "300", "--frames", "60")
+        exported = run("export", "--scene", scene, *size, "--out", npy)
+        self.assertEqual(exported.returncode, 0, exported.stderr)
+        sidecar = self.path("x.json")
+        info = json.loads(sidecar.read_text())
+        self.assertEqual(info["scene"], str(scene))
+        bench = ("bench", "bandwidth", "--codec", "tracker", "--json")
+        live = {}
+        for predictor in ("field", "contact", "auto"):
+            live[predictor] = json.loads(run(*bench, "--scene", scene, *size, "--predictor", predictor).stdout)["rows"][0]
+        # As a foreign program would write it: the file beside the sidecar.
+        for reference in (str(scene), "mine.textproto"):
+            sidecar.write_text(json.dumps({**info, "scene": reference}))
+            for predictor, row in live.items():
+                done = run(*bench, "--trajectory", npy, "--predictor", predictor)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                recorded = json.loads(done.stdout)["rows"][0]
+                for key in ("predictor", "mbit_per_s", "max_error", "rms_error"):
+                    self.assertEqual(recorded[key], row[key], (reference, predictor, key))
+
+    def test_a_trajectory_without_a_scene_has_ballistic_only(self):
+        npy = self.path("x.npy")
+        run("export", "--scene", "cube", "--bodies", "50", "--frames", "5", "--out", npy)
+        sidecar = self.path("x.json")
+        info = json.loads(sidecar.read_text())
+        del info["scene"]
+        sidecar.write_text(json.dumps(info))
+        bench = ("bench", "bandwidth", "--trajectory", npy, "--codec", "tracker", "--json")
+        self.assertEqual(json.loads(run(*bench).stdout)["rows"][0]["predictor"], "ballistic")
+        for predictor in ("field", "contact"):
+            done = run(*bench, "--predictor", predictor)
+            self.assertEqual(done.returncode, 2)
+            self.assertRegex(done.stderr.splitlines()[-1], rf"x\.json: no \"scene\"; --predictor {predictor} needs one")
+
+    def test_a_trajectory_whose_scene_is_no_scene_is_refused_in_one_line(self):
+        npy = self.path("x.npy")
+        run("export", "--scene", "cube", "--bodies", "20", "--frames", "3", "--out", npy)
+        sidecar = self.path("x.json")
+        info = json.loads(sidecar.read_text())
+        self.path("broken.textproto").write_text("nonsense: 2\n")
+        for scene, expected in (
+            ("nowhere", "unknown scene"), ("none.textproto", "none.textproto"), ("broken.textproto", "broken.textproto:1"),
+            ("", "expected the name"), (3, "expected the name"),
+        ):  # fmt: skip
+            sidecar.write_text(json.dumps({**info, "scene": scene}))
+            done = run("bench", "bandwidth", "--trajectory", npy, "--predictor", "field")
+            self.assertEqual(done.returncode, 1, scene)
+            self.assertRegex(done.stderr, r"^tandem bench bandwidth: \S*x\.json: \"scene\"[^\n]*\n$")
+            self.assertIn(expected, done.stderr)
 
     def test_the_same_seed_gives_the_same_bits_on_any_number_of_threads_and_jobs(self):
         bench = ("bench", "bandwidth", "--scene", "half_pipe,cube", "--bodies", "300", "--frames", "60", "--json", "--peers")

@@ -43,7 +43,7 @@ class Trajectory : public ::testing::Test {
         {{columns[0], columns[1], columns[2]}, {columns[3], columns[4], columns[5]}, alive, type});
   }
   static TrajectoryInfo info() {
-    TrajectoryInfo info{1.0 / 30, 0.1, 0.5, 0.1, {}};
+    TrajectoryInfo info{1.0 / 30, 0.1, 0.5, 0.1, {}, {}};
     for (std::uint64_t f = 0; f <= kFrames; ++f) info.gravity.push_back({0, -9.81, static_cast<double>(f)});
     return info;
   }
@@ -208,6 +208,28 @@ TEST_F(Trajectory, refuses_values_out_of_range_and_missing_gravity_rows) {
   write_pair();
   replace(json_, ",[0.0,-9.81,4.0]", "");
   expect_refused("x.json", "each of the 5 rows");
+}
+
+TEST_F(Trajectory, finds_its_scene_by_name_and_by_path_from_its_own_folder) {
+  const auto scene_of = [&](const std::string& written) {
+    write_pair();
+    replace(json_, "\"gravity\"", "\"scene\":\"" + written + "\",\"gravity\"");
+    const auto opened = RecordedTrajectory::open(npy_);
+    return opened ? (*opened)->info().scene : opened.error().message;
+  };
+  EXPECT_EQ(scene_of("half_pipe"), "half_pipe");
+  EXPECT_EQ(scene_of("pile.textproto"), (directory_ / "pile.textproto").string());
+  EXPECT_EQ(scene_of("../pile.textproto"), (directory_ / "../pile.textproto").string());
+  EXPECT_EQ(scene_of("/pile.textproto"), "/pile.textproto");
+}
+
+TEST_F(Trajectory, refuses_a_scene_that_is_no_text) {
+  write_pair();
+  replace(json_, "\"gravity\"", "\"scene\":[1],\"gravity\"");
+  expect_refused("x.json", "\"scene\" is [1]");
+  write_pair();
+  replace(json_, "\"gravity\"", "\"scene\":\"\",\"gravity\"");
+  expect_refused("x.json", "\"scene\" is \"\"");
 }
 
 TEST_F(Trajectory, leaves_nothing_behind_without_finish) {
