@@ -14,7 +14,6 @@ namespace {
 constexpr std::int64_t kEarlyShare = 218;
 // Bits that an error of one threshold is worth.
 constexpr std::uint64_t kErrorWorth = 14;
-constexpr std::int64_t kMostDistance = TrackerSteppings::kMostDistance;
 constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + 2;
 // A tried number of bodies this close (1/64) to the largest that fits is good enough.
 constexpr std::uint32_t kTryPrecision = 64;
@@ -57,113 +56,115 @@ std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
   return to < from ? -q : q;
 }
 
-// The two values on either side of the residual on each axis, what they leave over and what they cost, so
-// that the eight points are sums of table entries. All are filled, used or not: almost no branch that is hard
-// to guess. (The third value around the nearest, on its far side, does not pay: RESEARCH.md.)
+// The two lengths on either side of the residual on each axis, `shorter` and one more; a point is named by a
+// bit an axis, x the highest, 1: the longer one. (Third values, on the far side, do not pay: RESEARCH.md.)
 class Choices {
  public:
-  Choices(const TrackerCosts& costs, const TrackerContext& context, const TrackerSteps& lower)
-      : lower_(lower) {
-    const Lengths lengths = length_costs(costs, context);
-    for (std::uint32_t axis = 0; axis < 3; ++axis) fill_costs(costs, context, lengths, axis);
+  Choices(const Vec3i& from, const Vec3i& to, std::int32_t unit) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::uint32_t size = magnitude(to[axis], from[axis]);
+      const bool is_negative = to[axis] < from[axis];
+      // The point of lower values comes first, so on an axis of negative values the interval is open below.
+      const std::uint32_t inside = size - static_cast<std::uint32_t>(is_negative);
+      const auto one = static_cast<std::uint32_t>(unit);
+      std::uint32_t shorter = static_cast<std::uint32_t>(inside >= one);
+      if (inside >= 2 * one) shorter = std::min<std::uint32_t>(inside / one, kMostTrackerSteps - 1);
+      size_[axis] = size;
+      negative_[axis] = static_cast<std::uint32_t>(is_negative);
+      shorter_[axis] = shorter;
+    }
   }
 
-  void fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
-                   std::int64_t threshold);
   /// The cheapest point within the error ball; false: there is none.
-  bool cheapest(const ErrorWorth& worth, TrackerSteps& steps) const;
+  bool cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
+                const TrackerContext& context, TrackerSteps& steps) const;
 
  private:
-  static constexpr std::uint64_t kOutside = std::uint64_t{1} << 61U;  // three of them do not overflow
-  // Costs of the lengths 1 and 2 after so many axes that are not zero.
-  using Lengths = std::array<std::array<std::uint32_t, 2>, 3>;
+  // In 1/256 bits, [earlier axes that are not zero][longer].
+  using AxisCosts = std::array<std::array<std::uint32_t, 2>, 3>;
 
-  static Lengths length_costs(const TrackerCosts& costs, const TrackerContext& context) {
-    Lengths lengths{};
-    for (std::uint32_t moved = 0; moved < 3; ++moved) {
-      const auto* longer = &costs.of[magnitude_model(context, moved)];
-      lengths[moved] = {longer[0][0], std::uint32_t{longer[0][1]} + longer[1][0]};
-    }
-    return lengths;
+  [[nodiscard]] std::int32_t value(std::size_t axis, std::uint32_t longer) const {
+    const auto length = static_cast<std::int32_t>(shorter_[axis] + longer);
+    return negative_[axis] != 0 ? -length : length;
   }
-  void fill_costs(const TrackerCosts& costs, const TrackerContext& context, const Lengths& lengths,
-                  std::uint32_t axis);
-  [[nodiscard]] std::int32_t value(std::size_t axis, std::size_t i) const {
-    return lower_[axis] + static_cast<std::int32_t>(i);
-  }
+  [[nodiscard]] AxisCosts axis_costs(const TrackerCosts& costs, const TrackerContext& context,
+                                     std::uint32_t axis) const;
 
-  TrackerSteps lower_;
-  // Error squared on one axis: of the unit of long steps (0), or of small ones with 1, 2, 3 axes moved.
-  std::array<std::array<std::array<std::uint64_t, 2>, 3>, 4> error_{};
-  // In 1/256 bits, [axis][earlier axes that are not zero].
-  std::array<std::array<std::array<std::uint32_t, 2>, 3>, 3> cost_{};
+  std::array<std::uint32_t, 3> size_{}, negative_{}, shorter_{};
 };
 
-void Choices::fill_costs(const TrackerCosts& costs, const TrackerContext& context, const Lengths& lengths,
-                         std::uint32_t axis) {
-  const auto sign = costs.of[context.sign[axis]];
+Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerContext& context,
+                                       std::uint32_t axis) const {
+  AxisCosts result{};
+  const std::uint32_t sign = costs.of[context.sign[axis]][negative_[axis]];
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
-    std::array<std::uint16_t, 2> is_moved{0, 0};
-    if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
-    for (std::size_t i = 0; i < 2; ++i) {
-      std::int32_t steps = value(axis, i);
-      if (steps < -2 || steps > 2) {
+    if (shorter_[axis] > 1) {
+      for (std::uint32_t longer = 0; longer < 2; ++longer) {
+        std::int32_t steps = value(axis, longer);
         CostCoder coder{&costs};
         code_axis(coder, context, axis, moved, steps);
-        cost_[axis][moved][i] = coder.cost;
-        continue;
+        result[moved][longer] = coder.cost;
       }
-      const std::uint32_t length = lengths[moved][steps == 2 || steps == -2 ? 1 : 0];
-      cost_[axis][moved][i] = steps == 0 ? is_moved[0] : is_moved[1] + sign[steps < 0 ? 1U : 0U] + length;
+      continue;
     }
+    std::array<std::uint16_t, 2> is_moved{0, 0};
+    if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
+    const auto* is_longer = &costs.of[magnitude_model(context, moved)];
+    const std::uint32_t one = std::uint32_t{is_moved[1]} + sign + is_longer[0][0];
+    const std::uint32_t two = std::uint32_t{is_moved[1]} + sign + is_longer[0][1] + is_longer[1][0];
+    result[moved] = {shorter_[axis] == 0 ? is_moved[0] : one, shorter_[axis] == 0 ? one : two};
   }
+  return result;
 }
 
-void Choices::fill_errors(const TrackerSteppings& steppings, const std::array<std::int64_t, 3>& d,
-                          std::int64_t threshold) {
-  for (std::size_t unit = 0; unit < 4; ++unit) {
-    const std::int64_t one = steppings.unit(unit);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < 2; ++i) {
-        const std::int64_t off = d[axis] - std::clamp(value(axis, i) * one, -kMostDistance, kMostDistance);
-        const bool inside = -threshold <= off && off <= threshold;
-        // The product of values outside may wrap; it is not used.
-        const auto size = static_cast<std::uint64_t>(off);
-        error_[unit][axis][i] = inside ? size * size : kOutside;
-      }
-    }
-  }
-}
-
-bool Choices::cheapest(const ErrorWorth& worth, TrackerSteps& steps) const {
-  std::array<std::array<std::uint32_t, 2>, 3> moves{};
-  std::array<std::array<std::uint32_t, 2>, 3> is_long{};
+// All eight are worked out, used or not: almost no branch that is hard to guess. Errors wrap where a point is
+// of no use.
+bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
+                       const TrackerContext& context, TrackerSteps& steps) const {
+  std::array<std::array<std::uint64_t, 2>, 3> long_error{};  // squared, of the unit of long steps
+  std::array<std::array<std::uint32_t, 2>, 3> is_moved{}, is_long{};
+  std::uint64_t from_zero = 0;  // squared
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (std::size_t i = 0; i < 2; ++i) {
-      const std::int32_t v = value(axis, i);
-      moves[axis][i] = static_cast<std::uint32_t>(v != 0);
-      is_long[axis][i] = static_cast<std::uint32_t>(v < -1 || v > 1);
+    const std::uint64_t size = size_[axis];
+    from_zero += size * size;
+    for (std::uint32_t longer = 0; longer < 2; ++longer) {
+      const std::uint32_t length = shorter_[axis] + longer;
+      const std::uint64_t off = size - std::min(length * static_cast<std::uint64_t>(steppings.unit(0)),
+                                                static_cast<std::uint64_t>(TrackerSteppings::kMostDistance));
+      long_error[axis][longer] = off * off;
+      is_moved[axis][longer] = static_cast<std::uint32_t>(length != 0);
+      is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
-  std::uint64_t best = UINT64_MAX;
-  std::size_t best_point = 0;
-  for (std::size_t point = 0; point < 8; ++point) {
-    const std::size_t x = point >> 2U;
-    const std::size_t y = (point >> 1U) & 1U;
-    const std::size_t z = point & 1U;
-    const std::uint32_t before_y = moves[0][x];
-    const std::uint32_t before_z = before_y + moves[1][y];
-    const std::uint32_t moved = before_z + moves[2][z];
-    const std::size_t unit = (is_long[0][x] | is_long[1][y] | is_long[2][z]) != 0 ? 0 : moved;
-    const std::uint64_t error = error_[unit][0][x] + error_[unit][1][y] + error_[unit][2][z];
-    const std::uint64_t cost = std::uint64_t{cost_[0][0][x]} + cost_[1][before_y][y] + cost_[2][before_z][z] +
-                               (((error >> worth.shift) * worth.worth) >> 24U);
-    const std::uint64_t counted = moved != 0 && error <= worth.limit ? cost : UINT64_MAX;
-    best_point = counted < best ? point : best_point;
+  const AxisCosts x_costs = axis_costs(costs, context, 0);
+  const AxisCosts y_costs = axis_costs(costs, context, 1);
+  const AxisCosts z_costs = axis_costs(costs, context, 2);
+  const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
+  std::uint64_t best = UINT64_MAX;  // cost, then the point; among equals the lowest values
+  for (std::uint32_t point = 0; point < 8; ++point) {
+    const std::uint32_t x = point >> 2U;
+    const std::uint32_t y = (point >> 1U) & 1U;
+    const std::uint32_t z = point & 1U;
+    const std::uint32_t before_z = is_moved[0][x] + is_moved[1][y];
+    const std::uint32_t moved = before_z + is_moved[2][z];
+    // Of m steps of one along m axes: the sum of (size - unit)^2 there and size^2 elsewhere.
+    const auto unit = static_cast<std::uint64_t>(steppings.unit(moved));
+    const std::uint64_t sizes = (is_moved[0][x] != 0 ? std::uint64_t{size_[0]} : 0) +
+                                (is_moved[1][y] != 0 ? std::uint64_t{size_[1]} : 0) +
+                                (is_moved[2][z] != 0 ? std::uint64_t{size_[2]} : 0);
+    const std::uint64_t short_error = from_zero + unit * (moved * unit - 2 * sizes);
+    const std::uint64_t error = (is_long[0][x] | is_long[1][y] | is_long[2][z]) != 0
+                                    ? long_error[0][x] + long_error[1][y] + long_error[2][z]
+                                    : short_error;
+    const std::uint64_t cost = std::uint64_t{x_costs[0][x]} + y_costs[is_moved[0][x]][y] +
+                               z_costs[before_z][z] + (((error >> worth.shift) * worth.worth) >> 24U);
+    const std::uint64_t counted =
+        moved != 0 && error <= worth.limit ? cost << 3U | (point ^ lowest) : UINT64_MAX;
     best = std::min(counted, best);
   }
   if (best == UINT64_MAX) return false;
-  steps = {value(0, best_point >> 2U), value(1, (best_point >> 1U) & 1U), value(2, best_point & 1U)};
+  const auto point = static_cast<std::uint32_t>((best ^ lowest) & 7U);
+  steps = {value(0, point >> 2U), value(1, (point >> 1U) & 1U), value(2, point & 1U)};
   return true;
 }
 
@@ -185,16 +186,9 @@ ErrorWorth::ErrorWorth(std::int32_t e)
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
                   const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
                   TrackerSteps& steps) {
-  std::array<std::int64_t, 3> d{};
-  TrackerSteps lower{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    d[i] = std::int64_t{to[i]} - from[i];
-    steps[i] = nearest(from[i], to[i], steppings.unit(0));
-    lower[i] = steps[i] - (std::int64_t{steps[i]} * steppings.unit(0) > d[i] ? 1 : 0);
-  }
-  Choices choices(costs, context, lower);
-  choices.fill_errors(steppings, d, worth.threshold);
-  return choices.cheapest(worth, steps);
+  if (Choices(from, to, steppings.unit(0)).cheapest(steppings, worth, costs, context, steps)) return true;
+  for (std::size_t i = 0; i < 3; ++i) steps[i] = nearest(from[i], to[i], steppings.unit(0));
+  return false;
 }
 
 TrackerSearch::TrackerSearch(std::uint32_t capacity)
