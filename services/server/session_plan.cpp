@@ -28,11 +28,11 @@ std::vector<std::byte> codec_tables(const std::string& codec, const scenes::Trai
   return bytes.empty() ? default_code_tables() : bytes;
 }
 
-// `field` takes all bodies for as large as the largest.
+// Cells are as large as the largest bodies, and hold so many smaller ones at most.
 bool alike(const std::vector<engine::ParticleType>& types) {
   if (types.empty()) return false;
   const auto [smallest, largest] = std::ranges::minmax(types, {}, &engine::ParticleType::radius);
-  return smallest.radius > 0.9F * largest.radius;
+  return smallest.radius >= 0.5F * largest.radius;
 }
 
 // Sets the predictor and its constants.

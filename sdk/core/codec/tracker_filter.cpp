@@ -20,7 +20,8 @@ struct GainSet {
 constexpr GainSet kBallistic{52429, 9830, 3, 2, 19661};  // 0.8, 0.15
 // Contacts are predicted: what is left grows slower, and there is no force to learn.
 constexpr GainSet kContact{45875, 0, 3, 3, 19661};  // 0.7, 0
-constexpr GainSet kField{45875, 0, 3, 3, 5243};     // 0.7, 0: likewise
+// Contacts in one step for several: they leave a force to learn.
+constexpr GainSet kField{78643, 16384, 3, 3, 5243};  // 1.2, 0.25
 
 TrackerGains make_gains(const GainSet& set) {
   TrackerGains gains;

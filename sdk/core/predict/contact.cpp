@@ -1,5 +1,5 @@
-// The tier `contact`: v += g + c + contact forces, then as `ballistic`. Forces are those of the state at the
-// start of a sub-step, of S. Green, "Particle Simulation using CUDA" (2008):
+// The tiers `contact` and `field`: v += g + c + contact forces, then as `ballistic`. Forces are those of the
+// state at the start of a sub-step, of S. Green, "Particle Simulation using CUDA" (2008):
 //   (damping + shear) * u - (spring * overlap + shear * (u.n)) * n
 #include "sdk/core/predict/contact.hpp"
 
@@ -75,15 +75,9 @@ TANDEM_VECTOR_CLONES void decay(std::int32_t* c, std::size_t count, std::int64_t
 
 }  // namespace
 
-Result<std::unique_ptr<Predictor>> Contact::create(std::uint32_t capacity,
-                                                   std::span<const std::int32_t> constants) {
-  return read_contact_constants(constants).map([&](ContactConstants&& read) {
-    return std::unique_ptr<Predictor>(std::make_unique<Contact>(capacity, std::move(read)));
-  });
-}
-
-Contact::Contact(std::uint32_t capacity, ContactConstants constants)
-    : constants_(std::move(constants)),
+Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
+    : coarse_(tier == Tier::kField && constants.substeps > 1),
+      constants_(tier == Tier::kField ? in_one_step(std::move(constants)) : std::move(constants)),
       largest_radius_(largest_radius_of(constants_)),
       shift_(shift_for(largest_radius_)),
       pair_law_(law_of(constants_.pair, shift_)),
@@ -139,7 +133,7 @@ void Contact::sort(const State& state) {
         place_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + place_[s] : count_++;
     place_[s] = place;
     const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
-    const ContactConstants::Type& type = type_of(state, s);
+    const ContactConstants::Type& type = constants_.type_of(state.type()[s]);
     bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
     if (!one_mobility_) forces_[place].mobility = type.mobility;
     if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};

@@ -1,8 +1,7 @@
 #pragma once
-// The tier `contact`: the engine's penalty contacts as integers. idl/PROTOCOL.md, "Predicted step", has the
-// formulas.
+// The tiers `contact` and `field`: the engine's penalty contacts as integers. idl/PROTOCOL.md, "Predicted
+// step", has the formulas.
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -21,25 +20,24 @@ namespace tandem {
 /// pairs.
 class Contact final : public Predictor {
  public:
-  /// Errors: kMalformed for constants that do not describe a world.
-  static Result<std::unique_ptr<Predictor>> create(std::uint32_t capacity,
-                                                   std::span<const std::int32_t> constants);
-  Contact(std::uint32_t capacity, ContactConstants constants);
+  enum class Tier {
+    kContact,  ///< as many sub-steps a frame as the engine
+    kField,    ///< one step a frame
+  };
+  Contact(std::uint32_t capacity, ContactConstants constants, Tier tier);
 
-  [[nodiscard]] std::string_view name() const override { return "contact"; }
+  [[nodiscard]] std::string_view name() const override { return coarse_ ? "field" : "contact"; }
   void step(const State& from, State& to, const Drive& drive) override;
   /// Steps all bodies: each depends on the others.
   void step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
 
  private:
-  [[nodiscard]] const ContactConstants::Type& type_of(const State& state, Slot slot) const {
-    return constants_.types[std::min<std::size_t>(state.type()[slot], constants_.types.size() - 1)];
-  }
   void sort(const State& state);
   void add_pairs(bool first);
   void write(const State& from, const Drive& drive, State& to) const;
 
+  bool coarse_;  // one step stands for several
   ContactConstants constants_;
   std::int32_t largest_radius_;
   std::uint32_t shift_;  // a grid unit is 2^shift lattice units

@@ -1,5 +1,6 @@
 #include "sdk/core/predict/contact_constants.hpp"
 
+#include <algorithm>
 #include <string>
 
 namespace tandem {
@@ -49,8 +50,22 @@ constexpr std::size_t kPlaneValues = 4;
 constexpr std::size_t kBoxValues = 15;
 constexpr std::size_t kBallValues = 4;
 constexpr std::size_t kMostTypes = 65536;
+constexpr std::int32_t kMostSpringOfOneStep = 10240;  // 5/8; a stiffer one shakes
 
 }  // namespace
+
+ContactConstants in_one_step(ContactConstants constants) {
+  const std::int32_t substeps = constants.substeps;
+  if (substeps == 1) return constants;
+  for (ContactMaterial* const material : {&constants.pair, &constants.wall}) {
+    const std::int32_t drag = substeps * (material->damping + material->shear) * 5 / 8;
+    material->spring = std::min(substeps * material->spring, kMostSpringOfOneStep);
+    material->shear = std::min({substeps * material->shear, drag, ContactMaterial::kMostDamping});
+    material->damping = std::min(drag - material->shear, ContactMaterial::kMostDamping);
+  }
+  constants.substeps = 1;
+  return constants;
+}
 
 std::vector<std::int32_t> write_contact_constants(const ContactConstants& constants) {
   std::vector<std::int32_t> out{constants.substeps};
@@ -94,7 +109,7 @@ Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> va
   // Before anything is reserved.
   if (!in.good() ||
       in.left() != types * kTypeValues + planes * kPlaneValues + boxes * kBoxValues + balls * kBallValues) {
-    return fail(ErrorCode::kMalformed, "predictor 'contact': constants of wrong number or range");
+    return fail(ErrorCode::kMalformed, "predictor: constants of wrong number or range");
   }
   constants.types.resize(types);
   for (auto& type : constants.types) {
@@ -117,7 +132,7 @@ Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> va
     ball.centre = in.take_vector(-kPositionLimit, kPositionLimit);
     ball.radius = in.take(0, kPositionLimit);
   }
-  if (!in.good()) return fail(ErrorCode::kMalformed, "predictor 'contact': constant out of range");
+  if (!in.good()) return fail(ErrorCode::kMalformed, "predictor: constant out of range");
   return constants;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What the tier `contact` knows of the world, and its form in the session.
+// What the tiers `contact` and `field` know of the world, and its form in the session.
 
 #include <array>
 #include <cstdint>
@@ -48,7 +48,15 @@ struct ContactConstants {
   std::vector<Plane> planes;
   std::vector<Box> boxes;
   std::vector<Ball> balls;
+
+  [[nodiscard]] const Type& type_of(TypeId type) const {
+    return types[type < types.size() ? type : types.size() - 1];
+  }
 };
+
+/// The world in one step a frame, for the tier `field`: the gains of all sub-steps together, as far as one
+/// step does not shake by them. With one sub-step nothing changes.
+[[nodiscard]] ContactConstants in_one_step(ContactConstants constants);
 
 /// The integers of a session's `predictor_constants`.
 [[nodiscard]] std::vector<std::int32_t> write_contact_constants(const ContactConstants& constants);

@@ -4,7 +4,6 @@
 
 #include "sdk/core/predict/ballistic.hpp"
 #include "sdk/core/predict/contact.hpp"
-#include "sdk/core/predict/field.hpp"
 
 namespace tandem {
 
@@ -15,7 +14,10 @@ Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::ui
       return fail(ErrorCode::kInvalidArgument,
                   "predictor '" + std::string(name) + "': capacity out of range");
     }
-    return name == "field" ? Field::create(capacity, constants) : Contact::create(capacity, constants);
+    const auto tier = name == "field" ? Contact::Tier::kField : Contact::Tier::kContact;
+    return read_contact_constants(constants).map([&](ContactConstants&& read) {
+      return std::unique_ptr<Predictor>(std::make_unique<Contact>(capacity, std::move(read), tier));
+    });
   }
   if (name != "ballistic") {
     return fail(ErrorCode::kUnsupported,

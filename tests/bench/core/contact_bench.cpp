@@ -1,9 +1,11 @@
-// The predicted step `contact` on a heap of 10,000 bodies at rest in a room, from a settled state every time.
+// The predicted steps `contact` and `field` on a heap of 10,000 bodies at rest in a room, from a settled
+// state every time.
 
 #include <benchmark/benchmark.h>
 
 #include <memory>
 #include <random>
+#include <string_view>
 
 #include "sdk/core/predict/contact_constants.hpp"
 #include "sdk/core/predict/predictor.hpp"
@@ -16,7 +18,7 @@ constexpr std::int32_t kRadius = 20000, kWall = 500000;
 constexpr std::uint64_t kSeed = 42;
 const Drive kFalling{{0, -3000, 0}, 200, 0};
 
-std::unique_ptr<Predictor> room(std::int32_t substeps) {
+std::unique_ptr<Predictor> room(std::string_view tier, std::int32_t substeps) {
   constexpr std::int32_t kOne = ContactConstants::kOne;
   ContactConstants constants;
   constants.substeps = substeps;
@@ -27,11 +29,11 @@ std::unique_ptr<Predictor> room(std::int32_t substeps) {
                       {{-kOne, 0, 0}, -kWall},
                       {{0, 0, kOne}, -kWall},
                       {{0, 0, -kOne}, -kWall}};
-  return *make_predictor("contact", kBodies, write_contact_constants(constants));
+  return *make_predictor(tier, kBodies, write_contact_constants(constants));
 }
 
-void contact_step(benchmark::State& bench) {
-  const auto predictor = room(static_cast<std::int32_t>(bench.range(0)));
+void contact_step(benchmark::State& bench, std::string_view tier) {
+  const auto predictor = room(tier, static_cast<std::int32_t>(bench.range(0)));
   std::mt19937_64 random(kSeed);
   State heap(kBodies);
   constexpr std::int32_t kSide = 23;
@@ -49,7 +51,12 @@ void contact_step(benchmark::State& bench) {
   for (auto _ : bench) predictor->step(heap, next, kFalling);
   bench.SetItemsProcessed(static_cast<std::int64_t>(bench.iterations()) * kBodies);
 }
-BENCHMARK(contact_step)->ArgName("substeps")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(contact_step, contact, "contact")
+    ->ArgName("substeps")
+    ->Arg(1)
+    ->Arg(2)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(contact_step, field, "field")->ArgName("substeps")->Arg(2)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace tandem
