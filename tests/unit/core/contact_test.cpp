@@ -2,64 +2,32 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
+#include <string_view>
 #include <vector>
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/predict/contact_pairs.hpp"
 #include "sdk/core/predict/contact_walls.hpp"
+#include "tests/unit/core/contact_world.hpp"
 
 namespace tandem {
 namespace {
 
-constexpr std::int32_t kRadius = 20000;
+constexpr std::array<std::string_view, 2> kTiers{"contact", "field"};
 
-ContactConstants constants_of(std::int32_t substeps) {
-  ContactConstants constants;
-  constants.substeps = substeps;
-  constants.pair = {3641 / substeps, 410 / substeps, 410 / substeps};
-  constants.wall = constants.pair;
-  constants.types = {{kRadius, 65536}, {kRadius / 2, 131072}};
-  constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
-  constants.boxes = {
-      {{200000, 0, 0},
-       {50000, 50000, 50000},
-       {{{ContactConstants::kOne, 0, 0}, {0, ContactConstants::kOne, 0}, {0, 0, ContactConstants::kOne}}}}};
-  constants.balls = {{{-200000, 0, 0}, 60000}};
-  return constants;
-}
+class ContactTiers : public testing::TestWithParam<std::string_view> {};
+INSTANTIATE_TEST_SUITE_P(Tiers, ContactTiers, testing::ValuesIn(kTiers));
 
-std::unique_ptr<Predictor> contact(std::uint32_t capacity, const ContactConstants& constants) {
-  return *make_predictor("contact", capacity, write_contact_constants(constants));
-}
-
-Vec3i vector_within(std::mt19937_64& random, std::int32_t limit) {
-  Vec3i v{};
-  for (std::int32_t& x : v)
-    x = static_cast<std::int32_t>(random() % (2 * static_cast<std::uint64_t>(limit) + 1)) - limit;
-  return v;
-}
-
-State bodies_within(std::mt19937_64& random, std::uint32_t capacity, std::int32_t p, std::int32_t v) {
-  State state(capacity);
-  for (Slot s = 0; s < capacity; ++s) {
-    if (random() % 7 == 0) continue;
-    const TypeId type = static_cast<TypeId>(random() % 3);  // one more than the constants know
-    state.spawn(s, 0, type, {vector_within(random, p), vector_within(random, v)});
-  }
-  return state;
-}
-
-const Drive kFalling{{0, -3000, 0}, 200, 800};
-
-TEST(Contact, InPlaceEqualsApartForAnyState) {
+TEST_P(ContactTiers, InPlaceEqualsApartForAnyState) {
   constexpr std::uint64_t kSeed = 51;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
   for (const std::int32_t reach : {0, 10, kRadius, 20 * kRadius, kPositionLimit}) {
     for (const std::int32_t speed : {0, 100000, kVelocityLimit}) {
       for (const std::int32_t substeps : {1, 2, 16}) {
-        const auto predictor = contact(300, constants_of(substeps));
+        const auto predictor = predictor_of(GetParam(), 300, constants_of(substeps));
         State state = bodies_within(random, 300, reach, speed);
         State apart(300);
         for (int frame = 0; frame < 4; ++frame) {
@@ -71,6 +39,7 @@ TEST(Contact, InPlaceEqualsApartForAnyState) {
           for (std::size_t i = 0; i < 3; ++i) {
             ASSERT_LE(std::abs(state.p(i)[s]), kPositionLimit);
             ASSERT_LE(std::abs(state.v(i)[s]), kVelocityLimit);
+            ASSERT_TRUE(state.alive()[s] != 0 || (state.p(i)[s] | state.v(i)[s] | state.c(i)[s]) == 0);
           }
         }
       }
@@ -78,25 +47,27 @@ TEST(Contact, InPlaceEqualsApartForAnyState) {
   }
 }
 
-TEST(Contact, ExtremeConstantsMeetExtremeStates) {
+TEST_P(ContactTiers, ExtremeConstantsMeetExtremeStates) {
   constexpr std::uint64_t kSeed = 52;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
-  ContactConstants constants = constants_of(1);
-  constants.pair = constants.wall = {ContactMaterial::kMostSpring, ContactMaterial::kMostDamping,
-                                     ContactMaterial::kMostDamping};
-  const Vec3i ones{ContactConstants::kOne, ContactConstants::kOne, ContactConstants::kOne};
-  const Vec3i corner{kPositionLimit, -kPositionLimit, kPositionLimit};
-  constants.planes = {{ones, kPositionLimit}, {ones, -kPositionLimit}};
-  constants.boxes = {{corner, {kPositionLimit, kPositionLimit, kPositionLimit}, {ones, ones, ones}}};
-  constants.balls = {{corner, kPositionLimit}, {{}, 0}};
-  for (const std::int32_t radius : {1, 100, ContactConstants::kMostRadius}) {
-    constants.types = {{radius, ContactConstants::kMostMobility}};
-    const auto predictor = contact(200, constants);
-    for (const std::int32_t reach : {0, 1, kPositionLimit}) {
-      State state = bodies_within(random, 200, reach, kVelocityLimit);
-      for (int frame = 0; frame < 5; ++frame) predictor->step(state, state, kFalling);
-      EXPECT_GT(state.alive_count(), 0U);
+  for (const std::int32_t substeps : {1, ContactConstants::kMostSubsteps}) {
+    ContactConstants constants = constants_of(substeps);
+    constants.pair = constants.wall = {ContactMaterial::kMostSpring, ContactMaterial::kMostDamping,
+                                       ContactMaterial::kMostDamping};
+    const Vec3i ones{ContactConstants::kOne, ContactConstants::kOne, ContactConstants::kOne};
+    const Vec3i corner{kPositionLimit, -kPositionLimit, kPositionLimit};
+    constants.planes = {{ones, kPositionLimit}, {ones, -kPositionLimit}};
+    constants.boxes = {{corner, {kPositionLimit, kPositionLimit, kPositionLimit}, {ones, ones, ones}}};
+    constants.balls = {{corner, kPositionLimit}, {{}, 0}};
+    for (const std::int32_t radius : {1, 2, 100, ContactConstants::kMostRadius}) {
+      constants.types = {{radius, ContactConstants::kMostMobility}};
+      const auto predictor = predictor_of(GetParam(), 200, constants);
+      for (const std::int32_t reach : {0, 1, kPositionLimit}) {
+        State state = bodies_within(random, 200, reach, kVelocityLimit);
+        for (int frame = 0; frame < 5; ++frame) predictor->step(state, state, kFalling);
+        EXPECT_GT(state.alive_count(), 0U);
+      }
     }
   }
 }
@@ -104,7 +75,7 @@ TEST(Contact, ExtremeConstantsMeetExtremeStates) {
 TEST(Contact, TwoBodiesPartWithEqualAndOppositeSpeed) {
   ContactConstants constants = constants_of(1);
   constants.planes.clear();
-  const auto predictor = contact(2, constants);
+  const auto predictor = predictor_of("contact", 2, constants);
   State state(2);
   state.spawn(0, 0, 0, {{0, 0, 0}, {}});
   state.spawn(1, 0, 0, {{3 * kRadius / 2, 0, 0}, {}});
@@ -129,13 +100,13 @@ TEST(Contact, BodiesApartMoveAsBallistic) {
   }
   State expected = state;
   const auto ballistic = *make_predictor("ballistic", 64, {});
-  contact(64, constants)->step(state, state, kFalling);
+  predictor_of("contact", 64, constants)->step(state, state, kFalling);
   ballistic->step(expected, expected, kFalling);
   EXPECT_EQ(state, expected);
 }
 
-TEST(Contact, ABodyOnThePlaneComesToRest) {
-  const auto predictor = contact(1, constants_of(1));
+TEST_P(ContactTiers, ABodyOnThePlaneComesToRest) {
+  const auto predictor = predictor_of(GetParam(), 1, constants_of(1));
   State state(1);
   state.spawn(0, 0, 0, {{0, 3 * kRadius, 0}, {}});
   for (int frame = 0; frame < 600; ++frame) predictor->step(state, state, kFalling);
@@ -143,8 +114,8 @@ TEST(Contact, ABodyOnThePlaneComesToRest) {
   EXPECT_NEAR(state.v(1)[0], 0, 300);
 }
 
-TEST(Contact, AMixedRunKeepsItsHash) {
-  const auto predictor = contact(200, constants_of(2));
+TEST_P(ContactTiers, AMixedRunKeepsItsHash) {
+  const auto predictor = predictor_of(GetParam(), 200, constants_of(2));
   State state(200);
   std::uint32_t x = 1;
   const auto next = [&x](std::int32_t limit) {
@@ -157,7 +128,7 @@ TEST(Contact, AMixedRunKeepsItsHash) {
   }
   for (int frame = 0; frame < 50; ++frame) predictor->step(state, state, kFalling);
   StateHasher hasher;
-  EXPECT_EQ(to_hex(hasher.hash(state, {})), "9642e926eedf7002");
+  EXPECT_EQ(to_hex(hasher.hash(state, {})), GetParam() == "field" ? "cc81d67cfaebc15b" : "9642e926eedf7002");
 }
 
 // What the kernels leave: the pairs of a heap in a grid of 8 cells a side, and the forces between them.
@@ -261,10 +232,10 @@ TEST(Contact, ConstantsReadBackAsTheyWereWritten) {
   EXPECT_EQ(write_contact_constants(*read), values);
 }
 
-TEST(Contact, BadConstantsAreRefused) {
+TEST_P(ContactTiers, BadConstantsAreRefused) {
   const auto good = write_contact_constants(constants_of(2));
   const auto refused = [](std::span<const std::int32_t> values) {
-    const auto made = make_predictor("contact", 10, values);
+    const auto made = make_predictor(GetParam(), 10, values);
     return !made && made.error().code == ErrorCode::kMalformed;
   };
   for (std::size_t size = 0; size < good.size(); ++size) EXPECT_TRUE(refused(std::span(good).first(size)));
@@ -276,8 +247,8 @@ TEST(Contact, BadConstantsAreRefused) {
     bad[i] = INT32_MIN;
     EXPECT_TRUE(refused(bad)) << "value " << i;
   }
-  EXPECT_FALSE(make_predictor("contact", 0, good));
-  EXPECT_FALSE(make_predictor("contact", kMaxCapacity + 1, good));
+  EXPECT_FALSE(make_predictor(GetParam(), 0, good));
+  EXPECT_FALSE(make_predictor(GetParam(), kMaxCapacity + 1, good));
 }
 
 }  // namespace
