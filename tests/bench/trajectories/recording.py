@@ -35,7 +35,7 @@ def rows_of_dump(dump, bodies, every):
             if head[8].split() != "ITEM: ATOMS id x y z vx vy vz".split():
                 raise ValueError(f"{where}: expected the columns id x y z vx vy vz")
             values = " ".join(itertools.islice(lines, bodies)).split()
-            if [int(name) for name in values[::7]] != list(range(1, bodies + 1)):
+            if values[::7] != [str(name) for name in range(1, bodies + 1)] or len(values) != 7 * bodies:
                 raise ValueError(f"{where}: expected each of the {bodies} atoms once, in order")
             del values[::7]
             rows.extend(map(float, values))
