@@ -18,35 +18,38 @@ class Compare(unittest.TestCase):
     server = log(1, 100)
 
     def test_a_client_that_joined_late_is_fine(self):
-        self.assertEqual(quickstart.compare(self.server, log(40, 90)), (51, None))
+        self.assertEqual(quickstart.compare(self.server, log(40, 90), 90), (51, None))
 
     def test_a_client_without_a_frame_is_not(self):
-        self.assertEqual(quickstart.compare(self.server, {}), (0, "applied no frame"))
+        self.assertEqual(quickstart.compare(self.server, {}, 100), (0, "applied no frame"))
 
     def test_a_missing_frame_is_named(self):
         client = log(40, 90)
         del client[7, 50]
-        self.assertEqual(quickstart.compare(self.server, client), (10, "frame 50 is missing"))
+        self.assertEqual(quickstart.compare(self.server, client, 90), (10, "frame 50 is missing"))
 
     def test_a_wrong_hash_is_named(self):
         client = log(40, 90)
         client[7, 41] = "other"
-        compared, problem = quickstart.compare(self.server, client)
+        compared, problem = quickstart.compare(self.server, client, 90)
         self.assertEqual(compared, 1)
         self.assertIn("frame 41", problem)
 
     def test_a_client_that_stopped_long_before_the_end_is_named(self):
         server = log(1, 600)
-        self.assertEqual(quickstart.compare(server, log(1, 590)), (590, None))
+        self.assertEqual(quickstart.compare(server, log(1, 590), 600), (590, None))
         self.assertEqual(
-            quickstart.compare(server, log(1, 300)), (300, "stopped at frame 300, the server went on to 600")
+            quickstart.compare(server, log(1, 300), 600), (300, "stopped at frame 300, the session went on to 600")
         )
 
+    def test_frames_that_the_server_made_while_clients_were_leaving_do_not_count(self):
+        self.assertEqual(quickstart.compare(log(1, 900), log(40, 600), 600), (561, None))
+
     def test_another_epoch_is_a_gap(self):
-        self.assertIsNotNone(quickstart.compare(self.server, {**log(98, 100), **log(1, 3, epoch=8)})[1])
+        self.assertIsNotNone(quickstart.compare(self.server, {**log(98, 100), **log(1, 3, epoch=8)}, 100)[1])
 
     def test_a_frame_that_the_server_never_published_is_named(self):
-        self.assertEqual(quickstart.compare(self.server, log(99, 101)), (2, "frame 101 is not in the server's log"))
+        self.assertEqual(quickstart.compare(self.server, log(99, 101), 101), (2, "frame 101 is not in the server's log"))
 
 
 class LiveLine(unittest.TestCase):
