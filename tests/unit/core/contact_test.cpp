@@ -110,7 +110,7 @@ TEST_P(ContactTiers, ABodyOnThePlaneComesToRest) {
   State state(1);
   state.spawn(0, 0, 0, {{0, 3 * kRadius, 0}, {}});
   for (int frame = 0; frame < 600; ++frame) predictor->step(state, state, kFalling);
-  EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20);
+  EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20.0);
   EXPECT_NEAR(state.v(1)[0], 0, 300);
 }
 

@@ -60,7 +60,7 @@ TEST(Field, ABodyOnThePlaneComesToRest) {
     State state(1);
     state.spawn(0, 0, 0, {{0, 3 * kRadius, 0}, {}});
     for (int frame = 0; frame < 3000; ++frame) predictor->step(state, state, kFalling);
-    EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20);
+    EXPECT_NEAR(state.p(1)[0], kRadius, kRadius / 20.0);
     EXPECT_LT(std::abs(state.v(1)[0]), 1000);  // 16 lattice units a frame
   }
 }
