@@ -86,11 +86,19 @@ class RangeDecoder {
     const bool bit = code_ < bound;
     code_ -= bit ? 0U : bound;
     range_ = bit ? bound : range_ - bound;
-    while (range_ < kLeastRange) {
-      code_ = (code_ << 8U) | next();
-      range_ <<= 8U;
-    }
+    fill();
     return bit;
+  }
+
+  /// The same without a branch on the bit, for bits that are hard to guess and decide little.
+  bool get_masked(std::uint32_t p1) {
+    const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
+    const std::uint32_t rest = range_ - bound;
+    const std::uint32_t one = 0U - static_cast<std::uint32_t>(code_ < bound);
+    range_ = rest ^ ((rest ^ bound) & one);
+    code_ -= bound & ~one;
+    fill();
+    return (one & 1U) != 0;
   }
 
   /// True when every byte was used and the last one is not a zero that could have been left out.
@@ -99,6 +107,12 @@ class RangeDecoder {
  private:
   static constexpr std::uint32_t kLeastRange = 1U << 24U;
 
+  void fill() {
+    while (range_ < kLeastRange) {
+      code_ = (code_ << 8U) | next();
+      range_ <<= 8U;
+    }
+  }
   std::uint32_t next() { return at_ == end_ ? 0U : std::to_integer<std::uint32_t>(*at_++); }
 
   const std::byte* at_;

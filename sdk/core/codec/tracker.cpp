@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/codec/tracker_search.hpp"
@@ -20,6 +21,7 @@ Tracker::Tracker(std::uint32_t capacity)
       bodies_(kColumns * std::size_t{capacity}),
       history_(capacity),
       flags_(capacity),
+      contexts_(capacity),
       corrected_(capacity),
       steps_(capacity),
       work_(block_count(capacity)) {
@@ -94,15 +96,15 @@ Result<void> Tracker::parse_end() {
 }
 
 void Tracker::list_flags(const Block& block, std::span<const std::uint8_t> alive, Work& work) {
-  work.counts = {};
   const Slot end = block.first + block.slots;
-  for (Slot slot = block.first; slot < end; ++slot) {
-    const std::uint32_t model = alive[slot] != 0
-                                    ? flag_model(std::to_integer<std::uint8_t>(bodies_[slot]), history_[slot])
-                                    : TrackerModelIndex::kDead;
-    flags_[slot] = static_cast<std::uint16_t>(model);
-    ++work.counts[model][0];
-  }
+  list_flag_models(reinterpret_cast<const std::uint8_t*>(bodies_.data()) + block.first,
+                   history_.data() + block.first, alive.data() + block.first,
+                   std::span(flags_).subspan(block.first, block.slots));
+  // By turns in the places of zeros and ones, because neighbours often have the same model and an addition
+  // would wait for the one before.
+  work.counts = {};
+  for (Slot slot = block.first; slot < end; ++slot) ++work.counts[flags_[slot]][slot & 1U];
+  for (auto& [zeros, ones] : work.counts) zeros += std::exchange(ones, 0);
   auto renewed = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
   for (; renewed != renewed_.end() && *renewed < end; ++renewed) {
     if (alive[*renewed] == 0) continue;
@@ -110,6 +112,16 @@ void Tracker::list_flags(const Block& block, std::span<const std::uint8_t> alive
     flags_[*renewed] = static_cast<std::uint16_t>(flag_model(0, 0));
     ++work.counts[flags_[*renewed]][0];
   }
+}
+
+void Tracker::list_contexts(const Block& block) {
+  std::array<const std::uint8_t*, kColumns> columns{};
+  for (std::size_t i = 0; i < kColumns; ++i)
+    columns[i] = reinterpret_cast<const std::uint8_t*>(bodies_.data()) + i * capacity_;
+  contexts_.fill(block, *predicted_, columns, threshold_);
+  auto renewed = std::lower_bound(renewed_.begin(), renewed_.end(), block.first);
+  for (; renewed != renewed_.end() && *renewed < block.first + block.slots; ++renewed)
+    contexts_.renew(*renewed);
 }
 
 const char* Tracker::decode_block(const Block& block, Work& work) {
@@ -121,14 +133,15 @@ const char* Tracker::decode_block(const Block& block, Work& work) {
   RangeDecoder range(work.stream);
   const Slot end = block.first + block.slots;
   for (Slot slot = block.first; slot < end; ++slot) {
-    if (!range.get(p1[flags[slot]])) continue;
-    work.count_one(flags[slot]);
-    corrected[count++] = slot;
+    corrected[count] = slot;
+    count += static_cast<std::uint32_t>(range.get_masked(p1[flags[slot]]));
   }
+  for (std::uint32_t i = 0; i < count; ++i) work.count_one(flags[corrected[i]]);
   if (count == 0) return "corrections section without a body";
+  list_contexts(block);
   TrackerDecoder coder{range, &models_, &work.counts};
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (!code_steps(coder, context(corrected[i], threshold_), steps_[block.first + i]))
+    if (!code_steps(coder, contexts_.of(corrected[i]), steps_[block.first + i]))
       return "correction beyond any lattice";
   }
   if (!coder.range.at_end()) return "bytes after the code stream";

@@ -79,7 +79,6 @@ class Tracker final : public Codec {
     return is_renewed(slot) ? flag_model(0, 0)
                             : flag_model(std::to_integer<std::uint8_t>(bodies_[slot]), history_[slot]);
   }
-  [[nodiscard]] TrackerContext context(Slot slot, std::int32_t threshold) const;
 
   /// Calls job(block) for all blocks, perhaps on several threads.
   template <class Job>
@@ -87,6 +86,8 @@ class Tracker final : public Codec {
   /// Fills flags_ of a block, and counts its flags as zeros. Dead slots have a model that is never a one and
   /// takes no bits, so that loops need not ask.
   void list_flags(const Block& block, std::span<const std::uint8_t> alive, Work& work);
+  /// Fills contexts_ of a block.
+  void list_contexts(const Block& block);
   /// Null, or why the stream is none.
   const char* decode_block(const Block& block, Work& work);
   /// Forgets the renewed bodies, corrects the collected ones, learns, ages the others.
@@ -103,6 +104,7 @@ class Tracker final : public Codec {
   const State* predicted_ = nullptr;
   std::span<const std::uint8_t> alive_;
   std::vector<std::uint16_t> flags_;  // model of each slot's flag
+  TrackerContexts contexts_;
   std::vector<Slot> renewed_;
   std::vector<Slot> corrected_;
   std::vector<TrackerSteps> steps_;
@@ -121,13 +123,6 @@ inline TrackerBody Tracker::body(Slot slot) const {
   body.interval = std::to_integer<std::uint8_t>(*(at += capacity_));
   for (std::int8_t& step : body.steps) step = static_cast<std::int8_t>(*(at += capacity_));
   return body;
-}
-
-inline TrackerContext Tracker::context(Slot slot, std::int32_t threshold) const {
-  if (is_renewed(slot)) return value_context({}, {}, {}, threshold);
-  const State& state = *predicted_;
-  return value_context(body(slot), {state.v(0)[slot], state.v(1)[slot], state.v(2)[slot]},
-                       {state.c(0)[slot], state.c(1)[slot], state.c(2)[slot]}, threshold);
 }
 
 template <class Job>

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/range_coder.hpp"
+#include "sdk/core/codec/selection.hpp"
 #include "sdk/core/codec/tracker_filter.hpp"
 
 namespace tandem {
@@ -48,11 +51,11 @@ struct TrackerModels {
   std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
 };
 
-/// What the contexts of a corrected body see of it, on both sides the same.
+/// The context of a body's steps: parts of their models' indices.
 struct TrackerContext {
-  std::uint32_t zero = 0;                     ///< part of the index of "is this axis untouched"
-  std::uint32_t magnitude = 0;                ///< part of the index of "is it longer"
-  std::array<std::uint32_t, 3> sign{};        ///< index per axis
+  std::uint32_t zero = 0;                     ///< of "is this axis untouched"
+  std::uint32_t magnitude = 0;                ///< of "is it longer"
+  std::array<std::uint32_t, 3> sign{};        ///< the whole index, per axis
   std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
 };
 
@@ -60,16 +63,6 @@ struct TrackerContext {
 extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 
 namespace tracker_detail {
-
-// 0: below -limit, 1: between, 2: above. Sums of comparisons, because branches would be hard to guess.
-inline std::uint32_t side(std::int32_t value, std::int32_t limit) {
-  return 1U + static_cast<std::uint32_t>(value > limit) - static_cast<std::uint32_t>(value < -limit);
-}
-
-inline std::uint32_t bucket(std::uint32_t count, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-  return static_cast<std::uint32_t>(count > a) + static_cast<std::uint32_t>(count > b) +
-         static_cast<std::uint32_t>(count > c);
-}
 
 // Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
 inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
@@ -91,32 +84,45 @@ inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
          tracker_age_buckets[age + 1U] * (TrackerModelIndex::kAges * TrackerModelIndex::kLengths) + history;
 }
 
-/// The context of a corrected body's steps. `v`, `c`: of its predicted state; zero for a body renewed in this
-/// frame.
-[[nodiscard]] inline TrackerContext value_context(const TrackerBody& body, const Vec3i& v, const Vec3i& c,
-                                                  std::int32_t threshold) {
-  using tracker_detail::bucket;
-  using tracker_detail::side;
-  TrackerContext context;
-  const std::uint32_t k = body.age + 1U;
-  const std::uint32_t short_age = bucket(k, 2, 4, 8) + static_cast<std::uint32_t>(k > 20);
-  context.zero = short_age * TrackerModelIndex::kIntervals + bucket(body.interval, 2, 6, 20);
-  context.magnitude =
-      bucket(k, 1, 4, 20) * TrackerModelIndex::kLengths + tracker_detail::length_class(body.steps);
-  const std::uint32_t sign_age = bucket(k, 2, 6, 20);
-  // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
-  const std::int32_t slow = threshold + threshold / 4;
-  const std::int32_t faint = threshold / 32;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::uint32_t last = side(body.steps[axis], 0);
-    context.moved_last[axis] = static_cast<std::uint32_t>(body.steps[axis] != 0);
-    const std::uint32_t seen = (last * 3 + side(c[axis], faint)) * 3 + side(v[axis], slow);
-    context.sign[axis] = TrackerModelIndex::kSign +
-                         (static_cast<std::uint32_t>(axis) * 27 + seen) * TrackerModelIndex::kIntervals +
-                         sign_age;
+/// flag_model() of many slots, from their columns; kDead where there is no body.
+void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* alive,
+                      std::span<std::uint16_t> models);
+
+/// The contexts of all slots of a block, a byte each: worked out side by side, whether they are used or not,
+/// which takes less time than those of a tenth of the bodies one by one.
+class TrackerContexts {
+ public:
+  explicit TrackerContexts(std::uint32_t slots) : slots_(slots), bytes_(std::size_t{kColumns} * slots) {}
+
+  /// `ages`, `intervals`, `steps`: columns of the bodies before the delta; v and c of the predicted state.
+  void fill(const Block& block, const State& predicted, const std::array<const std::uint8_t*, 5>& bodies,
+            std::int32_t threshold);
+  /// Of a body that was renewed in this delta.
+  void renew(Slot slot) {
+    for (std::size_t i = 0; i < kColumns; ++i) column(i)[slot] = kRenewed[i];
   }
-  return context;
-}
+  [[nodiscard]] TrackerContext of(Slot slot) const {
+    const std::uint8_t* at = bytes_.data() + slot;
+    TrackerContext context;
+    context.zero = *at & 31U;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) context.moved_last[axis] = (*at >> (5U + axis)) & 1U;
+    context.magnitude = *(at += slots_) & 15U;
+    const std::uint32_t sign = TrackerModelIndex::kSign + (*at >> 4U);
+    for (std::uint32_t axis = 0; axis < 3; ++axis)
+      context.sign[axis] = sign + (axis * 27 + *(at += slots_)) * TrackerModelIndex::kIntervals;
+    return context;
+  }
+
+ private:
+  // zero, from bit 5 on moved_last; magnitude, from bit 4 on the age in all signs; what else is in the sign
+  // of x, y, z: 0 .. 26.
+  static constexpr std::size_t kColumns = 5;
+  static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 13, 13, 13};
+  std::uint8_t* column(std::size_t i) { return bytes_.data() + i * slots_; }
+
+  std::size_t slots_;
+  std::vector<std::uint8_t> bytes_;
+};
 
 /// Index of "is this axis untouched", after `moved` axes that are not.
 [[nodiscard]] inline std::uint32_t zero_model(const TrackerContext& context, std::uint32_t axis,
@@ -137,6 +143,7 @@ struct TrackerEncoder {
     ++(*counts)[model][bit ? 1 : 0];
     return bit;
   }
+  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
   RangeEncoder range;
   const TrackerModels* models = nullptr;
@@ -147,6 +154,11 @@ struct TrackerEncoder {
 struct TrackerDecoder {
   bool code(bool /*bit*/, std::uint32_t model) {
     const bool bit = range.get(models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_sign(bool /*bit*/, std::uint32_t model) {
+    const bool bit = range.get_masked(models->p1[model]);
     ++(*counts)[model][bit ? 1 : 0];
     return bit;
   }
@@ -188,7 +200,7 @@ bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis, 
     steps = 0;
     return true;
   }
-  const bool negative = coder.code(wanted < 0, context.sign[axis]);
+  const bool negative = coder.code_sign(wanted < 0, context.sign[axis]);
   const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
   const std::uint32_t base = magnitude_model(context, moved);
   std::uint32_t size = 1;

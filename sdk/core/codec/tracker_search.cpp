@@ -46,6 +46,7 @@ struct CostCoder {
     cost += costs->of[model][bit ? 1 : 0];
     return bit;
   }
+  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
 };
 
@@ -232,7 +233,7 @@ void TrackerSearch::encode(Tracker& tracker, const State& target, std::size_t bu
   if (!all_fit || some_wait_) remember_waiting(tracker);
 }
 
-void TrackerSearch::choose(const Tracker& tracker, const State& target, const Block& block) {
+void TrackerSearch::choose(Tracker& tracker, const State& target, const Block& block) {
   const State& predicted = *tracker.predicted_;
   const std::int32_t threshold = tracker.threshold_;
   const TrackerSteppings steppings(threshold);
@@ -240,6 +241,7 @@ void TrackerSearch::choose(const Tracker& tracker, const State& target, const Bl
   const auto early = static_cast<std::int32_t>((threshold * kEarlyShare) >> 8);
   Candidate* at = candidates_.data() + block.first;
   std::uint32_t must = 0;
+  tracker.list_contexts(block);
   const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
                                                    kBlockSlots);
   for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
@@ -248,7 +250,7 @@ void TrackerSearch::choose(const Tracker& tracker, const State& target, const Bl
       return;
     }
     const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth, costs_,
-                                     tracker.context(slot, threshold), candidate.steps);
+                                     tracker.contexts_.of(slot), candidate.steps);
     if (!inside && (!candidate.must || candidate.steps == TrackerSteps{})) return;
     must += static_cast<std::uint32_t>(candidate.must);
     *at++ = candidate;
@@ -318,8 +320,7 @@ void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint3
     ++next;
   }
   TrackerEncoder coder{flags, &tracker.models_, &work.counts};
-  for (std::uint32_t i = 0; i < count; ++i)
-    code_steps(coder, tracker.context(corrected[i], tracker.threshold_), steps[i]);
+  for (std::uint32_t i = 0; i < count; ++i) code_steps(coder, tracker.contexts_.of(corrected[i]), steps[i]);
   part.coded_bytes = coder.range.finish();
   part.fits = !coder.range.overflow();
 }

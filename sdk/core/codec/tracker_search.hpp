@@ -48,7 +48,7 @@ class TrackerSearch {
 
   /// Candidates of a block with their steps. Models are the same for a whole delta, so the choice does not
   /// depend on what else is sent.
-  void choose(const Tracker& tracker, const State& target, const Block& block);
+  void choose(Tracker& tracker, const State& target, const Block& block);
   void rank();
   /// Code streams of all blocks with the bodies of rank < limit, and early ones if `early`. False: beyond
   /// budget.

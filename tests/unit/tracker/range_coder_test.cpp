@@ -193,11 +193,19 @@ struct IdealCoder {
     bits -= std::log2(bit ? p1 : 1 - p1);
     return bit;
   }
+  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
   bool code_even(bool bit) {
     bits += 1;
     return bit;
   }
 };
+
+TrackerContext context_at_rest(const TrackerBody& body) {
+  const std::array<std::uint8_t, 5> columns{body.age, body.interval, 0, 0, 0};
+  TrackerContexts contexts(1);
+  contexts.fill({0, 0, 1}, State(1), {&columns[0], &columns[1], &columns[2], &columns[3], &columns[4]}, 100);
+  return contexts.of(0);
+}
 
 // Bodies of a block, one in `corrected_one_in` corrected by short steps; as Tracker codes them.
 template <class Coder>
@@ -215,7 +223,7 @@ void code_block(Coder& coder, std::uint64_t seed, std::uint64_t corrected_one_in
     TrackerSteps steps{1, 0, 0};
     for (std::int32_t& step : steps) step = static_cast<std::int32_t>(random() % 5U) - 2;
     if (steps == TrackerSteps{}) steps[0] = 20;
-    code_steps(coder, value_context(body, {}, {}, 100), steps);
+    code_steps(coder, context_at_rest(body), steps);
   }
 }
 
