@@ -10,23 +10,22 @@ Result<ScheduledDrive> read_scheduled(const transport::ScheduledInputMessage& me
   }
   const auto& v = message.values;
   constexpr std::int32_t kShareLimit = std::numeric_limits<std::uint16_t>::max();
-  if (message.number == 0 || message.frame == 0 || v.size() != 5) {
-    return fail(ErrorCode::kMalformed, "scheduled input without number, frame or its five integers");
+  if (message.number == 0 || message.frame == 0 || v.size() != 4) {
+    return fail(ErrorCode::kMalformed, "scheduled input without number, frame or its four integers");
   }
   for (std::size_t i = 0; i < 3; ++i) {
     if (v[i] < -kVelocityLimit || v[i] > kVelocityLimit) {
       return fail(ErrorCode::kMalformed, "scheduled gravity out of range");
     }
   }
-  if (v[3] < 0 || v[3] > kShareLimit || v[4] < 0 || v[4] > kShareLimit) {
-    return fail(ErrorCode::kMalformed, "scheduled damping or decay out of range");
+  if (v[3] < 0 || v[3] > kShareLimit) {
+    return fail(ErrorCode::kMalformed, "scheduled damping out of range");
   }
   ScheduledDrive input;
   input.number = message.number;
   input.frame = message.frame;
   input.drive.gravity = {v[0], v[1], v[2]};
   input.drive.damping = static_cast<std::uint16_t>(v[3]);
-  input.drive.decay = static_cast<std::uint16_t>(v[4]);
   return input;
 }
 

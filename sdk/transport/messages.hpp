@@ -81,7 +81,7 @@ struct DeltaMessage {
 };
 
 enum class ScheduledKind : std::uint32_t {
-  kDrive = 1,  ///< integers: gravity x, y, z (1/64 lattice unit per frame^2), damping D, decay E
+  kDrive = 1,  ///< integers: gravity x, y, z (1/64 lattice unit per frame^2), damping D
 };
 
 struct ScheduledInputMessage {

@@ -10,6 +10,7 @@
 #include "services/server/durations.hpp"
 #include "services/server/inputs.hpp"
 #include "services/server/joins.hpp"
+#include "services/server/mbit.hpp"
 #include "services/server/mirror.hpp"
 #include "services/server/pacing.hpp"
 #include "services/server/replies.hpp"
@@ -27,7 +28,6 @@ constexpr std::int64_t kLookNs = kSecond / 4;  // between looks for rivals and f
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
 constexpr std::size_t kMostNotices = 256;  // until somebody takes them
-constexpr double kBitsPerMbit = 1048576.0;
 constexpr double kRawBytesPerBody = 24;
 
 Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
@@ -120,8 +120,8 @@ struct Host::Impl {
                 .stall_timeout_ns = config.stall_timeout_ns,
                 .fixed_window = config.window,
                 .window_ceiling = config.window_ceiling}),
-        inputs({.epoch = config.epoch, .lead = config.lead, .lattice = config.lattice, .decay = config.decay},
-               full, timeline, outbox),
+        inputs({.epoch = config.epoch, .lead = config.lead, .lattice = config.lattice}, full, timeline,
+               outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate),
@@ -130,8 +130,12 @@ struct Host::Impl {
     timeline.start(config.start_frame, mirror.target(), drive);
     timeline.set_clock(config.clock_ns);
     if (config.quality) {
-      quality.emplace(*config.quality, config.parameters, config.frame_rate_hz);
+      quality.emplace(*config.quality, config.frame_rate_hz);
       timeline.set_statistics(&quality->statistics());
+    }
+    if (config.gains) {
+      gains.emplace(*config.gains, full.capacity(), config.parameters);
+      timeline.set_evidence(&gains->evidence());
     }
     bodies = mirror.target().alive_count();
     report.frame = config.start_frame;
@@ -185,6 +189,7 @@ struct Host::Impl {
   Pacing pacing;
   PublishTimes times;
   std::optional<QualityControl> quality;
+  std::optional<GainControl> gains;
   transport::SessionMessage session;
 
   State state = State::kClaiming;
@@ -348,9 +353,9 @@ void Host::Impl::produce_frame() {
   const std::int64_t applied = clock();
   publish(result, wall_ns + (applied - start));
   times.published(result.frame, now_ns);
-  if (quality) {
-    if (const auto next = quality->after_frame(result.payload.size())) use(*next);
-  }
+  const bool coarser = quality && quality->after_frame(result.payload.size(), config.parameters);
+  const bool steered = gains && gains->after_frame(config.parameters);
+  if (coarser || steered) timeline.set_parameters(config.parameters);
   report = {.frame = result.frame,
             .hash = result.hash,
             .payload_bytes = result.payload.size(),
@@ -458,7 +463,7 @@ void Host::Impl::plan_wake() {
 Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation& simulation,
                                            transport::ServerPort& port) {
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
-  auto drive = to_drive(config.lattice, simulation.gravity(), simulation.damping_per_s(), config.decay);
+  auto drive = to_drive(config.lattice, simulation.gravity(), simulation.damping_per_s());
   if (!drive) return tl::unexpected(drive.error());
   auto timeline = ServerTimeline::create(timeline_config(config, simulation.capacity()), config.epoch);
   if (!timeline) return tl::unexpected(timeline.error());

@@ -13,6 +13,7 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/engine/simulation.hpp"
+#include "services/server/gains.hpp"
 #include "services/server/lattice_choice.hpp"
 #include "services/server/outbox.hpp"
 #include "services/server/quality.hpp"
@@ -43,12 +44,12 @@ struct HostConfig {
   Outbox::Limits outbox;
 
   Lattice lattice;
-  std::uint16_t decay = 0;         ///< E of the predicted step
   std::size_t budget = kNoBudget;  ///< bytes of corrections per frame
   std::string codec = "entropy";
   std::vector<std::byte> codec_tables;
   CodecParameters parameters;          ///< of the first frame
-  std::optional<QualityGoal> quality;  ///< empty: parameters change only by set_parameters()
+  std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
+  std::optional<GainGoal> gains;       ///< empty: so do decay and gains
   std::string predictor = "ballistic";
   std::vector<std::int32_t> predictor_constants;
   RunBlocks run_blocks;  ///< threads for the codec; empty: none of its own
@@ -119,9 +120,9 @@ class Host {
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
   Result<Frame> inject(const engine::Input& input);
 
-  /// What the decoder reads (threshold, quantisation steps), in force from the next frame on. Travels in that
-  /// frame's delta; clients need nothing else. Errors: kInvalidArgument (out of range, or automatic quality
-  /// is on).
+  /// What the decoder reads (threshold, quantisation steps, gains), in force from the next frame on. Travels
+  /// in that frame's delta; clients need nothing else. Errors: kInvalidArgument (out of range, or automatic
+  /// quality is on).
   [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
   [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                 ///< of the next frame, scene units

@@ -95,7 +95,7 @@ Reason InputDesk::accept(const engine::Input& input, const Source& source, Frame
 
 Reason InputDesk::schedule(const engine::Input& input, const engine::Classification& effect,
                            const Source& source, Frame& acts_on) {
-  const auto drive = to_drive(rules_.lattice, effect.gravity, effect.damping_per_s, rules_.decay);
+  const auto drive = to_drive(rules_.lattice, effect.gravity, effect.damping_per_s);
   if (!drive) return Reason::kInvalid;
   // s + A: no client can have simulated it, as none is further than A beyond delta s - 1.
   const Frame frame = next_frame() + rules_.lead;
@@ -114,7 +114,7 @@ Reason InputDesk::schedule(const engine::Input& input, const engine::Classificat
       .source_client = source.client,
       .source_number = source.number,
       .kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive),
-      .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping, drive->decay}});
+      .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping}});
   return queued ? Reason::kNone : Reason::kRateLimited;
 }
 

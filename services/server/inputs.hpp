@@ -29,7 +29,6 @@ class InputDesk {
     Epoch epoch = 0;
     std::uint32_t lead = 1;
     Lattice lattice;
-    std::uint16_t decay = 0;
   };
   InputDesk(const Rules& rules, engine::Simulation& simulation, ServerTimeline& timeline, Outbox& outbox)
       : rules_(rules), simulation_(&simulation), timeline_(&timeline), outbox_(&outbox) {}

@@ -55,10 +55,8 @@ Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshol
   return parameters;
 }
 
-Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity, double damping_per_s,
-                       std::uint16_t decay) {
+Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity, double damping_per_s) {
   Drive drive;
-  drive.decay = decay;
   for (std::size_t i = 0; i < gravity.size(); ++i) {
     const double g = std::nearbyint(gravity[i] * lattice.dt_s * lattice.velocity_scale());
     if (!(std::abs(g) <= double{kVelocityLimit})) {

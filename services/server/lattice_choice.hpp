@@ -35,9 +35,9 @@ inline constexpr int kFewestHalvings = 8;  ///< coarser would show in the error
 [[nodiscard]] Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshold,
                                                        double position_range, double velocity_range);
 
-/// Gravity (scene units / s^2) and damping (1/s) as the integers of the predicted step; `decay` is passed
-/// through. Errors: kInvalidArgument for what is not finite or does not fit (|g| <= 2^28, 0 <= D < 2^16).
+/// Gravity (scene units / s^2) and damping (1/s) as the integers of the predicted step. Errors:
+/// kInvalidArgument for what is not finite or does not fit (|g| <= 2^28, 0 <= D < 2^16).
 [[nodiscard]] Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity,
-                                     double damping_per_s, std::uint16_t decay = 0);
+                                     double damping_per_s);
 
 }  // namespace tandem::server

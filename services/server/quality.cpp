@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/server/mbit.hpp"
+
 namespace tandem::server {
 namespace {
 
-constexpr double kBitsPerMbit = 1048576.0;
 // Bits fall with about the threshold's inverse; the square root keeps a decision from overshooting what it
 // caused.
 constexpr double kExponent = 0.5;
@@ -27,42 +28,38 @@ bool valid_goal(const QualityGoal& goal, const CodecParameters& parameters) {
          parameters.threshold <= goal.largest_threshold && goal.largest_threshold <= kPositionLimit;
 }
 
-QualityControl::QualityControl(const QualityGoal& goal, const CodecParameters& parameters,
-                               double frame_rate_hz)
+QualityControl::QualityControl(const QualityGoal& goal, double frame_rate_hz)
     : goal_(goal),
-      parameters_(parameters),
       frame_rate_hz_(frame_rate_hz),
       frames_per_decision_(
           static_cast<std::uint32_t>(std::clamp(std::lround(frame_rate_hz / 4), 1L, 1000L))) {}
 
-std::int32_t QualityControl::next_threshold() const {
-  if (goal_.target_mbit_per_s == 0) return parameters_.threshold;
+std::int32_t QualityControl::next_threshold(std::int32_t threshold) const {
+  if (goal_.target_mbit_per_s == 0) return threshold;
   const double mbit_per_s = static_cast<double>(bytes_) * 8 / kBitsPerMbit * frame_rate_hz_ / frames_;
   const double ratio = mbit_per_s / goal_.target_mbit_per_s;
-  if (std::abs(ratio - 1) <= kDeadBand) return parameters_.threshold;
+  if (std::abs(ratio - 1) <= kDeadBand) return threshold;
   const double factor =
       std::clamp(std::pow(std::max(ratio, 1e-3), kExponent), 1 / kLargestFactor, kLargestFactor);
-  const double wanted = std::clamp(parameters_.threshold * factor, double(goal_.smallest_threshold),
-                                   double(goal_.largest_threshold));
+  const double wanted =
+      std::clamp(threshold * factor, double(goal_.smallest_threshold), double(goal_.largest_threshold));
   return static_cast<std::int32_t>(std::lround(wanted));
 }
 
-std::optional<CodecParameters> QualityControl::after_frame(std::size_t payload_bytes) {
+bool QualityControl::after_frame(std::size_t payload_bytes, CodecParameters& parameters) {
   bytes_ += payload_bytes;
-  if (++frames_ < frames_per_decision_) return std::nullopt;
-  CodecParameters next = parameters_;
-  next.threshold = next_threshold();
+  if (++frames_ < frames_per_decision_) return false;
+  const CodecParameters before = parameters;
+  parameters.threshold = next_threshold(before.threshold);
   if (statistics_.bodies > 0) {  // in a time without corrections nothing is learnt
-    const CodecParameters wanted = trained_parameters(statistics_, next.threshold);
-    next.position_step = follow(parameters_.position_step, wanted.position_step);
-    next.velocity_step = follow(parameters_.velocity_step, wanted.velocity_step);
+    const CodecParameters wanted = trained_parameters(statistics_, parameters.threshold);
+    parameters.position_step = follow(before.position_step, wanted.position_step);
+    parameters.velocity_step = follow(before.velocity_step, wanted.velocity_step);
   }
   frames_ = 0;
   bytes_ = 0;
   statistics_ = {};
-  if (next == parameters_) return std::nullopt;
-  parameters_ = next;
-  return next;
+  return parameters != before;
 }
 
 }  // namespace tandem::server

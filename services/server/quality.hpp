@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/training.hpp"
@@ -26,19 +25,18 @@ struct QualityGoal {
 /// Looks at every frame and decides four times a second. Deterministic; no clock. Not thread-safe.
 class QualityControl {
  public:
-  /// `goal` must be valid for `parameters`, which are in force now.
-  QualityControl(const QualityGoal& goal, const CodecParameters& parameters, double frame_rate_hz);
+  QualityControl(const QualityGoal& goal, double frame_rate_hz);
 
   /// Where the timeline counts residuals: ServerTimeline::set_statistics().
   [[nodiscard]] CodecStatistics& statistics() { return statistics_; }
-  /// After each frame; parameters to set when they should change.
-  [[nodiscard]] std::optional<CodecParameters> after_frame(std::size_t payload_bytes);
+  /// After each frame; true when it changed threshold or steps. The goal must be valid for `parameters`,
+  /// which are those of the next frame.
+  bool after_frame(std::size_t payload_bytes, CodecParameters& parameters);
 
  private:
-  [[nodiscard]] std::int32_t next_threshold() const;
+  [[nodiscard]] std::int32_t next_threshold(std::int32_t threshold) const;
 
   QualityGoal goal_;
-  CodecParameters parameters_;
   double frame_rate_hz_;
   std::uint32_t frames_per_decision_;
   std::uint32_t frames_ = 0;

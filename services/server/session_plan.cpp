@@ -54,6 +54,24 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
   return {};
 }
 
+// Decay and gains of the first frame, and whether they stay.
+Result<void> choose_gains(const SessionChoice& choice, const scenes::TrainedTable& table,
+                          HostConfig& config) {
+  if (choice.codec != "tracker") return {};
+  // What the constants make of the predictor, which may be another than the name says.
+  const auto predictor = make_predictor(config.predictor, 1, config.predictor_constants);
+  if (!predictor) return tl::unexpected(predictor.error());
+  const std::string_view kind = (*predictor)->name();
+  config.parameters = with_usual_gains(config.parameters, choice.codec, kind);
+  if (choice.trained_gains) {
+    if (kind == "ballistic" && table.tracker_decay != 0) config.parameters.decay = table.tracker_decay;
+  } else {
+    config.gains = usual_gain_goal(kind);
+    config.parameters.decay = first_decay(kind);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
@@ -89,11 +107,8 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   if (choice.codec == "tracker") config.budget = choice.budget_bytes.value_or(kNoBudget);
   if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
     return tl::unexpected(chosen.error());
+  if (auto gained = choose_gains(choice, table, config); !gained) return tl::unexpected(gained.error());
   config.run_blocks = blocks_on_threads(choice.threads);
-  // Only the tier `ballistic` learns contact forces, so only there it matters how fast they are forgotten.
-  const bool has_decay =
-      choice.codec == "tracker" && config.predictor == "ballistic" && table.tracker_decay != 0;
-  config.decay = has_decay ? table.tracker_decay : recommended_decay(choice.codec);
   config.scene = scene.name;
   config.scene_description = scene.text;
   config.types.clear();

@@ -93,11 +93,16 @@ class Snaps {
 /// One session's server and client, and what they were seen to do.
 struct Lane {
   Lane(const server::HostConfig& config, std::unique_ptr<CodeAccount> books, ServerTimeline server_side,
-       ClientTimeline client_side)
+       ClientTimeline client_side, std::uint32_t bodies)
       : session(&config),
         account(std::move(books)),
         server(std::move(server_side)),
-        client(std::move(client_side)) {}
+        client(std::move(client_side)),
+        parameters(config.parameters) {
+    if (!config.gains) return;
+    gains = std::make_unique<server::GainControl>(*config.gains, bodies, parameters);
+    server.set_evidence(&gains->evidence());
+  }
 
   const server::HostConfig* session;
   std::unique_ptr<CodeAccount> account;
@@ -105,16 +110,12 @@ struct Lane {
   ClientTimeline client;
   std::vector<std::uint32_t> bytes;
   std::uint64_t corrected = 0;
+  CodecParameters parameters;
+  std::unique_ptr<server::GainControl> gains;  // stays where it is, with its evidence
   Errors errors;
   Snaps snaps;
   Durations predict, encode, decode, apply;
 };
-
-/// Sessions on one trajectory may differ in how fast c decays.
-Drive drive_of(const server::HostConfig& session, Drive drive) {
-  drive.decay = session.decay;
-  return drive;
-}
 
 Result<Lane> make_lane(const server::HostConfig& session, const Replay& replay) {
   TimelineConfig config = server::timeline_config(session, replay.simulation().capacity());
@@ -127,17 +128,17 @@ Result<Lane> make_lane(const server::HostConfig& session, const Replay& replay) 
   if (!client) return tl::unexpected(client.error());
   server->set_clock(&steady_ns);
   client->set_clock(&steady_ns);
-  server->start(0, replay.target(), drive_of(session, replay.start_drive()));
+  server->start(0, replay.target(), replay.start_drive());
   std::vector<std::byte> snapshot;
   server->snapshot(snapshot);
   if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
-  return Lane(session, std::move(account), std::move(*server), std::move(*client));
+  return Lane(session, std::move(account), std::move(*server), std::move(*client),
+              replay.simulation().capacity());
 }
 
 /// One frame of one session: the server's half, then the client's.
 Result<void> advance(Lane& lane, const Replay& replay) {
-  for (ScheduledDrive input : replay.scheduled()) {
-    input.drive = drive_of(*lane.session, input.drive);
+  for (const ScheduledDrive& input : replay.scheduled()) {
     auto scheduled = lane.server.schedule(input).and_then([&] { return lane.client.schedule(input); });
     if (!scheduled) return scheduled;
   }
@@ -147,6 +148,7 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.encode.add(frame.encode_ms + replay.mirror_ms());
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
+  if (lane.gains && lane.gains->after_frame(lane.parameters)) lane.server.set_parameters(lane.parameters);
 
   lane.client.step(1);
   lane.snaps.before(lane.client.state(frame.frame));
@@ -180,6 +182,8 @@ BandwidthRow row_of(Lane& lane, double frames) {
   BandwidthRow row;
   row.codec = session.codec;
   row.predictor = session.predictor;
+  if (session.codec == "tracker") row.gains = session.gains ? "auto" : "trained";
+  row.parameters = lane.parameters;
   row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
   if (!lane.account->decisions.empty()) {
@@ -337,6 +341,10 @@ std::string to_json(std::span<const BandwidthRow> rows) {
                     {"bodies", row.bodies},
                     {"codec", row.codec},
                     {"predictor", row.predictor},
+                    {"gains", row.gains.empty() ? Json(nullptr) : Json(row.gains)},
+                    {"decay", ours(row.parameters.decay / 65536.0)},
+                    {"velocity_gain", ours(row.parameters.velocity_gain / 32768.0)},
+                    {"acceleration_gain", ours(row.parameters.acceleration_gain / 65536.0)},
                     {"threads", row.threads},
                     {"seed", row.seed},
                     {"frames", row.frames},

@@ -5,10 +5,9 @@
 #include <optional>
 #include <string_view>
 
-namespace tandem::tool {
+#include "services/server/mbit.hpp"
 
-/// Bits of the thesis's Mbit.
-inline constexpr double kBitsPerMbit = 1048576.0;
+namespace tandem::tool {
 
 /// Table 5.3 in Mbit/s, where it has this scene, size and codec.
 [[nodiscard]] std::optional<double> paper_mbit_per_s(int scene, std::uint32_t bodies, std::string_view codec);

@@ -20,11 +20,6 @@ struct Observed {
   std::uint64_t payload_bytes = 0;
 };
 
-Drive drive_of(const server::HostConfig& session, Drive drive) {
-  drive.decay = session.decay;
-  return drive;
-}
-
 Result<Observed> observe(const server::HostConfig& session, const std::function<Result<Source>()>& make,
                          std::uint64_t frames, const std::function<void(Frame)>& progress) {
   auto source = make();
@@ -35,12 +30,11 @@ Result<Observed> observe(const server::HostConfig& session, const std::function<
   auto timeline = ServerTimeline::create(server::timeline_config(session, source->simulation->capacity()), 1);
   if (!timeline) return tl::unexpected(timeline.error());
   Observed observed;
-  timeline->start(0, replay->target(), drive_of(session, replay->start_drive()));
+  timeline->start(0, replay->target(), replay->start_drive());
   timeline->set_statistics(&observed.statistics);
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
-    for (ScheduledDrive input : replay->scheduled()) {
-      input.drive = drive_of(session, input.drive);
+    for (const ScheduledDrive& input : replay->scheduled()) {
       if (auto scheduled = timeline->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
     }
     observed.payload_bytes += timeline->advance(replay->target(), replay->lifecycle()).payload.size();
@@ -89,11 +83,12 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, server::SessionChoice ch
   table.velocity_code_lengths = lengths(tables, kSymbols);
 
   choice.codec = "tracker";
+  choice.trained_gains = true;
   std::uint64_t fewest_bytes = UINT64_MAX;
   for (std::size_t i = 0; i < kDecays.size(); ++i) {
     auto session = server::plan_session(scene, choice);
     if (!session) return tl::unexpected(session.error());
-    session->decay = kDecays[i];
+    session->parameters.decay = kDecays[i];
     const auto pass =
         observe(*session, make, frames, [&](Frame frame) { progress((2 + i) * frames + frame); });
     if (!pass) return tl::unexpected(pass.error());

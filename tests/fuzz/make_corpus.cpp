@@ -32,7 +32,7 @@ bool write_deltas(const std::filesystem::path& folder) {
         std::vector<LifecycleRecord> lifecycle;
         if (lively) lifecycle = synthetic::random_lifecycle(random, state, target, 4);
         DeltaCodec delta = synthetic::make_delta(codec_names()[codec], kCapacity, kParameters);
-        if (lively) delta.set_parameters({100, 8, 32});
+        if (lively) delta.set_parameters({100, 8, 32, 900, 30000, 5000});
         std::vector<std::byte> bytes(1 + delta.bound());
         bytes[0] = static_cast<std::byte>(codec);
         const auto encoded = delta.encode(state, target, lifecycle, kNoBudget, std::span(bytes).subspan(1));
@@ -63,6 +63,7 @@ bool write_streams(const std::filesystem::path& folder) {
         for (std::int32_t& p : body.p) p = std::clamp(p + random.even(500), -kPositionLimit, kPositionLimit);
         target.set_body(slot, body);
       }
+      if (frame == 2) delta.set_parameters({100, 16, 64, 900, 30000, 5000});
       const auto size = delta.encode(state, target, {}, kNoBudget, payload).size_bytes;
       if (size >= 128) return false;
       stream.push_back(static_cast<std::byte>(size));
@@ -86,9 +87,9 @@ bool write_snapshots(const std::filesystem::path& folder) {
     synthetic::Random random(2);
     auto server = ServerTimeline::create(config, 1);
     if (!server) return false;
-    server->start(10, synthetic::random_state(random, kCapacity, dead_one_in), Drive{{0, -640, 0}, 10, 3});
+    server->start(10, synthetic::random_state(random, kCapacity, dead_one_in), Drive{{0, -640, 0}, 10});
     for (std::uint64_t number = 1; number <= dead_one_in; ++number) {
-      if (!server->schedule({number, 11 + number, Drive{{1, 2, 3}, 4, 5}})) return false;
+      if (!server->schedule({number, 11 + number, Drive{{1, 2, 3}, 4}})) return false;
     }
     std::vector<std::byte> bytes;
     server->snapshot(bytes);

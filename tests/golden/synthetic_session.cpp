@@ -13,7 +13,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x4120BC44BE2DF08C;
+constexpr std::uint64_t kGolden = 0x64BEC76D55D71F7D;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field";
 constexpr std::pair<std::string_view, std::string_view> kSessions[] = {
@@ -38,21 +38,29 @@ bool run(std::string_view codec, std::string_view predictor, synthetic::Random& 
   config.type_count = synthetic::kTypes;
   config.codec = codec;
   config.codec_tables = synthetic::tables_for(codec);
-  config.parameters = {200, 16, 64};
+  config.parameters = {200, 16, 64, 100};
   config.predictor = predictor;
   if (predictor != kBallistic) config.predictor_constants = contact_constants();
   auto server = ServerTimeline::create(config, 1);
   auto client = ClientTimeline::create(config);
   if (!server || !client) return false;
-  server->start(0, synthetic::random_state(random, kCapacity), Drive{{0, -640, 0}, 300, 100});
+  server->start(0, synthetic::random_state(random, kCapacity), Drive{{0, -640, 0}, 300});
   std::vector<std::byte> snapshot;
   server->snapshot(snapshot);
   if (!client->load(snapshot, 1)) return false;
   for (Frame frame = 1; frame <= 200; ++frame) {
     if (random.one_in(10)) {
-      const Drive drive{{random.value(2000), random.value(2000), random.value(2000)}, 300, 100};
+      const Drive drive{{random.value(2000), random.value(2000), random.value(2000)}, 300};
       const ScheduledDrive input{server->last_input() + 1, frame + 1, drive};
       if (!server->schedule(input) || !client->schedule(input)) return false;
+    }
+    if (random.one_in(30)) {
+      const auto share = [&random] { return static_cast<std::uint16_t>(random.below(65536)); };
+      CodecParameters parameters = config.parameters;
+      parameters.decay = share();
+      parameters.velocity_gain = share();
+      parameters.acceleration_gain = share();
+      server->set_parameters(parameters);
     }
     State target = synthetic::random_target(random, server->state(), 8);
     const auto lifecycle = synthetic::random_lifecycle(random, server->state(), target, 100);

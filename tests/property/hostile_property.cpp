@@ -89,8 +89,8 @@ TEST(HostileSnapshot, AMutatedSnapshotIsRefused) {
     config.predictor = "ballistic";
     auto server = *ServerTimeline::create(config, 5);
     const State start = synthetic::random_state(random, capacity);
-    server.start(100, start, Drive{{1, 2, 3}, 4, 5});
-    ASSERT_TRUE(server.schedule({1, 105, Drive{{9, 9, 9}, 1, 1}}));
+    server.start(100, start, Drive{{1, 2, 3}, 4});
+    ASSERT_TRUE(server.schedule({1, 105, Drive{{9, 9, 9}, 1}}));
     Bytes snapshot;
     server.snapshot(snapshot);
     auto client = *ClientTimeline::create(config);

@@ -81,7 +81,7 @@ class Scenario {
     config_.type_count = synthetic::kTypes;
     config_.codec = codec_names()[random.below(codec_names().size())];
     config_.codec_tables = synthetic::tables_for(config_.codec);
-    config_.parameters = {200, 16, 64};
+    config_.parameters = {200, 16, 64, 300};
     config_.max_lead = lead;
     server_.emplace(*ServerTimeline::create(config_, 1, make(kind, config_.capacity)));
     client_.emplace(*ClientTimeline::create(config_, make(kind, config_.capacity)));
@@ -112,7 +112,8 @@ class Scenario {
     const auto lifecycle =
         synthetic::random_lifecycle(random_, server_->state(), target, 1 + random_.below(30));
     if (random_.one_in(10))
-      server_->set_parameters({static_cast<std::int32_t>(50 + random_.below(500)), 8, 32});
+      server_->set_parameters(
+          {static_cast<std::int32_t>(50 + random_.below(500)), 8, 32, share(), share(), share()});
     const auto frame =
         server_->advance(target, lifecycle, random_.one_in(2) ? kNoBudget : random_.below(400));
     deltas_.push_back(
@@ -155,6 +156,7 @@ class Scenario {
       for (const auto& [number, input] : all_inputs_) {
         if (input.frame == frame) drive = input.drive;
       }
+      drive.decay = client_->parameters().decay;
       reference_->step(state, state, drive);
       RC_ASSERT(client_->state(frame) == state);
     }
@@ -169,10 +171,10 @@ class Scenario {
   }
 
  private:
+  std::uint16_t share() { return static_cast<std::uint16_t>(random_.below(65536)); }
   Drive random_drive() {
     return {{random_.value(1 << 16), random_.value(1 << 16), random_.value(1 << 16)},
-            static_cast<std::uint16_t>(random_.below(3000)),
-            static_cast<std::uint16_t>(random_.below(500))};
+            static_cast<std::uint16_t>(random_.below(3000))};
   }
 
   Random& random_;

@@ -59,7 +59,7 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
   const auto joins_at = *rc::gen::inRange(1, 8);
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
   Random random(seed);
-  const CodecParameters parameters{threshold, 1, 1};
+  CodecParameters parameters{threshold, 1, 1};
   DeltaCodec server = synthetic::make_delta("tracker", capacity, parameters);
   DeltaCodec client = synthetic::make_delta("tracker", capacity, parameters);
   DeltaCodec late = synthetic::make_delta("tracker", capacity, parameters);
@@ -70,10 +70,16 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
   for (int frame = 0; frame < static_cast<int>(moods.size()); ++frame) {
     if (frame == joins_at) {
       RC_ASSERT(late.codec().load(saved(client)).has_value());
+      late.restore_parameters(client.parameters());
       joined = held;
     }
     const auto mood = static_cast<Mood>(moods[static_cast<std::size_t>(frame)]);
     const State target = target_of(random, agreed, mood, threshold, frame);
+    if (random.one_in(3)) {
+      parameters.velocity_gain = static_cast<std::uint16_t>(random.below(65536));
+      parameters.acceleration_gain = static_cast<std::uint16_t>(random.below(65536));
+      server.set_parameters(parameters);
+    }
     const std::size_t budget = random.one_in(3) ? random.below(4 * capacity + 20) : kNoBudget;
     const auto encoded = server.encode(agreed, target, {}, budget, out);
     RC_ASSERT(encoded.correction_bytes <= budget);

@@ -12,9 +12,6 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kNames{"none",    "selective", "quantized",
                                                  "entropy", "limited",   "tracker"};
-// 1.2 % a frame. Faster suits piles that churn, slower those at rest: at 3 % these learn hardly anything.
-constexpr std::uint16_t kTrackerDecay = 800;
-
 Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
   CodeLengths lengths{};
   for (std::size_t s = 0; s < kSymbols; ++s) lengths[s] = std::to_integer<std::uint8_t>(bytes[s]);
@@ -27,7 +24,17 @@ Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
 
 std::span<const std::string_view> codec_names() { return kNames; }
 
-std::uint16_t recommended_decay(std::string_view name) { return name == "tracker" ? kTrackerDecay : 0; }
+void GainEvidence::add(const GainEvidence& more) {
+  agreement += more.agreement;
+  repeated += more.repeated;
+  forwardness += more.forwardness;
+  driven += more.driven;
+}
+
+CodecParameters with_usual_gains(CodecParameters parameters, std::string_view codec,
+                                 std::string_view predictor) {
+  return codec == "tracker" ? with_tracker_gains(parameters, predictor) : parameters;
+}
 
 Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
                                           std::span<const std::byte> tables) {

@@ -21,6 +21,10 @@ struct CodecParameters {
   std::int32_t threshold = 0;      ///< lattice units; bodies further off than this are corrected. 1 .. 2^30
   std::int32_t position_step = 1;  ///< lattice units per quantisation step (range / 127). 1 .. 2^24
   std::int32_t velocity_step = 1;  ///< 1/64 unit per frame per quantisation step (range / 127). 1 .. 2^24
+  // For codecs that steer a filter (`tracker`); nothing to the others. Any value is valid.
+  std::uint16_t decay = 0;  ///< E of the predicted steps after this delta: share of c lost, in 1/65536
+  std::uint16_t velocity_gain = 26214;     ///< beta, in 1/32768: share of a correction that is an error of v
+  std::uint16_t acceleration_gain = 9830;  ///< gamma, in 1/65536: share of that that is an error of c
   friend bool operator==(const CodecParameters&, const CodecParameters&) = default;
 };
 /// 127 steps of this size span the lattice from end to end.
@@ -42,6 +46,15 @@ struct CodeAccount {
   std::vector<std::array<std::uint64_t, 2>> decisions;  ///< zeros and ones by context
 };
 
+/// What corrections say of a filter's gains: sums of cosines. Positive: more of it is wanted.
+struct GainEvidence {
+  double agreement = 0;        ///< of corrections with the one before: of v
+  std::uint64_t repeated = 0;  ///< corrections in it
+  double forwardness = 0;      ///< of corrections with c: of what is kept of c
+  std::uint64_t driven = 0;    ///< corrections in it
+  void add(const GainEvidence& more);
+};
+
 /// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
@@ -57,7 +70,7 @@ class Codec {
   /// Most bytes encode() can write for this session's capacity.
   [[nodiscard]] virtual std::size_t bound() const = 0;
 
-  /// The predicted step of the session, by name, before anything else. For codecs whose gains depend on it.
+  /// Predictor::name() of the session, before anything else. For codecs whose gains depend on it.
   virtual void predicted_by(std::string_view /*predictor*/) {}
 
   /// How to code blocks side by side; one after the other without it. For codecs that can. Changes no byte.
@@ -66,6 +79,10 @@ class Codec {
   /// Adds every encoded frame to `account`, which stays until this is called again; null: to none. For codecs
   /// with adaptive contexts; others do nothing.
   virtual void account_to(CodeAccount* /*account*/) {}
+
+  /// Adds every encoded frame to `evidence`, which stays until this is called again; null: to none. For
+  /// codecs with gains; others do nothing.
+  virtual void evidence_to(GainEvidence* /*evidence*/) {}
 
   /// The frame to come: `predicted` stays valid until the end of encode() or apply(); `slots` (ascending,
   /// each once) are those that lifecycle records spawned, despawned or teleported in it. Comes before
@@ -117,8 +134,9 @@ class Codec {
 /// The names make_codec() knows: those of the paper's table 5.1 in its order, then ours.
 [[nodiscard]] std::span<const std::string_view> codec_names();
 
-/// Drive::decay that suits a codec: how fast the learned acceleration c fades. 0 for codecs that learn none.
-[[nodiscard]] std::uint16_t recommended_decay(std::string_view name);
+/// `parameters` with decay and gains that suit most scenes. `predictor`: Predictor::name().
+[[nodiscard]] CodecParameters with_usual_gains(CodecParameters parameters, std::string_view codec,
+                                               std::string_view predictor);
 
 /// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
 inline constexpr std::size_t kPaperBudgetBytes = 6553;

@@ -10,14 +10,9 @@
 namespace tandem {
 namespace {
 
-constexpr std::size_t kParametersBytes = 12;
-
 Result<CodecParameters> read_parameters(std::span<const std::byte> section) {
   ByteReader in(section);
-  CodecParameters parameters;
-  parameters.threshold = in.get<std::int32_t>();
-  parameters.position_step = in.get<std::int32_t>();
-  parameters.velocity_step = in.get<std::int32_t>();
+  const CodecParameters parameters = get_parameters(in);
   if (!in.at_end()) return fail(ErrorCode::kMalformed, "parameters section of wrong length");
   if (!valid_parameters(parameters)) return fail(ErrorCode::kMalformed, "parameters out of range");
   return parameters;
@@ -29,6 +24,26 @@ void write_section_header(SectionType type, std::size_t size_bytes, ByteWriter& 
 }
 
 }  // namespace
+
+void put_parameters(const CodecParameters& parameters, ByteWriter& out) {
+  out.put(parameters.threshold);
+  out.put(parameters.position_step);
+  out.put(parameters.velocity_step);
+  out.put(parameters.decay);
+  out.put(parameters.velocity_gain);
+  out.put(parameters.acceleration_gain);
+}
+
+CodecParameters get_parameters(ByteReader& in) {
+  CodecParameters parameters;
+  parameters.threshold = in.get<std::int32_t>();
+  parameters.position_step = in.get<std::int32_t>();
+  parameters.velocity_step = in.get<std::int32_t>();
+  parameters.decay = in.get<std::uint16_t>();
+  parameters.velocity_gain = in.get<std::uint16_t>();
+  parameters.acceleration_gain = in.get<std::uint16_t>();
+  return parameters;
+}
 
 struct DeltaCodec::Impl {
   std::unique_ptr<Codec> codec;
@@ -164,9 +179,7 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   if (impl_->next != impl_->parameters) {
     impl_->parameters = impl_->next;
     write_section_header(SectionType::kParameters, kParametersBytes, writer);
-    writer.put(impl_->parameters.threshold);
-    writer.put(impl_->parameters.position_step);
-    writer.put(impl_->parameters.velocity_step);
+    put_parameters(impl_->parameters, writer);
   }
   TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
   if (impl_->statistics != nullptr) impl_->statistics->observe(state, target, impl_->parameters);

@@ -33,6 +33,12 @@ enum class SectionType : std::uint16_t {
 /// u16 type, u32 length of the body, body.
 inline constexpr std::size_t kSectionHeaderBytes = 6;
 
+/// CodecParameters as they stand in a delta and in a snapshot.
+inline constexpr std::size_t kParametersBytes = 18;
+void put_parameters(const CodecParameters& parameters, ByteWriter& out);
+/// Checks nothing.
+[[nodiscard]] CodecParameters get_parameters(ByteReader& in);
+
 struct CodecStatistics;
 
 /// Encodes and decodes whole payloads around a codec. One per side and session. Not thread-safe. encode() and

@@ -51,7 +51,7 @@ std::uint32_t Tracker::encode(State& state, const State& target, const CodecPara
   predicted_ = &state;
   if (!search_) search_ = std::make_unique<TrackerSearch>(capacity_);
   budget = std::min({budget, bound(), out.rest().size()});
-  threshold_ = parameters.threshold;
+  use(parameters);
   search_->encode(*this, target, budget, out);
   finish_frame(state, TrackerSteppings(threshold_));
   return static_cast<std::uint32_t>(count_);
@@ -71,7 +71,7 @@ void Tracker::begin() {
 Result<void> Tracker::parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
                             const CodecParameters& parameters) {
   TANDEM_ASSERT(alive.size() == capacity_ && predicted_ != nullptr);
-  threshold_ = parameters.threshold;
+  use(parameters);
   alive_ = alive;
   ByteReader in(section);
   const std::uint32_t index = in.get<std::uint16_t>();
@@ -158,7 +158,11 @@ void Tracker::finish_block(State& state, const Block& block, const TrackerSteppi
   for (std::uint32_t i = block.first; i < block.first + work_[block.index].corrected; ++i) {
     const Slot slot = corrected_[i];
     TrackerBody body = this->body(slot);
-    correct_body(state, slot, steps_[i], steppings, threshold_, *gains_, body);
+    if (evidence_ != nullptr) {
+      add_evidence(body, steps_[i], {state.c(0)[slot], state.c(1)[slot], state.c(2)[slot]},
+                   work_[block.index].evidence);
+    }
+    correct_body(state, slot, steps_[i], steppings, threshold_, gains_, body);
     set_body(slot, body);
     age[slot] = std::byte{0xFF};
   }
@@ -187,6 +191,8 @@ void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
     std::copy(first, first + work.corrected, corrected_.begin() + static_cast<std::ptrdiff_t>(count_));
     count_ += work.corrected;
     work.corrected = 0;
+    if (evidence_ != nullptr) evidence_->add(work.evidence);
+    work.evidence = {};
     if (sum == nullptr) {
       sum = &work;
       continue;

@@ -30,9 +30,10 @@ class Tracker final : public Codec {
 
   [[nodiscard]] std::string_view name() const override { return "tracker"; }
   [[nodiscard]] std::size_t bound() const override;
-  void predicted_by(std::string_view predictor) override { gains_ = &tracker_gains(predictor); }
+  void predicted_by(std::string_view predictor) override { gains_ = TrackerGains(predictor); }
   void run_blocks_on(const RunBlocks& run) override { run_ = run; }
   void account_to(CodeAccount* account) override { account_ = account; }
+  void evidence_to(GainEvidence* evidence) override { evidence_ = evidence; }
   void renew(const State& predicted, std::span<const Slot> slots) override;
   std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
                        std::size_t budget, ByteWriter& out) override;
@@ -59,6 +60,7 @@ class Tracker final : public Codec {
     std::uint32_t corrected = 0;
     const char* broken = nullptr;  // decoder: why the stream is none
     TrackerCounts counts{};
+    GainEvidence evidence;
     /// A decision that list_flags() counted as a zero is a one.
     void count_one(std::uint32_t model) {
       --counts[model][0];
@@ -80,6 +82,10 @@ class Tracker final : public Codec {
                             : flag_model(std::to_integer<std::uint8_t>(bodies_[slot]), history_[slot]);
   }
 
+  void use(const CodecParameters& parameters) {
+    threshold_ = parameters.threshold;
+    gains_.set(parameters.velocity_gain, parameters.acceleration_gain);
+  }
   /// Calls job(block) for all blocks, perhaps on several threads.
   template <class Job>
   void for_each_block(const Job& job) const;
@@ -100,6 +106,7 @@ class Tracker final : public Codec {
   TrackerModels models_;
   RunBlocks run_;
   CodeAccount* account_ = nullptr;
+  GainEvidence* evidence_ = nullptr;
   // Of the frame at hand.
   const State* predicted_ = nullptr;
   std::span<const std::uint8_t> alive_;
@@ -112,7 +119,7 @@ class Tracker final : public Codec {
   std::size_t count_ = 0;   // corrected_, once it is whole
   std::uint32_t next_block_ = 0;
   std::int32_t threshold_ = 1;
-  const TrackerGains* gains_ = &tracker_gains("ballistic");
+  TrackerGains gains_{"ballistic"};
   std::unique_ptr<TrackerSearch> search_;  // encoder only, made by the first encode()
 };
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "sdk/core/codec/codec.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem {
@@ -25,18 +26,32 @@ struct TrackerBody {
   std::array<std::int8_t, 3> steps{};  ///< of the last correction, saturated at +-127
 };
 
+struct TrackerKind;
+
 /// How much of a correction is believed to be an error of the velocity and of the acceleration, by
 /// k = min(age + 1, 255): 64 beta / k and 64 beta gamma / k^2, in 1/65536.
-struct TrackerGains {
-  std::array<std::int64_t, kMostAge + 1> velocity{};
-  std::array<std::int64_t, kMostAge + 1> acceleration{};
+class TrackerGains {
+ public:
+  /// The usual ones of a predictor; those of `ballistic` for a name not known here.
+  explicit TrackerGains(std::string_view predictor);
+  /// beta in 1/32768, gamma in 1/65536: as in CodecParameters.
+  void set(std::uint16_t beta, std::uint16_t gamma);
+
+  [[nodiscard]] std::int64_t velocity(std::uint32_t k) const { return velocity_[k]; }
+  [[nodiscard]] std::int64_t acceleration(std::uint32_t k) const { return acceleration_[k]; }
   /// Encoder only: how likely, in 1/65536, a correction must be for a body to be corrected before it has to
   /// be.
-  std::uint32_t early = 19661;
+  [[nodiscard]] std::uint32_t early() const;
+
+ private:
+  const TrackerKind* kind_;
+  std::uint16_t beta_ = 0, gamma_ = 0;
+  std::array<std::int64_t, kMostAge + 1> velocity_{};
+  std::array<std::int64_t, kMostAge + 1> acceleration_{};
 };
 
-/// The gains that belong to a predictor; those of `ballistic` for a name not known here.
-[[nodiscard]] const TrackerGains& tracker_gains(std::string_view predictor);
+/// `parameters` with the decay and the gains that suit most scenes with this predictor.
+[[nodiscard]] CodecParameters with_tracker_gains(CodecParameters parameters, std::string_view predictor);
 
 /// Steps to lattice units for one threshold e.
 class TrackerSteppings {
@@ -88,5 +103,8 @@ class TrackerSteppings {
 ///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2), H(1) = 0
 void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
                   std::int32_t threshold, const TrackerGains& gains, TrackerBody& body);
+
+/// What the correction of a body by `steps` says of the gains; before correct_body(). `c`: the body's.
+void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3i& c, GainEvidence& evidence);
 
 }  // namespace tandem

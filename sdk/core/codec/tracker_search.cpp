@@ -246,7 +246,7 @@ void TrackerSearch::choose(Tracker& tracker, const State& target, const Block& b
                                                    kBlockSlots);
   for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
     Candidate candidate{error, slot, 0, error > worth.limit, {}};
-    if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_->early) {
+    if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_.early()) {
       return;
     }
     const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth, costs_,

@@ -1,5 +1,5 @@
 #pragma once
-// What the predicted step reads besides the state. Changes by scheduled input only, never by a delta.
+// What the predicted step reads besides the state. Gravity and damping change by scheduled input only.
 
 #include <cstdint>
 
@@ -11,7 +11,9 @@ namespace tandem {
 struct Drive {
   Vec3i gravity{};            ///< 1/64 lattice unit per frame^2, |g| <= 2^28
   std::uint16_t damping = 0;  ///< D: share of v lost per frame, in 1/65536
-  std::uint16_t decay = 0;    ///< E: share of c lost per frame, in 1/65536; 0 for the paper's codecs
+  /// E: share of c lost per frame, in 1/65536. A timeline fills it in from the codec's parameters; scheduled
+  /// inputs do not have it.
+  std::uint16_t decay = 0;
   friend bool operator==(const Drive&, const Drive&) = default;
 };
 

@@ -30,16 +30,20 @@ struct ClientTimeline::Impl {
     const Held& before = at(frame - 1);
     Held& next = at(frame);
     next.drive = inputs.drive_for(frame, before.drive);
+    next.drive.decay = parts.delta.parameters().decay;
     parts.predictor->step(before.state, next.state, next.drive);
   }
 
-  // After a delta changed the touched slots of the frame just applied.
-  void resimulate_touched() {
+  // After a delta changed the touched slots of the frame just applied, and perhaps the decay from there on.
+  void resimulate() {
     const std::span<const Slot> touched = parts.delta.touched();
-    if (touched.empty()) return;
+    const std::uint16_t decay = parts.delta.parameters().decay;
     for (Frame frame = applied + 1; frame <= now; ++frame) {
       Held& next = at(frame);
-      if (parts.predictor->interacts()) {
+      const bool faded_otherwise = next.drive.decay != decay;
+      next.drive.decay = decay;
+      if (touched.empty() && !faded_otherwise) continue;
+      if (faded_otherwise || parts.predictor->interacts()) {
         parts.predictor->step(at(frame - 1).state, next.state, next.drive);
       } else {
         parts.predictor->step_slots(at(frame - 1).state, next.state, next.drive, touched);
@@ -137,7 +141,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.inputs.forget(frame);
   m.timings.decode_ms = watch.lap_ms();
   m.hash = m.hasher.hash(m.at(frame).state, m.parts.delta.codec().body_state());
-  m.resimulate_touched();
+  m.resimulate();
   m.timings.apply_ms = watch.lap_ms();
   if (m.hash != hash) {
     return fail(ErrorCode::kMismatch, "frame " + std::to_string(frame) + " is " + to_hex(m.hash) +

@@ -72,6 +72,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   Stopwatch watch(m.clock);
   ++m.frame;
   m.drive = m.inputs.drive_for(m.frame, m.drive);
+  m.drive.decay = m.parts.delta.parameters().decay;
   m.inputs.forget(m.frame);
   m.parts.predictor->step(m.state, m.state, m.drive);
   result.predict_ms = watch.lap_ms();
@@ -94,6 +95,10 @@ void ServerTimeline::set_parameters(const CodecParameters& parameters) {
 }
 void ServerTimeline::set_statistics(CodecStatistics* statistics) {
   impl_->parts.delta.set_statistics(statistics);
+}
+
+void ServerTimeline::set_evidence(GainEvidence* evidence) {
+  impl_->parts.delta.codec().evidence_to(evidence);
 }
 
 Frame ServerTimeline::frame() const { return impl_->frame; }

@@ -14,22 +14,20 @@ constexpr std::uint32_t kMagic = 0x50534454;  // "TDSP"
 constexpr std::uint16_t kVersion = 1;
 constexpr std::size_t kRun = 64;  // bodies packed with one width
 constexpr std::size_t kRunHeaderBytes = 5;
-constexpr std::size_t kPendingBytes = 8 + 8 + 16;
-constexpr std::size_t kFixedBytes = 4 + 2 + 8 + 8 + 8 + 16 + 12 + 8 + 4 + 4 + 2 + 4;
+constexpr std::size_t kPendingBytes = 8 + 8 + 14;
+constexpr std::size_t kFixedBytes = 4 + 2 + 8 + 8 + 8 + 14 + kParametersBytes + 8 + 4 + 4 + 2 + 4;
 // Far from overflow of any frame arithmetic; 10^11 years.
 constexpr Frame kMostFrame = Frame{1} << 62U;
 
 void put_drive(const Drive& drive, ByteWriter& out) {
   for (const std::int32_t g : drive.gravity) out.put(g);
   out.put(drive.damping);
-  out.put(drive.decay);
 }
 
 Drive get_drive(ByteReader& in) {
   Drive drive;
   for (std::int32_t& g : drive.gravity) g = in.get<std::int32_t>();
   drive.damping = in.get<std::uint16_t>();
-  drive.decay = in.get<std::uint16_t>();
   return drive;
 }
 
@@ -153,9 +151,7 @@ void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& c
   out.put(snapshot.frame);
   out.put(snapshot.last_input);
   put_drive(snapshot.drive, out);
-  out.put(snapshot.parameters.threshold);
-  out.put(snapshot.parameters.position_step);
-  out.put(snapshot.parameters.velocity_step);
+  put_parameters(snapshot.parameters, out);
   out.put(snapshot.hash);
   out.put(state.capacity());
   out.put(static_cast<std::uint32_t>(bodies.size()));
@@ -195,9 +191,7 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   snapshot.frame = in.get<Frame>();
   snapshot.last_input = in.get<std::uint64_t>();
   snapshot.drive = get_drive(in);
-  snapshot.parameters.threshold = in.get<std::int32_t>();
-  snapshot.parameters.position_step = in.get<std::int32_t>();
-  snapshot.parameters.velocity_step = in.get<std::int32_t>();
+  snapshot.parameters = get_parameters(in);
   snapshot.hash = in.get<std::uint64_t>();
   const auto capacity = in.get<std::uint32_t>();
   const auto count = in.get<std::uint32_t>();

@@ -82,6 +82,8 @@ class ServerTimeline {
   void set_parameters(const CodecParameters& parameters);
   /// For training: every advance() adds what it corrects (training.hpp). Null ends it.
   void set_statistics(CodecStatistics* statistics);
+  /// Every advance() adds what its corrections say of the gains. Null ends it.
+  void set_evidence(GainEvidence* evidence);
 
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] const State& state() const;

@@ -110,11 +110,12 @@ void World::start_server() {
   config.lead = options_.lead;
   if (dice_.chance(0.3)) config.window = 2;
   config.codec = options_.codec;
-  config.decay = recommended_decay(config.codec);
   if (config.codec == "limited") config.budget = 600;
   if (config.codec == "entropy" || config.codec == "limited") config.codec_tables = default_code_tables();
   config.lattice = must(server::choose_lattice(0.01, 3, simulation_->dt_s()));
   config.parameters = must(server::codec_parameters(config.lattice, 0.01, 0.1, 2));
+  config.parameters = with_usual_gains(config.parameters, config.codec, config.predictor);
+  if (config.codec == "tracker") config.gains = server::GainGoal{};
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};
   host_ = must(server::Host::create(config, *simulation_, *server_port_));
   acted_seen_ = 0;

@@ -90,7 +90,7 @@ inline ScheduledInputMessage a_scheduled_input(Epoch epoch, std::uint64_t number
   input.source_client = 99;
   input.source_number = number + 1;
   input.kind = static_cast<std::uint32_t>(ScheduledKind::kDrive);
-  input.values = {0, -980, 0, 12, 0};
+  input.values = {0, -980, 0, 12};
   return input;
 }
 

@@ -92,7 +92,7 @@ transport::ScheduledInputMessage FakeServer::schedule(std::int32_t gravity_y) {
   message.number = input.number;
   message.frame = input.frame;
   message.kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive);
-  message.values = {0, gravity_y, 0, 300, 0};
+  message.values = {0, gravity_y, 0, 300};
   return message;
 }
 

@@ -149,7 +149,7 @@ TEST_F(HostileTest, AMalformedScheduledInputStaysMissingAndTheClientJoinsAgain) 
     if (i == 1) bad.values.pop_back();
     if (i == 2) bad.values[1] = kVelocityLimit + 1;
     if (i == 3) bad.values[3] = -1;
-    if (i == 4) bad.values[4] = 65'536;
+    if (i == 4) bad.values[3] = 65'536;
     if (i == 5) bad.number = 0;
     port.inputs.push_back(from_server(bad));
   }

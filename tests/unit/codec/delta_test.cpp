@@ -28,6 +28,16 @@ class Payload {
     for (const std::int64_t value : u32_values) put(static_cast<std::uint32_t>(value));
     return *this;
   }
+  Payload& parameters(const CodecParameters& values, std::size_t size_bytes = kParametersBytes) {
+    put(static_cast<std::uint16_t>(SectionType::kParameters));
+    put(static_cast<std::uint32_t>(size_bytes));
+    Bytes body(kParametersBytes);
+    ByteWriter out(body);
+    put_parameters(values, out);
+    body.resize(size_bytes);
+    bytes_.insert(bytes_.end(), body.begin(), body.end());
+    return *this;
+  }
   Payload& record(LifecycleKind kind, Slot slot, TypeId type = 0, std::int32_t px = 0, std::int32_t vx = 0) {
     Bytes body;
     std::swap(body, bytes_);
@@ -161,20 +171,21 @@ TEST(DeltaCodec, ParametersTravelWithTheDeltaThatUsesThemFirst) {
   EXPECT_EQ(client.parameters(), changed);
   const std::size_t with_parameters = encoded.size_bytes;
   encoded = server.encode(agreed, target, {}, kNoBudget, out);
-  EXPECT_EQ(encoded.size_bytes, with_parameters - 18);
+  EXPECT_EQ(encoded.size_bytes, with_parameters - 24);
   EXPECT_EQ(encoded.correction_bytes, encoded.size_bytes);
 }
 
 TEST(DeltaCodec, ParametersOutOfRangeAreRefused) {
-  const auto with = [](std::initializer_list<std::int64_t> values) {
-    return Payload().section(static_cast<std::uint16_t>(SectionType::kParameters), values).bytes();
+  const auto taken = [](const CodecParameters& parameters, std::size_t size_bytes = kParametersBytes) {
+    return decode(Payload().parameters(parameters, size_bytes).bytes()).has_value();
   };
-  EXPECT_TRUE(decode(with({1, 1, 1})));
-  EXPECT_FALSE(decode(with({0, 1, 1})));
-  EXPECT_FALSE(decode(with({1, -1, 1})));
-  EXPECT_FALSE(decode(with({1, 1, kMaxStep + 1})));
-  EXPECT_FALSE(decode(with({1, 1})));
-  EXPECT_FALSE(decode(with({1, 1, 1, 1})));
+  EXPECT_TRUE(taken({1, 1, 1}));
+  EXPECT_TRUE(taken({1, 1, 1, 65535, 65535, 65535})) << "any decay and gains will do";
+  EXPECT_FALSE(taken({0, 1, 1}));
+  EXPECT_FALSE(taken({1, -1, 1}));
+  EXPECT_FALSE(taken({1, 1, kMaxStep + 1}));
+  EXPECT_FALSE(taken({1, 1, 1}, kParametersBytes - 1));
+  EXPECT_FALSE(taken({1, 1, 1}, kParametersBytes + 1));
 }
 
 TEST(DeltaCodec, UnknownSectionsAreSkippedUnlessCritical) {
@@ -185,10 +196,9 @@ TEST(DeltaCodec, UnknownSectionsAreSkippedUnlessCritical) {
 }
 
 TEST(DeltaCodec, SectionsOutOfOrderOrRepeatedAreRefused) {
-  const auto parameters = static_cast<std::uint16_t>(SectionType::kParameters);
-  EXPECT_FALSE(decode(Payload().section(parameters, {1, 1, 1}).section(parameters, {1, 1, 1}).bytes()));
-  EXPECT_FALSE(decode(
-      Payload().section(parameters, {1, 1, 1}).record(LifecycleKind::kDespawn, 0).end_lifecycle().bytes()));
+  EXPECT_FALSE(decode(Payload().parameters({1, 1, 1}).parameters({1, 1, 1}).bytes()));
+  EXPECT_FALSE(
+      decode(Payload().parameters({1, 1, 1}).record(LifecycleKind::kDespawn, 0).end_lifecycle().bytes()));
 }
 
 TEST(DeltaCodec, ABlockMayComeOnlyOnce) {
@@ -216,7 +226,7 @@ TEST(DeltaCodec, EveryTruncationAndExtensionOfADeltaIsRefused) {
     const std::vector<LifecycleRecord> lifecycle{{LifecycleKind::kDespawn, 2, 0, 0, {}}};
     server.set_parameters({99, 9, 9});
     const auto encoded = server.encode(state, target, lifecycle, kNoBudget, out);
-    const std::vector<std::size_t> boundaries{0, 11, 11 + 18};  // between sections
+    const std::vector<std::size_t> boundaries{0, 11, 11 + 24};  // between sections
     for (std::size_t size = 0; size < encoded.size_bytes; ++size) {
       const bool whole = std::find(boundaries.begin(), boundaries.end(), size) != boundaries.end();
       EXPECT_EQ(decode(Bytes(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(size)), name).has_value(),

@@ -48,7 +48,7 @@ TEST_F(InputTest, AScheduledInputActsOnFrameSPlusLead) {
   EXPECT_EQ(scheduled.source_number, 1U);
   EXPECT_EQ(scheduled.kind, static_cast<std::uint32_t>(transport::ScheduledKind::kDrive));
   const Drive drive = *to_drive(test_config().lattice, {0, 0, -5}, 0);
-  EXPECT_EQ(scheduled.values, (std::vector<std::int32_t>{0, 0, drive.gravity[2], 0, 0}));
+  EXPECT_EQ(scheduled.values, (std::vector<std::int32_t>{0, 0, drive.gravity[2], 0}));
 }
 
 TEST_F(InputTest, TheSimulationGetsAScheduledInputInTheStepThatProducesItsFrame) {

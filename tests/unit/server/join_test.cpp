@@ -86,11 +86,10 @@ TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {
   ASSERT_TRUE(client->load(snapshot.bytes, session.epoch));
   EXPECT_EQ(client->applied(), snapshot.frame);
   for (const auto& input : bench.port.scheduled) {
-    const ScheduledDrive drive{input.number,
-                               input.frame,
-                               {{input.values[0], input.values[1], input.values[2]},
-                                static_cast<std::uint16_t>(input.values[3]),
-                                static_cast<std::uint16_t>(input.values[4])}};
+    const ScheduledDrive drive{
+        input.number,
+        input.frame,
+        {{input.values[0], input.values[1], input.values[2]}, static_cast<std::uint16_t>(input.values[3])}};
     ASSERT_TRUE(client->schedule(drive));
   }
   for (const auto& delta : bench.port.deltas) {

@@ -71,12 +71,11 @@ TEST(CodecParametersOf, RefusesWhatDoesNotFit) {
 
 TEST(ToDrive, ConvertsGravityAndDampingToThePredictedStepsIntegers) {
   const auto lattice = *choose_lattice(1.0 / 64, 64, kDt);  // unit 2^-18
-  const auto drive = to_drive(lattice, {0, 0, -9.0}, 0.3, 7);
+  const auto drive = to_drive(lattice, {0, 0, -9.0}, 0.3);
   ASSERT_TRUE(drive);
   // 9 m/s^2 / 30^2 = 0.01 m per frame^2 = 0.01 * 2^18 units, times 64.
   EXPECT_EQ(drive->gravity[2], -std::lround(0.01 * (1 << 18) * 64));
   EXPECT_EQ(drive->damping, std::lround(0.01 * 65536));
-  EXPECT_EQ(drive->decay, 7);
 }
 
 TEST(ToDrive, RefusesWhatThePredictedStepCannotHold) {

@@ -27,10 +27,10 @@ Snapshot example() {
   snapshot.epoch = kEpoch;
   snapshot.frame = 1234567890123;
   snapshot.last_input = 9;
-  snapshot.drive = {{1, -2, 3}, 4, 5};
-  snapshot.parameters = {100, 10, 20};
+  snapshot.drive = {{1, -2, 3}, 4};
+  snapshot.parameters = {100, 10, 20, 5, 6, 7};
   snapshot.hash = 0xFEDCBA9876543210U;
-  snapshot.pending = {{8, snapshot.frame + 1, {{5, 5, 5}, 1, 2}}, {9, snapshot.frame + 2, {{6, 6, 6}, 1, 2}}};
+  snapshot.pending = {{8, snapshot.frame + 1, {{5, 5, 5}, 1}}, {9, snapshot.frame + 2, {{6, 6, 6}, 1}}};
   return snapshot;
 }
 
@@ -127,7 +127,7 @@ TEST(Snapshot, TheHashOfAClientsStateIsChecked) {
   server.start(0, state, {});
   auto bytes = snapshot_of(server);
   EXPECT_TRUE(client.load(bytes, kEpoch));
-  bytes[58] ^= std::byte{1};  // a byte of the hash
+  bytes[62] ^= std::byte{1};  // a byte of the hash
   EXPECT_EQ(client.load(bytes, kEpoch).error().code, ErrorCode::kMismatch);
   EXPECT_FALSE(client.playing());
 }

@@ -19,7 +19,7 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   State state = one_body();
   TrackerBody body;
   body.age = 9;
-  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, tracker_gains("ballistic"),
+  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, TrackerGains("ballistic"),
                body);
   const std::int32_t d = 2 * 3891;  // 0.95 * 4096, down
   EXPECT_EQ(state.p(0)[0], d);
@@ -35,7 +35,7 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
 TEST(TrackerFilter, ABodyCorrectedTwiceRunningWasHitAndLearnsVelocityAlone) {
   State state = one_body();
   TrackerBody body;
-  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, tracker_gains("ballistic"),
+  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, TrackerGains("ballistic"),
                body);
   EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * (2 * 3891) / 2, 8);
   EXPECT_EQ(state.c(0)[0], 0);
@@ -45,7 +45,7 @@ TEST(TrackerFilter, BelievesCorrectionsThatKeepTheirDirectionMore) {
   const auto velocity_after = [](std::int8_t last) {
     State state = one_body();
     TrackerBody body{9, 5, {last, 0, 0}};
-    correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, tracker_gains("ballistic"),
+    correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, TrackerGains("ballistic"),
                  body);
     return state.v(0)[0];
   };
@@ -61,7 +61,7 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
       const std::int32_t far = sign * kMostTrackerSteps;
       body.age = 2;  // c learns nothing from a body corrected twice running
       correct_body(state, 0, {far, far, far}, TrackerSteppings(kPositionLimit), kPositionLimit,
-                   tracker_gains("ballistic"), body);
+                   TrackerGains("ballistic"), body);
     }
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(state.p(i)[0], sign * kPositionLimit);

@@ -31,7 +31,7 @@ TimelineConfig config_of(std::uint32_t capacity) {
   config.capacity = capacity;
   config.type_count = synthetic::kTypes;
   config.codec = "tracker";
-  config.parameters = kParameters;
+  config.parameters = with_usual_gains(kParameters, "tracker", "ballistic");
   config.predictor = "ballistic";
   return config;
 }
@@ -42,8 +42,7 @@ TEST(Tracker, ASnapshotInMidStreamContinuesToTheBit) {
   Random random(kSeed);
   const TimelineConfig config = config_of(2 * kBlockSlots / 16);
   auto server = *ServerTimeline::create(config, 1);
-  server.start(0, synthetic::random_state(random, config.capacity),
-               {{0, -640, 0}, 300, recommended_decay("tracker")});
+  server.start(0, synthetic::random_state(random, config.capacity), {{0, -640, 0}, 300});
   std::vector<ClientTimeline> clients;
   Bytes snapshot;
   for (int frame = 0; frame < 60; ++frame) {
@@ -221,7 +220,7 @@ TEST(Tracker, ABodyAtRestOnOthersIsCorrectedRarely) {
   auto server = *ServerTimeline::create(config_of(1), 1);
   State start(1);
   start.spawn(0, 0, 0, {});
-  server.start(0, start, {{0, -700, 0}, 20, recommended_decay("tracker")});
+  server.start(0, start, {{0, -700, 0}, 20});
   std::uint32_t late = 0;
   for (int frame = 0; frame < 1000; ++frame) {
     const auto delta = server.advance(start, {});
