@@ -175,9 +175,8 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
 
   Wide squared =
       _mm256_add_epi32(_mm256_add_epi32(product(d[0], d[0]), product(d[1], d[1])), product(d[2], d[2]));
-  const Wide most = _mm256_sub_epi32(product(reach, reach), same(1));
-  const Wide touching = _mm256_cmpeq_epi32(_mm256_min_epu32(squared, most), squared);
-  squared = _mm256_and_si256(squared, touching);
+  const Wide apart = _mm256_cmpeq_epi32(_mm256_max_epu32(squared, product(reach, reach)), squared);
+  squared = _mm256_andnot_si256(apart, squared);
   const Wide inverse = looked_up(inverse_root, _mm256_srli_epi32(squared, 16));
   const Wide entry = _mm256_or_si256(_mm256_and_si256(squared, same(0xFFFF0000U)), same(1 << 15));
   const Wide middle = _mm256_srli_epi32(_mm256_add_epi32(squared, entry), 1);
@@ -198,9 +197,8 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
   const Wide drag = same(law.drag);
   Forces f{};
   for (unsigned i = 0; i < 3; ++i) {
-    f.row[i] = _mm256_and_si256(_mm256_sub_epi32(_mm256_srai_epi32(product(u[i], drag), 9),
-                                                 _mm256_srai_epi32(product(push_word, n[i]), 11)),
-                                touching);
+    f.row[i] = _mm256_andnot_si256(apart, _mm256_sub_epi32(_mm256_srai_epi32(product(u[i], drag), 9),
+                                                           _mm256_srai_epi32(product(push_word, n[i]), 11)));
   }
   transpose(f.row[0], f.row[1], f.row[2], f.row[3]);
   return f;

@@ -161,7 +161,7 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
       view.v[i] = static_cast<std::int16_t>(vector_within(random, (1 << 14) - 1)[i]);
     }
     if (place > 0 && random() % 20 == 0) view.q = views[place - 1].q;
-    view.radius = (1 << 13) - 1;
+    view.radius = random() % 3 == 0 ? 0 : (1 << 13) - 1;  // 0: far smaller than the largest
   }
   std::vector<std::uint32_t> inverse_root(1U << 12U);
   for (std::uint32_t& x : inverse_root) x = 65536 + static_cast<std::uint32_t>(random() % (1U << 15U));
