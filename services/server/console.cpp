@@ -12,8 +12,8 @@
 namespace tandem::server {
 
 std::string gains_text(const CodecParameters& parameters) {
-  if (parameters.decay == 0) return {};
-  return fmt::format("  gains {:.2f} {:.3f}  decay {:.1f} %", parameters.velocity_gain / 32768.0,
+  if (parameters.decay == 0) return {};  // no tracker
+  return fmt::format("gains {:.2f} {:.3f} decay {:.1f} %", parameters.velocity_gain / 32768.0,
                      parameters.acceleration_gain / 65536.0, parameters.decay / 655.36);
 }
 
@@ -39,7 +39,7 @@ void Console::show(Host& host, std::int64_t now_ns) {
   clear_line();
   fmt::print(stderr,
              "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
-             " window {}  threshold {:.3g} m{}",
+             " window {}  threshold {:.3g} m  {}",
              host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s,
              frames > 0 ? corrected / frames : 0, host.report().frame_ms, host.participants(),
              host.observers(), host.window(), host.threshold_m(), gains_text(host.parameters()));

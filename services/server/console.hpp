@@ -2,10 +2,14 @@
 // What tandemd shows while it runs: log lines, and on a terminal one live line.
 
 #include <cstdint>
+#include <string>
 
 #include "services/server/host.hpp"
 
 namespace tandem::server {
+
+/// Gains and decay of codec `tracker`; nothing for the others.
+[[nodiscard]] std::string gains_text(const CodecParameters& parameters);
 
 /// Writes to stderr. Not thread-safe.
 class Console {

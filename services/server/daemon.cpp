@@ -17,6 +17,7 @@
 #include "services/scenes/script.hpp"
 #include "services/server/console.hpp"
 #include "services/server/host.hpp"
+#include "services/server/mbit.hpp"
 #include "services/server/publisher.hpp"
 #include "services/server/session_plan.hpp"
 
@@ -175,7 +176,7 @@ Ending serve(Host& host, transport::ServerPort& port, Script& script, HashLog& h
 void print_report(const HostTotals& totals, double frame_rate_hz, bool json) {
   const double per_frame = totals.frames == 0 ? 0 : 1 / static_cast<double>(totals.frames);
   const double mbit_per_s =
-      static_cast<double>(totals.payload_bytes) * 8 / 1048576 * per_frame * frame_rate_hz;
+      static_cast<double>(totals.payload_bytes) * 8 / kBitsPerMbit * per_frame * frame_rate_hz;
   spdlog::info(
       "{} frames, {:.3f} Mbit/s at the nominal rate, {:.2f} ms a frame (p99 {:.2f}), {} clients, {} stalls "
       "({} ms), "
@@ -232,6 +233,8 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   if (!closed) spdlog::error(closed.error().message);
   if (ending == Ending::kRefused) return report_error(*(*host)->error(), 1);
   if (options.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
+  if (const std::string gains = gains_text((*host)->parameters()); !gains.empty())
+    spdlog::info("at the end: {}", gains);
   print_report((*host)->totals(), frame_rate_hz, options.json);
   if (ending == Ending::kNobodyCame) {
     return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",

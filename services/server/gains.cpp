@@ -23,12 +23,12 @@ constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
 // Corrections of a fifth of the bodies, and a hundred at least; beta needs three times as many, because
 // bodies that start to fall agree with themselves for a while.
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
-// Smaller changes are not worth the bytes of saying so.
-constexpr double kDeadBand = 0.05;
+// Smaller changes, as shares, are not worth the bytes of saying so.
+constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
 
 double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(count); }
 
-bool differs(double wanted, double held) { return std::abs(wanted - held) > kDeadBand * held; }
+bool differs(double wanted, double held, double band) { return std::abs(wanted - held) > band * held; }
 
 }  // namespace
 
@@ -68,7 +68,9 @@ bool GainControl::after_frame(CodecParameters& parameters) {
   }
   const double decay = std::exp(log_decay_);
   const double gain = 32768 * std::exp(log_gain_);
-  if (!differs(decay, parameters.decay) && !differs(gain, parameters.velocity_gain)) return false;
+  if (!differs(decay, parameters.decay, kDecayDeadBand) &&
+      !differs(gain, parameters.velocity_gain, kGainDeadBand))
+    return false;
   parameters.decay = static_cast<std::uint16_t>(decay);
   parameters.velocity_gain = static_cast<std::uint16_t>(gain);
   parameters.acceleration_gain =

@@ -181,7 +181,7 @@ TEST_F(HostileTest, AFloodOfScheduledInputsIsBounded) {
     input.number = n + 1'000'000;
     input.frame = 1'000'000 + n;
     input.kind = 1;
-    input.values = {0, 1, 0, 0, 0};
+    input.values = {0, 1, 0, 0};
     port.inputs.push_back(from_server(input));
   }
   poll();
