@@ -14,17 +14,17 @@ class RangeEncoder {
   explicit RangeEncoder(std::span<std::byte> out)
       : begin_(out.data()), at_(out.data()), end_(out.data() + out.size()) {}
 
-  /// `p1`: probability of 1 in 1/65536, in 1 .. 65535.
+  /// `p1`: probability of 1 in 1/65536, in 1 .. 65535; 0 for a bit that is never 1.
   void put(bool bit, std::uint32_t p1) {
     const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
-    const std::uint32_t skipped = bit ? 0U : bound;
-    low_ += skipped;
-    if (low_ < skipped) carry();
-    range_ = bit ? bound : range_ - bound;
+    const std::uint32_t rest = range_ - bound;
+    const std::uint32_t one = 0U - static_cast<std::uint32_t>(bit);  // a mask: bits are hard to guess
+    low_ += bound & ~one;
+    range_ = rest ^ ((rest ^ bound) & one);
     while (range_ < kLeastRange) {
-      emit(static_cast<std::byte>(low_ >> 24U));
-      low_ <<= 8U;
       range_ <<= 8U;
+      low_ <<= 8U;
+      if (++held_ == kMostHeld) flush();
     }
   }
 
@@ -34,7 +34,8 @@ class RangeEncoder {
       const std::uint64_t mask = std::uint64_t{0xFFFFFFFFU} >> (8U * bytes);
       const std::uint64_t value = (low_ + mask) & ~mask;
       if (value - low_ >= range_) continue;
-      if ((value >> 32U) != 0) carry();
+      low_ = value;
+      flush();
       for (unsigned i = 0; i < bytes; ++i) emit(static_cast<std::byte>(value >> (24U - 8U * i)));
       break;
     }
@@ -45,7 +46,14 @@ class RangeEncoder {
 
  private:
   static constexpr std::uint32_t kLeastRange = 1U << 24U;
+  static constexpr std::uint32_t kMostHeld = 3;
 
+  void flush() {
+    const std::uint64_t bytes = low_ >> 32U;
+    if (bytes >> (8U * held_) != 0) carry();
+    for (; held_ != 0; --held_) emit(static_cast<std::byte>(bytes >> (8U * held_ - 8U)));
+    low_ &= 0xFFFFFFFFU;
+  }
   void emit(std::byte byte) {
     if (at_ == end_) {
       overflow_ = true;
@@ -67,7 +75,8 @@ class RangeEncoder {
   std::byte* begin_;
   std::byte* at_;
   std::byte* end_;
-  std::uint32_t low_ = 0;
+  std::uint64_t low_ = 0;  // from the top: a carry, held_ bytes that are not written yet, 32 bits
+  std::uint32_t held_ = 0;
   std::uint32_t range_ = 0xFFFFFFFFU;
   bool overflow_ = false;
 };

@@ -92,8 +92,8 @@ class Tracker final : public Codec {
   /// Fills flags_ of a block, and counts its flags as zeros. Dead slots have a model that is never a one and
   /// takes no bits, so that loops need not ask.
   void list_flags(const Block& block, std::span<const std::uint8_t> alive, Work& work);
-  /// Fills contexts_ of a block.
-  void list_contexts(const Block& block);
+  /// Fills contexts_ of a block, at least those of `slots`.
+  void list_contexts(const Block& block, std::span<const Slot> slots);
   /// Null, or why the stream is none.
   const char* decode_block(const Block& block, Work& work);
   /// Forgets the renewed bodies, corrects the collected ones, learns, ages the others.

@@ -192,8 +192,8 @@ bool code_escape(Coder& coder, std::uint32_t& x) {
 
 /// Codes one axis. `moved`: how many earlier axes are not zero. Returns as code_steps().
 template <class Coder>
-bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis, std::uint32_t moved,
-               std::int32_t& steps) {
+[[gnu::always_inline]] inline bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis,
+                                             std::uint32_t moved, std::int32_t& steps) {
   const std::int32_t wanted = steps;
   const bool is_last_hope = axis == 2 && moved == 0;
   if (!is_last_hope && !coder.code(wanted != 0, zero_model(context, axis, moved))) {
@@ -224,11 +224,12 @@ template <class Coder>
 bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps) {
   Coder local = coder;  // in registers: counts are written through pointers in between
   std::uint32_t moved = 0;
-  bool good = true;
-  for (std::uint32_t axis = 0; axis < 3 && good; ++axis) {
-    good = code_axis(local, context, axis, moved, steps[axis]);
+  const auto code = [&](std::uint32_t axis) {
+    const bool good = code_axis(local, context, axis, moved, steps[axis]);
     moved += static_cast<std::uint32_t>(steps[axis] != 0);
-  }
+    return good;
+  };
+  const bool good = code(0) && code(1) && code(2);
   coder = local;
   return good;
 }

@@ -50,6 +50,10 @@ struct CostCoder {
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
 };
 
+Vec3i position(const State& state, Slot slot) {
+  return {state.p(0)[slot], state.p(1)[slot], state.p(2)[slot]};
+}
+
 std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
   const auto unit = static_cast<std::uint32_t>(step);
   const std::uint32_t steps = (magnitude(to, from) + unit / 2) / unit;
@@ -123,6 +127,7 @@ Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerC
 bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
                        const TrackerContext& context, TrackerSteps& steps) const {
   std::array<std::array<std::uint64_t, 2>, 3> long_error{};  // squared, of the unit of long steps
+  std::array<std::array<std::uint64_t, 2>, 3> moved_size{};
   std::array<std::array<std::uint32_t, 2>, 3> is_moved{}, is_long{};
   std::uint64_t from_zero = 0;  // squared
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -134,6 +139,7 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
                                                 static_cast<std::uint64_t>(TrackerSteppings::kMostDistance));
       long_error[axis][longer] = off * off;
       is_moved[axis][longer] = static_cast<std::uint32_t>(length != 0);
+      moved_size[axis][longer] = length != 0 ? size : 0;
       is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
@@ -142,27 +148,31 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
   const AxisCosts z_costs = axis_costs(costs, context, 2);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
   std::uint64_t best = UINT64_MAX;  // cost, then the point; among equals the lowest values
-  for (std::uint32_t point = 0; point < 8; ++point) {
-    const std::uint32_t x = point >> 2U;
-    const std::uint32_t y = (point >> 1U) & 1U;
-    const std::uint32_t z = point & 1U;
+  const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     const std::uint32_t before_z = is_moved[0][x] + is_moved[1][y];
     const std::uint32_t moved = before_z + is_moved[2][z];
     // Of m steps of one along m axes: the sum of (size - unit)^2 there and size^2 elsewhere.
     const auto unit = static_cast<std::uint64_t>(steppings.unit(moved));
-    const std::uint64_t sizes = (is_moved[0][x] != 0 ? std::uint64_t{size_[0]} : 0) +
-                                (is_moved[1][y] != 0 ? std::uint64_t{size_[1]} : 0) +
-                                (is_moved[2][z] != 0 ? std::uint64_t{size_[2]} : 0);
+    const std::uint64_t sizes = moved_size[0][x] + moved_size[1][y] + moved_size[2][z];
     const std::uint64_t short_error = from_zero + unit * (moved * unit - 2 * sizes);
     const std::uint64_t error = (is_long[0][x] | is_long[1][y] | is_long[2][z]) != 0
                                     ? long_error[0][x] + long_error[1][y] + long_error[2][z]
                                     : short_error;
     const std::uint64_t cost = std::uint64_t{x_costs[0][x]} + y_costs[is_moved[0][x]][y] +
                                z_costs[before_z][z] + (((error >> worth.shift) * worth.worth) >> 24U);
-    const std::uint64_t counted =
-        moved != 0 && error <= worth.limit ? cost << 3U | (point ^ lowest) : UINT64_MAX;
-    best = std::min(counted, best);
-  }
+    const std::uint64_t point = (x << 2U | y << 1U | z) ^ lowest;
+    const bool counts = moved != 0 && error <= worth.limit;
+    best = std::min(counts ? cost << 3U | point : UINT64_MAX, best);
+  };
+  // Written out, so that what depends on a point alone is no index any more.
+  try_point(0, 0, 0);
+  try_point(0, 0, 1);
+  try_point(0, 1, 0);
+  try_point(0, 1, 1);
+  try_point(1, 0, 0);
+  try_point(1, 0, 1);
+  try_point(1, 1, 0);
+  try_point(1, 1, 1);
   if (best == UINT64_MAX) return false;
   const auto point = static_cast<std::uint32_t>((best ^ lowest) & 7U);
   steps = {value(0, point >> 2U), value(1, (point >> 1U) & 1U), value(2, point & 1U)};
@@ -239,24 +249,31 @@ void TrackerSearch::choose(Tracker& tracker, const State& target, const Block& b
   const TrackerSteppings steppings(threshold);
   const ErrorWorth worth(threshold);
   const auto early = static_cast<std::int32_t>((threshold * kEarlyShare) >> 8);
-  Candidate* at = candidates_.data() + block.first;
-  std::uint32_t must = 0;
-  tracker.list_contexts(block);
+  Candidate* const first = candidates_.data() + block.first;
+  Slot* const slots = tracker.corrected_.data() + block.first;
+  std::uint32_t considered = 0;
   const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
                                                    kBlockSlots);
   for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
-    Candidate candidate{error, slot, 0, error > worth.limit, {}};
-    if (!candidate.must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_.early()) {
-      return;
-    }
-    const bool inside = choose_steps(predicted.body(slot).p, target.body(slot).p, steppings, worth, costs_,
-                                     tracker.contexts_.of(slot), candidate.steps);
-    if (!inside && (!candidate.must || candidate.steps == TrackerSteps{})) return;
+    const bool must = error > worth.limit;
+    if (!must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_.early()) return;
+    slots[considered] = slot;
+    first[considered++] = {error, slot, 0, must, {}};
+  });
+  tracker.list_contexts(block, std::span(slots, considered));
+  Candidate* at = first;
+  std::uint32_t must = 0;
+  for (std::uint32_t i = 0; i < considered; ++i) {
+    Candidate candidate = first[i];
+    const Slot slot = candidate.slot;
+    const bool inside = choose_steps(position(predicted, slot), position(target, slot), steppings, worth,
+                                     costs_, tracker.contexts_.of(slot), candidate.steps);
+    if (!inside && (!candidate.must || candidate.steps == TrackerSteps{})) continue;
     must += static_cast<std::uint32_t>(candidate.must);
     *at++ = candidate;
-  });
+  }
   Part& part = parts_[block.index];
-  part.candidates = static_cast<std::uint32_t>(at - (candidates_.data() + block.first));
+  part.candidates = static_cast<std::uint32_t>(at - first);
   part.must = must;
 }
 
@@ -311,13 +328,17 @@ void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint3
   const std::size_t room = kMostTrackerBytesPerBody * block.slots + kTrackerSlackBytes;
   RangeEncoder flags{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
   tracker.list_flags(block, tracker.predicted_->alive(), work);
-  std::uint32_t next = 0;
+  // Corrected bodies get a mark beside their models, so that no branch asks which they are.
+  constexpr std::uint16_t kMark = 0x8000;
+  static_assert(TrackerModelIndex::kAll <= kMark);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    work.count_one(tracker.flags_[corrected[i]]);
+    tracker.flags_[corrected[i]] |= kMark;
+  }
+  const std::uint16_t* const models = tracker.flags_.data();
   for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
-    const bool bit = next < count && corrected[next] == slot;
-    flags.put(bit, tracker.models_.p1[tracker.flags_[slot]]);
-    if (!bit) continue;
-    work.count_one(tracker.flags_[slot]);
-    ++next;
+    const std::uint32_t model = models[slot];
+    flags.put(model >= kMark, tracker.models_.p1[model % kMark]);
   }
   TrackerEncoder coder{flags, &tracker.models_, &work.counts};
   for (std::uint32_t i = 0; i < count; ++i) code_steps(coder, tracker.contexts_.of(corrected[i]), steps[i]);
