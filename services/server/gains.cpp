@@ -17,7 +17,7 @@ constexpr std::uint16_t kFirstDecayOfContact = 60000;
 constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
 constexpr double kDecayRate = 2, kMostDecayChange = 0.7;
 constexpr double kLeastGain = 0.35, kMostGain = 1.8;
-constexpr double kLeastDecay = 60, kMostDecay = 60000;  // in 1/65536
+constexpr double kLeastDecay = 15, kMostDecay = 60000;  // in 1/65536
 // The less of c is kept, the less is worth learning: gamma = 0.25 where E is below 800, then its inverse.
 constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
 // Corrections of a fifth of the bodies, and a hundred at least; beta needs three times as many, because

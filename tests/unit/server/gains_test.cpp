@@ -54,7 +54,7 @@ TEST(Gains, StayInTheirLimitsForEver) {
   const auto near_limit = [](double value, double limit) { return std::abs(value / limit - 1) < 0.31; };
   EXPECT_PRED2(near_limit, most.velocity_gain / 32768.0, 1.8);
   EXPECT_PRED2(near_limit, least.velocity_gain / 32768.0, 0.35);
-  EXPECT_PRED2(near_limit, most.decay, 60);
+  EXPECT_PRED2(near_limit, most.decay, 15);
   EXPECT_PRED2(near_limit, least.decay, 60000);
 }
 
