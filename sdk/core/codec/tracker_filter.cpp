@@ -112,16 +112,15 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
   const std::int64_t c_of_one = growth_of_one(gains.acceleration(k));
   const std::int64_t most_c = std::min<std::int64_t>(kVelocityLimit, std::int64_t{256} * threshold);
   for (std::size_t i = 0; i < 3; ++i) {
-    // |steps| < 2^31 and what one of them is worth is at most 2^30: products fit.
-    const auto times = [&](std::int64_t worth, std::int64_t most) {
-      return std::clamp(steps[i] * worth, -most, most);
-    };
+    // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of
+    // their own where the sum has a smaller one.
+    const std::int64_t n = steps[i];
     std::int32_t& p = state.p(i)[slot];
     std::int32_t& v = state.v(i)[slot];
     std::int32_t& c = state.c(i)[slot];
-    p = limited(p + times(one, TrackerSteppings::kMostDistance), kPositionLimit);
-    v = limited(v + times(v_of_one, kMostGrowth), kVelocityLimit);
-    c = limited(c + times(c_of_one, kMostGrowth), most_c);
+    p = limited(p + n * one, kPositionLimit);
+    v = limited(v + n * v_of_one, kVelocityLimit);
+    c = limited(c + n * c_of_one, most_c);
     body.steps[i] = static_cast<std::int8_t>(now[i]);
   }
   body.interval = static_cast<std::uint8_t>(k);

@@ -38,11 +38,11 @@ TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
       return static_cast<std::uint8_t>((x[s] > than) | (x[s] < -than) | (y[s] > than) | (y[s] < -than) |
                                        (z[s] > than) | (z[s] < -than));
     };
-    const auto moved = static_cast<std::uint8_t>((x[s] != 0) | (y[s] != 0) << 1 | (z[s] != 0) << 2);
+    const auto moved = static_cast<std::uint32_t>((x[s] != 0) | (y[s] != 0) << 1 | (z[s] != 0) << 2);
     zero[s] = static_cast<std::uint8_t>(above(n, 1, 3, 7, 19) * TrackerModelIndex::kIntervals +
-                                        above(interval[s], 2, 6, 20) + (moved << 5));
+                                        above(interval[s], 2, 6, 20) + (moved << 5U));
     magnitude[s] = static_cast<std::uint8_t>(above(n, 0, 3, 19) * TrackerModelIndex::kLengths + longer(1) +
-                                             longer(2) + (above(n, 1, 5, 19) << 4));
+                                             longer(2) + std::uint32_t{above(n, 1, 5, 19)} * 16);
   }
 }
 

@@ -92,14 +92,14 @@ class Choices {
     const auto length = static_cast<std::int32_t>(shorter_[axis] + longer);
     return negative_[axis] != 0 ? -length : length;
   }
-  [[nodiscard]] AxisCosts axis_costs(const TrackerCosts& costs, const TrackerContext& context,
-                                     std::uint32_t axis) const;
+  template <std::uint32_t axis>
+  [[nodiscard]] AxisCosts axis_costs(const TrackerCosts& costs, const TrackerContext& context) const;
 
   std::array<std::uint32_t, 3> size_{}, negative_{}, shorter_{};
 };
 
-Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerContext& context,
-                                       std::uint32_t axis) const {
+template <std::uint32_t axis>
+Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerContext& context) const {
   AxisCosts result{};
   const std::uint32_t sign = costs.of[context.sign[axis]][negative_[axis]];
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
@@ -143,9 +143,9 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
       is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
-  const AxisCosts x_costs = axis_costs(costs, context, 0);
-  const AxisCosts y_costs = axis_costs(costs, context, 1);
-  const AxisCosts z_costs = axis_costs(costs, context, 2);
+  const AxisCosts x_costs = axis_costs<0>(costs, context);
+  const AxisCosts y_costs = axis_costs<1>(costs, context);
+  const AxisCosts z_costs = axis_costs<2>(costs, context);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
   std::uint64_t best = UINT64_MAX;  // cost, then the point; among equals the lowest values
   const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
