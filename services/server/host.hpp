@@ -120,8 +120,8 @@ class Host {
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
   Result<Frame> inject(const engine::Input& input);
 
-  /// What the decoder reads (threshold, quantisation steps, gains), in force from the next frame on. Travels in
-  /// that frame's delta; clients need nothing else. With HostConfig::gains, gains stay so until the next
+  /// What the decoder reads (threshold, quantisation steps, gains), in force from the next frame on. Travels
+  /// in that frame's delta; clients need nothing else. With HostConfig::gains, gains stay so until the next
   /// decision. Errors: kInvalidArgument (out of range, or automatic quality is on).
   [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
   [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
