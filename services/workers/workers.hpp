@@ -2,7 +2,6 @@
 // A pool of threads that share out blocks of work, first come first served.
 
 #include <atomic>
-#include <barrier>
 #include <cstdint>
 #include <functional>
 #include <thread>
@@ -11,8 +10,8 @@
 namespace tandem {
 
 /// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
-/// because a static split waits for the thread whose core somebody else is using. Jobs write to places of
-/// their own.
+/// because a static split waits for the thread whose core somebody else is using; nor is a thread waited for
+/// that wakes up late and finds nothing left. Jobs write to places of their own.
 class Workers {
  public:
   /// `prepare` is called first on each thread of its own.
@@ -39,15 +38,18 @@ class Workers {
 
  private:
   void share(std::uint32_t count, std::uint32_t block);
-  void take_blocks();
+  /// Takes blocks until none is left; returns the ticket that said so.
+  std::uint64_t take_blocks();
 
+  // Of the run at hand. They change only while no block is taken.
   const void* context_ = nullptr;
   void (*call_)(const void*, std::uint32_t, std::uint32_t) = nullptr;
   std::uint32_t count_ = 0;
   std::uint32_t block_ = 1;
-  std::atomic<std::uint32_t> next_{0};
-  bool stop_ = false;
-  std::barrier<> barrier_;
+  std::atomic<std::uint64_t> ticket_{
+      0};  // number of the run in the upper half, blocks nobody took in the lower
+  std::atomic<std::uint32_t> undone_{0};  // blocks
+  std::atomic<bool> stop_{false};
   std::vector<std::jthread> threads_;
 };
 
