@@ -13,7 +13,7 @@ namespace tandem::server {
 namespace {
 
 constexpr std::uint32_t kBodies = 1000;
-const CodecParameters kStart{.threshold = 1000, .decay = 3000, .velocity_gain = 26214};
+constexpr CodecParameters kStart{.threshold = 1000, .decay = 3000, .velocity_gain = 26214};
 
 /// Decisions on corrections that all have these cosines; the parameters in force at the end.
 CodecParameters decide(double agreement, double forwardness, int decisions, std::uint64_t corrections = 600) {
