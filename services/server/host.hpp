@@ -44,7 +44,7 @@ struct HostConfig {
   Outbox::Limits outbox;
 
   Lattice lattice;
-  std::size_t budget = kNoBudget;  ///< bytes of corrections per frame
+  std::size_t budget = kNoBudget;  ///< bytes of a frame; spawns and parameters go first
   std::string codec = "entropy";
   std::vector<std::byte> codec_tables;
   CodecParameters parameters;          ///< of the first frame

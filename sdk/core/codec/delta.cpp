@@ -186,7 +186,8 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   Encoded encoded;
   const std::size_t before = writer.size();
   impl_->renew(state);
-  encoded.corrected = impl_->codec->encode(state, target, impl_->parameters, budget, writer);
+  const std::size_t left = budget - std::min(budget, before);
+  encoded.corrected = impl_->codec->encode(state, target, impl_->parameters, left, writer);
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
   TANDEM_ASSERT(!writer.overflow());

@@ -60,12 +60,12 @@ class DeltaCodec {
 
   struct Encoded {
     std::size_t size_bytes = 0;        ///< of the payload
-    std::size_t correction_bytes = 0;  ///< of the correction sections, headers included: what a budget covers
+    std::size_t correction_bytes = 0;  ///< of the correction sections, headers included
     std::uint32_t corrected = 0;       ///< bodies
   };
   /// Server side: applies `lifecycle` and corrections to `state` (predicted) and writes them to `out`, which
-  /// holds at least bound() bytes. `target` is the full simulation on the lattice. Preconditions are
-  /// asserted.
+  /// holds at least bound() bytes. `target` is the full simulation on the lattice. No more than `budget` bytes,
+  /// unless lifecycle and parameters alone take more. Preconditions are asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
                  std::size_t budget, std::span<std::byte> out);
 

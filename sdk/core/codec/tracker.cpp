@@ -192,13 +192,17 @@ void Tracker::finish_block(State& state, const Block& block, const TrackerSteppi
 
 void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
   for (const Slot slot : renewed_) set_body(slot, {});
+  // A delta without corrections teaches that they are rare. Else a budget that not even one body fits,
+  // because its flags seem likely, would never be met.
+  const bool none = std::ranges::all_of(work_, [](const Work& work) { return work.corrected == 0; });
+  if (none) for_each_block([&](const Block& block) { list_flags(block, state.alive(), work_[block.index]); });
   for_each_block([&](const Block& block) { finish_block(state, block, steppings); });
   // One list of all blocks, one sum of what they saw.
   Work* sum = nullptr;
   count_ = 0;
   for (std::uint32_t b = 0; b < work_.size(); ++b) {
     Work& work = work_[b];
-    if (work.corrected == 0) continue;
+    if (work.corrected == 0 && !none) continue;
     const auto first = corrected_.begin() + block_at(b, capacity_).first;
     std::copy(first, first + work.corrected, corrected_.begin() + static_cast<std::ptrdiff_t>(count_));
     count_ += work.corrected;
@@ -213,7 +217,7 @@ void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
       for (std::size_t bit = 0; bit < 2; ++bit) sum->counts[i][bit] += work.counts[i][bit];
     }
   }
-  if (sum != nullptr && account_ != nullptr) models_.account(sum->counts, *account_);
+  if (!none && account_ != nullptr) models_.account(sum->counts, *account_);
   if (sum != nullptr) models_.learn(sum->counts);
   predicted_ = nullptr;
   renewed_.clear();

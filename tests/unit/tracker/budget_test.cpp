@@ -60,6 +60,44 @@ TEST(TrackerBudget, ABodyThatWaitsIsServedThoughOthersAreAlwaysFurtherOff) {
   EXPECT_TRUE(served);
 }
 
+TEST(TrackerBudget, FewBytesAreEnoughToMoveManyBodiesOn) {
+  constexpr std::uint32_t kBodies = 20'000;  // two blocks, one as large as it can be
+  DeltaCodec server = synthetic::make_delta("tracker", kBodies, kParameters);
+  DeltaCodec client = synthetic::make_delta("tracker", kBodies, kParameters);
+  Bytes out(server.bound());
+  State agreed(kBodies);
+  for (Slot slot = 0; slot < kBodies; ++slot) agreed.spawn(slot, 0, 0, {});
+  State held = agreed;
+  int moved = 0;
+  // First all of them at once, so that corrections seem likely; then few bytes.
+  for (int frame = 0; frame < 80; ++frame) {
+    State target = agreed;
+    for (Slot slot = 0; slot < kBodies; ++slot) target.p(0)[slot] = agreed.p(0)[slot] + 2000;
+    const bool free = frame < 10;
+    const auto encoded = server.encode(agreed, target, {}, free ? kNoBudget : 64, out);
+    ASSERT_TRUE(free || encoded.size_bytes <= 64);
+    ASSERT_TRUE(client.decode(held, std::span(out).first(encoded.size_bytes)));
+    ASSERT_EQ(held, agreed);
+    moved += frame >= 40 && encoded.corrected > 0 ? 1 : 0;
+  }
+  EXPECT_GT(moved, 20);
+}
+
+TEST(TrackerBudget, CountsTheParametersToo) {
+  DeltaCodec server = synthetic::make_delta("tracker", 300, kParameters);
+  Bytes out(server.bound());
+  State agreed(300);
+  for (Slot slot = 0; slot < 300; ++slot) agreed.spawn(slot, 0, 0, {});
+  for (std::int32_t frame = 1; frame <= 20; ++frame) {
+    State target = agreed;
+    for (Slot slot = 0; slot < 300; ++slot) target.p(0)[slot] = agreed.p(0)[slot] + 2000;
+    CodecParameters parameters = kParameters;
+    parameters.threshold += frame;
+    server.set_parameters(parameters);
+    EXPECT_LE(server.encode(agreed, target, {}, 64, out).size_bytes, 64U);
+  }
+}
+
 TEST(TrackerBudget, WithoutOneEveryBodyEndsWithinTheThreshold) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
