@@ -45,7 +45,6 @@ void check_table(const Node& node, const idl::TrainedTable& table) {
   node.require(table.velocity_range_m_per_s() >= 0, "velocity_range_m_per_s", "must not be negative");
   check_lengths(node, table.position_code_lengths(), "position_code_lengths");
   check_lengths(node, table.velocity_code_lengths(), "velocity_code_lengths");
-  node.require(table.tracker_decay() <= UINT16_MAX, "tracker_decay", "must be at most 65535");
 }
 
 idl::TrainedTable to_proto(const TrainedTable& table) {
@@ -56,7 +55,6 @@ idl::TrainedTable to_proto(const TrainedTable& table) {
   out.set_velocity_range_m_per_s(table.velocity_range_m_per_s);
   for (const std::uint8_t length : table.position_code_lengths) out.add_position_code_lengths(length);
   for (const std::uint8_t length : table.velocity_code_lengths) out.add_velocity_code_lengths(length);
-  if (table.tracker_decay != 0) out.set_tracker_decay(table.tracker_decay);
   return out;
 }
 
@@ -115,8 +113,7 @@ Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path) {
     check_table(root.child("tables", i), table);
     tables.push_back({table.bodies(), table.threshold_m(), table.position_range_m(),
                       table.velocity_range_m_per_s(), narrowed(table.position_code_lengths()),
-                      narrowed(table.velocity_code_lengths()),
-                      static_cast<std::uint16_t>(table.tracker_decay())});
+                      narrowed(table.velocity_code_lengths())});
   }
   if (findings.first) return tl::unexpected(*findings.first);
   return tables;

@@ -9,8 +9,7 @@
 
 namespace tandem::scenes {
 
-/// Ranges and code lengths of the paper's codecs, and how fast `tracker` forgets what it learnt of contact
-/// forces, for one number of bodies and one error threshold.
+/// Ranges and code lengths of the paper's codecs, for one number of bodies and one error threshold.
 struct TrainedTable {
   std::uint32_t bodies = 0;
   double threshold_m = 0;
@@ -18,7 +17,6 @@ struct TrainedTable {
   double velocity_range_m_per_s = 0;
   std::vector<std::uint8_t> position_code_lengths;  ///< bits by symbol
   std::vector<std::uint8_t> velocity_code_lengths;
-  std::uint16_t tracker_decay = 0;  ///< Drive::decay, with the tier `ballistic`; 0: not trained
   bool operator==(const TrainedTable&) const = default;
 };
 

@@ -9,9 +9,6 @@ namespace {
 constexpr std::uint32_t kFramesPerDecision = 15;
 
 constexpr GainGoal kFieldGoal{0.1, -0.1};
-constexpr std::uint16_t kFirstDecay = 13000;
-// It leaves no force to learn: c is kept only as long as it takes to see whether it should be.
-constexpr std::uint16_t kFirstDecayOfContact = 60000;
 
 // How much the logarithms of beta and E move for a cosine, and at most, in one decision.
 constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
@@ -34,10 +31,6 @@ bool differs(double wanted, double held, double band) { return std::abs(wanted -
 
 GainGoal usual_gain_goal(std::string_view predictor) {
   return predictor == "field" ? kFieldGoal : GainGoal{};
-}
-
-std::uint16_t first_decay(std::string_view predictor) {
-  return predictor == "contact" ? kFirstDecayOfContact : kFirstDecay;
 }
 
 GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters)

@@ -18,8 +18,6 @@ struct GainGoal {
 
 /// For a predictor: Predictor::name().
 [[nodiscard]] GainGoal usual_gain_goal(std::string_view predictor);
-/// CodecParameters::decay to start from: bodies move at the start, so that little of c is worth keeping.
-[[nodiscard]] std::uint16_t first_decay(std::string_view predictor);
 
 /// Looks at every frame and decides every fifteen. Deterministic; no clock. Not thread-safe.
 ///

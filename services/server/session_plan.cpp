@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/codec/tracker_filter.hpp"
 #include "sdk/core/codec/training.hpp"
 #include "services/server/block_threads.hpp"
 #include "services/server/contact_plan.hpp"
@@ -54,21 +55,15 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
   return {};
 }
 
-// Decay and gains of the first frame, and whether they stay.
-Result<void> choose_gains(const SessionChoice& choice, const scenes::TrainedTable& table,
-                          HostConfig& config) {
-  if (choice.codec != "tracker") return {};
+// Decay and gains of the first frame, and what the later ones aim at.
+Result<void> choose_gains(HostConfig& config) {
+  if (config.codec != "tracker") return {};
   // What the constants make of the predictor, which may be another than the name says.
   const auto predictor = make_predictor(config.predictor, 1, config.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
   const std::string_view kind = (*predictor)->name();
-  config.parameters = with_usual_gains(config.parameters, choice.codec, kind);
-  if (choice.trained_gains) {
-    if (kind == "ballistic" && table.tracker_decay != 0) config.parameters.decay = table.tracker_decay;
-  } else {
-    config.gains = usual_gain_goal(kind);
-    config.parameters.decay = first_decay(kind);
-  }
+  config.parameters = with_first_gains(config.parameters, kind);
+  config.gains = usual_gain_goal(kind);
   return {};
 }
 
@@ -107,7 +102,7 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
   if (choice.codec == "tracker") config.budget = choice.budget_bytes.value_or(kNoBudget);
   if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
     return tl::unexpected(chosen.error());
-  if (auto gained = choose_gains(choice, table, config); !gained) return tl::unexpected(gained.error());
+  if (auto gained = choose_gains(config); !gained) return tl::unexpected(gained.error());
   config.run_blocks = blocks_on_threads(choice.threads);
   config.scene = scene.name;
   config.scene_description = scene.text;

@@ -25,8 +25,7 @@ struct SessionChoice {
   std::optional<double> max_error_m;  ///< with `automatic`; empty: four times the threshold
   /// Of corrections per frame, for `limited` and `tracker`; empty: the paper's and none.
   std::optional<std::size_t> budget_bytes;
-  bool trained_gains = false;  ///< `tracker` keeps the scene's trained decay and its usual gains
-  std::uint32_t threads = 1;   ///< of the codec, where a session has several blocks
+  std::uint32_t threads = 1;  ///< of the codec, where a session has several blocks
 };
 
 /// The part of a host's configuration that follows from scene and choice: lattice, codec with tables,

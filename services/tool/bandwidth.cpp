@@ -182,7 +182,6 @@ BandwidthRow row_of(Lane& lane, double frames) {
   BandwidthRow row;
   row.codec = session.codec;
   row.predictor = session.predictor;
-  if (session.codec == "tracker") row.gains = session.gains ? "auto" : "trained";
   row.parameters = lane.parameters;
   row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
@@ -341,7 +340,6 @@ std::string to_json(std::span<const BandwidthRow> rows) {
                     {"bodies", row.bodies},
                     {"codec", row.codec},
                     {"predictor", row.predictor},
-                    {"gains", row.gains.empty() ? Json(nullptr) : Json(row.gains)},
                     {"decay", ours(row.parameters.decay / 65536.0)},
                     {"velocity_gain", ours(row.parameters.velocity_gain / 32768.0)},
                     {"acceleration_gain", ours(row.parameters.acceleration_gain / 65536.0)},

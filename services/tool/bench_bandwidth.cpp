@@ -231,13 +231,6 @@ void add_bandwidth(CLI::App& bench, Run& run) {
                    "Predicted step of `tracker`: ballistic, field, contact, or auto; the paper's codecs have "
                    "ballistic")
       ->capture_default_str();
-  command
-      ->add_option_function<std::string>(
-          "--gains",
-          [options](const std::string& gains) { options->choice.trained_gains = gains == "trained"; },
-          "Of `tracker`: auto, chosen at run time, or trained, the scene's decay and fixed gains (default: "
-          "auto)")
-      ->check(CLI::IsMember({"auto", "trained"}));
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
   add_threshold_options(*command, options->choice);

@@ -50,17 +50,15 @@ int run_train(const TrainOptions& options) {
       if (!table) return report("bench train", table.error());
       if (!options.json) {
         fmt::print(
-            "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  decay {}  "
-            "-> {}\n",
+            "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  -> {}\n",
             scene.name, bodies, table->threshold_m, table->position_range_m, table->velocity_range_m_per_s,
-            table->tracker_decay, scenes::trained_path(scene.path));
+            scenes::trained_path(scene.path));
       }
       rows.push_back({{"scene", scene.name},
                       {"bodies", bodies},
                       {"threshold", table->threshold_m},
                       {"position_range", table->position_range_m},
                       {"velocity_range", table->velocity_range_m_per_s},
-                      {"tracker_decay", table->tracker_decay},
                       {"file", scenes::trained_path(scene.path)}});
     }
   }

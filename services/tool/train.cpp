@@ -1,7 +1,6 @@
 #include "services/tool/train.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "sdk/core/codec/training.hpp"
@@ -9,19 +8,12 @@
 namespace tandem::tool {
 namespace {
 
-// How fast c fades, in 1/65536 a frame: slow suits piles at rest, fast those that churn (RESEARCH.md).
-constexpr std::array<std::uint16_t, 3> kDecays{800, 3200, 13000};
-static_assert(kTrainingPasses == 2 + kDecays.size());
 constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
 
 /// What a session corrected in one pass over the source.
-struct Observed {
-  CodecStatistics statistics;
-  std::uint64_t payload_bytes = 0;
-};
-
-Result<Observed> observe(const server::HostConfig& session, const std::function<Result<Source>()>& make,
-                         std::uint64_t frames, const std::function<void(Frame)>& progress) {
+Result<CodecStatistics> observe(const server::HostConfig& session,
+                                const std::function<Result<Source>()>& make, std::uint64_t frames,
+                                const std::function<void(Frame)>& progress) {
   auto source = make();
   if (!source) return tl::unexpected(source.error());
   auto replay = Replay::create(*source->simulation, std::move(source->script), session.lattice,
@@ -29,15 +21,15 @@ Result<Observed> observe(const server::HostConfig& session, const std::function<
   if (!replay) return tl::unexpected(replay.error());
   auto timeline = ServerTimeline::create(server::timeline_config(session, source->simulation->capacity()), 1);
   if (!timeline) return tl::unexpected(timeline.error());
-  Observed observed;
+  CodecStatistics observed;
   timeline->start(0, replay->target(), replay->start_drive());
-  timeline->set_statistics(&observed.statistics);
+  timeline->set_statistics(&observed);
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
     for (const ScheduledDrive& input : replay->scheduled()) {
       if (auto scheduled = timeline->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
     }
-    observed.payload_bytes += timeline->advance(replay->target(), replay->lifecycle()).payload.size();
+    timeline->advance(replay->target(), replay->lifecycle());
     progress(frame);
   }
   return observed;
@@ -67,10 +59,9 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, server::SessionChoice ch
   table.bodies = choice.bodies;
   table.threshold_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   // A run without any correction still needs a range; one unit is the least there is.
-  table.position_range_m =
-      kMargin * std::max(1U, ranges->statistics.largest_position) / first->lattice.position_scale();
+  table.position_range_m = kMargin * std::max(1U, ranges->largest_position) / first->lattice.position_scale();
   table.velocity_range_m_per_s =
-      kMargin * std::max(1U, ranges->statistics.largest_velocity) / first->lattice.velocity_scale();
+      kMargin * std::max(1U, ranges->largest_velocity) / first->lattice.velocity_scale();
 
   scene.trained = {table};
   choice.codec = "quantized";
@@ -78,24 +69,9 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, server::SessionChoice ch
   if (!second) return tl::unexpected(second.error());
   const auto counts = observe(*second, make, frames, [&](Frame frame) { progress(frames + frame); });
   if (!counts) return tl::unexpected(counts.error());
-  const std::vector<std::byte> tables = trained_tables(counts->statistics);
+  const std::vector<std::byte> tables = trained_tables(*counts);
   table.position_code_lengths = lengths(tables, 0);
   table.velocity_code_lengths = lengths(tables, kSymbols);
-
-  choice.codec = "tracker";
-  choice.trained_gains = true;
-  std::uint64_t fewest_bytes = UINT64_MAX;
-  for (std::size_t i = 0; i < kDecays.size(); ++i) {
-    auto session = server::plan_session(scene, choice);
-    if (!session) return tl::unexpected(session.error());
-    session->parameters.decay = kDecays[i];
-    const auto pass =
-        observe(*session, make, frames, [&](Frame frame) { progress((2 + i) * frames + frame); });
-    if (!pass) return tl::unexpected(pass.error());
-    if (pass->payload_bytes >= fewest_bytes) continue;
-    fewest_bytes = pass->payload_bytes;
-    table.tracker_decay = kDecays[i];
-  }
   return table;
 }
 

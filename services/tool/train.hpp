@@ -11,13 +11,12 @@
 namespace tandem::tool {
 
 /// Passes of train() over its source.
-inline constexpr std::uint64_t kTrainingPasses = 5;
+inline constexpr std::uint64_t kTrainingPasses = 2;
 
 /// Runs the source that `make` makes of `scene`: with `selective` for the largest residuals, then for the
-/// symbol counts with `quantized` and 1.1 x those residuals as ranges (paper, 3.3.2); then with `tracker`
-/// and the tier `ballistic` once for each decay there is, for the one with the fewest bytes. Codec and
-/// predictor of `choice` are not used; `progress` gets the frame out of kTrainingPasses x frames. Errors: what the source, the session and the
-/// timeline refuse.
+/// symbol counts with `quantized` and 1.1 x those residuals as ranges (paper, 3.3.2). Codec and predictor of
+/// `choice` are not used; `progress` gets the frame out of kTrainingPasses x frames. Errors: what the source,
+/// the session and the timeline refuse.
 [[nodiscard]] Result<scenes::TrainedTable> train(scenes::Scene scene, server::SessionChoice choice,
                                                  const std::function<Result<Source>()>& make,
                                                  std::uint64_t frames,

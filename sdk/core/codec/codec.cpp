@@ -31,11 +31,6 @@ void GainEvidence::add(const GainEvidence& more) {
   driven += more.driven;
 }
 
-CodecParameters with_usual_gains(CodecParameters parameters, std::string_view codec,
-                                 std::string_view predictor) {
-  return codec == "tracker" ? with_tracker_gains(parameters, predictor) : parameters;
-}
-
 Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
                                           std::span<const std::byte> tables) {
   if (capacity == 0 || capacity > kMaxCapacity)

@@ -134,10 +134,6 @@ class Codec {
 /// The names make_codec() knows: those of the paper's table 5.1 in its order, then ours.
 [[nodiscard]] std::span<const std::string_view> codec_names();
 
-/// `parameters` with decay and gains that suit most scenes. `predictor`: Predictor::name().
-[[nodiscard]] CodecParameters with_usual_gains(CodecParameters parameters, std::string_view codec,
-                                               std::string_view predictor);
-
 /// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
 inline constexpr std::size_t kPaperBudgetBytes = 6553;
 

@@ -18,16 +18,18 @@ struct TrackerKind {
   std::int64_t least_k;
   std::int64_t k_of_the_hit;
   std::uint32_t early;
-  std::uint16_t usual_beta, usual_gamma, usual_decay;  // as in CodecParameters
+  std::uint16_t first_beta, first_gamma, first_decay;  // as in CodecParameters
 };
 
 namespace {
 
-constexpr TrackerKind kBallistic{3, 2, 19661, 26214, 9830, 800};  // 0.8, 0.15; 1.2 %
-// Contacts are predicted: what is left grows slower, and there is no force to learn.
-constexpr TrackerKind kContact{3, 3, 19661, 22938, 0, 800};  // 0.7, 0
+// Bodies move at the start, so that little of c is worth keeping.
+constexpr TrackerKind kBallistic{3, 2, 19661, 26214, 9830, 13000};  // 0.8, 0.15; 20 %
+// Contacts are predicted: what is left grows slower, and there is no force to learn. c is kept only as long
+// as it takes to see whether it should be.
+constexpr TrackerKind kContact{3, 3, 19661, 22938, 0, 60000};  // 0.7, 0; 92 %
 // Contacts in one step for several: they leave a force to learn.
-constexpr TrackerKind kField{3, 3, 5243, 39322, 16384, 800};  // 1.2, 0.25; 1.2 %
+constexpr TrackerKind kField{3, 3, 5243, 39322, 16384, 13000};  // 1.2, 0.25; 20 %
 
 const TrackerKind& kind_of(std::string_view predictor) {
   if (predictor == "field") return kField;
@@ -49,7 +51,7 @@ double dot(const Vec3i& a, const Vec3i& b) {
 }  // namespace
 
 TrackerGains::TrackerGains(std::string_view predictor) : kind_(&kind_of(predictor)) {
-  set(kind_->usual_beta, kind_->usual_gamma);
+  set(kind_->first_beta, kind_->first_gamma);
 }
 
 std::uint32_t TrackerGains::early() const { return kind_->early; }
@@ -68,11 +70,11 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
   }
 }
 
-CodecParameters with_tracker_gains(CodecParameters parameters, std::string_view predictor) {
+CodecParameters with_first_gains(CodecParameters parameters, std::string_view predictor) {
   const TrackerKind& kind = kind_of(predictor);
-  parameters.decay = kind.usual_decay;
-  parameters.velocity_gain = kind.usual_beta;
-  parameters.acceleration_gain = kind.usual_gamma;
+  parameters.decay = kind.first_decay;
+  parameters.velocity_gain = kind.first_beta;
+  parameters.acceleration_gain = kind.first_gamma;
   return parameters;
 }
 

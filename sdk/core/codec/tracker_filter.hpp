@@ -50,8 +50,8 @@ class TrackerGains {
   std::array<std::int64_t, kMostAge + 1> acceleration_{};
 };
 
-/// `parameters` with the decay and the gains that suit most scenes with this predictor.
-[[nodiscard]] CodecParameters with_tracker_gains(CodecParameters parameters, std::string_view predictor);
+/// `parameters` with decay and gains to start from; they suit most scenes. `predictor`: Predictor::name().
+[[nodiscard]] CodecParameters with_first_gains(CodecParameters parameters, std::string_view predictor);
 
 /// Steps to lattice units for one threshold e.
 class TrackerSteppings {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "sdk/core/codec/tracker_filter.hpp"
 #include "sdk/core/codec/training.hpp"
 #include "services/server/outbox.hpp"
 
@@ -114,8 +115,10 @@ void World::start_server() {
   if (config.codec == "entropy" || config.codec == "limited") config.codec_tables = default_code_tables();
   config.lattice = must(server::choose_lattice(0.01, 3, simulation_->dt_s()));
   config.parameters = must(server::codec_parameters(config.lattice, 0.01, 0.1, 2));
-  config.parameters = with_usual_gains(config.parameters, config.codec, config.predictor);
-  if (config.codec == "tracker") config.gains = server::GainGoal{};
+  if (config.codec == "tracker") {
+    config.parameters = with_first_gains(config.parameters, config.predictor);
+    config.gains = server::GainGoal{};
+  }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};
   host_ = must(server::Host::create(config, *simulation_, *server_port_));
   acted_seen_ = 0;

@@ -141,6 +141,15 @@ TEST(TrainedTables, ThatAreMalformedNameFileLineAndField) {
               HasSubstr("s.trained.textproto:4: field \"tables[0].position_code_lengths[1]\""));
 }
 
+TEST(TrainedTables, OfOlderVersionsAreRead) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("s.textproto", small_scene());
+  (void)folder.write("s.trained.textproto", "tables { bodies: 5 threshold_m: 1 tracker_decay: 800 }");
+  const auto scene = load_scene(path);
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene->trained.size(), 1U);
+}
+
 TEST(TrainedTables, ThatCannotBeWrittenSaySo) {
   const auto saved = save_trained("/nonexistent/folder/s.textproto", {1, 1, 1, 1, {}, {}});
   ASSERT_FALSE(saved);

@@ -68,15 +68,12 @@ TEST(Gains, AreDecidedEveryFifteenFrames) {
   }
 }
 
-TEST(Gains, AreChosenAtRunTimeUnlessTheTrainedOnesAreAskedFor) {
+TEST(Gains, AreChosenAtRunTimeForTrackerAlone) {
   const auto scene = scenes::load_scene("cube");
   ASSERT_TRUE(scene);
   SessionChoice choice;
   choice.bodies = 1000;
   EXPECT_TRUE(plan_session(*scene, choice)->gains);
-  choice.trained_gains = true;
-  EXPECT_FALSE(plan_session(*scene, choice)->gains);
-  choice.trained_gains = false;
   choice.codec = "entropy";
   EXPECT_FALSE(plan_session(*scene, choice)->gains);
 }

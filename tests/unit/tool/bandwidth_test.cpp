@@ -123,7 +123,7 @@ TEST(Bandwidth, rows_have_the_agreed_fields) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
   EXPECT_THAT(keys, ::testing::UnorderedElementsAre(
-                        "scene", "number", "bodies", "codec", "predictor", "gains", "decay", "velocity_gain",
+                        "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain",
                         "acceleration_gain", "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit",
                         "mbit_per_s", "ideal_mbit_per_s", "bound_mbit_per_s", "max_error", "rms_error",
                         "max_snap", "rms_snap", "corrected_per_frame", "colliding_per_frame", "step_ms",
