@@ -42,7 +42,7 @@ class Stream {
   }
   void restart() {
     for (Side* side : {&side_, &twin_}) {
-      require(side->delta.codec().load(fresh_).has_value());
+      require(side->delta.codec().load(fresh_, start_.alive()).has_value());
       side->delta.restore_parameters(kParameters);
       side->state = start_;
     }
@@ -59,7 +59,8 @@ class Stream {
       const std::size_t at = in.get<std::uint16_t>();
       edited_[at % edited_.size()] = static_cast<std::byte>(in.get<std::uint8_t>());
     }
-    if (side_.delta.codec().load(edited_)) require(twin_.delta.codec().load(edited_).has_value());
+    if (side_.delta.codec().load(edited_, side_.state.alive()))
+      require(twin_.delta.codec().load(edited_, twin_.state.alive()).has_value());
   }
   void end() {
     side_.save(edited_);

@@ -69,7 +69,7 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
   State joined = agreed;
   for (int frame = 0; frame < static_cast<int>(moods.size()); ++frame) {
     if (frame == joins_at) {
-      RC_ASSERT(late.codec().load(saved(client)).has_value());
+      RC_ASSERT(late.codec().load(saved(client), held.alive()).has_value());
       late.restore_parameters(client.parameters());
       joined = held;
     }

@@ -119,7 +119,9 @@ class Codec {
   virtual void save(ByteWriter& /*out*/) const {}
   /// Most bytes save() writes.
   [[nodiscard]] virtual std::size_t save_bound() const { return 0; }
-  [[nodiscard]] virtual Result<void> load(std::span<const std::byte> bytes) {
+  /// Errors: kMalformed for what save() would not write beside these slots; then nothing changed.
+  [[nodiscard]] virtual Result<void> load(std::span<const std::byte> bytes,
+                                          std::span<const std::uint8_t> /*alive*/) {
     if (!bytes.empty()) return fail(ErrorCode::kMalformed, "this codec keeps no coder state");
     return {};
   }

@@ -194,7 +194,8 @@ void Tracker::finish_frame(State& state, const TrackerSteppings& steppings) {
   for (const Slot slot : renewed_) set_body(slot, {});
   // A delta without corrections teaches that they are rare. Else a budget that not even one body fits,
   // because its flags seem likely, would never be met.
-  const bool none = std::ranges::all_of(work_, [](const Work& work) { return work.corrected == 0; });
+  const bool none =
+      std::all_of(work_.begin(), work_.end(), [](const Work& work) { return work.corrected == 0; });
   if (none) for_each_block([&](const Block& block) { list_flags(block, state.alive(), work_[block.index]); });
   for_each_block([&](const Block& block) { finish_block(state, block, steppings); });
   // One list of all blocks, one sum of what they saw.
@@ -234,13 +235,18 @@ void Tracker::save(ByteWriter& out) const {
 
 std::size_t Tracker::save_bound() const { return bodies_.size() + TrackerModelIndex::kCount * kModelBytes; }
 
-Result<void> Tracker::load(std::span<const std::byte> bytes) {
+Result<void> Tracker::load(std::span<const std::byte> bytes, std::span<const std::uint8_t> alive) {
   ByteReader in(bytes);
   const std::span<const std::byte> bodies = in.get_bytes(bodies_.size());
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated coder state");
   if (std::any_of(bodies.begin(), bodies.begin() + capacity_,
                   [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMostAge; })) {
     return fail(ErrorCode::kMalformed, "coder state with an impossible age");
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const bool impossible = i >= 2 * std::size_t{capacity_} && bodies[i] == std::byte{0x80};  // steps of -128
+    if (impossible || (bodies[i] != std::byte{0} && alive[i % capacity_] == 0))
+      return fail(ErrorCode::kMalformed, "coder state of a slot that cannot have it");
   }
   bool good = true;
   TrackerModels models;

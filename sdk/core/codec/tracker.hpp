@@ -48,7 +48,8 @@ class Tracker final : public Codec {
   [[nodiscard]] std::span<const std::byte> body_state() const override { return bodies_; }
   void save(ByteWriter& out) const override;
   [[nodiscard]] std::size_t save_bound() const override;
-  [[nodiscard]] Result<void> load(std::span<const std::byte> bytes) override;
+  [[nodiscard]] Result<void> load(std::span<const std::byte> bytes,
+                                  std::span<const std::uint8_t> alive) override;
 
  private:
   friend class TrackerSearch;

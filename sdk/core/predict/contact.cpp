@@ -102,8 +102,8 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
   cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 32) / (width + 1));
   near_ = ((width + (constants_.substeps > 1 ? width >> 5 : 0)) >> kNearShift) + 3;
   later_share_ = 32768 - (32768 + constants_.substeps / 2) / constants_.substeps;
-  one_mobility_ =
-      std::ranges::all_of(constants_.types, [](const auto& type) { return type.mobility == 65536; });
+  one_mobility_ = std::all_of(constants_.types.begin(), constants_.types.end(),
+                              [](const auto& type) { return type.mobility == 65536; });
   for (std::size_t i = 0; i < kRoots; ++i) {
     // r at the middle of the entry, in 2^-8.
     const std::int64_t r = root(((2 * std::uint64_t{i} + 1) << (kRootShift - 1)) << 16U);
@@ -173,14 +173,17 @@ void Contact::add_pairs(bool first) {
 
 void Contact::write(const State& from, const Drive& drive, State& to) const {
   if (&from != &to) {
-    std::ranges::copy(from.alive(), to.alive().begin());
-    std::ranges::copy(from.generation(), to.generation().begin());
-    std::ranges::copy(from.type(), to.type().begin());
+    const auto copy = [](const auto& column, const auto& column_to) {
+      std::copy(column.begin(), column.end(), column_to.begin());
+    };
+    copy(from.alive(), to.alive());
+    copy(from.generation(), to.generation());
+    copy(from.type(), to.type());
     for (std::size_t i = 0; i < 3; ++i) {
       if (accelerated_) {
-        std::ranges::copy(from.c(i), to.c(i).begin());
+        copy(from.c(i), to.c(i));
       } else {
-        std::ranges::fill(to.c(i), 0);
+        std::fill(to.c(i).begin(), to.c(i).end(), 0);
       }
     }
   }

@@ -119,7 +119,8 @@ void ContactWalls::add_shapes(std::span<const Shape> shapes, std::span<const Sla
   const std::size_t each = shapes.empty() ? 0 : slabs.size() / shapes.size();
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     const auto own = slabs.subspan(s * each, each);
-    if (!std::ranges::all_of(own, [&](const Slab& slab) { return meets(slab, places.extent); })) continue;
+    if (!std::all_of(own.begin(), own.end(), [&](const Slab& slab) { return meets(slab, places.extent); }))
+      continue;
     std::uint64_t near =
         within(own.data(), each, places.p[0].data(), places.p[1].data(), places.p[2].data()) & places.present;
     for (; near != 0; near &= near - 1) {

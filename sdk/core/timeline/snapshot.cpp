@@ -211,7 +211,8 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   const std::size_t coder_bytes = in.get<std::uint32_t>();
   if (!in.ok() || coder_bytes != in.remaining())
     return fail(ErrorCode::kMalformed, "snapshot of wrong length");
-  if (auto coder = codec.load(in.get_bytes(coder_bytes)); !coder) return tl::unexpected<Error>(coder.error());
+  if (auto coder = codec.load(in.get_bytes(coder_bytes), state.alive()); !coder)
+    return tl::unexpected<Error>(coder.error());
   return snapshot;
 }
 

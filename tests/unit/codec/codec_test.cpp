@@ -186,8 +186,8 @@ TEST(Codec, AValueBeyondTheLatticeIsRefused) {
 TEST(Codec, ThePaperCodecsKeepNoCoderState) {
   const auto codec = codec_of("entropy", 4);
   EXPECT_TRUE(codec->body_state().empty());
-  EXPECT_TRUE(codec->load({}));
-  EXPECT_FALSE(codec->load(std::vector<std::byte>(1)));
+  EXPECT_TRUE(codec->load({}, {}));
+  EXPECT_FALSE(codec->load(std::vector<std::byte>(1), {}));
 }
 
 }  // namespace

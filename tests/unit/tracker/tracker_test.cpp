@@ -152,7 +152,7 @@ TEST(Tracker, ARefusedDeltaLeavesCoderAndBodiesUntouched) {
       Bytes mutated = payload;
       synthetic::mutate(random, mutated);
       DeltaCodec probe = synthetic::make_delta("tracker", 60, kParameters);
-      ASSERT_TRUE(probe.codec().load(before));
+      ASSERT_TRUE(probe.codec().load(before, held.alive()));
       State state = held;
       if (probe.decode(state, mutated)) {
         ASSERT_EQ(synthetic::broken_invariant(state), nullptr);
@@ -183,16 +183,24 @@ TEST(Tracker, RefusesCoderStatesThatAreNone) {
   }
   const Bytes good = coder_state(server);
   DeltaCodec client = synthetic::make_delta("tracker", 20, kParameters);
-  EXPECT_TRUE(client.codec().load(good));
+  EXPECT_TRUE(client.codec().load(good, agreed.alive()));
   EXPECT_EQ(coder_state(client), good);
   Bytes impossible_age = good;
   impossible_age[3] = std::byte{255};
-  EXPECT_EQ(client.codec().load(impossible_age).error().code, ErrorCode::kMalformed);
+  EXPECT_EQ(client.codec().load(impossible_age, agreed.alive()).error().code, ErrorCode::kMalformed);
+  Bytes impossible_steps = good;
+  impossible_steps[2 * 20 + 3] = std::byte{0x80};
+  EXPECT_FALSE(client.codec().load(impossible_steps, agreed.alive()));
+  std::vector<std::uint8_t> dead(agreed.alive().begin(), agreed.alive().end());
+  dead[static_cast<std::size_t>(
+      std::find_if(good.begin(), good.begin() + 20, [](std::byte age) { return age != std::byte{0}; }) -
+      good.begin())] = 0;
+  EXPECT_FALSE(client.codec().load(good, dead));
   Bytes longer = good;
   longer.push_back(std::byte{0});
-  EXPECT_FALSE(client.codec().load(longer));
+  EXPECT_FALSE(client.codec().load(longer, agreed.alive()));
   for (std::size_t size = 0; size < good.size(); ++size) {
-    EXPECT_FALSE(client.codec().load(std::span(good).first(size)));
+    EXPECT_FALSE(client.codec().load(std::span(good).first(size), agreed.alive()));
   }
   EXPECT_EQ(coder_state(client), good);
 }
