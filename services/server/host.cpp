@@ -49,6 +49,12 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   if (config.quality && !valid_goal(*config.quality, config.parameters)) {
     return refuse("automatic quality: the threshold must lie between its smallest and its largest");
   }
+  if (config.quality && config.budget < least_budget(*config.quality, config.frame_rate_hz)) {
+    return refuse(fmt::format(
+        "a budget of {} bytes a frame is too tight for a target of {} Mbit/s, which needs at least {} bytes",
+        config.budget, config.quality->target_mbit_per_s,
+        least_budget(*config.quality, config.frame_rate_hz)));
+  }
   if (config.epoch == 0) return refuse("epoch must not be 0");
   const std::uint32_t capacity = simulation.capacity();
   if (capacity == 0 || capacity > kMaxCapacity) {
@@ -130,8 +136,9 @@ struct Host::Impl {
     timeline.start(config.start_frame, mirror.target(), drive);
     timeline.set_clock(config.clock_ns);
     if (config.quality) {
-      quality.emplace(*config.quality, config.frame_rate_hz);
-      timeline.set_statistics(&quality->statistics());
+      const StepRule steps = step_rule(config.codec, !config.codec_tables.empty());
+      quality.emplace(*config.quality, steps, config.parameters, full.capacity(), config.frame_rate_hz);
+      if (steps != StepRule::kLeave) timeline.set_statistics(&quality->statistics());
     }
     if (config.gains) {
       gains.emplace(*config.gains, full.capacity(), config.parameters);
@@ -166,6 +173,7 @@ struct Host::Impl {
   void digest(const transport::Received<transport::AckMessage>& ack);
   void digest(const transport::Received<transport::InputMessage>& input);
   void produce_frame();
+  bool choose_quality(const ServerTimeline::FrameResult& result);
   void publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns);
   void note_foreigner(transport::ClientId client);
   void use(const CodecParameters& parameters) {
@@ -353,7 +361,7 @@ void Host::Impl::produce_frame() {
   const std::int64_t applied = clock();
   publish(result, wall_ns + (applied - start));
   times.published(result.frame, now_ns);
-  const bool coarser = quality && quality->after_frame(result.payload.size(), config.parameters);
+  const bool coarser = quality && choose_quality(result);
   const bool steered = gains && gains->after_frame(config.parameters);
   if (coarser || steered) timeline.set_parameters(config.parameters);
   report = {.frame = result.frame,
@@ -367,6 +375,20 @@ void Host::Impl::produce_frame() {
   totals.corrected += report.corrected;
   frame_durations.add(report.frame_ms);
   second_durations.add(report.frame_ms);
+}
+
+bool Host::Impl::choose_quality(const ServerTimeline::FrameResult& result) {
+  const bool before = quality->out_of_reach();
+  const bool changed = quality->after_frame(result.payload.size(), result.corrected, config.parameters);
+  if (quality->out_of_reach() != before && notices.size() < kMostNotices) {
+    const double target = config.quality->target_mbit_per_s;
+    notices.push_back(before
+                          ? fmt::format("the target of {} Mbit/s is kept again", target)
+                          : fmt::format("the target of {} Mbit/s is exceeded even at the largest threshold, "
+                                        "{:.3g} m",
+                                        target, config.quality->largest_threshold * config.lattice.unit));
+  }
+  return changed;
 }
 
 void Host::Impl::publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns) {
