@@ -15,26 +15,34 @@ constexpr std::int64_t kEarlyShare = 218;
 // Bits that an error of one threshold is worth.
 constexpr std::uint64_t kErrorWorth = 14;
 constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + 2;
-// A tried number of bodies this close (1/64) to the largest that fits is good enough.
-constexpr std::uint32_t kTryPrecision = 64;
+// Under a budget: this share of it may stay unused (1/128), and this often what is sent is written; if
+// estimates mislead, the last times with half as many bodies.
+constexpr std::size_t kSpareShare = 128;
+constexpr std::uint32_t kMostWrites = 8, kMostEstimates = 4;
+constexpr std::size_t kTooLarge = SIZE_MAX;
+// In 1/256 bits: a byte, and a first guess of what a body costs with its share of the flags.
+constexpr std::int64_t kByte = std::int64_t{8} << 8U;
+constexpr std::int64_t kGuessedCost = std::int64_t{16} << 8U;
 
-// log2(x / 2^12) in 1/256 bits, x in 1 .. 2^12, by repeated squaring: the same with every compiler.
-constexpr std::uint32_t bits_256(std::uint32_t x) {
+// log2(x) in 1/2^fraction bits, x > 0, by repeated squaring: the same with every compiler.
+constexpr std::uint32_t log2_of(std::uint32_t x, std::uint32_t fraction) {
   const auto whole = static_cast<std::uint32_t>(std::bit_width(x)) - 1U;
   std::uint64_t mantissa = (std::uint64_t{x} << 32U) >> whole;  // 1 .. 2 in 32.32
-  std::uint32_t log = whole << 8U;
-  for (std::uint32_t i = 0; i < 8; ++i) {
+  std::uint32_t log = whole << fraction;
+  for (std::uint32_t i = 1; i <= fraction; ++i) {
     mantissa = (mantissa >> 2U) * (mantissa >> 2U) >> 28U;
     if (mantissa >= std::uint64_t{2} << 32U) {
       mantissa >>= 1U;
-      log |= 128U >> i;
+      log |= 1U << (fraction - i);
     }
   }
-  return (12U << 8U) - log;
+  return log;
 }
+// -log2(x / 2^12) in 1/256 bits, x in 0 .. 2^12.
 constexpr auto kBits = [] {
   std::array<std::uint16_t, 4096> table{};
-  for (std::uint32_t i = 0; i < 4096; ++i) table[i] = static_cast<std::uint16_t>(bits_256(i == 0 ? 1 : i));
+  for (std::uint32_t i = 0; i < 4096; ++i)
+    table[i] = static_cast<std::uint16_t>((12U << 8U) - log2_of(i == 0 ? 1 : i, 8));
   return table;
 }();
 
@@ -218,21 +226,14 @@ TrackerSearch::TrackerSearch(std::uint32_t capacity)
 
 void TrackerSearch::encode(Tracker& tracker, const State& target, std::size_t budget, ByteWriter& out) {
   costs_.learn(tracker.models_);
-  tracker.for_each_block([&](const Block& block) { choose(tracker, target, block); });
-  must_ = 0;
-  for (const Part& part : parts_) must_ += part.must;
-  const bool all_fit = write(tracker, must_, true, budget);
-  if (!all_fit) {
-    rank();
-    std::uint32_t fits = 0;
-    std::uint32_t too_many = must_ + 1;
-    std::uint32_t tried = must_ + 1;
-    while (too_many - fits > 1 + fits / kTryPrecision) {
-      tried = fits + (too_many - fits) / 2;
-      (write(tracker, tried, false, budget) ? fits : too_many) = tried;
-    }
-    if (tried != fits) write(tracker, fits, false, budget);
-  }
+  // Where bodies wait, the budget was too small a frame ago and probably still is.
+  const bool is_enough = !some_wait_ || budget >= tracker.bound();
+  tracker.for_each_block([&](const Block& block) {
+    gather(tracker, target, block);
+    if (is_enough) choose(tracker, target, block);
+  });
+  const bool all_fit =
+      (is_enough && write(tracker, true) <= budget) || write_most_urgent(tracker, target, budget);
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     if (tracker.work_[b].corrected == 0) continue;
     out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
@@ -243,73 +244,181 @@ void TrackerSearch::encode(Tracker& tracker, const State& target, std::size_t bu
   if (!all_fit || some_wait_) remember_waiting(tracker);
 }
 
-void TrackerSearch::choose(Tracker& tracker, const State& target, const Block& block) {
+void TrackerSearch::gather(Tracker& tracker, const State& target, const Block& block) {
   const State& predicted = *tracker.predicted_;
-  const std::int32_t threshold = tracker.threshold_;
-  const TrackerSteppings steppings(threshold);
-  const ErrorWorth worth(threshold);
-  const auto early = static_cast<std::int32_t>((threshold * kEarlyShare) >> 8);
+  const ErrorWorth worth(tracker.threshold_);
+  const auto early = static_cast<std::int32_t>((tracker.threshold_ * kEarlyShare) >> 8);
   Candidate* const first = candidates_.data() + block.first;
   Slot* const slots = tracker.corrected_.data() + block.first;
-  std::uint32_t considered = 0;
+  std::uint32_t count = 0;
   const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
                                                    kBlockSlots);
   for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
     const bool must = error > worth.limit;
     if (!must && tracker.models_.p1[tracker.flag_of(slot)] <= tracker.gains_.early()) return;
-    slots[considered] = slot;
-    first[considered++] = {error, slot, 0, must, {}};
+    slots[count] = slot;
+    first[count++] = {error, slot, kNoCost, Candidate::Steps::kOpen, must, false, {}};
   });
-  tracker.list_contexts(block, std::span(slots, considered));
-  Candidate* at = first;
-  std::uint32_t must = 0;
-  for (std::uint32_t i = 0; i < considered; ++i) {
-    Candidate candidate = first[i];
-    const Slot slot = candidate.slot;
-    const bool inside = choose_steps(position(predicted, slot), position(target, slot), steppings, worth,
-                                     costs_, tracker.contexts_.of(slot), candidate.steps);
-    if (!inside && (!candidate.must || candidate.steps == TrackerSteps{})) continue;
-    must += static_cast<std::uint32_t>(candidate.must);
-    *at++ = candidate;
-  }
-  Part& part = parts_[block.index];
-  part.candidates = static_cast<std::uint32_t>(at - first);
-  part.must = must;
+  tracker.list_contexts(block, std::span(slots, count));
+  parts_[block.index].candidates = count;
 }
 
-void TrackerSearch::rank() {
+void TrackerSearch::choose(const Tracker& tracker, const State& target, const ErrorWorth& worth,
+                           Candidate& candidate) {
+  const Slot slot = candidate.slot;
+  const bool inside = choose_steps(position(*tracker.predicted_, slot), position(target, slot),
+                                   TrackerSteppings(tracker.threshold_), worth, costs_,
+                                   tracker.contexts_.of(slot), candidate.steps);
+  const bool is_of_use = inside || (candidate.must && candidate.steps != TrackerSteps{});
+  candidate.state = is_of_use ? Candidate::Steps::kFound : Candidate::Steps::kUseless;
+}
+
+void TrackerSearch::choose(const Tracker& tracker, const State& target, const Block& block) {
+  const ErrorWorth worth(tracker.threshold_);
+  Candidate* const first = candidates_.data() + block.first;
+  for (std::uint32_t i = 0; i < parts_[block.index].candidates; ++i) {
+    if (first[i].state == Candidate::Steps::kOpen) choose(tracker, target, worth, first[i]);
+  }
+}
+
+bool TrackerSearch::write_most_urgent(Tracker& tracker, const State& target, std::size_t budget) {
+  rank(tracker);
+  const auto all = static_cast<std::uint32_t>(order_.size());
+  bool may_all_fit = some_wait_;  // else they were tried
+  const auto try_all = [&] {
+    may_all_fit = false;
+    tracker.for_each_block([&](const Block& block) { choose(tracker, target, block); });
+    return write(tracker, true) <= budget;
+  };
+  if (all == 0 && may_all_fit && try_all()) return true;
+  std::uint32_t fits = 0;
+  std::uint32_t too_many = all + 1;
+  std::uint32_t written = too_many;
+  std::int64_t beyond = kByte;  // what is written over what was estimated
+  for (std::uint32_t i = 0; i < kMostWrites && too_many - fits > 1; ++i) {
+    std::uint32_t last = too_many - 1;
+    if (i >= kMostEstimates) {
+      last = fits + (too_many - fits) / 2;
+      std::nth_element(order_.begin() + fits, order_.begin() + last, order_.begin() + too_many - 1);
+    }
+    const Cut cut =
+        this->cut(tracker, target, fits, last, static_cast<std::int64_t>(budget) * kByte - beyond);
+    if (cut.count == fits) break;
+    if (cut.count == all && may_all_fit && try_all()) return true;
+    written = cut.count;
+    const std::size_t size_bytes = write_first(tracker, written);
+    (size_bytes <= budget ? fits : too_many) = written;
+    if (size_bytes <= budget && budget - size_bytes <= budget / kSpareShare) break;
+    if (size_bytes != kTooLarge)
+      beyond = static_cast<std::int64_t>(size_bytes) * kByte - cut.cost + kByte / 2;
+  }
+  if (written != fits) write_first(tracker, fits);
+  return false;
+}
+
+void TrackerSearch::rank(Tracker& tracker) {
+  tracker.for_each_block([&](const Block& block) {
+    Tracker::Work& work = tracker.work_[block.index];
+    tracker.list_flags(block, tracker.predicted_->alive(), work);
+    // Finer than costs_, because there are so many of them.
+    std::uint64_t zeros = 0;
+    for (std::uint32_t model = 0; model < TrackerModelIndex::kZero; ++model) {
+      if (work.counts[model][0] == 0) continue;
+      const std::uint32_t p0 = 65536U - tracker.models_.p1[model];
+      zeros += std::uint64_t{work.counts[model][0]} * ((16U << 16U) - log2_of(p0, 16));
+    }
+    Part& part = parts_[block.index];
+    part.cost = static_cast<std::int64_t>(zeros >> 8U) + static_cast<std::int64_t>(kHeaderBytes) * kByte;
+    part.sent = 0;
+  });
   order_.clear();
+  constexpr std::uint64_t kMostError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     const std::uint32_t first = b * kBlockSlots;
     for (std::uint32_t i = first; i < first + parts_[b].candidates; ++i) {
-      if (candidates_[i].must) order_.push_back(i);
+      const Candidate& candidate = candidates_[i];
+      const std::uint64_t frames = waiting_[candidate.slot] + 1U;
+      if (candidate.must) order_.push_back({std::min(candidate.error, kMostError) * frames * frames, i});
     }
   }
-  const auto urgency = [this](std::uint32_t i) {
-    constexpr std::uint64_t kMostError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
-    const std::uint64_t waited = waiting_[candidates_[i].slot];
-    return std::min(candidates_[i].error, kMostError) * (waited + 1) * (waited + 1);
-  };
-  std::sort(order_.begin(), order_.end(), [&urgency](std::uint32_t a, std::uint32_t b) {
-    const std::uint64_t of_a = urgency(a);
-    const std::uint64_t of_b = urgency(b);
-    return of_a != of_b ? of_a > of_b : a < b;
-  });
-  for (std::uint32_t r = 0; r < order_.size(); ++r) candidates_[order_[r]].rank = r;
 }
 
-bool TrackerSearch::write(Tracker& tracker, std::uint32_t limit, bool early, std::size_t budget) {
-  tracker.for_each_block([&](const Block& block) { write_block(tracker, block, limit, early); });
+std::int32_t TrackerSearch::cost(const Tracker& tracker, const Candidate& candidate) const {
+  const auto& flag = costs_.of[tracker.flag_of(candidate.slot)];
+  CostCoder coder{&costs_};
+  TrackerSteps steps = candidate.steps;
+  code_steps(coder, tracker.contexts_.of(candidate.slot), steps);
+  return static_cast<std::int32_t>(coder.cost) + flag[1] - flag[0];
+}
+
+std::int64_t TrackerSearch::add(const Tracker& tracker, const State& target, std::uint32_t first,
+                                std::uint32_t last) {
+  const ErrorWorth worth(tracker.threshold_);
+  std::int64_t sum = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    const std::uint32_t index = order_[i].index;
+    Candidate& candidate = candidates_[index];
+    if (candidate.state == Candidate::Steps::kOpen) choose(tracker, target, worth, candidate);
+    if (candidate.state == Candidate::Steps::kUseless) continue;
+    if (candidate.cost == kNoCost) candidate.cost = cost(tracker, candidate);
+    Part& part = parts_[index / kBlockSlots];
+    sum += candidate.cost + (part.sent++ == 0 ? part.cost : 0);
+  }
+  return sum;
+}
+
+std::int64_t TrackerSearch::remove(std::uint32_t first, std::uint32_t last) {
+  std::int64_t sum = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    const std::uint32_t index = order_[i].index;
+    const Candidate& candidate = candidates_[index];
+    if (candidate.state == Candidate::Steps::kUseless) continue;
+    Part& part = parts_[index / kBlockSlots];
+    sum += candidate.cost + (--part.sent == 0 ? part.cost : 0);
+  }
+  return sum;
+}
+
+TrackerSearch::Cut TrackerSearch::cut(const Tracker& tracker, const State& target, std::uint32_t first,
+                                      std::uint32_t last, std::int64_t most) {
+  for (Part& part : parts_) part.sent = 0;
+  std::int64_t sum = add(tracker, target, 0, first);
+  bool is_limited = false;
+  const auto guess = static_cast<std::uint32_t>(std::max<std::int64_t>(most / kGuessedCost, 16));
+  while (first < last) {
+    const std::uint32_t more = is_limited ? (last - first + 1) / 2 : std::max(first, guess);
+    const std::uint32_t tried = first + std::min(more, last - first);
+    std::nth_element(order_.begin() + first, order_.begin() + tried - 1, order_.begin() + last);
+    const std::int64_t added = add(tracker, target, first, tried);
+    if (sum + added <= most || tried == 1) {
+      sum += added;
+      first = tried;
+    } else {
+      remove(first, tried);
+      last = tried - 1;
+      is_limited = true;
+    }
+  }
+  return {first, sum};
+}
+
+std::size_t TrackerSearch::write_first(Tracker& tracker, std::uint32_t count) {
+  for (std::uint32_t i = 0; i < order_.size(); ++i) candidates_[order_[i].index].is_sent = i < count;
+  return write(tracker, false);
+}
+
+std::size_t TrackerSearch::write(Tracker& tracker, bool all) {
+  tracker.for_each_block([&](const Block& block) { write_block(tracker, block, all); });
   std::size_t size_bytes = 0;
   bool fits = true;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     fits = fits && parts_[b].fits;
     if (tracker.work_[b].corrected != 0) size_bytes += kHeaderBytes + parts_[b].coded_bytes;
   }
-  return fits && size_bytes <= budget;
+  return fits ? size_bytes : kTooLarge;
 }
 
-void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint32_t limit, bool early) {
+void TrackerSearch::write_block(Tracker& tracker, const Block& block, bool all) {
   Tracker::Work& work = tracker.work_[block.index];
   Part& part = parts_[block.index];
   Slot* const corrected = tracker.corrected_.data() + block.first;
@@ -317,7 +426,7 @@ void TrackerSearch::write_block(Tracker& tracker, const Block& block, std::uint3
   std::uint32_t count = 0;
   for (std::uint32_t i = block.first; i < block.first + part.candidates; ++i) {
     const Candidate& candidate = candidates_[i];
-    if (candidate.must ? candidate.rank >= limit : !early) continue;
+    if (candidate.state != Candidate::Steps::kFound || !(all || candidate.is_sent)) continue;
     corrected[count] = candidate.slot;
     steps[count++] = candidate.steps;
   }
@@ -357,7 +466,8 @@ void TrackerSearch::remember_waiting(const Tracker& tracker) {
     for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
       const bool is_candidate = candidate != end && candidate->slot == slot;
       const bool is_sent = sent != sent_end && *sent == slot;
-      const bool waits = is_candidate && candidate->must && !is_sent;
+      const bool waits =
+          is_candidate && candidate->must && candidate->state != Candidate::Steps::kUseless && !is_sent;
       waiting_[slot] = waits ? static_cast<std::uint8_t>(std::min(waiting_[slot] + 1, 255)) : std::uint8_t{0};
       some_wait_ = some_wait_ || waits;
       candidate += is_candidate ? 1 : 0;
