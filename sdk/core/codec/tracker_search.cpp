@@ -15,9 +15,9 @@ constexpr std::int64_t kEarlyShare = 218;
 // Bits that an error of one threshold is worth.
 constexpr std::uint64_t kErrorWorth = 14;
 constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + 2;
-// Under a budget: this share of it may stay unused (1/128), and this often what is sent is written; if
+// Under a budget: this share of it may stay unused (1/64), and this often what is sent is written; if
 // estimates mislead, the last times with half as many bodies.
-constexpr std::size_t kSpareShare = 128;
+constexpr std::size_t kSpareShare = 64;
 constexpr std::uint32_t kMostWrites = 8, kMostEstimates = 4;
 constexpr std::size_t kTooLarge = SIZE_MAX;
 // In 1/256 bits: a byte, and a first guess of what a body costs with its share of the flags.
