@@ -17,6 +17,20 @@ std::string gains_text(const CodecParameters& parameters) {
                      parameters.acceleration_gain / 65536.0, parameters.decay / 655.36);
 }
 
+std::string coding_text(const HostConfig& config) {
+  std::string text = fmt::format("codec {}, predictor {}", config.codec, config.predictor);
+  const auto metres = [&](std::int32_t units) { return units * config.lattice.unit; };
+  if (config.codec != "none")
+    text += fmt::format(", threshold {:.4g} m", metres(config.parameters.threshold));
+  if (config.quality) {
+    text += fmt::format(" (automatic, up to {:.4g} m)", metres(config.quality->largest_threshold));
+    if (config.quality->target_mbit_per_s > 0)
+      text += fmt::format(", target {} Mbit/s", config.quality->target_mbit_per_s);
+  }
+  if (config.budget != kNoBudget) text += fmt::format(", budget {} bytes a frame", config.budget);
+  return text;
+}
+
 Console::Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
 Console::~Console() { clear_line(); }
 

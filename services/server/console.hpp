@@ -11,6 +11,10 @@ namespace tandem::server {
 /// Gains and decay of codec `tracker`; nothing for the others.
 [[nodiscard]] std::string gains_text(const CodecParameters& parameters);
 
+/// How bodies are predicted and corrected from the first frame on: codec, predictor, threshold, and what binds
+/// them.
+[[nodiscard]] std::string coding_text(const HostConfig& config);
+
 /// Writes to stderr. Not thread-safe.
 class Console {
  public:

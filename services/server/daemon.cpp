@@ -216,10 +216,11 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   auto port = open_port(*config, options, stop);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
+  const std::string coding = coding_text(*config);
   auto host = Host::create(std::move(*config), **simulation, **port);
   if (!host) return report_error(host.error(), 2);
-  spdlog::info("scene {}, {} bodies, codec {}, session '{}' on domain {}, epoch {}", scene->name,
-               options.bodies, options.codec, options.session, options.domain, (*host)->session().epoch);
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name, options.bodies,
+               coding, options.session, options.domain, (*host)->session().epoch);
 
   Publisher publisher((*host)->outbox(), **port);
   Script script(*scene, options);

@@ -26,6 +26,7 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
   return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
 }
 
+bool takes_budget(const std::string& codec) { return codec == "limited" || codec == "tracker"; }
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 
 Result<void> check_words(const Settings& settings, Options& options) {
@@ -67,6 +68,8 @@ Result<void> check_numbers(const Settings& settings, const Options& options) {
   }
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
     return refuse("duration", "seconds, not negative");
+  if (options.automatic && options.codec == "none")
+    return refuse("threshold", "auto chooses nothing with codec none, which has no threshold");
   if (options.automatic && settings.threshold) return refuse("threshold", "a length or auto, not both");
   if (!options.automatic && settings.target_bandwidth)
     return refuse("target-bandwidth", "needs --threshold auto");
@@ -75,7 +78,7 @@ Result<void> check_numbers(const Settings& settings, const Options& options) {
     return refuse("target-bandwidth", "Mbit/s, at least 0.001");
   if (options.max_error_m && !within(*options.max_error_m, 1e-9, 1e9))
     return refuse("max-error", "a positive length");
-  if (options.budget_bytes && options.codec != "limited" && options.codec != "tracker")
+  if (options.budget_bytes && !takes_budget(options.codec))
     return refuse("budget", "only with --codec limited or tracker");
   if (options.budget_bytes && *options.budget_bytes < 64) return refuse("budget", "at least 64 bytes");
   return {};
@@ -111,11 +114,16 @@ Settings overlay(const Settings& over, const Settings& under) {
   pick(&Settings::seed);
   pick(&Settings::scripted);
   pick(&Settings::automatic);
-  // The two ways to set the threshold exclude each other, so one on the command line displaces the other in
-  // the file.
+  // What a flag excludes goes with it, when only the file says it.
+  if (over.threshold || over.automatic) all.threshold = over.threshold;
   if (over.threshold) all.threshold_scale = over.threshold_scale;
   if (over.threshold_scale) all.threshold = over.threshold;
-  if (over.automatic) all.threshold = over.threshold;
+  if (over.threshold || over.codec == "none") all.automatic = over.automatic;
+  if (over.automatic == false || !all.automatic.value_or(false)) {
+    all.target_bandwidth = over.target_bandwidth;
+    all.max_error = over.max_error;
+  }
+  if (over.codec && !takes_budget(*over.codec)) all.budget_bytes = over.budget_bytes;
   return all;
 }
 
@@ -186,9 +194,11 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       ->type_name("METRES|auto");
   app.add_option(
       "--target-bandwidth", flags.target_bandwidth,
-      "Mbit/s that --threshold auto keeps to, from a quarter of the scene's threshold up to --max-error");
+      "Mbit/s of payload at the nominal rate that --threshold auto keeps to, from a quarter of the threshold "
+      "it starts from up to --max-error");
   app.add_option("--max-error", flags.max_error,
-                 "Largest threshold of --threshold auto, in metres [four times the scene's]");
+                 "Largest threshold of --threshold auto, in metres; below the scene's it is also the first [four "
+                 "times the scene's]");
   app.add_option("--threshold-scale", flags.threshold_scale, "The scene's threshold times this [1]");
   app.add_option("--budget", flags.budget_bytes,
                  "Bytes of corrections per frame with --codec limited [6553] or tracker [no limit]");

@@ -70,7 +70,9 @@ Result<void> choose_gains(HostConfig& config) {
 }  // namespace
 
 Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
-  const double threshold_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  const double threshold_m =
+      choice.automatic ? std::min(stated_m, choice.max_error_m.value_or(stated_m)) : stated_m;
   const double finest_m = choice.automatic ? threshold_m * kFinest : threshold_m;
   const auto lattice = choose_lattice(finest_m, scene.extent_m, scene.dt_s);
   if (!lattice) return tl::unexpected(lattice.error());
@@ -88,10 +90,6 @@ Result<HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice&
     };
     config.quality = QualityGoal{choice.target_mbit_per_s, units(finest_m),
                                  units(choice.max_error_m.value_or(threshold_m * kCoarsest))};
-    if (!valid_goal(*config.quality, *parameters)) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("--max-error: at least the threshold, {} in this scene", threshold_m));
-    }
   }
   config.lattice = *lattice;
   config.parameters = *parameters;

@@ -150,6 +150,28 @@ TEST(Options, AThresholdOnTheCommandLineDisplacesAutomaticQualityInTheFile) {
   EXPECT_FALSE(options->automatic);
 }
 
+TEST(Options, WhatDependedOnADisplacedChoiceInTheFileGoesWithIt) {
+  Settings flags = least(), file;
+  file.automatic = true;
+  file.target_bandwidth = 1;
+  file.max_error = 0.5;
+  flags.threshold = 0.1;
+  flags.automatic = false;
+  EXPECT_TRUE(check_settings(overlay(flags, file)));
+  flags = least();
+  flags.codec = "none";
+  EXPECT_TRUE(check_settings(overlay(flags, file)));
+  flags.automatic = true;
+  EXPECT_FALSE(check_settings(overlay(flags, file))) << "none has no threshold to choose";
+  file = {};
+  file.budget_bytes = 1000;
+  flags = least();
+  flags.codec = "entropy";
+  EXPECT_TRUE(check_settings(overlay(flags, file)));
+  flags.codec = "limited";
+  EXPECT_EQ(overlay(flags, file).budget_bytes, 1000U);
+}
+
 TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
   write(
       "scene: \"cube\" bodies: 500 session: \"arena\" window: \"4\" scripted: true seed: 9 duration: 2.5\n");

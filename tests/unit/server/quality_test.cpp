@@ -272,7 +272,11 @@ TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedEr
   EXPECT_NEAR(plan->quality->smallest_threshold * plan->lattice.unit, scene->threshold_m / 4, 1e-6);
   EXPECT_NEAR(plan->quality->largest_threshold * plan->lattice.unit, scene->threshold_m * 4, 1e-6);
   choice.max_error_m = scene->threshold_m / 2;
-  EXPECT_FALSE(plan_session(*scene, choice));
+  plan = plan_session(*scene, choice);
+  ASSERT_TRUE(plan) << "a smaller error is where it starts";
+  EXPECT_TRUE(valid_goal(*plan->quality, plan->parameters));
+  EXPECT_NEAR(plan->parameters.threshold * plan->lattice.unit, scene->threshold_m / 2, 1e-6);
+  EXPECT_EQ(plan->quality->largest_threshold, plan->parameters.threshold);
 }
 
 }  // namespace
