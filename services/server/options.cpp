@@ -196,9 +196,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "--target-bandwidth", flags.target_bandwidth,
       "Mbit/s of payload at the nominal rate that --threshold auto keeps to, from a quarter of the threshold "
       "it starts from up to --max-error");
-  app.add_option("--max-error", flags.max_error,
-                 "Largest threshold of --threshold auto, in metres; below the scene's it is also the first [four "
-                 "times the scene's]");
+  app.add_option(
+      "--max-error", flags.max_error,
+      "Largest threshold of --threshold auto, in metres; below the scene's it is also the first [four "
+      "times the scene's]");
   app.add_option("--threshold-scale", flags.threshold_scale, "The scene's threshold times this [1]");
   app.add_option("--budget", flags.budget_bytes,
                  "Bytes of corrections per frame with --codec limited [6553] or tracker [no limit]");
