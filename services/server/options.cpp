@@ -9,6 +9,7 @@
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/transport/port.hpp"
+#include "services/server/session_plan.hpp"
 
 namespace tandem::server {
 namespace {
@@ -80,7 +81,8 @@ Result<void> check_numbers(const Settings& settings, const Options& options) {
     return refuse("max-error", "a positive length");
   if (options.budget_bytes && !takes_budget(options.codec))
     return refuse("budget", "only with --codec limited or tracker");
-  if (options.budget_bytes && *options.budget_bytes < 64) return refuse("budget", "at least 64 bytes");
+  if (options.budget_bytes && *options.budget_bytes < kLeastBudgetBytes)
+    return refuse("budget", fmt::format("at least {} bytes", kLeastBudgetBytes));
   return {};
 }
 

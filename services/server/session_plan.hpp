@@ -12,6 +12,9 @@
 
 namespace tandem::server {
 
+/// Below, a frame has hardly room for one body.
+inline constexpr std::size_t kLeastBudgetBytes = 64;
+
 /// What an operator chooses on top of the scene.
 struct SessionChoice {
   std::uint32_t bodies = 0;
@@ -23,7 +26,8 @@ struct SessionChoice {
   bool automatic = false;        ///< quality follows the scene at run time, from a quarter of that threshold
   double target_mbit_per_s = 0;  ///< with `automatic`; 0: the threshold stays
   std::optional<double> max_error_m;  ///< with `automatic`; empty: four times the threshold
-  /// Of corrections per frame, for `limited` and `tracker`; empty: the paper's and none.
+  /// Of corrections per frame, for `limited` and `tracker`, at least kLeastBudgetBytes; empty: the paper's
+  /// and none.
   std::optional<std::size_t> budget_bytes;
   std::uint32_t threads = 1;  ///< of the codec, where a session has several blocks
 };

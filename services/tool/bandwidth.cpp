@@ -372,11 +372,12 @@ std::string to_json(std::span<const BandwidthRow> rows) {
 
 std::string to_table(std::span<const BandwidthRow> rows) {
   std::string text = fmt::format(
-      "{:<12} {:>7} {:<10} {:>8} {:>7} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} "
+      "{:<12} {:>7} {:<10} {:<9} {:>8} {:>7} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} "
+      "{:>8} "
       "{:>8} "
       "{:>8}\n",
-      "scene", "bodies", "codec", "Mbit/s", "paper", "bound", "max err", "rms err", "threshold", "rms snap",
-      "corrected", "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
+      "scene", "bodies", "codec", "predictor", "Mbit/s", "paper", "bound", "max err", "rms err", "threshold",
+      "rms snap", "corrected", "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
   for (const BandwidthRow& row : rows) {
     if (!row.missing.empty()) {
       text += fmt::format("{:<12} {:>7} {:<10} not in this build: {} was missing\n", row.scene, row.bodies,
@@ -384,17 +385,18 @@ std::string to_table(std::span<const BandwidthRow> rows) {
       continue;
     }
     if (row.predictor.empty()) {
-      text += fmt::format("{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n", row.scene,
-                          row.bodies, row.codec, row.mbit_per_s, "-", "-", row.max_error, row.rms_error,
-                          row.threshold);
+      text += fmt::format("{:<12} {:>7} {:<10} {:<9} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n",
+                          row.scene, row.bodies, row.codec, "-", row.mbit_per_s, "-", "-", row.max_error,
+                          row.rms_error, row.threshold);
       continue;
     }
     text += fmt::format(
-        "{:<12} {:>7} {:<10} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} {:>7} "
+        "{:<12} {:>7} {:<10} {:<9} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} "
+        "{:>7} "
         "{:>8.3f} "
         "{:>8.3f} "
         "{:>8.3f} {:>8.3f} {:>8.3f}\n",
-        row.scene, row.bodies, row.codec, row.mbit_per_s, rounded(mbit_in_paper(row), 2),
+        row.scene, row.bodies, row.codec, row.predictor, row.mbit_per_s, rounded(mbit_in_paper(row), 2),
         rounded(row.bound_mbit_per_s, 3), row.max_error, row.rms_error, row.threshold, row.rms_snap,
         row.corrected_per_frame, rounded(row.colliding_per_frame, 0), rounded(colliding_in_paper(row), 0),
         row.step_ms, row.predict_ms, row.encode_ms, row.decode_ms, row.apply_ms);

@@ -41,7 +41,8 @@ double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count)
 
 std::string rows_csv(Rows rows) {
   std::string text =
-      "scene,number,bodies,codec,predictor,seed,frames,threshold,mbit_per_s,paper_mbit_per_s,ideal_mbit_per_"
+      "scene,number,bodies,codec,predictor,decay,velocity_gain,acceleration_gain,seed,frames,threshold,mbit_"
+      "per_s,paper_mbit_per_s,ideal_mbit_per_"
       "s,"
       "bound_mbit_per_s,max_error,"
       "rms_error,max_snap,rms_snap,corrected_per_frame,colliding_per_frame,missing\n";
@@ -50,10 +51,13 @@ std::string rows_csv(Rows rows) {
   };
   for (const BandwidthRow& row : rows) {
     const auto measured = [&](double value) { return row.missing.empty() ? fmt::format("{}", value) : ""; };
+    const auto gain = [&](double value) { return row.codec == "tracker" ? fmt::format("{}", value) : ""; };
     text +=
-        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
+        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
                     row.number ? fmt::format("{}", *row.number) : "", row.bodies, row.codec, row.predictor,
-                    row.seed, row.frames, row.threshold, measured(row.mbit_per_s),
+                    gain(row.parameters.decay / 65536.0), gain(row.parameters.velocity_gain / 32768.0),
+                    gain(row.parameters.acceleration_gain / 65536.0), row.seed, row.frames, row.threshold,
+                    measured(row.mbit_per_s),
                     number(row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt),
                     number(row.ideal_mbit_per_s), number(row.bound_mbit_per_s), measured(row.max_error),
                     measured(row.rms_error), row.predictor.empty() ? "" : measured(row.max_snap),

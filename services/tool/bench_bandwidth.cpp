@@ -230,6 +230,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->add_option("--predictor", options->choice.predictor,
                    "Predicted step of `tracker`: ballistic, field, contact, or auto; the paper's codecs have "
                    "ballistic")
+      ->check(CLI::IsMember({"auto", "ballistic", "field", "contact"}))
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
@@ -243,11 +244,11 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->add_option(
           "--budget", options->choice.budget_bytes,
           "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
-      ->capture_default_str();
+      ->check(CLI::Range(server::kLeastBudgetBytes, std::size_t{1} << 30U));
   command
       ->add_option("--trajectory", options->trajectory,
                    "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
-      ->excludes("--scene");
+      ->excludes("--scene", "--bodies", "--seed", "--users");
   command->add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();

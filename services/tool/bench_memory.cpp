@@ -1,4 +1,4 @@
-// `tandem bench memory`: bytes a slot costs a server and a client.
+// `tandem bench memory`: bytes that engine, server and client hold, in all and a slot.
 
 #include <fmt/format.h>
 
@@ -37,33 +37,28 @@ Result<HostedSimulation> host_scene(const scenes::Scene& scene, const MemoryOpti
 int run_memory(const MemoryOptions& options) {
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return report("bench memory", scene.error());
-  const std::uint32_t sizes[2] = {options.bodies, 2 * options.bodies};
-  MemoryUse uses[2];
-  for (std::size_t i = 0; i < 2; ++i) {
-    const auto use = measure_memory([&] { return host_scene(*scene, options, sizes[i]); }, options.frames);
-    if (!use) return report("bench memory", use.error());
-    uses[i] = *use;
-  }
   const struct {
     const char* name;
     std::int64_t MemoryUse::*bytes;
   } parts[] = {{"engine", &MemoryUse::engine_bytes},
                {"server", &MemoryUse::server_bytes},
                {"client", &MemoryUse::client_bytes}};
-  nlohmann::ordered_json json{{"scene", scene->name}, {"bodies", options.bodies}, {"codec", options.codec}};
-  if (!options.json)
-    fmt::print("{:<8} {:>14} {:>14} {:>12}\n", "", "bytes a slot", "fixed bytes", "total bytes");
-  for (const auto& part : parts) {
-    const PerSlot cost = per_slot(uses[0].*part.bytes, uses[1].*part.bytes, sizes[0], sizes[1]);
-    json[part.name] = {{"slot_bytes", cost.slot_bytes},
-                       {"fixed_bytes", cost.fixed_bytes},
-                       {"total_bytes", uses[0].*part.bytes}};
-    if (!options.json) {
-      fmt::print("{:<8} {:>14.1f} {:>14.0f} {:>12}\n", part.name, cost.slot_bytes, cost.fixed_bytes,
-                 uses[0].*part.bytes);
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  if (!options.json) fmt::print("{:>8} {:<8} {:>14} {:>14}\n", "bodies", "", "total bytes", "bytes a slot");
+  // Two sizes, each for itself: scratch may grow in steps, so that a line through both would tell nothing.
+  for (const std::uint32_t bodies : {options.bodies, 2 * options.bodies}) {
+    const auto use = measure_memory([&] { return host_scene(*scene, options, bodies); }, options.frames);
+    if (!use) return report("bench memory", use.error());
+    nlohmann::ordered_json row{{"scene", scene->name}, {"bodies", bodies}, {"codec", options.codec}};
+    for (const auto& part : parts) {
+      const std::int64_t total = (*use).*part.bytes;
+      const double a_slot = static_cast<double>(total) / bodies;
+      row[part.name] = {{"total_bytes", total}, {"slot_bytes", a_slot}};
+      if (!options.json) fmt::print("{:>8} {:<8} {:>14} {:>14.1f}\n", bodies, part.name, total, a_slot);
     }
+    rows.push_back(std::move(row));
   }
-  if (options.json) fmt::print("{}\n", json.dump());
+  if (options.json) fmt::print("{}\n", nlohmann::ordered_json{{"rows", rows}}.dump());
   return 0;
 }
 
@@ -74,9 +69,7 @@ void add_memory(CLI::App& bench, Run& run) {
       bench.add_subcommand("memory", "Heap bytes of engine, server and client while playing, DDS excluded.");
   const auto options = std::make_shared<MemoryOptions>();
   command->add_option("--scene", options->scene, "Scene by name or file")->capture_default_str();
-  command
-      ->add_option("--bodies", options->bodies,
-                   "Number of bodies; twice as many are measured too, for the slope")
+  command->add_option("--bodies", options->bodies, "Number of bodies; twice as many are measured too")
       ->check(CLI::Range(1U, scenes::kMaxBodies / 2))
       ->capture_default_str();
   std::vector<std::string> names;
@@ -85,7 +78,8 @@ void add_memory(CLI::App& bench, Run& run) {
   command->add_option("--frames", options->frames, "Frames to play")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object");
+  command->add_flag("--json", options->json,
+                    "One JSON object: rows[scene, bodies, codec, engine, server, client]");
   command->callback([options, &run] { run = [options] { return run_memory(*options); }; });
 }
 

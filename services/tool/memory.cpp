@@ -66,11 +66,4 @@ Result<MemoryUse> measure_memory(const std::function<Result<HostedSimulation>()>
   return use;
 }
 
-PerSlot per_slot(std::int64_t small_bytes, std::int64_t large_bytes, std::uint32_t small_slots,
-                 std::uint32_t large_slots) {
-  const double slot =
-      static_cast<double>(large_bytes - small_bytes) / static_cast<double>(large_slots - small_slots);
-  return {slot, static_cast<double>(small_bytes) - slot * small_slots};
-}
-
 }  // namespace tandem::tool

@@ -31,12 +31,4 @@ struct HostedSimulation {
 [[nodiscard]] Result<MemoryUse> measure_memory(const std::function<Result<HostedSimulation>()>& make,
                                                std::uint64_t frames);
 
-/// From two sizes: what a slot costs and what there is whatever the number of slots.
-struct PerSlot {
-  double slot_bytes = 0;
-  double fixed_bytes = 0;
-};
-[[nodiscard]] PerSlot per_slot(std::int64_t small_bytes, std::int64_t large_bytes, std::uint32_t small_slots,
-                               std::uint32_t large_slots);
-
 }  // namespace tandem::tool

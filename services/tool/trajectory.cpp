@@ -24,6 +24,8 @@ constexpr std::size_t kMaxHeaderBytes = 4096;
 constexpr std::uint64_t kMaxBodies = 1U << 20U;
 // Rows are read and checked a frame at a time; a frame count beyond this is a broken header.
 constexpr std::uint64_t kMaxRows = 1U << 24U;
+// Of the numbers in the sidecar; beyond, somebody mistook something.
+constexpr double kMostNumber = 1e9;
 
 std::string header(std::uint64_t rows, std::uint32_t bodies) {
   std::string text(kMagic);
@@ -45,9 +47,10 @@ Result<double> positive(const nlohmann::json& json, const std::string& path, con
     return fail(ErrorCode::kMalformed, fmt::format("{}: expected a number \"{}\"", path, key));
   }
   const auto value = found->get<double>();
-  if (!std::isfinite(value) || value < 0 || (value == 0 && !zero_allowed)) {
-    return fail(ErrorCode::kMalformed, fmt::format("{}: \"{}\" is {}; expected a finite number {} 0", path,
-                                                   key, value, zero_allowed ? ">=" : ">"));
+  if (!(value >= 0 && value <= kMostNumber) || (value == 0 && !zero_allowed)) {
+    return fail(ErrorCode::kMalformed,
+                fmt::format("{}: \"{}\" is {:g}; expected a number {} 0 and at most {:g}", path, key, value,
+                            zero_allowed ? ">=" : ">", kMostNumber));
   }
   return value;
 }

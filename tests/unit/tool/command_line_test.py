@@ -48,6 +48,11 @@ class CommandLine(unittest.TestCase):
         self.assert_usage("subcommand")
         self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", "0")
         self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", 2**20 + 1)
+        for codec in ("entropy", "tracker"):
+            self.assert_usage("--predictor", "bench", "bandwidth", "--scene", "cube", "--codec", codec, "--predictor", "foo")
+        self.assert_usage("--budget", "bench", "bandwidth", "--scene", "cube", "--codec", "tracker", "--budget", "63")
+        for flag in ("--bodies", "--users", "--seed"):
+            self.assert_usage(flag, "bench", "bandwidth", "--trajectory", "x.npy", flag, "5")
         self.assert_usage("zip", "bench", "bandwidth", "--scene", "half_pipe", "--codec", "zip")
         self.assert_usage("--scene", "bench", "bandwidth")
         self.assert_usage("--out", "export", "--scene", "half_pipe")
@@ -210,6 +215,10 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("x.json", done.stderr)
         self.assertIn("dt", done.stderr)
+        sidecar.write_text(json.dumps({**good, "threshold": 1e30}))
+        done = run(*bench, self.path("x.npy"))
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"x\.json: \"threshold\" is 1e\+30; expected a number > 0 and at most 1e\+09\n$")
         sidecar.unlink()
         done = run(*bench, self.path("x.npy"))
         self.assertEqual(done.returncode, 1)
@@ -245,9 +254,11 @@ class CommandLine(unittest.TestCase):
     def test_memory_gives_bytes_a_slot(self):
         done = run("bench", "memory", "--bodies", "500", "--frames", "5", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
-        figures = json.loads(done.stdout)
-        for part in ("engine", "server", "client"):
-            self.assertIn("slot_bytes", figures[part])
+        rows = json.loads(done.stdout)["rows"]
+        self.assertEqual([row["bodies"] for row in rows], [500, 1000])
+        for row in rows:
+            for part in ("engine", "server", "client"):
+                self.assertEqual(row[part]["slot_bytes"], row[part]["total_bytes"] / row["bodies"])
 
     def test_doctor_fails_on_a_configuration_file_that_is_not_there(self):
         done = run("doctor", "--json", CYCLONEDDS_URI="file:///nowhere/cyclonedds.xml")
