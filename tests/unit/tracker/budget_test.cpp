@@ -37,7 +37,7 @@ TEST(TrackerBudget, IsNeverExceededByAByteAndSpentOnTheLargestErrors) {
     for (Slot slot = 0; slot < 300; ++slot) {
       if (agreed.body(slot) == start.body(slot) && encoded.corrected > 0) {
         const std::uint64_t error = error_of(slot);
-        ASSERT_TRUE(error <= 200 * 200 || error <= least_sent);
+        ASSERT_TRUE(error <= 40'000 || error <= least_sent);
       }
     }
   }
