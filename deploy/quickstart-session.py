@@ -91,7 +91,7 @@ class Session:
 
     def start_server(self):
         self.start(
-            "server", "services/server/tandemd",
+            "server", "services/tandemd/tandemd",
             "--scene", self.options.scene, "--bodies", str(self.options.bodies),
             "--wait-for", "2", "--duration", str(self.longest()), "--json",
             "--hash-log", str(self.file("server", "hashes")),

@@ -4,7 +4,7 @@
 #include <scene.pb.h>
 #include <cmath>
 
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 
 namespace tandem::scenes {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/engine/particles/world.hpp"
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 #include "services/scenes/script.hpp"
 #include "services/scenes/trained.hpp"
 #include "tandem/result.hpp"

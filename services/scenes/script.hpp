@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::scenes {

@@ -1,5 +1,5 @@
 #pragma once
-// The subcommands of `tandem`, one file each.
+// The subcommands of `tandem` for operators, one file each.
 
 #include <CLI/CLI.hpp>
 #include <functional>
@@ -12,8 +12,6 @@ using Run = std::function<int()>;
 
 /// Each adds one subcommand to `app`; when the command line chooses it, its callback sets `run`.
 void add_join(CLI::App& app, Run& run);
-void add_bench(CLI::App& app, Run& run);
-void add_export(CLI::App& app, Run& run);
 void add_top(CLI::App& app, Run& run);
 void add_doctor(CLI::App& app, Run& run);
 

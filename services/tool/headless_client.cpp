@@ -50,7 +50,7 @@ Result<void> HeadlessClient::open() {
   core.id = client::random_client_id();
   core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options_.lead;
-  core.measure_ns = client::steady_ns;
+  core.measure_ns = transport::steady_ns;
   core.log = [this](LogLevel, std::string_view line) { tell(std::string(line)); };
   transport::DdsOptions dds;
   dds.domain = options_.domain;
@@ -76,7 +76,7 @@ Result<void> HeadlessClient::load_script(double dt_s) {
 }
 
 void HeadlessClient::run(const std::atomic<bool>& stop) {
-  started_ns_ = client::steady_ns();
+  started_ns_ = transport::steady_ns();
   told_ns_ = live_ns_ = started_ns_;
   while (!stop) {
     const client::Now now = client::now();
@@ -93,7 +93,7 @@ void HeadlessClient::run(const std::atomic<bool>& stop) {
     } else if (over(figures.first_applied_ns, options_.seconds)) {
       break;
     }
-    const std::int64_t wait_ns = due_ns - client::steady_ns();
+    const std::int64_t wait_ns = due_ns - transport::steady_ns();
     if (wait_ns > 0) port_->wait(std::chrono::nanoseconds(wait_ns));
   }
   finish();
@@ -117,7 +117,7 @@ void HeadlessClient::finish() {
 
 void HeadlessClient::on_session(const transport::SessionMessage& session) {
   if (session_ns_ == 0) {
-    session_ns_ = client::steady_ns();
+    session_ns_ = transport::steady_ns();
     if (!options_.input_script.empty() && session.frame_rate_hz > 0) {
       if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
     }
@@ -233,8 +233,7 @@ std::string HeadlessClient::summary() const {
   const client::Statistics& figures = core_->statistics();
   return fmt::format(
       "{}{} frames, last {} with hash {}, {:.3f} Mbit/s; latency {:.2f} / {:.2f} ms, client {:.3f} / {:.3f} "
-      "ms (p50 / "
-      "p99); joined in {:.0f} ms; {} resyncs, {} mismatches; inputs: {} sent, {} refused\n",
+      "ms (p50 / p99); joined in {:.0f} ms; {} resyncs, {} mismatches; inputs: {} sent, {} refused\n",
       options_.name, figures.frames_applied, last_frame_, to_hex(last_hash_), figures.mbit_per_s(),
       figures.latency.at_ms(0.5), figures.latency.at_ms(0.99), figures.frame_cost.at_ms(0.5),
       figures.frame_cost.at_ms(0.99), first_join_ms_.value_or(0), figures.resyncs, figures.hash_mismatches,

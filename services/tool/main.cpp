@@ -5,6 +5,9 @@
 #include <string>
 
 #include "services/tool/commands.hpp"
+#ifdef TANDEM_LAB
+#include "services/lab/commands.hpp"
+#endif
 
 namespace {
 
@@ -23,10 +26,19 @@ int main(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage. With --json, stdout holds one JSON object.");
   tandem::tool::Run run;
   tandem::tool::add_join(app, run);
-  tandem::tool::add_bench(app, run);
-  tandem::tool::add_export(app, run);
+#ifdef TANDEM_LAB
+  tandem::lab::add_bench(app, run);
+  tandem::lab::add_export(app, run);
+#endif
   tandem::tool::add_top(app, run);
   tandem::tool::add_doctor(app, run);
+#ifndef TANDEM_LAB
+  if (argc > 1 && (argv[1] == std::string("bench") || argv[1] == std::string("export"))) {
+    std::fprintf(stderr, "tandem: %s is not in this build; build from source with TANDEM_BUILD_LAB=ON\n",
+                 argv[1]);
+    return 2;
+  }
+#endif
   if (argc > 1 && argv[1][0] != '-' && unknown(app, argv[1])) {
     std::fprintf(stderr, "tandem: unknown command '%s'; see tandem --help\n", argv[1]);
     return 2;

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "services/tool/replay.hpp"
+#include "sdk/transport/clock.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -20,7 +20,7 @@ Progress::Progress(std::string what, std::uint64_t total)
     : what_(std::move(what)),
       total_(total),
       terminal_(::isatty(STDERR_FILENO) != 0),
-      next_ns_(steady_ns() + kPatienceNs) {}
+      next_ns_(transport::steady_ns() + kPatienceNs) {}
 
 Progress::~Progress() {
   if (shown_) std::fputs("\r\x1b[K", stderr);
@@ -28,7 +28,7 @@ Progress::~Progress() {
 
 void Progress::at(std::uint64_t done) {
   if (!terminal_) return;
-  const std::int64_t now_ns = steady_ns();
+  const std::int64_t now_ns = transport::steady_ns();
   if (now_ns < next_ns_) return;
   next_ns_ = now_ns + kPeriodNs;
   shown_ = true;

@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/tool/commands.hpp"
-#include "services/tool/replay.hpp"
 #include "services/tool/top_view.hpp"
 
 namespace tandem::tool {
@@ -33,7 +33,7 @@ void collect(transport::Monitor& monitor, TopView& view) {
   std::vector<transport::Received<transport::ClientStatusMessage>> clients;
   monitor.take(servers);
   monitor.take(clients);
-  const std::int64_t now_ns = steady_ns();
+  const std::int64_t now_ns = transport::steady_ns();
   for (const auto& server : servers) view.update(server.message, now_ns);
   for (const auto& client : clients) view.update(client.message, now_ns);
   view.forget_silent(now_ns);
@@ -61,12 +61,12 @@ int run_top(const TopOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);
   TopView view;
   if (!options.session.empty()) view.only(options.session);
-  const std::int64_t start_ns = steady_ns();
+  const std::int64_t start_ns = transport::steady_ns();
   std::int64_t shown_ns = start_ns;
   while (stopped == 0) {
     (*monitor)->wait(std::chrono::milliseconds(100));
     collect(**monitor, view);
-    const std::int64_t now_ns = steady_ns();
+    const std::int64_t now_ns = transport::steady_ns();
     if (options.once) {
       if (now_ns - start_ns < kOnceNs) continue;
       show(view, options);

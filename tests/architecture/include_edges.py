@@ -17,38 +17,50 @@ SKIPPED = {"build", ".git"}
 # Project folders that a folder may include, besides itself; the longest matching folder of a file decides.
 # A name ending in .hpp is that header alone. "public" is sdk/include/tandem.
 CORE = ["public/result.hpp", "sdk/core/lattice"]
-TIMELINE = CORE + ["sdk/core/predict", "sdk/core/codec", "sdk/core/timeline"]
+PREDICT = ["sdk/core/predict", "sdk/core/predict/ballistic", "sdk/core/predict/contact"]
+CODEC = ["sdk/core/codec", "sdk/core/codec/paper", "sdk/core/codec/tracker"]
+TIMELINE = CORE + PREDICT + CODEC + ["sdk/core/timeline"]
+SIMULATION = ["services/host/simulation.hpp"]
 EDGES = {
     "sdk/include": [],
     "sdk/core/lattice": ["public/result.hpp"],
-    "sdk/core/predict": CORE,
-    "sdk/core/codec": CORE,
+    "sdk/core/predict": CORE + PREDICT,
+    "sdk/core/predict/ballistic": CORE + ["sdk/core/predict"],
+    "sdk/core/predict/contact": CORE + ["sdk/core/predict"],
+    "sdk/core/codec": CORE + CODEC,
+    "sdk/core/codec/paper": CORE + ["sdk/core/codec"],
+    "sdk/core/codec/tracker": CORE + ["sdk/core/codec"],
     "sdk/core/timeline": TIMELINE,
     "sdk/transport": CORE,
     "sdk/transport/simulated": CORE + ["sdk/transport"],
     "sdk/transport/dds": CORE + ["sdk/transport"],
-    "sdk/client": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds"],
+    "sdk/client": TIMELINE + ["public", "sdk/transport"],
+    "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
     "sdk/examples": ["public"],
     "services/workers": [],
-    "services/engine": [],
-    "services/engine/particles": ["public/result.hpp", "services/engine/simulation.hpp", "services/workers"],
-    "services/scenes": ["public/result.hpp", "services/engine", "services/engine/particles"],
-    "services/server": TIMELINE
-    + ["sdk/transport", "sdk/transport/dds", "services/engine/simulation.hpp", "services/scenes", "services/workers"],
+    "services/host": TIMELINE + ["sdk/transport", "services/workers"],
+    "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
+    "services/scenes": ["public/result.hpp", "services/engine/particles"] + SIMULATION,
+    "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
+    "services/tandemd": CORE
+    + CODEC
+    + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions"],
     "services/tool": TIMELINE
-    + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
-    + ["services/engine/simulation.hpp"]
-    + ["services/scenes", "services/server"],
+    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "services/scenes"],
+    "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
+    "services/lab": TIMELINE
+    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
+    + ["services/host", "services/scenes", "services/sessions", "services/tool"],
     "tests": ["*"],
 }
 
 # Headers from outside the project, and the only folders that may include them.
 OWNERS = [
     (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
-    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services", "tests/unit/scenes", "tests/unit/server"]),
+    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/sessions", "services/tandemd", "services/lab", "tests/unit"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
-    (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/server"]),
+    (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/lab", "services/tandemd"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]

@@ -16,8 +16,8 @@ class IncludeEdges(unittest.TestCase):
                 "sdk/core/lattice/state.hpp": '#include <vector>\n#include "tandem/result.hpp"\n',
                 "sdk/core/predict/predictor.hpp": '#include "sdk/core/lattice/state.hpp"\n',
                 "sdk/transport/port.hpp": '#include "sdk/core/lattice/state.hpp"\n',
-                "services/engine/simulation.hpp": "#include <span>\n",
-                "services/engine/particles/particles.cpp": '#include "services/engine/simulation.hpp"\n',
+                "services/host/simulation.hpp": "#include <span>\n",
+                "services/engine/particles/particles.cpp": '#include "services/host/simulation.hpp"\n',
             }
             for path, text in {**base, **dict(files)}.items():
                 file = pathlib.Path(root) / path
@@ -49,7 +49,7 @@ class IncludeEdges(unittest.TestCase):
 
     def test_only_the_dds_room_sees_dds_headers(self):
         self.assert_one("sdk/transport/a.cpp", '"dds/dds.h"', "DDS headers belong to")
-        self.assert_one("services/server/a.cpp", "<dds/dds.h>", "DDS headers belong to")
+        self.assert_one("services/host/a.cpp", "<dds/dds.h>", "DDS headers belong to")
         self.assertEqual(self.found(("sdk/transport/dds/a.cpp", '#include "dds/dds.h"\n')), [])
 
     def test_the_sdk_may_not_see_protobuf(self):
@@ -61,7 +61,7 @@ class IncludeEdges(unittest.TestCase):
 
     def test_an_engine_sees_only_the_simulation_interface(self):
         self.assert_one("services/engine/particles/a.cpp", '"sdk/core/lattice/state.hpp"', "may not include")
-        self.assert_one("services/engine/particles/a.cpp", '"services/server/host.hpp"', "neither a path")
+        self.assert_one("services/engine/particles/a.cpp", '"services/host/host.hpp"', "neither a path")
 
     def test_public_headers_include_only_public_headers(self):
         self.assert_one("sdk/include/tandem/client.hpp", '"sdk/core/lattice/state.hpp"', "may not include")

@@ -1,17 +1,17 @@
 // Any text as a server's configuration: refused naming the file, or options within their ranges.
 
 #include "sdk/core/lattice/state.hpp"
-#include "services/server/options.hpp"
+#include "services/tandemd/options.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const tandem::fuzz::ScratchFolder folder;
-  const auto settings = tandem::server::load_config(folder.put("any.textproto", {data, size}));
+  const auto settings = tandem::daemon::load_config(folder.put("any.textproto", {data, size}));
   if (!settings) {
     if (settings.error().message.find("any.textproto") == std::string::npos) std::abort();
     return 0;
   }
-  const auto options = tandem::server::check_settings(*settings);
+  const auto options = tandem::daemon::check_settings(*settings);
   if (options && (options->bodies == 0 || options->bodies > tandem::kMaxCapacity || options->lead > 1))
     std::abort();
   return 0;

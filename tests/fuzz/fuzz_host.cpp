@@ -2,9 +2,9 @@
 // not notice.
 
 #include "tests/fuzz/program.hpp"
-#include "tests/unit/server/fakes.hpp"
+#include "tests/unit/host/fakes.hpp"
 
-namespace tandem::server {
+namespace tandem::host {
 namespace {
 
 using fuzz::Program;
@@ -109,10 +109,10 @@ class Run {
 };
 
 }  // namespace
-}  // namespace tandem::server
+}  // namespace tandem::host
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   tandem::fuzz::Program program(std::as_bytes(std::span(data, size)));
-  tandem::server::Run(program).play();
+  tandem::host::Run(program).play();
   return 0;
 }

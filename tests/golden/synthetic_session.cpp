@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/core/predict/contact_constants.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

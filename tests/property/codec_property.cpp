@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "sdk/core/codec/residual.hpp"
+#include "sdk/core/codec/paper/residual.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {

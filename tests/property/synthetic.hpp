@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
-#include "sdk/core/codec/training.hpp"
+#include "sdk/core/codec/paper/training.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem::synthetic {

@@ -4,8 +4,8 @@
 #include <deque>
 #include <map>
 
-#include "sdk/core/predict/ballistic.hpp"
-#include "sdk/core/predict/contact_constants.hpp"
+#include "sdk/core/predict/ballistic/ballistic.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

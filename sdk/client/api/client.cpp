@@ -30,7 +30,7 @@ client::CoreOptions core_options(const ClientOptions& options) {
       options.role == ClientRole::kObserver ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options.lead;
   core.log = options.log;
-  core.measure_ns = client::steady_ns;
+  core.measure_ns = transport::steady_ns;
   return core;
 }
 
@@ -58,7 +58,7 @@ struct Client::Impl {
       const std::lock_guard lock(mutex);
       due_ns = core.poll(client::now());
     }
-    const std::int64_t wait_ns = std::min(longest_ns, due_ns - client::steady_ns());
+    const std::int64_t wait_ns = std::min(longest_ns, due_ns - transport::steady_ns());
     if (wait_ns > 0 && !ending) port->wait(std::chrono::nanoseconds(wait_ns));
   }
 

@@ -1,21 +1,11 @@
 #pragma once
-// The clocks that a running client lives by.
-
-#include <chrono>
-#include <cstdint>
+// Both clocks at once, as a ClientCore wants them.
 
 #include "sdk/client/client_core.hpp"
+#include "sdk/transport/clock.hpp"
 
 namespace tandem::client {
 
-[[nodiscard]] inline std::int64_t steady_ns() {
-  const auto since = std::chrono::steady_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
-}
-
-[[nodiscard]] inline Now now() {
-  const auto wall = std::chrono::system_clock::now().time_since_epoch();
-  return {steady_ns(), std::chrono::duration_cast<std::chrono::nanoseconds>(wall).count()};
-}
+[[nodiscard]] inline Now now() { return {transport::steady_ns(), transport::wall_ns()}; }
 
 }  // namespace tandem::client

@@ -3,9 +3,9 @@
 #include <array>
 #include <string>
 
-#include "sdk/core/codec/absolute_coding.hpp"
-#include "sdk/core/codec/residual_coding.hpp"
-#include "sdk/core/codec/tracker.hpp"
+#include "sdk/core/codec/paper/absolute_coding.hpp"
+#include "sdk/core/codec/paper/residual_coding.hpp"
+#include "sdk/core/codec/tracker/tracker.hpp"
 
 namespace tandem {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "sdk/core/codec/lifecycle.hpp"
-#include "sdk/core/codec/training.hpp"
+#include "sdk/core/codec/paper/training.hpp"
 #include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {

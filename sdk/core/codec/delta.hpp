@@ -64,8 +64,8 @@ class DeltaCodec {
     std::uint32_t corrected = 0;       ///< bodies
   };
   /// Server side: applies `lifecycle` and corrections to `state` (predicted) and writes them to `out`, which
-  /// holds at least bound() bytes. `target` is the full simulation on the lattice. No more than `budget` bytes,
-  /// unless lifecycle and parameters alone take more. Preconditions are asserted.
+  /// holds at least bound() bytes. `target` is the full simulation on the lattice. No more than `budget`
+  /// bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
                  std::size_t budget, std::span<std::byte> out);
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "sdk/core/predict/ballistic.hpp"
-#include "sdk/core/predict/contact.hpp"
+#include "sdk/core/predict/ballistic/ballistic.hpp"
+#include "sdk/core/predict/contact/contact.hpp"
 
 namespace tandem {
 

@@ -69,7 +69,8 @@ struct Topic<AckMessage> {
   using Wire = tandem_TandemAck;
   static constexpr const char* kName = "TandemAck";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemAck_desc; }
-  // A participant that writes another's client id must not displace the owner's sample before the server sees it.
+  // A participant that writes another's client id must not displace the owner's sample before the server sees
+  // it.
   static constexpr TopicQos kQos{true, false, 1, 16};
 };
 template <>

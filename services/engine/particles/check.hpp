@@ -2,7 +2,7 @@
 // What a particle simulation accepts: worlds at the start, inputs at run time.
 
 #include "services/engine/particles/world.hpp"
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::engine {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/engine/particles/contacts.hpp"
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 
 namespace tandem::engine {
 

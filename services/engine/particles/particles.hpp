@@ -4,7 +4,7 @@
 #include <string>
 
 #include "services/engine/particles/world.hpp"
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::engine {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "services/server/block_threads.hpp"
+#include "services/host/block_threads.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {
@@ -146,7 +146,7 @@ void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
     state.spawn(slot, 0, 0, {{random.even(1 << 22), random.even(1 << 22), random.even(1 << 22)}, {}});
   DeltaCodec server = synthetic::make_delta("tracker", kMany, kParameters);
   DeltaCodec client = synthetic::make_delta("tracker", kMany, kParameters);
-  const RunBlocks run = server::blocks_on_threads(threads);
+  const RunBlocks run = host::blocks_on_threads(threads);
   server.codec().run_blocks_on(run);
   client.codec().run_blocks_on(run);
   std::vector<std::byte> out(server.bound());

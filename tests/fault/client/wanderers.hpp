@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/engine/simulation.hpp"
+#include "services/host/simulation.hpp"
 
 namespace tandem::client {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "sdk/core/codec/tracker_filter.hpp"
-#include "sdk/core/codec/training.hpp"
-#include "services/server/outbox.hpp"
+#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/tracker/filter.hpp"
+#include "services/host/outbox.hpp"
 
 namespace tandem::client {
 namespace {
@@ -105,7 +105,7 @@ void World::start_server() {
   epoch_ = epoch_ + 1 + dice_.below(1000);
   server_port_ = must(network_.make_server("default"));
   simulation_ = std::make_unique<Wanderers>(kBodies, options_.seed + epoch_);
-  server::HostConfig config;
+  host::HostConfig config;
   config.epoch = epoch_;
   config.start_frame = start_frame_;
   config.lead = options_.lead;
@@ -113,14 +113,14 @@ void World::start_server() {
   config.codec = options_.codec;
   if (config.codec == "limited") config.budget = 600;
   if (config.codec == "entropy" || config.codec == "limited") config.codec_tables = default_code_tables();
-  config.lattice = must(server::choose_lattice(0.01, 3, simulation_->dt_s()));
-  config.parameters = must(server::codec_parameters(config.lattice, 0.01, 0.1, 2));
+  config.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
+  config.parameters = must(host::codec_parameters(config.lattice, 0.01, 0.1, 2));
   if (config.codec == "tracker") {
     config.parameters = with_first_gains(config.parameters, config.predictor);
-    config.gains = server::GainGoal{};
+    config.gains = host::GainGoal{};
   }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};
-  host_ = must(server::Host::create(config, *simulation_, *server_port_));
+  host_ = must(host::Host::create(config, *simulation_, *server_port_));
   acted_seen_ = 0;
   server_frozen_ = false;
   poll_server_ns_ = now_ns_;
@@ -142,7 +142,7 @@ void World::poll_server() {
     const auto& [values, step] = simulation_->acted[acted_seen_];
     truth_.acted[{epoch_, values[0]}] = start_frame_ + step;
   }
-  if (!dice_.chance(0.05)) static_cast<void>(server::drain(host_->outbox(), *server_port_));
+  if (!dice_.chance(0.05)) static_cast<void>(host::drain(host_->outbox(), *server_port_));
   poll_server_ns_ = std::min(host_->next_wake_ns(), now_ns_ + 2 * kTickNs);
 }
 

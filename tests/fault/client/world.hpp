@@ -9,7 +9,7 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "services/server/host.hpp"
+#include "services/host/host.hpp"
 #include "wanderers.hpp"
 
 namespace tandem::client {
@@ -123,7 +123,7 @@ class World {
   std::vector<std::int64_t> poll_client_ns_;
   std::unique_ptr<transport::ServerPort> server_port_;
   std::unique_ptr<Wanderers> simulation_;
-  std::unique_ptr<server::Host> host_;
+  std::unique_ptr<host::Host> host_;
   std::size_t acted_seen_ = 0;
   Epoch epoch_ = 0;
   Frame start_frame_ = 0;

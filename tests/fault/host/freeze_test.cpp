@@ -5,7 +5,7 @@
 
 #include "tests/fault/host/stage.hpp"
 
-namespace tandem::server {
+namespace tandem::host {
 namespace {
 
 TEST(Freeze, FrozenAndDeadClientsDelayTheOthersByTheStallTimeoutAtMost) {
@@ -107,4 +107,4 @@ TEST(Freeze, ManyJoinersAtOnceShareFewSnapshotsAndAllPlay) {
 }
 
 }  // namespace
-}  // namespace tandem::server
+}  // namespace tandem::host

@@ -6,7 +6,7 @@
 
 #include "tests/fault/host/stage.hpp"
 
-namespace tandem::server {
+namespace tandem::host {
 namespace {
 
 // Mostly plausible fields, each now and then something else.
@@ -115,4 +115,4 @@ TEST(Hostile, AParticipantThatSaysAnythingIsCountedAndNobodyElseNotices) {
 }
 
 }  // namespace
-}  // namespace tandem::server
+}  // namespace tandem::host

@@ -5,7 +5,7 @@
 
 #include "tests/fault/host/stage.hpp"
 
-namespace tandem::server {
+namespace tandem::host {
 namespace {
 
 // A refused server leaves, as tandemd does.
@@ -62,4 +62,4 @@ TEST(Rivals, ALaterServerLeavesAndTheClientsOfTheFirstDoNotNotice) {
 }
 
 }  // namespace
-}  // namespace tandem::server
+}  // namespace tandem::host

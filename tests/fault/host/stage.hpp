@@ -12,10 +12,10 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "services/server/host.hpp"
+#include "services/host/host.hpp"
 #include "tests/fault/client/wanderers.hpp"
 
-namespace tandem::server {
+namespace tandem::host {
 
 template <class T>
 T must(Result<T> result) {
@@ -133,4 +133,4 @@ class Stage {
   std::uint64_t seed_;
 };
 
-}  // namespace tandem::server
+}  // namespace tandem::host

@@ -1,4 +1,4 @@
-#include "sdk/core/codec/huffman.hpp"
+#include "sdk/core/codec/paper/huffman.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sdk/core/codec/training.hpp"
+#include "sdk/core/codec/paper/training.hpp"
 
 #include <gtest/gtest.h>
 

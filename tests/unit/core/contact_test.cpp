@@ -1,4 +1,4 @@
-#include "sdk/core/predict/contact.hpp"
+#include "sdk/core/predict/contact/contact.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/core/predict/contact_pairs.hpp"
-#include "sdk/core/predict/contact_walls.hpp"
+#include "sdk/core/predict/contact/pairs.hpp"
+#include "sdk/core/predict/contact/walls.hpp"
 #include "tests/unit/core/contact_world.hpp"
 
 namespace tandem {

@@ -6,7 +6,7 @@
 #include <random>
 #include <string_view>
 
-#include "sdk/core/predict/contact_constants.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <random>
 
-#include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/predict/ballistic/ballistic.hpp"
 
 namespace tandem {
 namespace {

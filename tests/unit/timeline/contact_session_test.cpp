@@ -3,7 +3,7 @@
 #include <random>
 #include <tuple>
 
-#include "sdk/core/predict/contact_constants.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "tests/unit/timeline/session.hpp"
 
 // A session whose predicted bodies interact: what was simulated ahead is simulated again as a whole.

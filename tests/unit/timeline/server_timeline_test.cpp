@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "sdk/core/predict/ballistic.hpp"
+#include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/timeline/snapshot.hpp"
 #include "tests/unit/timeline/session.hpp"
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "sdk/core/codec/residual.hpp"
-#include "sdk/core/codec/tracker.hpp"
+#include "sdk/core/codec/paper/residual.hpp"
+#include "sdk/core/codec/tracker/tracker.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {

@@ -1,8 +1,8 @@
-#include "sdk/core/codec/tracker_filter.hpp"
+#include "sdk/core/codec/tracker/filter.hpp"
 
 #include <gtest/gtest.h>
 
-#include "sdk/core/codec/tracker_search.hpp"
+#include "sdk/core/codec/tracker/search.hpp"
 
 namespace tandem {
 namespace {

@@ -1,4 +1,4 @@
-#include "sdk/core/codec/range_coder.hpp"
+#include "sdk/core/codec/tracker/range_coder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/core/codec/tracker_models.hpp"
+#include "sdk/core/codec/tracker/models.hpp"
 
 namespace tandem {
 namespace {

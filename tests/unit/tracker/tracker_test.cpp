@@ -1,4 +1,4 @@
-#include "sdk/core/codec/tracker.hpp"
+#include "sdk/core/codec/tracker/tracker.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "sdk/core/codec/tracker_filter.hpp"
+#include "sdk/core/codec/tracker/filter.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

@@ -1,0 +1,78 @@
+#pragma once
+// Values as they are: position and velocity, six int32 a body (`none`, `selective`; paper, section 3.3.1).
+
+#include <array>
+#include <cstring>
+#include <vector>
+
+#include "sdk/core/codec/paper/block_codec.hpp"
+
+namespace tandem {
+
+/// `EveryBody`: `none` sends all alive bodies, `selective` those beyond the threshold. Applying sets c = 0.
+template <bool EveryBody>
+class AbsoluteCoding {
+ public:
+  static constexpr bool kEveryBody = EveryBody;
+  static constexpr std::size_t kBodyBytes = 24;
+
+  explicit AbsoluteCoding(std::uint32_t capacity) { sections_.reserve(block_count(capacity)); }
+  [[nodiscard]] static unsigned most_bits() { return 8 * kBodyBytes; }
+  static bool measure(const State&, const State&, const CodecParameters&, Candidate& candidate) {
+    candidate.bits = 8 * kBodyBytes;
+    return true;
+  }
+  static void write(const State&, const State& target, std::span<const Candidate> chosen, std::byte* to) {
+    for (const Candidate& candidate : chosen) {
+      const BodyState body = clamped(target.body(candidate.slot));
+      ByteWriter out({to, kBodyBytes});
+      for (const std::int32_t value : body.p) out.put(value);
+      for (const std::int32_t value : body.v) out.put(value);
+      to += kBodyBytes;
+    }
+  }
+  static void correct(State& state, const State& target, const CodecParameters&, const Candidate& candidate) {
+    state.set_body(candidate.slot, target.body(candidate.slot));
+  }
+
+  void begin() { sections_.clear(); }
+  Result<void> parse(std::span<const std::byte> values, std::span<const Slot> slots, std::size_t first) {
+    if (values.size() != slots.size() * kBodyBytes)
+      return fail(ErrorCode::kMalformed, "corrections of wrong length");
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      const BodyState body = read(values.subspan(i * kBodyBytes, kBodyBytes));
+      if (body != clamped(body)) return fail(ErrorCode::kMalformed, "correction beyond the lattice");
+    }
+    sections_.push_back({values, first});
+    return {};
+  }
+  void apply(State& state, std::span<const Slot> slots, const CodecParameters&) const {
+    for (const Section& section : sections_) {
+      for (std::size_t i = 0; i < section.values.size() / kBodyBytes; ++i) {
+        state.set_body(slots[section.first + i], read(section.values.subspan(i * kBodyBytes, kBodyBytes)));
+      }
+    }
+  }
+
+ private:
+  struct Section {
+    std::span<const std::byte> values;
+    std::size_t first = 0;  // of its slots among all corrected ones
+  };
+  static BodyState clamped(BodyState body) {
+    for (std::int32_t& value : body.p) value = std::clamp(value, -kPositionLimit, kPositionLimit);
+    for (std::int32_t& value : body.v) value = std::clamp(value, -kVelocityLimit, kVelocityLimit);
+    return body;
+  }
+  static BodyState read(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    BodyState body;
+    for (std::int32_t& value : body.p) value = in.get<std::int32_t>();
+    for (std::int32_t& value : body.v) value = in.get<std::int32_t>();
+    return body;
+  }
+
+  std::vector<Section> sections_;
+};
+
+}  // namespace tandem

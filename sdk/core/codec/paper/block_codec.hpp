@@ -1,0 +1,214 @@
+#pragma once
+// What the paper's codecs have in common: scan a block, choose bodies, keep to the budget, write one section
+// a block.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/codec/paper/residual.hpp"
+#include "sdk/core/codec/selection.hpp"
+#include "sdk/core/lattice/assert.hpp"
+
+namespace tandem {
+
+/// A body that could be corrected in this frame.
+struct Candidate {
+  std::uint64_t error = 0;  ///< squared
+  Slot slot = 0;
+  std::uint16_t bits = 0;  ///< of its values
+  Residual residual{};     ///< unused by codecs of absolute values
+};
+
+/// `Coding` says how the values of one body are measured, written, read and applied (absolute_coding.hpp,
+/// residual_coding.hpp):
+///   kEveryBody                                      whether bodies within the threshold are sent too
+///   unsigned most_bits()                            a body can cost
+///   bool measure(state, target, parameters, Candidate&)   fills bits and residual; false: nothing to send
+///   void write(state, target, candidates, to)       values of one section, padded to bytes
+///   void correct(state, target, parameters, candidate)    what the decoder will do
+///   begin(), parse(bytes, slots, first) -> Result<void>, apply(state, slots, parameters)
+template <class Coding>
+class BlockCodec final : public Codec {
+ public:
+  BlockCodec(std::string_view name, std::uint32_t capacity, Coding coding)
+      : name_(name), capacity_(capacity), coding_(std::move(coding)), corrected_(capacity) {}
+
+  [[nodiscard]] std::string_view name() const override { return name_; }
+  [[nodiscard]] std::size_t bound() const override {
+    std::size_t bytes = 0;
+    for (std::uint32_t b = 0; b < block_count(capacity_); ++b) {
+      const std::uint32_t slots = block_at(b, capacity_).slots;
+      // A list is taken only where it is no longer than the mask.
+      bytes += section_bytes(SelectionForm::kMask, slots, 0, std::uint64_t{coding_.most_bits()} * slots);
+    }
+    return bytes;
+  }
+
+  std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
+                       std::size_t budget, ByteWriter& out) override {
+    scan(state, target, parameters);
+    budget = std::min(budget, out.rest().size());
+    if (total_bytes() > budget) keep_largest(budget);
+    std::size_t at = 0;
+    for (std::uint32_t b = 0; b < plans_.size(); ++b) {
+      const std::span<const Candidate> chosen = std::span(candidates_).subspan(at, plans_[b].chosen);
+      if (!chosen.empty()) write_section(b, state, target, chosen, std::span(corrected_).subspan(at), out);
+      at += chosen.size();
+    }
+    for (const Candidate& candidate : candidates_) coding_.correct(state, target, parameters, candidate);
+    count_ = candidates_.size();
+    return static_cast<std::uint32_t>(count_);
+  }
+
+  void begin() override {
+    count_ = 0;
+    next_block_ = 0;
+    coding_.begin();
+  }
+
+  Result<void> parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
+                     const CodecParameters& parameters) override {
+    TANDEM_ASSERT(alive.size() == capacity_);
+    parameters_ = parameters;
+    ByteReader in(section);
+    const std::uint32_t index = in.get<std::uint16_t>();
+    const auto form = static_cast<SelectionForm>(in.get<std::uint8_t>());
+    if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
+    if (index >= block_count(capacity_))
+      return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
+    if (index < next_block_) return fail(ErrorCode::kMalformed, "blocks do not ascend");
+    next_block_ = index + 1;
+    const auto chosen =
+        parse_selection(form, block_at(index, capacity_), alive, in, std::span(corrected_).subspan(count_));
+    if (!chosen) return tl::unexpected<Error>(chosen.error());
+    const std::span<const Slot> slots = std::span<const Slot>(corrected_).subspan(count_, *chosen);
+    auto values = coding_.parse(in.get_bytes(in.remaining()), slots, count_);
+    if (!values) return values;
+    count_ += *chosen;
+    return {};
+  }
+
+  void apply(State& state) override { coding_.apply(state, corrected(), parameters_); }
+  [[nodiscard]] std::span<const Slot> corrected() const override {
+    return std::span(corrected_).first(count_);
+  }
+
+ private:
+  struct Plan {
+    std::uint32_t alive = 0;
+    std::uint32_t chosen = 0;
+    std::uint64_t bits = 0;
+  };
+
+  static std::size_t section_bytes(SelectionForm form, std::uint32_t slots, std::uint32_t chosen,
+                                   std::uint64_t bits) {
+    return kSectionHeaderBytes + kBlockHeaderBytes + selection_bytes(form, slots, chosen) +
+           static_cast<std::size_t>((bits + 7) / 8);
+  }
+  [[nodiscard]] std::size_t plan_bytes(std::uint32_t block) const {
+    const Plan& plan = plans_[block];
+    if (plan.chosen == 0) return 0;
+    const std::uint32_t slots = block_at(block, capacity_).slots;
+    return section_bytes(smallest_form(slots, plan.chosen, plan.alive), slots, plan.chosen, plan.bits);
+  }
+  [[nodiscard]] std::size_t total_bytes() const {
+    std::size_t bytes = 0;
+    for (std::uint32_t b = 0; b < plans_.size(); ++b) bytes += plan_bytes(b);
+    return bytes;
+  }
+
+  // Collects everything worth sending, ascending by slot, and what each block would cost.
+  void scan(const State& state, const State& target, const CodecParameters& parameters) {
+    candidates_.reserve(capacity_);
+    candidates_.clear();
+    plans_.assign(block_count(capacity_), Plan{});
+    const std::uint8_t* alive = state.alive().data();
+    for (std::uint32_t b = 0; b < plans_.size(); ++b) {
+      const Block block = block_at(b, capacity_);
+      Plan& plan = plans_[b];
+      for (Slot slot = block.first; slot < block.first + block.slots; ++slot) plan.alive += alive[slot];
+      const auto consider = [&](Slot slot, std::uint64_t error) {
+        Candidate candidate{error, slot, 0, {}};
+        if (!coding_.measure(state, target, parameters, candidate)) return;
+        candidates_.push_back(candidate);
+        ++plan.chosen;
+        plan.bits += candidate.bits;
+      };
+      if constexpr (Coding::kEveryBody) {
+        for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
+          if (alive[slot] != 0) consider(slot, error_squared(state, target, slot));
+        }
+      } else {
+        marks_.resize(kBlockSlots);
+        for_each_beyond(state, target, block, parameters.threshold,
+                        std::span<std::uint8_t, kBlockSlots>(marks_.data(), kBlockSlots), consider);
+      }
+    }
+  }
+
+  // Drops all candidates from the first on that does not fit, in the order of their errors.
+  void keep_largest(std::size_t budget) {
+    const auto first = [](const Candidate& a, const Candidate& b) {
+      return a.error != b.error ? a.error > b.error : a.slot < b.slot;
+    };
+    // More than budget / cheapest body cannot fit, so only that many need sorting.
+    std::uint16_t cheapest = UINT16_MAX;
+    for (const Candidate& candidate : candidates_) cheapest = std::min(cheapest, candidate.bits);
+    const std::size_t most = std::min(candidates_.size(), budget * 8 / cheapest + 1);
+    std::nth_element(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(most - 1),
+                     candidates_.end(), first);
+    std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(most), first);
+
+    for (Plan& plan : plans_) plan = {plan.alive, 0, 0};
+    std::size_t bytes = 0;
+    std::size_t kept = 0;
+    for (; kept < most; ++kept) {
+      const Candidate& candidate = candidates_[kept];
+      const std::uint32_t block = candidate.slot / kBlockSlots;
+      const Plan before = plans_[block];
+      const std::size_t others = bytes - plan_bytes(block);
+      plans_[block] = {before.alive, before.chosen + 1, before.bits + candidate.bits};
+      if (others + plan_bytes(block) > budget) {
+        plans_[block] = before;
+        break;
+      }
+      bytes = others + plan_bytes(block);
+    }
+    candidates_.resize(kept);
+    std::sort(candidates_.begin(), candidates_.end(),
+              [](const Candidate& a, const Candidate& b) { return a.slot < b.slot; });
+  }
+
+  void write_section(std::uint32_t index, const State& state, const State& target,
+                     std::span<const Candidate> chosen, std::span<Slot> slots, ByteWriter& out) {
+    const Block block = block_at(index, capacity_);
+    const auto count = static_cast<std::uint32_t>(chosen.size());
+    for (std::uint32_t i = 0; i < count; ++i) slots[i] = chosen[i].slot;
+    const SelectionForm form = smallest_form(block.slots, count, plans_[index].alive);
+    out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
+    out.put(static_cast<std::uint32_t>(plan_bytes(index) - kSectionHeaderBytes));
+    out.put(static_cast<std::uint16_t>(index));
+    out.put(static_cast<std::uint8_t>(form));
+    write_selection(form, block, slots.first(count), out);
+    coding_.write(state, target, chosen, out.rest().data());
+    out.advance(static_cast<std::size_t>((plans_[index].bits + 7) / 8));
+  }
+
+  std::string name_;
+  std::uint32_t capacity_;
+  Coding coding_;
+  CodecParameters parameters_;
+  std::vector<Slot> corrected_;  // the first count_ are of the last delta
+  std::size_t count_ = 0;
+  std::uint32_t next_block_ = 0;
+  // Encoder only, taken by the first encode().
+  std::vector<Candidate> candidates_;
+  std::vector<Plan> plans_;
+  std::vector<std::uint8_t> marks_;
+};
+
+}  // namespace tandem

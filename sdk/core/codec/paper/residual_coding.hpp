@@ -1,0 +1,81 @@
+#pragma once
+// Quantised residuals (paper, section 3.3.2): as bytes (`quantized`) or Huffman codes (`entropy`, `limited`).
+
+#include <cstring>
+#include <vector>
+
+#include "sdk/core/codec/paper/block_codec.hpp"
+#include "sdk/core/codec/paper/huffman.hpp"
+
+namespace tandem {
+
+/// Bytes: 6 a body.
+class PlainResiduals {
+ public:
+  [[nodiscard]] static unsigned most_bits() { return 48; }
+  [[nodiscard]] static unsigned bits(const Residual&) { return 48; }
+  static void write(std::span<const Candidate> chosen, std::byte* to) {
+    for (const Candidate& candidate : chosen) {
+      std::memcpy(to, candidate.residual.data(), sizeof(Residual));
+      to += sizeof(Residual);
+    }
+  }
+  static Result<void> read(std::span<const std::byte> values, std::span<Residual> residuals) {
+    if (values.size() != residuals.size_bytes())
+      return fail(ErrorCode::kMalformed, "corrections of wrong length");
+    std::memcpy(residuals.data(), values.data(), values.size());
+    return {};
+  }
+};
+
+/// Canonical Huffman codes, one table for positions and one for velocities.
+class HuffmanResiduals {
+ public:
+  HuffmanResiduals(const CodeLengths& position, const CodeLengths& velocity);
+  [[nodiscard]] unsigned most_bits() const { return 3 * (position_.longest() + velocity_.longest()); }
+  [[nodiscard]] unsigned bits(const Residual& q) const;
+  void write(std::span<const Candidate> chosen, std::byte* to) const;
+  [[nodiscard]] Result<void> read(std::span<const std::byte> values, std::span<Residual> residuals) const;
+
+ private:
+  HuffmanCode position_;
+  HuffmanCode velocity_;
+};
+
+/// Bodies beyond the threshold as residuals; what exceeds the range of 127 steps is finished in later frames.
+template <class Bits>
+class ResidualCoding {
+ public:
+  static constexpr bool kEveryBody = false;
+
+  ResidualCoding(std::uint32_t capacity, Bits bits) : bits_(std::move(bits)), residuals_(capacity) {}
+  [[nodiscard]] unsigned most_bits() const { return bits_.most_bits(); }
+  bool measure(const State& state, const State& target, const CodecParameters& parameters,
+               Candidate& candidate) const {
+    candidate.residual = quantise(state, target, candidate.slot, parameters);
+    candidate.bits = static_cast<std::uint16_t>(bits_.bits(candidate.residual));
+    // With steps wider than the threshold all six may round to nothing: sending that would change nothing.
+    return candidate.residual != Residual{};
+  }
+  void write(const State&, const State&, std::span<const Candidate> chosen, std::byte* to) const {
+    bits_.write(chosen, to);
+  }
+  static void correct(State& state, const State&, const CodecParameters& parameters,
+                      const Candidate& candidate) {
+    apply_residual(state, candidate.slot, candidate.residual, parameters);
+  }
+
+  static void begin() {}
+  Result<void> parse(std::span<const std::byte> values, std::span<const Slot> slots, std::size_t first) {
+    return bits_.read(values, std::span(residuals_).subspan(first, slots.size()));
+  }
+  void apply(State& state, std::span<const Slot> slots, const CodecParameters& parameters) const {
+    for (std::size_t i = 0; i < slots.size(); ++i) apply_residual(state, slots[i], residuals_[i], parameters);
+  }
+
+ private:
+  Bits bits_;
+  std::vector<Residual> residuals_;
+};
+
+}  // namespace tandem

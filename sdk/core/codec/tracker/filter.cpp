@@ -1,0 +1,132 @@
+#include "sdk/core/codec/tracker/filter.hpp"
+
+#include <cmath>
+
+#include "sdk/core/lattice/fixed_point.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
+
+}  // namespace
+
+// A position error that grew over k frames means a velocity error of d/k; beta of that is believed, and a
+// part gamma of what that would be as an acceleration. Below least_k frames one correction says too little
+// about either; but a body corrected twice running was hit: all of it is velocity, and more is believed.
+struct TrackerKind {
+  std::int64_t least_k;
+  std::int64_t k_of_the_hit;
+  std::uint32_t early;
+  std::uint16_t first_beta, first_gamma, first_decay;  // as in CodecParameters
+};
+
+namespace {
+
+// Bodies move at the start, so that little of c is worth keeping.
+constexpr TrackerKind kBallistic{3, 2, 19661, 26214, 9830, 13000};  // 0.8, 0.15; 20 %
+// Contacts are predicted: what is left grows slower, and there is no force to learn. c is kept only as long
+// as it takes to see whether it should be.
+constexpr TrackerKind kContact{3, 3, 19661, 22938, 0, 60000};  // 0.7, 0; 92 %
+// Contacts in one step for several: they leave a force to learn.
+constexpr TrackerKind kField{3, 3, 5243, 39322, 16384, 13000};  // 1.2, 0.25; 20 %
+
+const TrackerKind& kind_of(std::string_view predictor) {
+  if (predictor == "field") return kField;
+  return predictor == "contact" ? kContact : kBallistic;
+}
+
+// Steps in 1/256 of the threshold.
+Vec3i relative(const TrackerSteps& steps) {
+  return TrackerSteppings::relative(
+      {std::clamp(steps[0], -127, 127), std::clamp(steps[1], -127, 127), std::clamp(steps[2], -127, 127)});
+}
+
+double dot(const Vec3i& a, const Vec3i& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) sum += static_cast<double>(a[i]) * b[i];
+  return sum;
+}
+
+}  // namespace
+
+TrackerGains::TrackerGains(std::string_view predictor) : kind_(&kind_of(predictor)) {
+  set(kind_->first_beta, kind_->first_gamma);
+}
+
+std::uint32_t TrackerGains::early() const { return kind_->early; }
+
+void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
+  if (beta == beta_ && gamma == gamma_) return;
+  beta_ = beta;
+  gamma_ = gamma;
+  const std::int64_t share = std::int64_t{128} * beta;
+  for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
+    const std::int64_t k = std::max(i, kind_->least_k);
+    const auto at = static_cast<std::size_t>(i);
+    const bool hit = i == 1;
+    velocity_[at] = share / (hit ? kind_->k_of_the_hit : k);
+    acceleration_[at] = hit ? 0 : ((share * gamma) >> 16) / (k * k);
+  }
+}
+
+CodecParameters with_first_gains(CodecParameters parameters, std::string_view predictor) {
+  const TrackerKind& kind = kind_of(predictor);
+  parameters.decay = kind.first_decay;
+  parameters.velocity_gain = kind.first_beta;
+  parameters.acceleration_gain = kind.first_gamma;
+  return parameters;
+}
+
+void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3i& c,
+                  GainEvidence& evidence) {
+  if (body.age == 0) return;  // hit: its last correction says nothing of this one
+  const Vec3i now = relative(steps);
+  const Vec3i before = relative({body.steps[0], body.steps[1], body.steps[2]});
+  const double length_squared = dot(now, now);
+  if (const double squared = dot(before, before); squared > 0) {
+    evidence.agreement += dot(now, before) / std::sqrt(length_squared * squared);
+    ++evidence.repeated;
+  }
+  if (const double squared = dot(c, c); squared > 0) {
+    evidence.forwardness += dot(now, c) / std::sqrt(length_squared * squared);
+    ++evidence.driven;
+  }
+}
+
+void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
+                  std::int32_t threshold, const TrackerGains& gains, TrackerBody& body) {
+  TrackerSteps now{};
+  for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
+  const auto before = TrackerSteppings::relative({body.steps[0], body.steps[1], body.steps[2]});
+  const auto after = TrackerSteppings::relative(now);
+  std::int64_t dot = 0;
+  for (std::size_t i = 0; i < 3; ++i) dot += std::int64_t{before[i]} * after[i];
+  // Corrections that keep pointing the same way are believed more, in 1/256: 128 .. 384.
+  const std::int64_t belief = 256 + (std::clamp<std::int64_t>(dot >> 8, -256, 256) >> 1);
+
+  const std::uint32_t k = std::min(body.age + 1U, kMostAge);
+  const std::int64_t one = steppings.unit_for(steps);
+  const auto growth_of_one = [&](std::int64_t gain) {
+    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
+  };
+  const std::int64_t v_of_one = growth_of_one(gains.velocity(k));
+  const std::int64_t c_of_one = growth_of_one(gains.acceleration(k));
+  const std::int64_t most_c = std::min<std::int64_t>(kVelocityLimit, std::int64_t{256} * threshold);
+  for (std::size_t i = 0; i < 3; ++i) {
+    // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of
+    // their own where the sum has a smaller one.
+    const std::int64_t n = steps[i];
+    std::int32_t& p = state.p(i)[slot];
+    std::int32_t& v = state.v(i)[slot];
+    std::int32_t& c = state.c(i)[slot];
+    p = limited(p + n * one, kPositionLimit);
+    v = limited(v + n * v_of_one, kVelocityLimit);
+    c = limited(c + n * c_of_one, most_c);
+    body.steps[i] = static_cast<std::int8_t>(now[i]);
+  }
+  body.interval = static_cast<std::uint8_t>(k);
+  body.age = 0;
+}
+
+}  // namespace tandem

@@ -1,0 +1,129 @@
+#include "sdk/core/codec/tracker/models.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sdk/core/lattice/vector_clones.hpp"
+
+namespace tandem {
+namespace {
+
+// Fifteen runs of counts, each about as wide as a third of its start: what the hazard of a correction needs.
+constexpr std::array<std::uint8_t, 14> kLastOfRun{0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 40, 64, 128, 250};
+constexpr std::array<std::uint8_t, 256> make_age_buckets() {
+  std::array<std::uint8_t, 256> buckets{};
+  for (std::uint32_t count = 0; count < 256; ++count) {
+    for (const std::uint8_t last : kLastOfRun)
+      buckets[count] = static_cast<std::uint8_t>(buckets[count] + (count > last ? 1 : 0));
+  }
+  return buckets;
+}
+
+// How many of the limits are below n.
+template <class... Limits>
+std::uint8_t above(std::uint8_t n, Limits... limits) {
+  return static_cast<std::uint8_t>((static_cast<std::uint8_t>(n > limits) + ...));
+}
+
+// What ages, intervals and last steps say.
+TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
+                                    const std::uint8_t* __restrict interval, const std::int8_t* __restrict x,
+                                    const std::int8_t* __restrict y, const std::int8_t* __restrict z,
+                                    std::uint32_t slots, std::uint8_t* __restrict zero,
+                                    std::uint8_t* __restrict magnitude) {
+  for (std::uint32_t s = 0; s < slots; ++s) {
+    // With k = age + 1, n > limit is age >= limit.
+    const std::uint8_t n = age[s];
+    const auto longer = [&](std::int8_t than) {
+      return static_cast<std::uint8_t>((x[s] > than) | (x[s] < -than) | (y[s] > than) | (y[s] < -than) |
+                                       (z[s] > than) | (z[s] < -than));
+    };
+    const auto moved = static_cast<std::uint32_t>((x[s] != 0) | (y[s] != 0) << 1 | (z[s] != 0) << 2);
+    zero[s] = static_cast<std::uint8_t>(above(n, 1, 3, 7, 19) * TrackerModelIndex::kIntervals +
+                                        above(interval[s], 2, 6, 20) + (moved << 5U));
+    magnitude[s] = static_cast<std::uint8_t>(above(n, 0, 3, 19) * TrackerModelIndex::kLengths + longer(1) +
+                                             longer(2) + std::uint32_t{above(n, 1, 5, 19)} * 16);
+  }
+}
+
+// Of one axis: which way it went last, which way c pushes and v goes.
+TANDEM_VECTOR_CLONES void list_signs(const std::int8_t* __restrict last, const std::int32_t* __restrict c,
+                                     const std::int32_t* __restrict v, std::int32_t threshold,
+                                     std::uint32_t slots, std::uint8_t* __restrict sign) {
+  // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
+  const std::int32_t slow = threshold + threshold / 4;
+  const std::int32_t faint = threshold / 32;
+  for (std::uint32_t s = 0; s < slots; ++s) {
+    // 0: below -limit, 1: between, 2: above.
+    const std::int32_t side = 9 * ((last[s] > 0) - (last[s] < 0)) + 3 * ((c[s] > faint) - (c[s] < -faint)) +
+                              ((v[s] > slow) - (v[s] < -slow));
+    sign[s] = static_cast<std::uint8_t>(side + 13);
+  }
+}
+
+TANDEM_VECTOR_CLONES void list_flag_models(const std::uint8_t* __restrict age,
+                                           const std::uint8_t* __restrict history,
+                                           const std::uint8_t* __restrict alive, std::uint32_t slots,
+                                           std::uint16_t* __restrict models) {
+  constexpr std::uint32_t kHistories = TrackerModelIndex::kAges * TrackerModelIndex::kLengths;
+  for (std::uint32_t s = 0; s < slots; ++s) {
+    std::uint8_t bucket = 0;
+    for (const std::uint8_t last : kLastOfRun) bucket = static_cast<std::uint8_t>(bucket + (age[s] >= last));
+    const std::uint32_t model = TrackerModelIndex::kFlag + bucket * kHistories + history[s];
+    models[s] = static_cast<std::uint16_t>(alive[s] != 0 ? model : TrackerModelIndex::kDead);
+  }
+}
+
+}  // namespace
+
+void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* alive,
+                      std::span<std::uint16_t> models) {
+  list_flag_models(ages, histories, alive, static_cast<std::uint32_t>(models.size()), models.data());
+}
+
+const std::array<std::uint8_t, 256> tracker_age_buckets = make_age_buckets();
+
+TrackerModels::TrackerModels() {
+  std::fill(p1.begin(), p1.begin() + TrackerModelIndex::kZero, kRare);
+  std::fill(p1.begin() + TrackerModelIndex::kZero, p1.end(), std::uint16_t{32768});
+  p1[TrackerModelIndex::kDead] = 0;
+}
+
+void TrackerContexts::fill(const Block& block, const State& predicted,
+                           const std::array<const std::uint8_t*, 5>& bodies, std::int32_t threshold) {
+  const Slot first = block.first;
+  const auto steps = [&](std::size_t axis) {
+    return reinterpret_cast<const std::int8_t*>(bodies[2 + axis]) + first;
+  };
+  list_ages(bodies[0] + first, bodies[1] + first, steps(0), steps(1), steps(2), block.slots,
+            column(0) + first, column(1) + first);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    list_signs(steps(axis), predicted.c(axis).data() + first, predicted.v(axis).data() + first, threshold,
+               block.slots, column(2 + axis) + first);
+}
+
+void TrackerModels::learn(const TrackerCounts& counts) {
+  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+    const std::uint32_t ones = counts[i][1];
+    const std::uint32_t seen = counts[i][0] + ones;
+    if (seen == 0) continue;
+    const std::uint32_t before = weight[i] + 1U;
+    const std::uint64_t sum = std::uint64_t{before} * p1[i] + (std::uint64_t{ones} << 16U);
+    // Two divisions, because the short one takes a third of the time and nearly always does.
+    const std::uint64_t mean =
+        sum >> 32U == 0 ? static_cast<std::uint32_t>(sum) / (before + seen) : sum / (before + seen);
+    p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));
+    weight[i] = static_cast<std::uint8_t>(std::min(before - 1 + seen, 255U));
+  }
+}
+
+void TrackerModels::account(const TrackerCounts& counts, CodeAccount& account) const {
+  account.decisions.resize(TrackerModelIndex::kDead);
+  for (std::size_t i = 0; i < TrackerModelIndex::kDead; ++i) {
+    const double p = p1[i] / 65536.0;
+    account.ideal_bits -= counts[i][0] * std::log2(1 - p) + counts[i][1] * std::log2(p);
+    for (std::size_t bit = 0; bit < 2; ++bit) account.decisions[i][bit] += counts[i][bit];
+  }
+}
+
+}  // namespace tandem

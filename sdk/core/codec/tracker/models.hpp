@@ -1,0 +1,237 @@
+#pragma once
+// The tracker codec's probabilities: which decisions a block codes, each in which context. One text for the
+// encoder, the decoder and the encoder's estimate of costs.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/codec.hpp"
+#include "sdk/core/codec/selection.hpp"
+#include "sdk/core/codec/tracker/filter.hpp"
+#include "sdk/core/codec/tracker/range_coder.hpp"
+
+namespace tandem {
+
+/// Indices of the models, and the decisions seen in one delta: zeros and ones of each model.
+struct TrackerModelIndex {
+  static constexpr std::uint32_t kAges = 15, kLengths = 3, kShortAges = 5, kIntervals = 4, kUnary = 14;
+
+  static constexpr std::uint32_t kFlag = 0;
+  static constexpr std::uint32_t kZero = kFlag + kAges * kAges * kLengths;
+  static constexpr std::uint32_t kSign = kZero + 3 * kShortAges * kIntervals * 3 * 2;
+  static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
+  static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
+  static constexpr std::uint32_t kCount = kEscape + 32;
+  static constexpr std::uint32_t kEven = kCount;     ///< of decisions without a model
+  static constexpr std::uint32_t kDead = kEven + 1;  ///< of slots without a body: never a 1
+  static constexpr std::uint32_t kAll = kDead + 1;
+};
+using TrackerCounts = std::array<std::array<std::uint32_t, 2>, TrackerModelIndex::kAll>;
+
+/// The probability of a 1 of each model, in 1/65536, and how much is behind it. All blocks share them, and
+/// they stay the same within a delta, so that blocks are coded side by side; they learn when the delta is
+/// done.
+struct TrackerModels {
+  /// So that no decision costs more than 11 bits.
+  static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
+  /// What a flag starts with: most bodies need no correction.
+  static constexpr std::uint16_t kRare = 4096;
+
+  TrackerModels();
+  /// p1 becomes the mean of what it was, counted weight + 1 times, and of the decisions; the weight grows by
+  /// their number, up to 255.
+  void learn(const TrackerCounts& counts);
+  /// Before learn().
+  void account(const TrackerCounts& counts, CodeAccount& account) const;
+
+  std::array<std::uint16_t, TrackerModelIndex::kAll> p1{};
+  std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
+};
+
+/// The context of a body's steps: parts of their models' indices.
+struct TrackerContext {
+  std::uint32_t zero = 0;                     ///< of "is this axis untouched"
+  std::uint32_t magnitude = 0;                ///< of "is it longer"
+  std::array<std::uint32_t, 3> sign{};        ///< the whole index, per axis
+  std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
+};
+
+/// Buckets of frame counts 0 .. 255; see tracker_models.cpp.
+extern const std::array<std::uint8_t, 256> tracker_age_buckets;
+
+namespace tracker_detail {
+
+// Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
+inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
+  int longest = 0;
+  for (const std::int8_t step : steps) longest = std::max({longest, int{step}, -int{step}});
+  return static_cast<std::uint32_t>(longest > 1) + static_cast<std::uint32_t>(longest > 2);
+}
+
+}  // namespace tracker_detail
+
+/// The part of a flag's index that changes only when its body is corrected: 0 .. 44.
+[[nodiscard]] inline std::uint8_t flag_history(const TrackerBody& body) {
+  return static_cast<std::uint8_t>(tracker_age_buckets[body.interval] * TrackerModelIndex::kLengths +
+                                   tracker_detail::length_class(body.steps));
+}
+/// The flag's index.
+[[nodiscard]] inline std::uint32_t flag_model(std::uint8_t age, std::uint8_t history) {
+  return TrackerModelIndex::kFlag +
+         tracker_age_buckets[age + 1U] * (TrackerModelIndex::kAges * TrackerModelIndex::kLengths) + history;
+}
+
+/// flag_model() of many slots, from their columns; kDead where there is no body.
+void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* alive,
+                      std::span<std::uint16_t> models);
+
+/// The contexts of all slots of a block, a byte each: worked out side by side, whether they are used or not,
+/// which takes less time than those of a tenth of the bodies one by one.
+class TrackerContexts {
+ public:
+  explicit TrackerContexts(std::uint32_t slots) : slots_(slots), bytes_(std::size_t{kColumns} * slots) {}
+
+  /// `ages`, `intervals`, `steps`: columns of the bodies before the delta; v and c of the predicted state.
+  void fill(const Block& block, const State& predicted, const std::array<const std::uint8_t*, 5>& bodies,
+            std::int32_t threshold);
+  /// Of a body that was renewed in this delta.
+  void renew(Slot slot) {
+    for (std::size_t i = 0; i < kColumns; ++i) column(i)[slot] = kRenewed[i];
+  }
+  [[nodiscard]] TrackerContext of(Slot slot) const {
+    const std::uint8_t* at = bytes_.data() + slot;
+    TrackerContext context;
+    context.zero = *at & 31U;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) context.moved_last[axis] = (*at >> (5U + axis)) & 1U;
+    context.magnitude = *(at += slots_) & 15U;
+    const std::uint32_t sign = TrackerModelIndex::kSign + (*at >> 4U);
+    for (std::uint32_t axis = 0; axis < 3; ++axis)
+      context.sign[axis] = sign + (axis * 27 + *(at += slots_)) * TrackerModelIndex::kIntervals;
+    return context;
+  }
+
+ private:
+  // zero, from bit 5 on moved_last; magnitude, from bit 4 on the age in all signs; what else is in the sign
+  // of x, y, z: 0 .. 26.
+  static constexpr std::size_t kColumns = 5;
+  static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 13, 13, 13};
+  std::uint8_t* column(std::size_t i) { return bytes_.data() + i * slots_; }
+
+  std::size_t slots_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+/// Index of "is this axis untouched", after `moved` axes that are not.
+[[nodiscard]] inline std::uint32_t zero_model(const TrackerContext& context, std::uint32_t axis,
+                                              std::uint32_t moved) {
+  using Index = TrackerModelIndex;
+  return Index::kZero + ((axis * Index::kShortAges * Index::kIntervals + context.zero) * 3 + moved) * 2 +
+         context.moved_last[axis];
+}
+/// Index of "is it longer than 1", after `moved` axes that are not zero; those of longer ones follow it.
+[[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t moved) {
+  return TrackerModelIndex::kMagnitude + (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
+}
+
+/// Decisions into bytes; counts them.
+struct TrackerEncoder {
+  bool code(bool bit, std::uint32_t model) {
+    range.put(bit, models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
+  RangeEncoder range;
+  const TrackerModels* models = nullptr;
+  TrackerCounts* counts = nullptr;
+};
+
+/// Bytes into decisions; counts them. The first argument is what an encoder would code.
+struct TrackerDecoder {
+  bool code(bool /*bit*/, std::uint32_t model) {
+    const bool bit = range.get(models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_sign(bool /*bit*/, std::uint32_t model) {
+    const bool bit = range.get_masked(models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
+  RangeDecoder range;
+  const TrackerModels* models = nullptr;
+  TrackerCounts* counts = nullptr;
+};
+
+/// Most bits code_steps() takes.
+inline constexpr std::size_t kMostStepsBits =
+    3 * (22 + (std::size_t{TrackerModelIndex::kUnary} + 31) * 11 + 31);
+
+namespace tracker_detail {
+
+// x >= 0 as the number of bits of x + 1, in unary, then those bits without the first.
+template <class Coder>
+bool code_escape(Coder& coder, std::uint32_t& x) {
+  const std::uint64_t wanted = std::uint64_t{x} + 1;
+  unsigned bits = 0;
+  while (bits < 31 && coder.code((wanted >> (bits + 1)) != 0, TrackerModelIndex::kEscape + bits)) ++bits;
+  std::uint64_t value = 1;
+  for (unsigned i = bits; i-- > 0;) {
+    value = value << 1U | static_cast<std::uint64_t>(coder.code_even(((wanted >> i) & 1U) != 0));
+  }
+  x = static_cast<std::uint32_t>(value - 1);
+  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - TrackerModelIndex::kUnary - 1;
+}
+
+}  // namespace tracker_detail
+
+/// Codes one axis. `moved`: how many earlier axes are not zero. Returns as code_steps().
+template <class Coder>
+[[gnu::always_inline]] inline bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis,
+                                             std::uint32_t moved, std::int32_t& steps) {
+  const std::int32_t wanted = steps;
+  const bool is_last_hope = axis == 2 && moved == 0;
+  if (!is_last_hope && !coder.code(wanted != 0, zero_model(context, axis, moved))) {
+    steps = 0;
+    return true;
+  }
+  const bool negative = coder.code_sign(wanted < 0, context.sign[axis]);
+  const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
+  const std::uint32_t base = magnitude_model(context, moved);
+  std::uint32_t size = 1;
+  while (size <= TrackerModelIndex::kUnary && coder.code(length > size, base + size - 1)) ++size;
+  if (size > TrackerModelIndex::kUnary) {
+    std::uint32_t beyond = length > TrackerModelIndex::kUnary ? length - TrackerModelIndex::kUnary - 1 : 0;
+    Coder rare = coder;  // a copy, so that a call that is not inlined leaves `coder` in registers
+    const bool good = tracker_detail::code_escape(rare, beyond);
+    coder = rare;
+    if (!good) return false;
+    size = TrackerModelIndex::kUnary + 1 + beyond;
+  }
+  steps = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
+  return true;
+}
+
+/// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
+/// returning the bit; for a decoder the argument means nothing and `steps` is filled. False: a decoder read
+/// steps beyond kMostTrackerSteps.
+template <class Coder>
+bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps) {
+  Coder local = coder;  // in registers: counts are written through pointers in between
+  std::uint32_t moved = 0;
+  const auto code = [&](std::uint32_t axis) {
+    const bool good = code_axis(local, context, axis, moved, steps[axis]);
+    moved += static_cast<std::uint32_t>(steps[axis] != 0);
+    return good;
+  };
+  const bool good = code(0) && code(1) && code(2);
+  coder = local;
+  return good;
+}
+
+}  // namespace tandem

@@ -1,0 +1,121 @@
+// The tier `ballistic`: the paper's equation 3.1 (semi-implicit Euler, gravity and damping) on the lattice,
+// plus the learned acceleration c:
+//   v += g + c;  c -= (c*E + 2^15) >> 16;  v -= (v*D + 2^15) >> 16;  clamp v, c to +-2^28;
+//   p += (v + 32) >> 6;  clamp p to +-2^30
+#include "sdk/core/predict/ballistic/ballistic.hpp"
+
+#include <algorithm>
+
+#include "sdk/core/lattice/vector_clones.hpp"
+
+namespace tandem {
+namespace {
+
+// (x*k + 2^15) >> 16 exactly, by one unsigned product, which is what plain SSE2 has: with u = x + 2^31 the
+// result is ((u*k + 2^15) >> 16) - k*2^15. Needs k < 2^16.
+inline std::int32_t share_of(std::int32_t x, std::uint32_t k) {
+  const std::uint64_t u = static_cast<std::uint32_t>(x) ^ 0x80000000U;
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>((u * k + 0x8000U) >> 16U) - (k << 15U));
+}
+
+inline std::int32_t clamp_velocity(std::int32_t x) { return std::clamp(x, -kVelocityLimit, kVelocityLimit); }
+
+struct Motion {
+  std::int32_t p;
+  std::int32_t v;
+  std::int32_t c;
+};
+
+// |v|, |g|, |c| <= 2^28, so their sum stays inside 32 bits.
+inline Motion stepped(Motion m, std::int32_t gravity, std::uint32_t damping, std::uint32_t decay) {
+  m.v += gravity + m.c;
+  m.c = clamp_velocity(m.c - share_of(m.c, decay));
+  m.v = clamp_velocity(m.v - share_of(m.v, damping));
+  m.p = std::clamp(m.p + ((m.v + 32) >> 6), -kPositionLimit, kPositionLimit);
+  return m;
+}
+
+// A dead slot is all zero; without gravity it stays so, which keeps the loops free of branches.
+inline std::int32_t gravity_of(std::uint8_t alive, std::int32_t gravity) {
+  return gravity & -static_cast<std::int32_t>(alive);
+}
+
+// One channel. Columns never overlap; a compiler that is told so vectorises.
+TANDEM_VECTOR_CLONES void step_channel(const std::int32_t* __restrict p, const std::int32_t* __restrict v,
+                                       const std::int32_t* __restrict c, std::int32_t* __restrict p_to,
+                                       std::int32_t* __restrict v_to, std::int32_t* __restrict c_to,
+                                       const std::uint8_t* __restrict alive, std::size_t count,
+                                       std::int32_t gravity, const Drive& drive) {
+  const std::uint32_t damping = drive.damping;
+  const std::uint32_t decay = drive.decay;
+  for (std::size_t s = 0; s < count; ++s) {
+    const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
+    p_to[s] = m.p;
+    v_to[s] = m.v;
+    c_to[s] = m.c;
+  }
+}
+
+TANDEM_VECTOR_CLONES void step_channel_in_place(std::int32_t* __restrict p, std::int32_t* __restrict v,
+                                                std::int32_t* __restrict c,
+                                                const std::uint8_t* __restrict alive, std::size_t count,
+                                                std::int32_t gravity, const Drive& drive) {
+  const std::uint32_t damping = drive.damping;
+  const std::uint32_t decay = drive.decay;
+  for (std::size_t s = 0; s < count; ++s) {
+    const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
+    p[s] = m.p;
+    v[s] = m.v;
+    c[s] = m.c;
+  }
+}
+
+void step_all(const State& from, State& to, const Drive& drive) {
+  const std::size_t count = from.capacity();
+  const std::uint8_t* alive = from.alive().data();
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    const std::int32_t gravity = drive.gravity[i];
+    if (&from == &to) {
+      step_channel_in_place(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, drive);
+    } else {
+      step_channel(from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
+                   to.c(i).data(), alive, count, gravity, drive);
+    }
+  }
+}
+
+}  // namespace
+
+void Ballistic::step(const State& from, State& to, const Drive& drive) {
+  if (&from != &to) {
+    std::copy(from.alive().begin(), from.alive().end(), to.alive().begin());
+    std::copy(from.generation().begin(), from.generation().end(), to.generation().begin());
+    std::copy(from.type().begin(), from.type().end(), to.type().begin());
+  }
+  step_all(from, to, drive);
+}
+
+void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) {
+  for (const Slot s : slots) {
+    to.alive()[s] = from.alive()[s];
+    to.generation()[s] = from.generation()[s];
+    to.type()[s] = from.type()[s];
+  }
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    const std::int32_t* p = from.p(i).data();
+    const std::int32_t* v = from.v(i).data();
+    const std::int32_t* c = from.c(i).data();
+    std::int32_t* p_to = to.p(i).data();
+    std::int32_t* v_to = to.v(i).data();
+    std::int32_t* c_to = to.c(i).data();
+    for (const Slot s : slots) {
+      const std::int32_t gravity = gravity_of(from.alive()[s], drive.gravity[i]);
+      const Motion m = stepped({p[s], v[s], c[s]}, gravity, drive.damping, drive.decay);
+      p_to[s] = m.p;
+      v_to[s] = m.v;
+      c_to[s] = m.c;
+    }
+  }
+}
+
+}  // namespace tandem

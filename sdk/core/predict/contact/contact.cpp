@@ -1,0 +1,223 @@
+// The tiers `contact` and `field`: v += g + c + contact forces, then as `ballistic`. Forces are those of the
+// state at the start of a sub-step, of S. Green, "Particle Simulation using CUDA" (2008):
+//   (damping + shear) * u - (spring * overlap + shear * (u.n)) * n
+#include "sdk/core/predict/contact/contact.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact/move.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kReachBits = 14;
+constexpr std::uint32_t kRootShift = 16;
+constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
+constexpr std::uint32_t kNearShift = 5;
+constexpr std::uint32_t kBeyond = 8;  // places a vector may read behind the last body
+constexpr std::uint32_t kPairsPerBody = 6;
+constexpr std::uint32_t kPairsAtOnce = 1024;
+
+// Every grid needs four cells a side, or the cells before and behind one would be the same.
+std::uint32_t side_bits_for(std::uint32_t capacity) {
+  std::uint32_t bits = 2;
+  while ((1U << (3 * bits)) < 2 * capacity) ++bits;
+  return bits;
+}
+
+std::int32_t largest_radius_of(const ContactConstants& constants) {
+  std::int32_t largest = 1;
+  for (const auto& type : constants.types) largest = std::max(largest, type.radius);
+  return largest;
+}
+
+// Lattice units to grid units: two bodies that touch are less than 2^14 grid units apart.
+std::uint32_t shift_for(std::int32_t largest_radius) {
+  const auto bits =
+      static_cast<std::uint32_t>(std::bit_width(2 * static_cast<std::uint32_t>(largest_radius)));
+  return bits > kReachBits ? bits - kReachBits : 0;
+}
+
+ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
+  return {material.spring, material.damping + material.shear, material.shear, shift};
+}
+
+struct CellNumbers {
+  std::uint32_t shift, side_bits;
+  std::int32_t cells_per;
+};
+
+TANDEM_VECTOR_CLONES void number_cells(const CellNumbers& how, const std::int32_t* __restrict x,
+                                       const std::int32_t* __restrict y, const std::int32_t* __restrict z,
+                                       std::uint32_t* __restrict cell, std::size_t count) {
+  const std::uint32_t last = (1U << (3 * how.side_bits)) - 1;
+  const auto along = [shift = how.shift, cells_per = how.cells_per](std::int32_t p) {
+    return static_cast<std::uint32_t>(std::int64_t{p >> shift} * cells_per >> 32);
+  };
+  for (std::size_t s = 0; s < count; ++s) {
+    cell[s] = (along(x[s]) + (along(y[s]) << how.side_bits) + (along(z[s]) << (2 * how.side_bits))) & last;
+  }
+}
+
+TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
+  std::int32_t all = 0;
+  for (std::size_t s = 0; s < count; ++s) all |= c[s];
+  return all != 0;
+}
+
+// c -= (c*E + 2^15) >> 16, which is never larger than c.
+TANDEM_VECTOR_CLONES void decay(std::int32_t* c, std::size_t count, std::int64_t share) {
+  for (std::size_t s = 0; s < count; ++s) c[s] -= static_cast<std::int32_t>((c[s] * share + 32768) >> 16);
+}
+
+}  // namespace
+
+Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
+    : coarse_(tier == Tier::kField && constants.substeps > 1),
+      constants_(tier == Tier::kField ? in_one_step(std::move(constants)) : std::move(constants)),
+      largest_radius_(largest_radius_of(constants_)),
+      shift_(shift_for(largest_radius_)),
+      pair_law_(law_of(constants_.pair, shift_)),
+      kernels_(fastest_contact_kernels()),
+      walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
+      side_bits_(side_bits_for(capacity)),
+      cell_(capacity),
+      place_(capacity),
+      begin_((std::size_t{1} << (3 * side_bits_)) + 1),
+      bodies_(capacity),
+      views_(capacity),
+      forces_(capacity),
+      accelerations_(capacity),
+      place_cell_(capacity),
+      near_xy_(capacity + kBeyond),
+      later_xy_(near_xy_.size()),
+      near_z_(near_xy_.size()),
+      first_(kPairsPerBody * capacity + kPairsAtOnce + ContactPairs::kMostAtOnce),
+      second_(first_.size()),
+      inverse_root_(kRoots) {
+  const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
+  cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 32) / (width + 1));
+  near_ = ((width + (constants_.substeps > 1 ? width >> 5 : 0)) >> kNearShift) + 3;
+  later_share_ = 32768 - (32768 + constants_.substeps / 2) / constants_.substeps;
+  one_mobility_ = std::all_of(constants_.types.begin(), constants_.types.end(),
+                              [](const auto& type) { return type.mobility == 65536; });
+  for (std::size_t i = 0; i < kRoots; ++i) {
+    // r at the middle of the entry, in 2^-8.
+    const std::int64_t r = root(((2 * std::uint64_t{i} + 1) << (kRootShift - 1)) << 16U);
+    inverse_root_[i] = static_cast<std::uint32_t>((std::int64_t{1} << 38) / r);
+  }
+}
+
+void Contact::sort(const State& state) {
+  const std::uint32_t capacity = state.capacity();
+  number_cells({shift_, side_bits_, cells_per_}, state.p(0).data(), state.p(1).data(), state.p(2).data(),
+               cell_.data(), capacity);
+  accelerated_ = any_of(state.c(0).data(), capacity) || any_of(state.c(1).data(), capacity) ||
+                 any_of(state.c(2).data(), capacity);
+  std::fill(begin_.begin(), begin_.end(), 0U);
+  const std::span<const std::uint8_t> alive = state.alive();
+  for (Slot s = 0; s < capacity; ++s) place_[s] = (begin_[cell_[s]] += alive[s]) - 1;
+  std::uint32_t sum = 0;
+  for (std::uint32_t& begin : begin_) {
+    const std::uint32_t in_cell = std::min(begin, ContactGrid::kMostInCell);
+    begin = sum;
+    sum += in_cell;
+  }
+  count_ = sum;
+  for (Slot s = 0; s < capacity; ++s) {
+    if (alive[s] == 0) continue;
+    const std::uint32_t place =
+        place_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + place_[s] : count_++;
+    place_[s] = place;
+    const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
+    const ContactConstants::Type& type = constants_.type_of(state.type()[s]);
+    bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
+    if (!one_mobility_) forces_[place].mobility = type.mobility;
+    if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};
+  }
+  for (std::uint32_t place = 0; place < count_; ++place) place_cell_[place] = cell_[bodies_[place].slot];
+}
+
+// Those found are worked on while they are in the cache. They are kept for the later sub-steps as long as
+// there is room; else they are found again.
+void Contact::add_pairs(bool first) {
+  const auto add_forces = [this](std::uint32_t begin, std::uint32_t end) {
+    kernels_.add_forces(pair_law_, inverse_root_.data(), views_.data(),
+                        {first_.data() + begin, second_.data() + begin, end - begin}, forces_.data());
+  };
+  if (!first && all_kept_) return add_forces(0, kept_);
+  const ContactGrid grid{side_bits_,
+                         begin_.data(),
+                         place_cell_.data(),
+                         near_xy_.data(),
+                         constants_.substeps > 1 ? later_xy_.data() : nullptr,
+                         near_z_.data(),
+                         near_ * near_};
+  const auto room = static_cast<std::uint32_t>(first_.size());
+  all_kept_ = true;
+  kept_ = 0;
+  for (std::uint32_t place = 0; place < begin_.back();) {
+    if (constants_.substeps == 1 || room - kept_ < kPairsAtOnce + ContactPairs::kMostAtOnce) {
+      all_kept_ = kept_ == 0 && place == 0;
+      kept_ = 0;
+    }
+    ContactPairs pairs{first_.data() + kept_, second_.data() + kept_, 0};
+    place = kernels_.find(grid, place, kPairsAtOnce, pairs);
+    add_forces(kept_, kept_ + pairs.count);
+    kept_ += pairs.count;
+  }
+}
+
+void Contact::write(const State& from, const Drive& drive, State& to) const {
+  if (&from != &to) {
+    const auto copy = [](const auto& column, const auto& column_to) {
+      std::copy(column.begin(), column.end(), column_to.begin());
+    };
+    copy(from.alive(), to.alive());
+    copy(from.generation(), to.generation());
+    copy(from.type(), to.type());
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (accelerated_) {
+        copy(from.c(i), to.c(i));
+      } else {
+        std::fill(to.c(i).begin(), to.c(i).end(), 0);
+      }
+    }
+  }
+  static constexpr ContactBody kDead{};
+  for (Slot s = 0; s < to.capacity(); ++s) {
+    const ContactBody& body = to.alive()[s] != 0 ? bodies_[place_[s]] : kDead;
+    for (std::size_t i = 0; i < 3; ++i) {
+      to.p(i)[s] = body.p[i];
+      to.v(i)[s] = body.v[i];
+    }
+  }
+  for (std::size_t i = 0; accelerated_ && i < 3; ++i) decay(to.c(i).data(), to.c(i).size(), drive.decay);
+}
+
+void Contact::step(const State& from, State& to, const Drive& drive) {
+  sort(from);
+  place_bodies(std::span(bodies_).first(count_),
+               {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_);
+  for (std::int32_t i = 0; i < constants_.substeps; ++i) {
+    walls_.add_forces(std::span(bodies_).first(count_), forces_);
+    add_pairs(i == 0);
+    const bool first = i == 0;
+    const ContactMove move{shift_, one_mobility_, constants_.substeps, first ? drive.gravity : Vec3i{},
+                           first ? drive.damping : 0U};
+    const bool pushed = first && accelerated_;
+    move_bodies(move, std::span(bodies_).first(count_), forces_,
+                pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>(),
+                views_);
+  }
+  write(from, drive, to);
+}
+
+void Contact::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> /*slots*/) {
+  step(from, to, drive);
+}
+
+}  // namespace tandem

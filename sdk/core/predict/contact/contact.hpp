@@ -1,0 +1,68 @@
+#pragma once
+// The tiers `contact` and `field`: the engine's penalty contacts as integers. idl/PROTOCOL.md, "Predicted
+// step", has the formulas.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/contact/pairs.hpp"
+#include "sdk/core/predict/contact/walls.hpp"
+#include "sdk/core/predict/predictor.hpp"
+
+namespace tandem {
+
+/// Ballistic motion plus forces between bodies that overlap and of the static geometry.
+/// O(capacity) a step whatever the state: at most ContactGrid::kMostInCell bodies of a cell take part in
+/// pairs.
+class Contact final : public Predictor {
+ public:
+  enum class Tier {
+    kContact,  ///< as many sub-steps a frame as the engine
+    kField,    ///< one step a frame
+  };
+  Contact(std::uint32_t capacity, ContactConstants constants, Tier tier);
+
+  [[nodiscard]] std::string_view name() const override { return coarse_ ? "field" : "contact"; }
+  void step(const State& from, State& to, const Drive& drive) override;
+  /// Steps all bodies: each depends on the others.
+  void step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) override;
+  [[nodiscard]] bool interacts() const override { return true; }
+
+ private:
+  void sort(const State& state);
+  void add_pairs(bool first);
+  void write(const State& from, const Drive& drive, State& to) const;
+
+  bool coarse_;  // one step stands for several
+  ContactConstants constants_;
+  std::int32_t largest_radius_;
+  std::uint32_t shift_;  // a grid unit is 2^shift lattice units
+  ContactLaw pair_law_;
+  ContactKernels kernels_;
+  ContactWalls walls_;
+  std::uint32_t side_bits_ = 2;   // the grid is a torus of 2^side_bits cells a side
+  std::int32_t cells_per_ = 0;    // cells per grid unit, in 2^-32
+  std::uint32_t near_ = 0;        // in 2^5 grid units
+  std::int32_t later_share_ = 0;  // of v, in 1/32768: what the sub-steps before the last move a body by
+  bool one_mobility_ = false;     // all bodies have that of type 0
+  std::vector<std::uint32_t> cell_, place_;  // by slot; first the rank in the cell, then the place
+  std::vector<std::uint32_t> begin_;         // by cell, and one more
+  // By place: bodies that take part in pairs by cell, then the rest.
+  std::uint32_t count_ = 0;
+  std::vector<ContactBody> bodies_;
+  std::vector<ContactView> views_;
+  std::vector<ContactForce> forces_;
+  std::vector<ContactForce> accelerations_;  // c, where any is not zero
+  bool accelerated_ = false;
+  std::vector<std::uint32_t> place_cell_, near_xy_, later_xy_, near_z_;
+  std::vector<std::uint32_t> first_, second_;
+  std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
+  bool all_kept_ = false;                    // first_ and second_ hold all pairs of the frame
+  std::uint32_t kept_ = 0;
+};
+
+}  // namespace tandem

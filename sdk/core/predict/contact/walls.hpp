@@ -1,0 +1,51 @@
+#pragma once
+// Where a body touches the static geometry of the tier `contact`.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/contact/pairs.hpp"
+
+namespace tandem {
+
+/// How deep (lattice units, <= 0: not at all), and the unit vector (in 2^-14) out of the surface.
+struct WallTouch {
+  std::int64_t overlap = 0;
+  Vec3i out{};
+};
+
+[[nodiscard]] WallTouch touch(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t radius);
+[[nodiscard]] WallTouch touch(const ContactConstants::Box& box, const Vec3i& p, std::int32_t radius);
+[[nodiscard]] WallTouch touch(const ContactConstants::Ball& ball, const Vec3i& p, std::int32_t radius);
+
+/// The static geometry, and the forces of what touches it.
+class ContactWalls {
+ public:
+  /// `largest_radius` of all types; `constants` outlive this.
+  ContactWalls(const ContactConstants& constants, const ContactLaw& law, std::int32_t largest_radius);
+
+  /// `forces` by place, as `bodies`.
+  void add_forces(std::span<const ContactBody> bodies, std::span<ContactForce> forces) const;
+
+  /// Where low <= normal . p <= high, with p in lattice units; no wider than 2^63.
+  struct Slab {
+    Vec3i normal{};
+    std::int64_t low = 0, high = 0;
+  };
+
+ private:
+  template <class Shape>
+  void add_shapes(std::span<const Shape> shapes, std::span<const Slab> slabs, const struct PlacesOf64& places,
+                  std::span<const ContactBody> bodies, std::span<ContactForce> forces) const;
+
+  const ContactConstants& constants_;
+  ContactLaw law_;
+  std::vector<Slab> planes_, boxes_, balls_;  // one a plane, three each of the others
+};
+
+/// Largest r with r * r <= x.
+[[nodiscard]] std::int64_t root(std::uint64_t x);
+
+}  // namespace tandem

@@ -1,0 +1,74 @@
+#include "services/host/gains.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::host {
+namespace {
+
+constexpr std::uint32_t kFramesPerDecision = 15;
+
+constexpr GainGoal kFieldGoal{0.1, -0.1};
+
+// How much the logarithms of beta and E move for a cosine, and at most, in one decision.
+constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
+constexpr double kDecayRate = 2, kMostDecayChange = 0.7;
+constexpr double kLeastGain = 0.35, kMostGain = 1.8;
+constexpr double kLeastDecay = 15, kMostDecay = 60000;  // in 1/65536
+// The less of c is kept, the less is worth learning: gamma = 0.25 where E is below 800, then its inverse.
+constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
+// Corrections of a fifth of the bodies, and a hundred at least; beta needs three times as many, because
+// bodies that start to fall agree with themselves for a while.
+constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
+// Smaller changes, as shares, are not worth the bytes of saying so.
+constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
+
+double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(count); }
+
+bool differs(double wanted, double held, double band) { return std::abs(wanted - held) > band * held; }
+
+}  // namespace
+
+GainGoal usual_gain_goal(std::string_view predictor) {
+  return predictor == "field" ? kFieldGoal : GainGoal{};
+}
+
+GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters)
+    : goal_(goal),
+      enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+      log_decay_(std::log(std::clamp<double>(parameters.decay, kLeastDecay, kMostDecay))),
+      log_gain_(std::log(std::clamp(parameters.velocity_gain / 32768.0, kLeastGain, kMostGain))) {}
+
+bool GainControl::after_frame(CodecParameters& parameters) {
+  if (++frames_ < kFramesPerDecision) return false;
+  const GainEvidence seen = evidence_;
+  evidence_ = {};
+  frames_ = 0;
+  const auto belief = [](std::uint64_t count, double enough) {
+    return std::min(1.0, static_cast<double>(count) / enough);
+  };
+  if (seen.repeated > 0) {
+    const double off = mean(seen.agreement, seen.repeated) - goal_.agreement;
+    const double change = kGainRate * off * belief(seen.repeated, kMoreForGain * enough_);
+    log_gain_ = std::clamp(log_gain_ + std::clamp(change, -kMostGainChange, kMostGainChange),
+                           std::log(kLeastGain), std::log(kMostGain));
+  }
+  if (seen.driven > 0) {
+    const double off = goal_.forwardness - mean(seen.forwardness, seen.driven);
+    const double change = kDecayRate * off * belief(seen.driven, enough_);
+    log_decay_ = std::clamp(log_decay_ + std::clamp(change, -kMostDecayChange, kMostDecayChange),
+                            std::log(kLeastDecay), std::log(kMostDecay));
+  }
+  const double decay = std::exp(log_decay_);
+  const double gain = 32768 * std::exp(log_gain_);
+  if (!differs(decay, parameters.decay, kDecayDeadBand) &&
+      !differs(gain, parameters.velocity_gain, kGainDeadBand))
+    return false;
+  parameters.decay = static_cast<std::uint16_t>(decay);
+  parameters.velocity_gain = static_cast<std::uint16_t>(gain);
+  parameters.acceleration_gain =
+      static_cast<std::uint16_t>(65536 * kMostAcceleration * std::min(1.0, kDecayOfMost / decay));
+  return true;
+}
+
+}  // namespace tandem::host

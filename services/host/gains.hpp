@@ -1,0 +1,45 @@
+#pragma once
+// Gains at run time: chooses how the tracker's filter learns from its corrections, so that no scene has to be
+// trained for it. The choice travels in the deltas.
+
+#include <cstdint>
+#include <string_view>
+
+#include "sdk/core/codec/codec.hpp"
+
+namespace tandem::host {
+
+/// Mean cosines, see GainEvidence, at which bits are fewest. Not 0, as corrections come late, when a body is
+/// beyond the threshold, or early, where the encoder likes to be.
+struct GainGoal {
+  double agreement = 0.25;
+  double forwardness = 0.2;
+};
+
+/// For a predictor: Predictor::name().
+[[nodiscard]] GainGoal usual_gain_goal(std::string_view predictor);
+
+/// Looks at every frame and decides every fifteen. Deterministic; no clock. Not thread-safe.
+///
+/// Where corrections agree with the one before more than the goal says, velocities learn more from them,
+/// where less, less; where they agree with c, it is kept for longer. RESEARCH.md of the codec, "Gains at run
+/// time".
+class GainControl {
+ public:
+  /// `parameters`: those in force at the start.
+  GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters);
+
+  /// Where the timeline adds evidence: ServerTimeline::set_evidence().
+  [[nodiscard]] GainEvidence& evidence() { return evidence_; }
+  /// After each frame; true when it changed decay and gains.
+  bool after_frame(CodecParameters& parameters);
+
+ private:
+  GainGoal goal_;
+  double enough_;                // corrections in one decision, to believe them
+  double log_decay_, log_gain_;  // of E in 1/65536, of beta
+  std::uint32_t frames_ = 0;
+  GainEvidence evidence_;
+};
+
+}  // namespace tandem::host

@@ -1,0 +1,150 @@
+#pragma once
+// The host: drives a full simulation, predicts, encodes and publishes it, and answers its clients. All rules
+// of behaviour over time (idl/STATES.md) live behind it; it owns no thread, reads no clock and writes to no
+// socket.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/host/gains.hpp"
+#include "services/host/lattice_choice.hpp"
+#include "services/host/outbox.hpp"
+#include "services/host/quality.hpp"
+#include "services/host/simulation.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::host {
+
+inline constexpr std::int64_t kMillisecond = 1'000'000;
+inline constexpr std::int64_t kSecond = 1'000'000'000;
+/// Most payload bytes of one delta sample.
+inline constexpr std::size_t kPartBytes = 60'000;
+
+struct HostConfig {
+  std::string session = "default";
+  Epoch epoch = 1;  ///< ms of wall clock at the process's start
+  Frame start_frame = 0;
+
+  double frame_rate_hz = 30;            ///< nominal; decides the period and what a client is blamed for
+  bool free_rate = false;               ///< as fast as window and queue allow (--rate max)
+  std::uint32_t lead = 1;               ///< A, 0 or 1
+  std::optional<std::uint32_t> window;  ///< frames; empty: automatic from measured round trips
+  std::uint32_t window_ceiling = 24;
+  std::optional<std::int64_t> stall_timeout_ns = kSecond / 2;  ///< empty: nobody is demoted
+  std::uint32_t wait_for = 0;                                  ///< participants that must play before frame 1
+  std::uint32_t client_limit = 256;
+  std::uint32_t participant_limit = 16;  ///< clients of one DDS participant, or it could take all seats
+  std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
+  Outbox::Limits outbox;
+
+  Lattice lattice;
+  std::size_t budget = kNoBudget;  ///< bytes of a frame; spawns and parameters go first
+  std::string codec = "entropy";
+  std::vector<std::byte> codec_tables;
+  CodecParameters parameters;          ///< of the first frame
+  std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
+  std::optional<GainGoal> gains;       ///< empty: so do decay and gains
+  std::string predictor = "ballistic";
+  std::vector<std::int32_t> predictor_constants;
+  RunBlocks run_blocks;  ///< threads for the codec; empty: none of its own
+
+  std::uint32_t client_cost_ns = 2;
+  std::string scene;
+  std::string scene_description;
+  std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
+
+  /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
+  /// stamped with the time at which their frame started.
+  std::int64_t (*clock_ns)() = nullptr;
+};
+
+/// One frame that was just produced.
+struct FrameReport {
+  Frame frame = 0;
+  std::uint64_t hash = 0;
+  std::size_t payload_bytes = 0;
+  std::uint32_t corrected = 0;
+  double frame_ms = 0, step_ms = 0;  ///< whole frame (step, quantise, predict, encode, apply); engine alone
+};
+
+/// Counts since the start.
+struct HostTotals {
+  std::uint64_t frames = 0, payload_bytes = 0, corrected = 0;
+  std::uint64_t stalls = 0;        ///< suspensions that a participant caused
+  std::uint64_t suspended_ms = 0;  ///< waiting past due, for participants or for the queue
+  std::uint64_t refused_inputs = 0, refused_messages = 0, snapshots = 0, demotions = 0, clients_seen = 0;
+  double frame_ms_p50 = 0, frame_ms_p99 = 0;
+};
+
+/// Drives one session. Call poll() from one thread, whenever something arrived and at the latest at
+/// next_wake_ns(). Drain outbox() in another thread (Publisher) or with drain(). Memory is bounded by the
+/// configuration.
+class Host {
+ public:
+  enum class State : std::uint8_t {
+    kClaiming,  ///< looking for another server of the same session; nothing was announced
+    kWaiting,   ///< announced; joiners are served, frame 1 waits for participants
+    kRunning,
+    kRefused,  ///< another server owns the session: see error()
+  };
+
+  /// `simulation` and `port` must outlive the host. `simulation` was not stepped yet; its bodies now are the
+  /// start frame. Errors: kInvalidArgument (configuration, body columns not `capacity` long), kUnsupported
+  /// (codec, predictor), kMalformed (tables).
+  static Result<std::unique_ptr<Host>> create(HostConfig config, engine::Simulation& simulation,
+                                              transport::ServerPort& port);
+  ~Host();
+  Host(const Host&) = delete;
+  Host& operator=(const Host&) = delete;
+
+  /// Takes what arrived, then produces at most one frame and queues what must be published. `now_ns` is a
+  /// steady clock that never goes back, `wall_ns` the time of day. True when a frame was produced: see
+  /// report().
+  bool poll(std::int64_t now_ns, std::int64_t wall_ns);
+  /// Steady time at which poll() has something to do even if nothing arrives. Never more than 50 ms ahead.
+  [[nodiscard]] std::int64_t next_wake_ns() const;
+
+  [[nodiscard]] State state() const;
+  /// Set in kRefused: kConflict, naming the other server.
+  [[nodiscard]] const std::optional<Error>& error() const;
+  [[nodiscard]] const FrameReport& report() const;
+  [[nodiscard]] Outbox& outbox();
+
+  /// Applies an input of the server's own, as if a participant had sent it now. Returns the frame it acts on.
+  /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
+  Result<Frame> inject(const engine::Input& input);
+
+  /// What the decoder reads (threshold, quantisation steps, gains), in force from the next frame on. Travels
+  /// in that frame's delta; clients need nothing else. With HostConfig::gains, gains stay so until the next
+  /// decision. Errors: kInvalidArgument (out of range, or automatic quality is on).
+  [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
+  [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
+  [[nodiscard]] double threshold_m() const;                 ///< of the next frame, scene units
+
+  [[nodiscard]] const transport::SessionMessage& session() const;
+  [[nodiscard]] Frame frame() const;                  ///< of the last delta
+  [[nodiscard]] const tandem::State& agreed() const;  ///< client state at frame()
+  [[nodiscard]] std::uint64_t hash() const;           ///< of agreed()
+  [[nodiscard]] std::uint32_t window() const;         ///< in force
+  [[nodiscard]] std::uint32_t participants() const;   ///< playing and waited for
+  [[nodiscard]] std::uint32_t observers() const;      ///< playing and not waited for
+  [[nodiscard]] HostTotals totals() const;
+  /// One line for a log per thing worth telling (joined, demoted, refused ...), oldest first; forgets them.
+  [[nodiscard]] std::vector<std::string> take_notices();
+
+ private:
+  struct Impl;
+  explicit Host(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What both sides of the session build their timelines from.
+[[nodiscard]] TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity);
+
+}  // namespace tandem::host

@@ -1,0 +1,38 @@
+#pragma once
+// Snapshots on demand.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "sdk/transport/port.hpp"
+#include "services/host/roster.hpp"
+
+namespace tandem::host {
+
+/// Decides when a snapshot is made and when the published ones are removed.
+class JoinDesk {
+ public:
+  static constexpr std::int64_t kCollectNs = 100'000'000;  ///< joiners of one snapshot
+  static constexpr std::int64_t kPatienceNs =
+      5'000'000'000;  ///< a joiner that does not ask again gets another
+
+  /// True when the time has come to make one snapshot for all who are ready: they say `joining`, all three
+  /// writers have matched their participant, and they were not served for this attempt within 5 s.
+  [[nodiscard]] bool due(std::map<transport::ClientId, Account>& accounts, transport::ServerPort& port,
+                         std::int64_t now_ns);
+  /// One was queued for those who were ready at the last due().
+  void served(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
+  /// True when snapshots are out and nobody joins any more.
+  [[nodiscard]] bool dispose_due(const std::map<transport::ClientId, Account>& accounts) const;
+  void disposed() { published_ = false; }
+  /// When the joiners collected so far get theirs.
+  [[nodiscard]] std::optional<std::int64_t> due_ns() const;
+
+ private:
+  std::optional<std::int64_t> collecting_since_ns_;
+  std::vector<transport::ClientId> ready_;
+  bool published_ = false;
+};
+
+}  // namespace tandem::host

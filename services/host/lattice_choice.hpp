@@ -1,0 +1,43 @@
+#pragma once
+// Scene units to lattice units: which lattice a session uses, and everything that is converted to it once.
+
+#include <cstdint>
+
+#include "sdk/core/codec/codec.hpp"
+#include "sdk/core/predict/drive.hpp"
+#include "services/host/simulation.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::host {
+
+/// The integer lattice of a session, seen from the scene's units.
+struct Lattice {
+  double unit = 0;   ///< scene units per lattice unit
+  double dt_s = 0;   ///< seconds per frame
+  int halvings = 0;  ///< s: unit = smallest permitted threshold / 2^s
+  /// Lattice units per scene unit.
+  [[nodiscard]] double position_scale() const { return 1.0 / unit; }
+  /// 1/64 lattice unit per frame, per scene unit per second.
+  [[nodiscard]] double velocity_scale() const { return 64.0 * dt_s / unit; }
+};
+
+inline constexpr int kMostHalvings = 12;   ///< finer gains nothing
+inline constexpr int kFewestHalvings = 8;  ///< coarser would show in the error
+
+/// Picks the unit: smallest permitted threshold / 2^s, s as large as the bounds allow with a factor of four
+/// to spare, at most 12. `extent` is the largest |coordinate| inside the world's bounds; all in scene units.
+/// Errors: kInvalidArgument for values that are not finite and positive, or when s would be below 8.
+[[nodiscard]] Result<Lattice> choose_lattice(double smallest_threshold, double extent, double dt_s);
+
+/// Threshold and quantisation ranges (scene units; per second for velocity) as integers. A range of 0 means
+/// untrained and stands for eight thresholds (per frame for velocity). Steps are rounded up so that 127 of
+/// them cover the range. Errors: kInvalidArgument for what is negative, not finite or finer than the lattice.
+[[nodiscard]] Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshold,
+                                                       double position_range, double velocity_range);
+
+/// Gravity (scene units / s^2) and damping (1/s) as the integers of the predicted step. Errors:
+/// kInvalidArgument for what is not finite or does not fit (|g| <= 2^28, 0 <= D < 2^16).
+[[nodiscard]] Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity,
+                                     double damping_per_s);
+
+}  // namespace tandem::host

@@ -1,0 +1,130 @@
+#include "services/host/mirror.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace tandem::host {
+namespace {
+
+constexpr std::uint8_t mark(engine::Event::Kind kind) {
+  return static_cast<std::uint8_t>(1U << static_cast<unsigned>(kind));
+}
+constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
+constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
+constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
+
+}  // namespace
+
+Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count)
+    : lattice_(lattice),
+      type_count_(type_count),
+      target_(capacity),
+      off_(capacity),
+      shown_(capacity),
+      expelled_(capacity),
+      marks_(capacity),
+      generations_(capacity) {
+  lifecycle_.reserve(std::size_t{2} * capacity);
+}
+
+void Mirror::quantise(const engine::Bodies& bodies) {
+  std::ranges::fill(off_, 0);
+  const double position = lattice_.position_scale();
+  const double velocity = lattice_.velocity_scale();
+  const auto world = static_cast<float>(kPositionLimit * lattice_.unit);
+  constexpr float kFinite = std::numeric_limits<float>::max();
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    quantise_column(bodies.position[i], position, kPositionLimit, world, target_.p(i), off_);
+    quantise_column(bodies.velocity[i], velocity, kVelocityLimit, kFinite, target_.v(i), off_);
+  }
+  const std::size_t capacity = shown_.size();
+  for (std::size_t s = 0; s < capacity; ++s) {
+    const bool sound = off_[s] == 0 && bodies.type[s] < type_count_;
+    shown_[s] = static_cast<std::uint8_t>((bodies.alive[s] != 0) & sound);
+  }
+}
+
+void Mirror::clear_hidden() {
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    if (shown_[s] == 0) target_.despawn(s);
+  }
+}
+
+void Mirror::start(const engine::Bodies& bodies) {
+  lifecycle_.clear();
+  quantise(bodies);
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
+    expelled_count_ += expelled_[s];
+    target_.alive()[s] = shown_[s];
+    target_.generation()[s] = 0;
+    target_.type()[s] = bodies.type[s];
+    generations_[s] = shown_[s];
+  }
+  clear_hidden();
+}
+
+void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event> events) {
+  lifecycle_.clear();
+  quantise(bodies);
+  for (const engine::Event& event : events) {
+    if (event.slot < marks_.size()) marks_[event.slot] |= mark(event.kind);
+  }
+  const std::span<const std::uint8_t> was = target_.alive();
+  const std::span<const TypeId> type = target_.type();
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    const bool quiet = (marks_[s] | expelled_[s]) == 0 && was[s] == shown_[s];
+    if (quiet && (shown_[s] == 0 || type[s] == bodies.type[s])) continue;
+    record(s, bodies, marks_[s]);
+    marks_[s] = 0;
+  }
+  clear_hidden();
+}
+
+void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks) {
+  const bool was = target_.alive()[slot] != 0;
+  const bool lives = bodies.alive[slot] != 0;
+  if (!lives || (marks & (kDespawned | kSpawned | kTeleported)) != 0) expelled_[slot] = 0;
+  const bool shown = shown_[slot] != 0 && expelled_[slot] == 0;
+  if (lives && shown_[slot] == 0 && expelled_[slot] == 0) {
+    expelled_[slot] = 1;
+    ++expelled_count_;
+  }
+  shown_[slot] = static_cast<std::uint8_t>(shown);
+
+  const TypeId type = bodies.type[slot];
+  const bool reused = was && shown && (marks & kSpawned) != 0;
+  if (was && (!shown || reused)) {
+    lifecycle_.push_back(
+        {.kind = LifecycleKind::kDespawn, .slot = slot, .generation = 0, .type = 0, .body = {}});
+  }
+  if (shown && (!was || reused)) {
+    spawn(slot, type);
+  } else if (shown && (marks & kTeleported) != 0) {
+    // A slot gets one record a frame; a type changed in the same step differs still in the next and follows
+    // then.
+    lifecycle_.push_back({.kind = LifecycleKind::kTeleport,
+                          .slot = slot,
+                          .generation = 0,
+                          .type = 0,
+                          .body = target_.body(slot)});
+  } else if (shown && target_.type()[slot] != type) {
+    target_.type()[slot] = type;
+    lifecycle_.push_back(
+        {.kind = LifecycleKind::kTypeChange, .slot = slot, .generation = 0, .type = type, .body = {}});
+  }
+}
+
+void Mirror::spawn(Slot slot, TypeId type) {
+  const std::uint8_t generation = generations_[slot]++;
+  target_.alive()[slot] = 1;
+  target_.generation()[slot] = generation;
+  target_.type()[slot] = type;
+  lifecycle_.push_back({.kind = LifecycleKind::kSpawn,
+                        .slot = slot,
+                        .generation = generation,
+                        .type = type,
+                        .body = target_.body(slot)});
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,60 @@
+#pragma once
+// The engine's bodies on the lattice, frame by frame: what a codec encodes towards, and what happened to the
+// slots.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/lattice/state.hpp"
+#include "services/host/lattice_choice.hpp"
+#include "services/host/simulation.hpp"
+
+namespace tandem::host {
+
+/// Rounds one column of floats (times `scale`) to integers, saturating at +-limit; `off` is set to 1 (never
+/// cleared) where a value is NaN or its magnitude exceeds `off_bound` (units of `in`). Spans have equal
+/// length. Plain loops that vectorise.
+void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
+                     std::span<std::int32_t> out, std::span<std::int32_t> off);
+
+/// Follows a simulation. A body is shown to clients while it is alive, finite, on the lattice and of a listed
+/// type; one that stops being so is despawned and stays away until the engine despawns, spawns or teleports
+/// it. Velocities saturate. Allocates nothing after construction. Not thread-safe.
+class Mirror {
+ public:
+  /// `type_count`: types the session lists, 1 or more.
+  Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count);
+
+  /// The start state: everything shown is simply there, in generation 0.
+  void start(const engine::Bodies& bodies);
+  /// After a step. `events` may be incomplete: births, deaths and types are read off the bodies themselves;
+  /// only reuse of a slot within the step and teleports need their event. Events out of range are ignored.
+  void update(const engine::Bodies& bodies, std::span<const engine::Event> events);
+
+  [[nodiscard]] const State& target() const { return target_; }
+  /// Of the last update(): ascending by slot, despawn before spawn.
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
+  /// Bodies taken off because they left the lattice or were not finite, since the start.
+  [[nodiscard]] std::uint64_t expelled() const { return expelled_count_; }
+
+ private:
+  void quantise(const engine::Bodies& bodies);
+  void clear_hidden();
+  void record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks);
+  void spawn(Slot slot, TypeId type);
+
+  Lattice lattice_;
+  TypeId type_count_;
+  State target_;                           // p and v are written whole, the other columns by records
+  std::vector<std::int32_t> off_;          // 1: not finite or off the lattice, this frame
+  std::vector<std::uint8_t> shown_;        // 1: clients shall see it, this frame
+  std::vector<std::uint8_t> expelled_;     // 1: the engine keeps it, clients lost it
+  std::vector<std::uint8_t> marks_;        // bits of Event::Kind, this frame
+  std::vector<std::uint8_t> generations_;  // of the next spawn in the slot
+  std::vector<LifecycleRecord> lifecycle_;
+  std::uint64_t expelled_count_ = 0;
+};
+
+}  // namespace tandem::host

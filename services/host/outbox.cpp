@@ -1,0 +1,100 @@
+#include "services/host/outbox.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::host {
+
+// Parts before the last are not counted: they never come without it.
+std::uint32_t* Outbox::count_of(const Outgoing& message, std::uint32_t& limit) {
+  if (const auto* delta = std::get_if<transport::DeltaMessage>(&message)) {
+    limit = limits_.frames;
+    return delta->part + 1 == delta->parts ? &frames_ : nullptr;
+  }
+  if (std::holds_alternative<transport::SnapshotMessage>(message)) {
+    limit = limits_.snapshots;
+    return &snapshots_;
+  }
+  limit = limits_.control;
+  return &control_;
+}
+
+bool Outbox::has_frame_room() const {
+  const std::scoped_lock lock(mutex_);
+  return frames_ < limits_.frames;
+}
+
+bool Outbox::has_snapshot_room() const {
+  const std::scoped_lock lock(mutex_);
+  return snapshots_ < limits_.snapshots;
+}
+
+bool Outbox::has_control_room() const {
+  const std::scoped_lock lock(mutex_);
+  return control_ < limits_.control;
+}
+
+bool Outbox::push(Outgoing message) {
+  {
+    const std::scoped_lock lock(mutex_);
+    std::uint32_t limit = 0;
+    std::uint32_t* const count = count_of(message, limit);
+    if (count != nullptr && *count >= limit) return false;
+    if (count != nullptr) ++*count;
+    queue_.push_back(std::move(message));
+    high_water_ = std::max(high_water_, queue_.size());
+  }
+  ready_.notify_one();
+  return true;
+}
+
+std::optional<Outgoing> Outbox::pop(std::chrono::nanoseconds timeout) {
+  std::unique_lock lock(mutex_);
+  writing_frame_ = false;
+  if (queue_.empty() && timeout.count() > 0) ready_.wait_for(lock, timeout);
+  if (queue_.empty()) return std::nullopt;
+  std::optional<Outgoing> message(std::move(queue_.front()));
+  queue_.pop_front();
+  writing_frame_ = std::holds_alternative<transport::DeltaMessage>(*message);
+  std::uint32_t limit = 0;
+  if (std::uint32_t* const count = count_of(*message, limit)) --*count;
+  return message;
+}
+
+void Outbox::wake() { ready_.notify_all(); }
+
+std::size_t Outbox::size() const {
+  const std::scoped_lock lock(mutex_);
+  return queue_.size();
+}
+
+std::uint32_t Outbox::unwritten_frames() const {
+  const std::scoped_lock lock(mutex_);
+  return frames_ + (writing_frame_ ? 1U : 0U);
+}
+
+std::size_t Outbox::high_water() const {
+  const std::scoped_lock lock(mutex_);
+  return high_water_;
+}
+
+Result<void> publish(transport::ServerPort& port, const Outgoing& message) {
+  return std::visit(
+      [&port](const auto& m) -> Result<void> {
+        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, DisposeSnapshots>) {
+          return port.dispose_snapshots();
+        } else {
+          return port.write(m);
+        }
+      },
+      message);
+}
+
+Result<void> drain(Outbox& outbox, transport::ServerPort& port) {
+  while (const auto message = outbox.pop(std::chrono::nanoseconds{0})) {
+    if (auto written = publish(port, *message); !written) return written;
+  }
+  return {};
+}
+
+}  // namespace tandem::host

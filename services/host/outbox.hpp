@@ -1,0 +1,73 @@
+#pragma once
+// What the host wants published, in order, bounded. The one place where its thread meets the publisher's.
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <variant>
+
+#include "sdk/transport/port.hpp"
+
+namespace tandem::host {
+
+/// Asks the publisher to remove all snapshots.
+struct DisposeSnapshots {};
+
+using Outgoing = std::variant<transport::SessionMessage, transport::DeltaMessage,
+                              transport::ScheduledInputMessage, transport::SnapshotMessage,
+                              transport::ReplyMessage, transport::ServerStatusMessage, DisposeSnapshots>;
+
+/// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
+/// for one producer and one consumer.
+class Outbox {
+ public:
+  struct Limits {
+    std::uint32_t frames = 8;  ///< whole deltas, whatever their number of parts
+    std::uint32_t snapshots = 2;
+    std::uint32_t control = 1024;  ///< everything else
+  };
+  explicit Outbox(const Limits& limits) : limits_(limits) {}
+
+  /// Room for one more delta; stays true until the producer pushes one.
+  [[nodiscard]] bool has_frame_room() const;
+  [[nodiscard]] bool has_snapshot_room() const;
+  [[nodiscard]] bool has_control_room() const;
+  /// False, and nothing queued, when the message's kind is at its limit. All parts of a delta count once,
+  /// with the last; check has_frame_room() before the first.
+  [[nodiscard]] bool push(Outgoing message);
+
+  /// The oldest message, or nothing after `timeout`. Asking for the next says that the one before is written.
+  [[nodiscard]] std::optional<Outgoing> pop(std::chrono::nanoseconds timeout);
+  /// Wakes a waiting pop().
+  void wake();
+
+  [[nodiscard]] std::size_t size() const;
+  /// Deltas pushed and not yet written.
+  [[nodiscard]] std::uint32_t unwritten_frames() const;
+  /// Most messages ever queued.
+  [[nodiscard]] std::size_t high_water() const;
+
+ private:
+  std::uint32_t* count_of(const Outgoing& message, std::uint32_t& limit);
+
+  mutable std::mutex mutex_;
+  std::condition_variable ready_;
+  Limits limits_;
+  std::deque<Outgoing> queue_;
+  std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
+  bool writing_frame_ = false;  // the last pop() handed out a delta
+  std::size_t high_water_ = 0;
+};
+
+/// Writes one message. Errors: what the port says.
+[[nodiscard]] Result<void> publish(transport::ServerPort& port, const Outgoing& message);
+
+/// Writes everything that is queued, in the caller's thread: for tests and single-threaded hosts. Stops at
+/// the first error; that message is lost.
+Result<void> drain(Outbox& outbox, transport::ServerPort& port);
+
+}  // namespace tandem::host

@@ -1,0 +1,34 @@
+#pragma once
+// When the next frame is due.
+
+#include <cstdint>
+
+namespace tandem::host {
+
+/// Absolute deadlines, one period apart, so that errors do not add up. After a suspension there is no
+/// catch-up; a slow step is caught up with if it costs less than four periods.
+class Pacing {
+ public:
+  /// `free_rate`: always due; the nominal period still decides when waiting becomes a suspension.
+  Pacing(double frame_rate_hz, bool free_rate);
+
+  void start(std::int64_t now_ns);
+  [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= deadline_ns_; }
+  [[nodiscard]] std::int64_t deadline_ns() const { return deadline_ns_; }
+  /// From here on waiting is a suspension: one nominal period after the last frame.
+  [[nodiscard]] std::int64_t suspended_from_ns() const { return suspended_from_ns_; }
+  /// A frame starts now; `suspended`: after a suspension.
+  void frame_started(std::int64_t now_ns, bool suspended);
+  /// Nominal, or as measured at a free rate.
+  [[nodiscard]] std::int64_t period_ns() const { return free_rate_ ? measured_ns_ : nominal_ns_; }
+
+ private:
+  bool free_rate_;
+  std::int64_t nominal_ns_;
+  std::int64_t measured_ns_;
+  std::int64_t last_ns_ = 0;
+  std::int64_t deadline_ns_ = 0;
+  std::int64_t suspended_from_ns_ = 0;
+};
+
+}  // namespace tandem::host

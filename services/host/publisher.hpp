@@ -1,0 +1,45 @@
+#pragma once
+// The thread that writes what the host queued, so that a slow write never holds up the simulation.
+
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "sdk/transport/port.hpp"
+#include "services/host/outbox.hpp"
+
+namespace tandem::host {
+
+/// Drains an outbox into a port from construction to stop(). Deltas, scheduled inputs and the session are
+/// written again until they are accepted; other messages are given up after an error, as they are either
+/// repeated or superseded by the host.
+class Publisher {
+ public:
+  /// Both must outlive the publisher.
+  Publisher(Outbox& outbox, transport::ServerPort& port);
+  ~Publisher() { stop(); }
+  Publisher(const Publisher&) = delete;
+  Publisher& operator=(const Publisher&) = delete;
+
+  /// Ends the thread; what is still queued then is not written. Blocks for one write at most.
+  void stop();
+  /// Writes that failed since the start. Thread-safe.
+  [[nodiscard]] std::uint64_t failures() const { return failures_.load(std::memory_order_relaxed); }
+  /// The last failure's text, empty without one. Thread-safe.
+  [[nodiscard]] std::string last_failure() const;
+
+ private:
+  void run(const std::stop_token& stop);
+  bool write(const Outgoing& message);
+
+  Outbox* outbox_;
+  transport::ServerPort* port_;
+  std::atomic<std::uint64_t> failures_{0};
+  mutable std::mutex mutex_;
+  std::string last_failure_;
+  std::jthread thread_;
+};
+
+}  // namespace tandem::host

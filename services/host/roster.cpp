@@ -1,0 +1,187 @@
+#include "services/host/roster.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace tandem::host {
+namespace {
+
+using transport::Phase;
+using transport::Reason;
+using transport::Role;
+
+constexpr std::int64_t kReturnNs = 10'000'000'000;   // a demoted client must keep up this long
+constexpr std::int64_t kSilenceNs = 30'000'000'000;  // without an acknowledgement a client is taken for gone
+constexpr std::int64_t kForgetNs = 60'000'000'000;   // and its account deleted
+constexpr std::size_t kMostNotices = 256;
+
+}  // namespace
+
+std::string client_name(transport::ClientId id) { return fmt::format("{:016x}", id); }
+
+void Roster::note(const Account& account, std::string_view what) {
+  if (notices_.size() < kMostNotices)
+    notices_.push_back(fmt::format("client {} {}", client_name(account.id), what));
+}
+
+Account* Roster::admit(const transport::AckMessage& ack, const transport::ParticipantId& from,
+                       std::int64_t now_ns) {
+  const auto siblings =
+      std::ranges::count_if(accounts_, [&from](const auto& entry) { return entry.second.from == from; });
+  if (siblings >= rules_.participant_limit) return nullptr;
+  if (accounts_.size() >= rules_.client_limit) {
+    const auto oldest = std::ranges::min_element(accounts_, {}, [](const auto& entry) {
+      return entry.second.present ? INT64_MAX : entry.second.heard_ns;
+    });
+    if (oldest == accounts_.end() || oldest->second.present) return nullptr;
+    accounts_.erase(oldest);
+  }
+  Account account;
+  account.id = ack.client;
+  account.from = from;
+  account.heard_ns = now_ns;
+  account.attempt = ack.join_attempt;
+  ++seen_;
+  return &accounts_.emplace(ack.client, account).first->second;
+}
+
+Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
+                           const PublishTimes& times, const Now& now) {
+  const auto known = accounts_.find(ack.client);
+  Account* account = known == accounts_.end() ? nullptr : &known->second;
+  if (account != nullptr && account->from != from) return Reason::kForeignClient;
+  if (ack.protocol_version != transport::kProtocolVersion) return Reason::kProtocolVersion;
+  if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
+  const bool plays = ack.phase == Phase::kPlaying;
+  const bool readable = ack.client != 0 && (plays || ack.phase == Phase::kJoining) &&
+                        (ack.role_wanted == Role::kParticipant || ack.role_wanted == Role::kObserver);
+  if (!readable || (plays && ack.applied > now.frame)) return Reason::kInvalid;
+  if (account == nullptr) account = admit(ack, from, now.ns);
+  if (account == nullptr) return Reason::kFull;
+
+  const bool starts_over = account->phase == Phase::kJoining || account->attempt != ack.join_attempt;
+  if (account->phase != ack.phase || account->wanted != ack.role_wanted) account->reply.due = true;
+  if (plays && starts_over) {
+    account->timed_from = now.frame;
+    note(*account, ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer");
+  } else if (plays && ack.applied > account->applied && ack.applied > account->timed_from) {
+    if (const auto at_ns = times.of(ack.applied)) account->round_trip.measured(now.ns - *at_ns);
+  }
+  // A joiner, also one whose `joining` was overwritten by its `playing`, counts only once it has caught up
+  // again.
+  if (!plays || starts_over || ack.role_wanted == Role::kObserver) account->counted = false;
+  account->phase = ack.phase;
+  account->wanted = ack.role_wanted;
+  account->attempt = ack.join_attempt;
+  account->applied = ack.applied;
+  account->clock_ns = ack.clock_ns;
+  account->reply.clock_moved = true;
+  account->heard_ns = now.ns;
+  account->present = true;
+  return Reason::kNone;
+}
+
+Account* Roster::find(transport::ClientId id, const transport::ParticipantId& from, Reason& reason) {
+  const auto known = accounts_.find(id);
+  if (known == accounts_.end()) {
+    reason = Reason::kNotPlaying;
+    return nullptr;
+  }
+  if (known->second.from != from) {
+    reason = Reason::kForeignClient;
+    return nullptr;
+  }
+  reason = Reason::kNone;
+  return &known->second;
+}
+
+void Roster::look_for_dead(transport::ServerPort& port, const Now& now) {
+  for (auto it = accounts_.begin(); it != accounts_.end();) {
+    Account& account = it->second;
+    const std::int64_t silence_ns = now.ns - account.heard_ns;
+    if (account.present && (silence_ns > kSilenceNs || !port.alive(account.from))) {
+      account.present = false;
+      account.counted = false;
+      note(account, "is gone");
+    }
+    it = !account.present && silence_ns > kForgetNs ? accounts_.erase(it) : std::next(it);
+  }
+}
+
+bool Roster::blocked(const Now& now) const {
+  return std::ranges::any_of(
+      accounts_, [&](const auto& entry) { return entry.second.counted && !keeps_up(entry.second, now); });
+}
+
+bool Roster::blamed(const Now& now) const {
+  return std::ranges::any_of(accounts_, [&](const auto& entry) { return blamed(entry.second, now); });
+}
+
+void Roster::charge(std::int64_t duration_ns, const Now& now) {
+  for (auto& [id, account] : accounts_) {
+    if (!blamed(account, now)) continue;
+    account.stalls.charge(now.ns, duration_ns);
+    if (!rules_.stall_timeout_ns || account.stalls.total_ns(now.ns) <= *rules_.stall_timeout_ns) continue;
+    account.demoted = true;
+    account.counted = false;
+    account.kept_up = false;
+    account.reply.due = true;
+    ++demotions_;
+    note(account, "held the others up for too long: observer until it keeps up for 10 s");
+  }
+}
+
+std::optional<std::int64_t> Roster::patience_ns(const Now& now) {
+  std::optional<std::int64_t> least;
+  if (!rules_.stall_timeout_ns) return least;
+  for (auto& [id, account] : accounts_) {
+    if (!blamed(account, now)) continue;
+    const std::int64_t left =
+        std::max<std::int64_t>(*rules_.stall_timeout_ns - account.stalls.total_ns(now.ns), 0);
+    least = std::min(least.value_or(left), left);
+  }
+  return least;
+}
+
+void Roster::frame_starts(const Now& now) {
+  for (auto& [id, account] : accounts_) {
+    if (account.demoted && !keeps_up(account, now)) account.kept_up = false;
+  }
+}
+
+void Roster::refresh(const Now& now) {
+  std::int64_t round_trip_ns = 0;
+  for (auto& [id, account] : accounts_) {
+    if (account.plays() && account.wanted == Role::kParticipant) {
+      round_trip_ns = std::max(round_trip_ns, account.round_trip.high_ns());
+    }
+  }
+  if (!rules_.fixed_window) window_ = window_for(round_trip_ns, now.period_ns, rules_.window_ceiling);
+
+  for (auto& [id, account] : accounts_) {
+    const bool abreast = account.plays() && keeps_up(account, now);
+    if (account.demoted) {
+      if (abreast && !account.kept_up) account.kept_up_since_ns = now.ns;
+      account.kept_up = account.plays() && (account.kept_up || abreast);
+      if (account.kept_up && abreast && now.ns - account.kept_up_since_ns >= kReturnNs) {
+        account.demoted = false;
+        account.reply.due = true;
+        note(account, "kept up for 10 s: participant again");
+      }
+    }
+    if (abreast && account.role() == Role::kParticipant) account.counted = true;
+  }
+}
+
+std::uint32_t Roster::counted() const {
+  return static_cast<std::uint32_t>(
+      std::ranges::count_if(accounts_, [](const auto& entry) { return entry.second.counted; }));
+}
+
+std::uint32_t Roster::watching() const {
+  return static_cast<std::uint32_t>(std::ranges::count_if(
+      accounts_, [](const auto& entry) { return entry.second.plays() && !entry.second.counted; }));
+}
+
+}  // namespace tandem::host

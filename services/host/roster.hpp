@@ -1,0 +1,138 @@
+#pragma once
+// The clients of a session: who they are, whether the server waits for them, and what they did to deserve it.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sdk/transport/port.hpp"
+#include "services/host/stall_meter.hpp"
+#include "services/host/window.hpp"
+
+namespace tandem::host {
+
+/// The last outcomes of a client's inputs, oldest first, and how fast it may send.
+struct InputAccount {
+  std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
+  std::vector<transport::ReplyEntry> outcomes;
+  double spent = 0;  ///< of the burst, as of spent_at_ns
+  std::int64_t spent_at_ns = 0;
+};
+
+struct JoinAccount {
+  bool served = false;
+  std::uint32_t served_attempt = 0;
+  std::int64_t served_at_ns = 0;
+};
+
+struct ReplyAccount {
+  bool due = true;                                    ///< something changed
+  bool clock_moved = false;                           ///< only the echo of the client's clock is new
+  transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
+  std::int64_t last_ns = INT64_MIN;
+};
+
+/// One client id. Survives rejoins; forgotten a minute after the client was last heard of.
+struct Account {
+  transport::ClientId id = 0;
+  transport::ParticipantId from;
+  transport::Phase phase = transport::Phase::kJoining;
+  transport::Role wanted = transport::Role::kObserver;
+  bool present = true;   ///< its participant lives and it was heard of lately
+  bool counted = false;  ///< a participant that plays and has caught up: the server waits for it
+  bool demoted = false;
+  bool kept_up = false;  ///< while demoted: since kept_up_since_ns
+  std::int64_t kept_up_since_ns = 0;
+  Frame applied = 0;
+  Frame timed_from = 0;  ///< acknowledgements of later frames tell a round trip
+  std::uint32_t attempt = 0;
+  std::int64_t clock_ns = 0;
+  std::int64_t heard_ns = 0;
+  StallMeter stalls;
+  RoundTrip round_trip;
+  InputAccount inputs;
+  JoinAccount join;
+  ReplyAccount reply;
+
+  [[nodiscard]] transport::Role role() const { return demoted ? transport::Role::kObserver : wanted; }
+  [[nodiscard]] bool plays() const { return present && phase == transport::Phase::kPlaying; }
+};
+
+/// Rules of clients, without I/O. Not thread-safe.
+class Roster {
+ public:
+  struct Rules {
+    Epoch epoch = 0;
+    std::uint32_t client_limit = 256;
+    std::uint32_t participant_limit = 16;  ///< clients of one DDS participant
+    std::optional<std::int64_t> stall_timeout_ns;
+    std::optional<std::uint32_t> fixed_window;
+    std::uint32_t window_ceiling = 24;
+  };
+  explicit Roster(const Rules& rules)
+      : rules_(rules), window_(rules.fixed_window.value_or(kSmallestWindow)) {}
+
+  /// Where the server stands when something happens.
+  struct Now {
+    std::int64_t ns = 0;
+    Frame frame = 0;    ///< last delta made; s is the next
+    Frame written = 0;  ///< last delta that left the queue: nobody is to blame for lacking a later one
+    std::int64_t period_ns = 0;
+  };
+
+  /// Digests an acknowledgement. kNone: taken. Otherwise why not; what concerns a known account is left as it
+  /// was.
+  transport::Reason acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
+                                const PublishTimes& times, const Now& now);
+  /// The account of `id` if it belongs to `from`; null and kForeignClient or kNotPlaying otherwise.
+  Account* find(transport::ClientId id, const transport::ParticipantId& from, transport::Reason& reason);
+
+  /// Forgets clients whose participant is gone; call now and then, and while suspended.
+  void look_for_dead(transport::ServerPort& port, const Now& now);
+  /// Who keeps the server from starting frame s = now.frame + 1.
+  [[nodiscard]] bool blocked(const Now& now) const;
+  /// Whether a client is to blame for that: it lacks a delta that was written.
+  [[nodiscard]] bool blamed(const Now& now) const;
+  /// Charges a suspension that lasted `duration_ns` to all who are to blame, and demotes who caused too much.
+  void charge(std::int64_t duration_ns, const Now& now);
+  /// Shortest time until somebody who is to blame has used up its allowance; nothing if nobody does or may.
+  [[nodiscard]] std::optional<std::int64_t> patience_ns(const Now& now);
+  /// Frame s = now.frame + 1 starts: notes which demoted clients do not keep up.
+  void frame_starts(const Now& now);
+  /// Demoted clients that kept up for 10 s are participants again; caught-up joiners count; the window
+  /// follows.
+  void refresh(const Now& now);
+
+  [[nodiscard]] std::uint32_t window() const { return window_; }
+  [[nodiscard]] std::uint32_t counted() const;
+  [[nodiscard]] std::uint32_t watching() const;  ///< playing and not counted
+  [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
+  [[nodiscard]] std::uint64_t seen() const { return seen_; }
+  [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
+  [[nodiscard]] std::vector<std::string>& notices() { return notices_; }
+
+ private:
+  Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
+  void note(const Account& account, std::string_view what);
+  [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
+    return account.applied + window_ >= now.frame + 1;
+  }
+  [[nodiscard]] bool blamed(const Account& account, const Now& now) const {
+    return account.counted && !keeps_up(account, now) && account.applied < now.written;
+  }
+
+  Rules rules_;
+  std::uint32_t window_;
+  std::map<transport::ClientId, Account>
+      accounts_;  // ordered, so that rules apply in the same order everywhere
+  std::uint64_t seen_ = 0, demotions_ = 0;
+  std::vector<std::string> notices_;
+};
+
+/// Sixteen hex digits, as ids are shown everywhere.
+[[nodiscard]] std::string client_name(transport::ClientId id);
+
+}  // namespace tandem::host

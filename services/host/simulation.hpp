@@ -1,0 +1,82 @@
+#pragma once
+// What the server needs from a full simulation. Engines implement this and see nothing else of Tandem.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace tandem::engine {
+
+using Vec3 = std::array<double, 3>;
+
+enum class InputKind : std::uint32_t {
+  kGravity = 1,       ///< values: x, y, z in scene units / s^2; changes the predicted step too
+  kPush = 2,          ///< values: centre x, y, z; radius; velocity change x, y, z
+  kApplication = 16,  ///< bytes whose meaning only the engine knows
+};
+
+struct Input {
+  std::uint32_t kind = 0;  ///< InputKind; unknown values are refused by classify()
+  std::vector<double> values;
+  std::vector<std::byte> bytes;
+};
+
+/// How an input takes effect (paper, section 4.2.1), and what it makes of the predicted step.
+struct Classification {
+  enum class Effect : std::uint8_t { kScheduled, kImmediate, kRefused };
+  Effect effect = Effect::kRefused;
+  std::string reason;        ///< kRefused: one line
+  Vec3 gravity{};            ///< kScheduled: scene units / s^2, in force from the frame the input acts on
+  double damping_per_s = 0;  ///< kScheduled
+};
+
+/// The bodies after a step, in slot order, structure of arrays, each `capacity` long; scene units and per
+/// second. Valid until the next step(). Values of dead slots are unspecified.
+struct Bodies {
+  std::array<std::span<const float>, 3> position;
+  std::array<std::span<const float>, 3> velocity;
+  std::span<const std::uint8_t> alive;
+  std::span<const std::uint16_t> type;
+};
+
+/// A change of a slot in the last step, ascending by slot; for one slot, despawned before spawned.
+struct Event {
+  enum class Kind : std::uint8_t { kDespawned, kSpawned, kTeleported, kTypeChanged };
+  Kind kind = Kind::kSpawned;
+  std::uint32_t slot = 0;
+};
+
+/// A full simulation. Deterministic: same inputs on the same frames give the same bodies to the last bit, on
+/// any number of threads. Called from one thread; it may use others inside step().
+class Simulation {
+ public:
+  virtual ~Simulation() = default;
+
+  [[nodiscard]] virtual std::uint32_t capacity() const = 0;
+  /// Seconds a step.
+  [[nodiscard]] virtual double dt_s() const = 0;
+  /// In force now: the drive of the next step unless an input changes it.
+  [[nodiscard]] virtual Vec3 gravity() const = 0;
+  [[nodiscard]] virtual double damping_per_s() const = 0;
+
+  /// Decides what an input is, without applying it. Refuses what is not finite or out of range.
+  [[nodiscard]] virtual Classification classify(const Input& input) const = 0;
+  /// Takes effect in the next step(). The last gravity wins. Only inputs that classify() did not refuse.
+  virtual void apply(const Input& input) = 0;
+  virtual void step() = 0;
+
+  [[nodiscard]] virtual Bodies bodies() const = 0;
+  [[nodiscard]] virtual std::span<const Event> events() const = 0;
+  /// Bodies in contact (with another body or with the scene) in the last step, for the paper's tables.
+  [[nodiscard]] virtual std::uint32_t colliding() const = 0;
+
+  /// Checkpoint: everything that decides the following steps. load() returns false and changes nothing when
+  /// the bytes are not a checkpoint of this simulation.
+  virtual void save(std::vector<std::byte>& out) const = 0;
+  [[nodiscard]] virtual bool load(std::span<const std::byte> bytes) = 0;
+};
+
+}  // namespace tandem::engine

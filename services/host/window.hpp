@@ -1,0 +1,49 @@
+#pragma once
+// How many frames the server may run beyond its slowest participant.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem::host {
+
+/// When each of the last frames was queued for publication: what acknowledgements are timed against.
+class PublishTimes {
+ public:
+  static constexpr std::size_t kFrames = 128;
+  void published(Frame frame, std::int64_t now_ns);
+  /// Nothing for frames that are too old or were not published.
+  [[nodiscard]] std::optional<std::int64_t> of(Frame frame) const;
+
+ private:
+  struct Entry {
+    Frame frame = 0;
+    std::int64_t at_ns = 0;
+  };
+  std::array<Entry, kFrames> entries_{};  // frame 0 is never published, so a zero entry matches nothing
+};
+
+/// Smoothed publish-to-acknowledgement time of one client and its deviation, estimated as TCP does (Jacobson
+/// 1988).
+class RoundTrip {
+ public:
+  void measured(std::int64_t duration_ns);
+  /// Smoothed + 4 deviations; 0 before the first measurement.
+  [[nodiscard]] std::int64_t high_ns() const { return known_ ? smoothed_ + 4 * deviation_ : 0; }
+
+ private:
+  bool known_ = false;
+  std::int64_t smoothed_ = 0;
+  std::int64_t deviation_ = 0;
+};
+
+inline constexpr std::uint32_t kSmallestWindow = 2;  ///< the paper's; automatic windows start here
+
+/// Frames that cover a round trip at one frame per `period_ns`, and one to spare; between kSmallestWindow and
+/// `ceiling`.
+[[nodiscard]] std::uint32_t window_for(std::int64_t round_trip_ns, std::int64_t period_ns,
+                                       std::uint32_t ceiling);
+
+}  // namespace tandem::host

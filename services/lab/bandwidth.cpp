@@ -1,0 +1,407 @@
+#include "services/lab/bandwidth.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <utility>
+
+#include "services/lab/cells.hpp"
+#include "services/lab/peers.hpp"
+
+namespace tandem::lab {
+namespace {
+
+constexpr Epoch kEpoch = 1;
+
+/// Durations of one kind; the median at the end.
+class Durations {
+ public:
+  void add(double ms) { ms_.push_back(static_cast<float>(ms)); }
+  [[nodiscard]] double median() {
+    if (ms_.empty()) return 0;
+    const auto middle = ms_.begin() + static_cast<std::ptrdiff_t>(ms_.size() / 2);
+    std::nth_element(ms_.begin(), middle, ms_.end());
+    return *middle;
+  }
+
+ private:
+  std::vector<float> ms_;
+};
+
+/// Euclidean distances of what a client shows to the simulation's floats, over all bodies that are shown.
+class Errors {
+ public:
+  /// `shown(channel, body)` in scene units.
+  template <class Shown>
+  void add(std::span<const std::uint8_t> alive, const engine::Bodies& bodies, const Shown& shown) {
+    for (std::size_t body = 0; body < alive.size(); ++body) {
+      if (alive[body] == 0) continue;
+      double squared = 0;
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        const double off = shown(channel, body) - double{bodies.position[channel][body]};
+        squared += off * off;
+      }
+      max_squared_ = std::max(max_squared_, squared);
+      sum_squared_ += squared;
+      ++body_frames_;
+    }
+  }
+  void fill(BandwidthRow& row) const {
+    row.max_error = std::sqrt(max_squared_);
+    if (body_frames_ > 0) row.rms_error = std::sqrt(sum_squared_ / static_cast<double>(body_frames_));
+  }
+
+ private:
+  double max_squared_ = 0, sum_squared_ = 0;
+  std::uint64_t body_frames_ = 0;
+};
+
+/// How far corrections move bodies at once: what somebody sees who shows a client's state as it is.
+class Snaps {
+ public:
+  /// The state of the frame before its delta.
+  void before(const State& predicted) {
+    for (std::size_t i = 0; i < kPositionChannels; ++i)
+      before_[i].assign(predicted.p(i).begin(), predicted.p(i).end());
+  }
+  /// And after it. `renewed`: bodies that are new or jumped, which is no correction.
+  void after(const State& agreed, std::span<const Slot> touched, std::span<const LifecycleRecord> renewed) {
+    for (const Slot slot : touched) {
+      if (std::ranges::any_of(renewed, [slot](const auto& record) { return record.slot == slot; })) continue;
+      const double squared =
+          static_cast<double>(distance_squared({before_[0][slot], before_[1][slot], before_[2][slot]},
+                                               {agreed.p(0)[slot], agreed.p(1)[slot], agreed.p(2)[slot]}));
+      max_squared_ = std::max(max_squared_, squared);
+      sum_squared_ += squared;
+      ++count_;
+    }
+  }
+  void fill(BandwidthRow& row, double unit) const {
+    row.max_snap = std::sqrt(max_squared_) * unit;
+    if (count_ > 0) row.rms_snap = std::sqrt(sum_squared_ / static_cast<double>(count_)) * unit;
+  }
+
+ private:
+  std::array<std::vector<std::int32_t>, kPositionChannels> before_;
+  double max_squared_ = 0, sum_squared_ = 0;
+  std::uint64_t count_ = 0;
+};
+
+/// One session's server and client, and what they were seen to do.
+struct Lane {
+  Lane(const host::HostConfig& config, std::unique_ptr<CodeAccount> books, ServerTimeline server_side,
+       ClientTimeline client_side, std::uint32_t bodies)
+      : session(&config),
+        account(std::move(books)),
+        server(std::move(server_side)),
+        client(std::move(client_side)),
+        parameters(config.parameters) {
+    if (!config.gains) return;
+    gains = std::make_unique<host::GainControl>(*config.gains, bodies, parameters);
+    server.set_evidence(&gains->evidence());
+  }
+
+  const host::HostConfig* session;
+  std::unique_ptr<CodeAccount> account;
+  ServerTimeline server;
+  ClientTimeline client;
+  std::vector<std::uint32_t> bytes;
+  std::uint64_t corrected = 0;
+  CodecParameters parameters;
+  std::unique_ptr<host::GainControl> gains;  // stays where it is, with its evidence
+  Errors errors;
+  Snaps snaps;
+  Durations predict, encode, decode, apply;
+};
+
+Result<Lane> make_lane(const host::HostConfig& session, const Replay& replay) {
+  TimelineConfig config = host::timeline_config(session, replay.simulation().capacity());
+  auto account = std::make_unique<CodeAccount>();
+  config.account = account.get();
+  auto server = ServerTimeline::create(config, kEpoch);
+  if (!server) return tl::unexpected(server.error());
+  config.account = nullptr;
+  auto client = ClientTimeline::create(config);
+  if (!client) return tl::unexpected(client.error());
+  server->set_clock(&steady_ns);
+  client->set_clock(&steady_ns);
+  server->start(0, replay.target(), replay.start_drive());
+  std::vector<std::byte> snapshot;
+  server->snapshot(snapshot);
+  if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
+  return Lane(session, std::move(account), std::move(*server), std::move(*client),
+              replay.simulation().capacity());
+}
+
+/// One frame of one session: the server's half, then the client's.
+Result<void> advance(Lane& lane, const Replay& replay) {
+  for (const ScheduledDrive& input : replay.scheduled()) {
+    auto scheduled = lane.server.schedule(input).and_then([&] { return lane.client.schedule(input); });
+    if (!scheduled) return scheduled;
+  }
+  const ServerTimeline::FrameResult frame =
+      lane.server.advance(replay.target(), replay.lifecycle(), lane.session->budget);
+  lane.predict.add(frame.predict_ms);
+  lane.encode.add(frame.encode_ms + replay.mirror_ms());
+  lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
+  lane.corrected += frame.corrected;
+  if (lane.gains && lane.gains->after_frame(lane.parameters)) lane.server.set_parameters(lane.parameters);
+
+  lane.client.step(1);
+  lane.snaps.before(lane.client.state(frame.frame));
+  auto applied = lane.client.apply(frame.frame, frame.last_input, frame.hash, frame.payload);
+  lane.decode.add(lane.client.timings().decode_ms);
+  lane.apply.add(lane.client.timings().apply_ms);
+  if (!applied) return applied;
+  const State& agreed = lane.client.state(frame.frame);
+  lane.snaps.after(agreed, lane.client.touched(), replay.lifecycle());
+  const double unit = lane.session->lattice.unit;
+  lane.errors.add(agreed.alive(), replay.simulation().bodies(),
+                  [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; });
+  return {};
+}
+
+/// Bits of all decisions at the best fixed probability of each context.
+double conditional_entropy(const CodeAccount& account) {
+  double bits = 0;
+  for (const auto& [zeros, ones] : account.decisions) {
+    const auto all = static_cast<double>(zeros + ones);
+    for (const std::uint64_t some : {zeros, ones}) {
+      if (some != 0) bits += static_cast<double>(some) * std::log2(all / static_cast<double>(some));
+    }
+  }
+  return bits;
+}
+
+/// What a lane measured over `frames` frames.
+BandwidthRow row_of(Lane& lane, double frames) {
+  const host::HostConfig& session = *lane.session;
+  BandwidthRow row;
+  row.codec = session.codec;
+  row.predictor = session.predictor;
+  row.parameters = lane.parameters;
+  row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
+  row.bytes = std::move(lane.bytes);
+  if (!lane.account->decisions.empty()) {
+    const double per_s = frames * session.lattice.dt_s * kBitsPerMbit;
+    row.ideal_mbit_per_s = lane.account->ideal_bits / per_s;
+    row.bound_mbit_per_s = conditional_entropy(*lane.account) / per_s;
+  }
+  lane.errors.fill(row);
+  lane.snaps.fill(row, session.lattice.unit);
+  row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
+  row.predict_ms = lane.predict.median();
+  row.encode_ms = lane.encode.median();
+  row.decode_ms = lane.decode.median();
+  row.apply_ms = lane.apply.median();
+  return row;
+}
+
+/// A peer at work.
+struct PeerLane {
+  const PeerKind* kind = nullptr;
+  std::unique_ptr<Peer> peer;
+  std::array<std::vector<double>, 3> seen;
+  std::vector<std::uint32_t> bytes;
+  Errors errors;
+};
+
+Result<std::size_t> send(PeerLane& lane, const engine::Bodies& bodies) {
+  auto size = lane.peer->send(bodies, lane.seen);
+  if (!size) return fail(size.error().code, fmt::format("{}: {}", lane.kind->name, size.error().message));
+  return size;
+}
+
+/// The start state is free, as a session's snapshot is.
+Result<std::vector<PeerLane>> make_peers(const PeerSetting& setting, const engine::Bodies& start) {
+  std::vector<PeerLane> lanes;
+  for (const PeerKind& kind : peer_kinds()) {
+    PeerLane& lane = lanes.emplace_back();
+    lane.kind = &kind;
+    if (kind.make == nullptr) continue;
+    lane.peer = kind.make(setting);
+    for (auto& column : lane.seen) column.resize(setting.bodies);
+    if (auto sent = send(lane, start); !sent) return tl::unexpected(sent.error());
+  }
+  return lanes;
+}
+
+Result<void> advance(PeerLane& lane, const engine::Bodies& bodies) {
+  if (!lane.peer) return {};
+  return send(lane, bodies).map([&](std::size_t size) {
+    lane.bytes.push_back(static_cast<std::uint32_t>(size));
+    lane.errors.add(bodies.alive, bodies,
+                    [&](std::size_t channel, std::size_t body) { return lane.seen[channel][body]; });
+  });
+}
+
+BandwidthRow row_of(PeerLane& lane, double dt_s) {
+  BandwidthRow row;
+  row.codec = lane.kind->name;
+  if (!lane.peer) {
+    row.missing = lane.kind->missing;
+    return row;
+  }
+  row.mbit_per_s = mbit_per_s(lane.bytes, dt_s);
+  row.bytes = std::move(lane.bytes);
+  lane.errors.fill(row);
+  return row;
+}
+
+}  // namespace
+
+double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
+  const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
+  return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s / kBitsPerMbit;
+}
+
+Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
+                                                    std::span<const host::HostConfig> sessions,
+                                                    std::uint64_t frames,
+                                                    const std::function<void(Frame)>& progress,
+                                                    std::optional<double> peer_threshold) {
+  const double dt_s = replay.simulation().dt_s();
+  std::vector<Lane> lanes;
+  lanes.reserve(sessions.size());
+  for (const host::HostConfig& session : sessions) {
+    auto lane = make_lane(session, replay);
+    if (!lane)
+      return fail(lane.error().code, fmt::format("codec {}: {}", session.codec, lane.error().message));
+    lanes.push_back(std::move(*lane));
+  }
+  std::vector<PeerLane> peers;
+  if (peer_threshold) {
+    auto made =
+        make_peers({replay.simulation().capacity(), *peer_threshold, dt_s}, replay.simulation().bodies());
+    if (!made) return tl::unexpected(made.error());
+    peers = std::move(*made);
+  }
+  Durations step;
+  std::vector<std::uint32_t> colliding;
+  for (Frame frame = 1; frame <= frames; ++frame) {
+    if (auto stepped = replay.next(); !stepped) return tl::unexpected(stepped.error());
+    step.add(replay.step_ms());
+    colliding.push_back(replay.simulation().colliding());
+    for (Lane& lane : lanes) {
+      if (auto advanced = advance(lane, replay); !advanced) {
+        return fail(advanced.error().code, fmt::format("codec {}, frame {}: {}", lane.session->codec, frame,
+                                                       advanced.error().message));
+      }
+    }
+    for (PeerLane& peer : peers) {
+      if (auto advanced = advance(peer, replay.simulation().bodies()); !advanced)
+        return tl::unexpected(advanced.error());
+    }
+    progress(frame);
+  }
+
+  const double step_ms = step.median();
+  std::vector<BandwidthRow> rows;
+  rows.reserve(lanes.size() + peers.size());
+  for (Lane& lane : lanes) rows.push_back(row_of(lane, static_cast<double>(frames)));
+  for (PeerLane& peer : peers) rows.push_back(row_of(peer, dt_s));
+  const auto contacts = std::accumulate(colliding.begin(), colliding.end(), std::uint64_t{0});
+  for (BandwidthRow& row : rows) {
+    row.bodies = replay.simulation().capacity();
+    row.frames = frames;
+    row.dt_s = dt_s;
+    row.lattice_unit = sessions.empty() ? 0 : sessions.front().lattice.unit;
+    row.colliding_per_frame = static_cast<double>(contacts) / static_cast<double>(frames);
+    row.colliding = colliding;
+    row.step_ms = step_ms;
+  }
+  return rows;
+}
+
+namespace {
+
+std::optional<double> mbit_in_paper(const BandwidthRow& row) {
+  return row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt;
+}
+
+std::optional<double> colliding_in_paper(const BandwidthRow& row) {
+  return row.number ? paper_colliding_per_frame(*row.number, row.bodies) : std::nullopt;
+}
+
+}  // namespace
+
+std::string to_json(std::span<const BandwidthRow> rows) {
+  using Json = nlohmann::ordered_json;
+  Json list = Json::array();
+  for (const BandwidthRow& row : rows) {
+    const auto measured = [&](double value) { return row.missing.empty() ? Json(value) : Json(nullptr); };
+    const bool is_peer = row.predictor.empty() && !row.codec.empty();
+    const auto ours = [&](double value) { return is_peer ? Json(nullptr) : Json(value); };
+    list.push_back({{"scene", row.scene},
+                    {"number", json_of(row.number)},
+                    {"bodies", row.bodies},
+                    {"codec", row.codec},
+                    {"predictor", row.predictor},
+                    {"decay", ours(row.parameters.decay / 65536.0)},
+                    {"velocity_gain", ours(row.parameters.velocity_gain / 32768.0)},
+                    {"acceleration_gain", ours(row.parameters.acceleration_gain / 65536.0)},
+                    {"threads", row.threads},
+                    {"seed", row.seed},
+                    {"frames", row.frames},
+                    {"dt_s", row.dt_s},
+                    {"threshold", row.threshold},
+                    {"lattice_unit", row.lattice_unit},
+                    {"mbit_per_s", measured(row.mbit_per_s)},
+                    {"paper_mbit_per_s", json_of(mbit_in_paper(row))},
+                    {"ideal_mbit_per_s", json_of(row.ideal_mbit_per_s)},
+                    {"bound_mbit_per_s", json_of(row.bound_mbit_per_s)},
+                    {"max_error", measured(row.max_error)},
+                    {"rms_error", measured(row.rms_error)},
+                    {"max_snap", ours(row.max_snap)},
+                    {"rms_snap", ours(row.rms_snap)},
+                    {"corrected_per_frame", ours(row.corrected_per_frame)},
+                    {"colliding_per_frame", json_of(row.colliding_per_frame)},
+                    {"paper_colliding_per_frame", json_of(colliding_in_paper(row))},
+                    {"step_ms", row.step_ms},
+                    {"predict_ms", ours(row.predict_ms)},
+                    {"encode_ms", ours(row.encode_ms)},
+                    {"decode_ms", ours(row.decode_ms)},
+                    {"apply_ms", ours(row.apply_ms)},
+                    {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});
+  }
+  return Json{{"rows", list}}.dump();
+}
+
+std::string to_table(std::span<const BandwidthRow> rows) {
+  std::string text = fmt::format(
+      "{:<12} {:>7} {:<10} {:<9} {:>8} {:>7} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} "
+      "{:>8} "
+      "{:>8} "
+      "{:>8}\n",
+      "scene", "bodies", "codec", "predictor", "Mbit/s", "paper", "bound", "max err", "rms err", "threshold",
+      "rms snap", "corrected", "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
+  for (const BandwidthRow& row : rows) {
+    if (!row.missing.empty()) {
+      text += fmt::format("{:<12} {:>7} {:<10} not in this build: {} was missing\n", row.scene, row.bodies,
+                          row.codec, row.missing);
+      continue;
+    }
+    if (row.predictor.empty()) {
+      text += fmt::format("{:<12} {:>7} {:<10} {:<9} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n",
+                          row.scene, row.bodies, row.codec, "-", row.mbit_per_s, "-", "-", row.max_error,
+                          row.rms_error, row.threshold);
+      continue;
+    }
+    text += fmt::format(
+        "{:<12} {:>7} {:<10} {:<9} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} "
+        "{:>7} "
+        "{:>8.3f} "
+        "{:>8.3f} "
+        "{:>8.3f} {:>8.3f} {:>8.3f}\n",
+        row.scene, row.bodies, row.codec, row.predictor, row.mbit_per_s, rounded(mbit_in_paper(row), 2),
+        rounded(row.bound_mbit_per_s, 3), row.max_error, row.rms_error, row.threshold, row.rms_snap,
+        row.corrected_per_frame, rounded(row.colliding_per_frame, 0), rounded(colliding_in_paper(row), 0),
+        row.step_ms, row.predict_ms, row.encode_ms, row.decode_ms, row.apply_ms);
+  }
+  return text;
+}
+
+}  // namespace tandem::lab

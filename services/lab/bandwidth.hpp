@@ -1,0 +1,64 @@
+#pragma once
+// What `tandem bench bandwidth` measures: codecs side by side over one trajectory, without a network.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "services/host/host.hpp"
+#include "services/lab/paper_numbers.hpp"
+#include "services/lab/replay.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// One row of the result: a scene, a size and a codec. Times are medians over the frames.
+struct BandwidthRow {
+  std::string scene;
+  std::optional<int> number;  ///< of the paper's scene, 1..5
+  std::uint32_t bodies = 0;
+  std::string codec, predictor;
+  CodecParameters parameters;  ///< at the end
+  std::uint32_t threads = 1;
+  std::uint64_t seed = 0;
+  std::uint64_t frames = 0;
+  double dt_s = 0;                         ///< a frame
+  double threshold = 0;                    ///< scene units
+  double lattice_unit = 0;                 ///< scene units; the error may reach threshold and one of these
+  double mbit_per_s = 0;                   ///< payload only, at the nominal rate; 2^20 bits to the Mbit
+  std::optional<double> ideal_mbit_per_s;  ///< code length of adaptive models, without rounding and headers
+  std::optional<double> bound_mbit_per_s;  ///< their decisions at the best fixed probability of each context
+  double max_error = 0, rms_error = 0;     ///< scene units; agreed state against the simulation's floats
+  double max_snap = 0, rms_snap = 0;       ///< scene units; how far a correction moves a body at once
+  double corrected_per_frame = 0;          ///< bodies
+  std::optional<double> colliding_per_frame;  ///< bodies; not known for recorded trajectories
+  double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;
+  std::string missing;                   ///< not empty: nothing was measured, for want of this Debian package
+  std::vector<std::uint32_t> bytes;      ///< payload of each frame
+  std::vector<std::uint32_t> colliding;  ///< bodies in contact in each frame
+};
+
+/// Mean of frames of `dt_s` seconds, not none.
+[[nodiscard]] double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s);
+
+/// Runs `replay` for `frames` frames. In each of `sessions`, which differ in codec and predictor and share
+/// the replay's lattice, a server's timeline encodes every frame, and a client's timeline decodes it and
+/// checks the hash. Fills the measured fields of a row per session; `progress` gets the frame. Errors: what
+/// the timelines and the replay refuse; kMismatch when a client's state ever differs. With a `peer_threshold`
+/// (scene units) rows of all peers follow, at that largest error on the same frames.
+[[nodiscard]] Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
+                                                                  std::span<const host::HostConfig> sessions,
+                                                                  std::uint64_t frames,
+                                                                  const std::function<void(Frame)>& progress,
+                                                                  std::optional<double> peer_threshold = {});
+
+/// {"rows": [...]}, one line.
+[[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows);
+/// A table for people, with the paper's numbers beside ours.
+[[nodiscard]] std::string to_table(std::span<const BandwidthRow> rows);
+
+}  // namespace tandem::lab

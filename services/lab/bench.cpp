@@ -1,0 +1,64 @@
+#include "services/lab/bench.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+namespace tandem::lab {
+
+int report(const std::string& command, const Error& error) {
+  fmt::print(stderr, "tandem {}: {}\n", command, error.message);
+  return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
+}
+
+std::vector<std::string> paper_scenes() {
+  return {"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"};
+}
+
+Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names) {
+  std::vector<scenes::Scene> loaded;
+  for (const std::string& name : names == std::vector<std::string>{"all"} ? paper_scenes() : names) {
+    auto scene = scenes::load_scene(name);
+    if (!scene) return tl::unexpected(scene.error());
+    loaded.push_back(std::move(*scene));
+  }
+  return loaded;
+}
+
+void add_scene_option(CLI::App& command, std::vector<std::string>& scenes) {
+  command.add_option("--scene", scenes, "Scenes by name or file, separated by commas; all: the paper's five")
+      ->delimiter(',')
+      ->required();
+}
+
+void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
+  command.add_option("--bodies", bodies, "Numbers of bodies, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::Range(1U, scenes::kMaxBodies))
+      ->capture_default_str();
+}
+
+void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice) {
+  const auto positive = CLI::Range(std::numeric_limits<double>::min(), 1e6);
+  CLI::Option* length = command.add_option("--threshold", choice.threshold_m,
+                                           "Error threshold, scene units (default: the scene's)");
+  length->check(positive);
+  command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
+      ->check(positive)
+      ->excludes(length);
+}
+
+void add_bench(CLI::App& app, Run& run) {
+  CLI::App* bench = app.add_subcommand(
+      "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine.");
+  bench->require_subcommand(1);
+  add_bandwidth(*bench, run);
+  add_train(*bench, run);
+  add_memory(*bench, run);
+  add_engine(*bench, run);
+  add_framerate(*bench, run);
+}
+
+}  // namespace tandem::lab

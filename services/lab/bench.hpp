@@ -1,0 +1,34 @@
+#pragma once
+// The subcommands of `tandem bench` and what they share with `tandem export`.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "services/lab/commands.hpp"
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+
+namespace tandem::lab {
+
+void add_bandwidth(CLI::App& bench, Run& run);
+void add_train(CLI::App& bench, Run& run);
+void add_memory(CLI::App& bench, Run& run);
+void add_engine(CLI::App& bench, Run& run);
+void add_framerate(CLI::App& bench, Run& run);
+
+/// Prints the error to stderr; the exit code: 2 when the caller named something that does not exist or is out
+/// of range, else 1.
+int report(const std::string& command, const Error& error);
+
+/// The scenes of the paper, in the order of their numbers.
+[[nodiscard]] std::vector<std::string> paper_scenes();
+/// Loads the scenes of a --scene flag: names, files, or "all" for the paper's. Errors: those of load_scene().
+[[nodiscard]] Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names);
+
+/// Flags that several subcommands have.
+void add_scene_option(CLI::App& command, std::vector<std::string>& scenes);
+void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies);
+void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice);
+
+}  // namespace tandem::lab

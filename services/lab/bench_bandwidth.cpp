@@ -1,0 +1,271 @@
+// `tandem bench bandwidth`: the paper's table 5.3 and everything like it.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "services/lab/bandwidth.hpp"
+#include "services/lab/bandwidth_report.hpp"
+#include "services/lab/bench.hpp"
+#include "services/lab/train.hpp"
+#include "services/lab/trajectory.hpp"
+#include "services/tool/progress.hpp"
+
+namespace tandem::lab {
+namespace {
+
+struct BandwidthOptions {
+  std::vector<std::string> scenes;
+  std::vector<std::uint32_t> bodies{10000};
+  std::uint64_t frames = 1000;
+  std::vector<std::string> codecs;
+  std::string trajectory;
+  sessions::SessionChoice choice;
+  SceneRun run;
+  bool json = false;
+  bool peers = false;
+  std::string report;
+  unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
+};
+
+/// One scene at one size.
+struct Job {
+  const scenes::Scene* scene;
+  std::uint32_t bodies;
+};
+
+/// All codecs over one source; the rows lack only what the scene does not know.
+Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& source,
+                                          const BandwidthOptions& options, std::uint64_t frames,
+                                          const std::function<void(Frame)>& progress) {
+  sessions::SessionChoice choice = options.choice;
+  choice.bodies = source.simulation->capacity();
+  choice.threads = options.run.threads;
+  std::vector<host::HostConfig> sessions;
+  for (const std::string& codec : options.codecs) {
+    choice.codec = codec;
+    // The paper's codecs are what tracker is compared with: always as the paper has them.
+    choice.predictor = codec == "tracker" ? options.choice.predictor : "ballistic";
+    auto session = sessions::plan_session(scene, choice);
+    if (!session) return tl::unexpected(session.error());
+    sessions.push_back(std::move(*session));
+  }
+  auto replay = Replay::create(*source.simulation, std::move(source.script), sessions[0].lattice,
+                               static_cast<TypeId>(scene.types.size()));
+  if (!replay) return tl::unexpected(replay.error());
+  const double threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  auto rows = measure_bandwidth(*replay, sessions, frames, progress,
+                                options.peers ? std::optional(threshold) : std::nullopt);
+  if (!rows) return rows;
+  for (BandwidthRow& row : *rows) {
+    row.scene = scene.name;
+    row.threshold = threshold;
+  }
+  return rows;
+}
+
+Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, const BandwidthOptions& options,
+                                                std::uint32_t bodies,
+                                                const std::function<void(Frame)>& progress) {
+  SceneRun run = options.run;
+  run.bodies = bodies;
+  run.frames = options.frames;
+  auto source = make_source(scene, run);
+  if (!source) return tl::unexpected(source.error());
+  auto rows = measure(scene, *source, options, options.frames, progress);
+  if (!rows) return rows;
+  // With another number of users it is not the scene of the paper's table.
+  const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
+  for (BandwidthRow& row : *rows) {
+    if (as_in_paper) row.number = static_cast<int>(scene.number);
+    row.threads = run.threads;
+    row.seed = run.seed;
+  }
+  return rows;
+}
+
+/// What a session needs to know about a trajectory, in the shape of a scene. Errors: kMalformed where
+/// the scene that it names is none.
+Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
+  scenes::Scene scene;
+  scene.name = path;
+  scene.dt_s = trajectory.dt_s();
+  scene.threshold_m = trajectory.info().threshold;
+  // A file without any motion has no extent of its own.
+  scene.extent_m = std::max(trajectory.position_bound(), trajectory.info().threshold);
+  scene.types.resize(1);
+  if (trajectory.info().scene.empty()) return scene;
+  auto named = scenes::load_scene(trajectory.info().scene);
+  if (!named) {
+    return fail(ErrorCode::kMalformed,
+                fmt::format("{}: \"scene\": {}", sidecar_path(path).value(), named.error().message));
+  }
+  scene.extent_m = std::max(scene.extent_m, named->extent_m);
+  scene.world = std::move(named->world);
+  // A recording does not say which body is of which type.
+  scene.world.types.resize(1);
+  return scene;
+}
+
+/// The tiers that compute contacts need to know what the bodies are and where the walls stand.
+Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const BandwidthOptions& options) {
+  const std::string& predictor = options.choice.predictor;
+  const bool asked = (predictor == "field" || predictor == "contact") &&
+                     std::ranges::find(options.codecs, "tracker") != options.codecs.end();
+  if (!asked || !trajectory.info().scene.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("{}: no \"scene\"; --predictor {} needs one for radius, materials and walls (see "
+                          "`tandem export --help`)",
+                          sidecar_path(options.trajectory).value(), predictor));
+}
+
+/// There is no other run to train on, so a trajectory trains the paper's codecs itself, in their favour.
+Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& options) {
+  const auto make = [&] {
+    return RecordedTrajectory::open(options.trajectory)
+        .map([](std::unique_ptr<RecordedTrajectory>&& trajectory) {
+          return Source{std::move(trajectory), {}};
+        });
+  };
+  const auto opened = RecordedTrajectory::open(options.trajectory);
+  if (!opened) return tl::unexpected(opened.error());
+  if (auto known = check_world_is_known(**opened, options); !known) return tl::unexpected(known.error());
+  auto scene_or = scene_of(**opened, options.trajectory);
+  if (!scene_or) return tl::unexpected(scene_or.error());
+  scenes::Scene& scene = *scene_or;
+  const std::uint64_t frames = std::min(options.frames, (*opened)->frames());
+  sessions::SessionChoice choice = options.choice;
+  choice.bodies = (*opened)->capacity();
+  {
+    tool::Progress progress(fmt::format("{}: training, frame", options.trajectory), kTrainingPasses * frames);
+    auto table = train(scene, choice, make, frames, [&](Frame frame) { progress.at(frame); });
+    if (!table) return fail(table.error().code, options.trajectory + ": " + table.error().message);
+    scene.trained = {std::move(*table)};
+  }
+  auto source = make();
+  if (!source) return tl::unexpected(source.error());
+  tool::Progress progress(fmt::format("{}: frame", options.trajectory), frames);
+  auto rows = measure(scene, *source, options, frames, [&](Frame frame) { progress.at(frame); });
+  if (!rows) return rows;
+  for (BandwidthRow& row : *rows) row.colliding_per_frame.reset();
+  return rows;
+}
+
+/// Jobs run beside each other; their rows come in the order of the jobs.
+Result<std::vector<BandwidthRow>> measure_jobs(std::span<const Job> jobs, const BandwidthOptions& options) {
+  std::vector<Result<std::vector<BandwidthRow>>> results(jobs.size());
+  std::atomic<std::size_t> next = 0;
+  std::atomic<bool> failed = false;
+  std::mutex mutex;
+  std::uint64_t done = 0;
+  tool::Progress progress(fmt::format("{} runs: frame", jobs.size()), jobs.size() * options.frames);
+  const auto one_frame = [&](Frame) {
+    const std::lock_guard lock(mutex);
+    progress.at(++done);
+  };
+  const auto work = [&] {
+    for (std::size_t job = next++; job < jobs.size() && !failed; job = next++) {
+      results[job] = measure_scene(*jobs[job].scene, options, jobs[job].bodies, one_frame);
+      if (!results[job]) failed = true;
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t i = 1; i < std::min<std::size_t>(options.jobs, jobs.size()); ++i)
+      workers.emplace_back(work);
+    work();
+  }
+  std::vector<BandwidthRow> rows;
+  for (auto& result : results) {
+    if (!result) return result;
+    std::move(result->begin(), result->end(), std::back_inserter(rows));
+  }
+  return rows;
+}
+
+Result<std::vector<BandwidthRow>> measure_all(const BandwidthOptions& options) {
+  if (!options.trajectory.empty()) return measure_trajectory(options);
+  auto scenes = load_scenes(options.scenes);
+  if (!scenes) return tl::unexpected(scenes.error());
+  std::vector<Job> jobs;
+  for (const scenes::Scene& scene : *scenes) {
+    for (const std::uint32_t bodies : options.bodies) jobs.push_back({&scene, bodies});
+  }
+  return measure_jobs(jobs, options);
+}
+
+int run_bandwidth(const BandwidthOptions& options) {
+  const auto rows = measure_all(options);
+  if (!rows) return report("bench bandwidth", rows.error());
+  if (!options.report.empty()) {
+    if (const auto written = write_report(options.report, *rows); !written)
+      return report("bench bandwidth", written.error());
+  }
+  fmt::print("{}{}", options.json ? to_json(*rows) : to_table(*rows), options.json ? "\n" : "");
+  return 0;
+}
+
+}  // namespace
+
+void add_bandwidth(CLI::App& bench, Run& run) {
+  CLI::App* command = bench.add_subcommand(
+      "bandwidth", "Codecs side by side over the same trajectory; a decoder checks every frame's hash.");
+  const auto options = std::make_shared<BandwidthOptions>();
+  for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
+  add_scene_option(*command, options->scenes);
+  add_bodies_option(*command, options->bodies);
+  command->get_option("--scene")->required(false);
+  command->add_option("--frames", options->frames, "Frames, from the start block on")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
+      ->capture_default_str();
+  command->add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember(options->codecs));
+  command
+      ->add_option("--predictor", options->choice.predictor,
+                   "Predicted step of `tracker`: ballistic, field, contact, or auto; the paper's codecs have "
+                   "ballistic")
+      ->check(CLI::IsMember({"auto", "ballistic", "field", "contact"}))
+      ->capture_default_str();
+  command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
+      ->capture_default_str();
+  add_threshold_options(*command, options->choice);
+  command->add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+      ->check(CLI::Range(1U, scenes::kMaxUsers));
+  command
+      ->add_option(
+          "--budget", options->choice.budget_bytes,
+          "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
+      ->check(CLI::Range(sessions::kLeastBudgetBytes, std::size_t{1} << 30U));
+  command
+      ->add_option("--trajectory", options->trajectory,
+                   "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
+      ->excludes("--scene", "--bodies", "--seed", "--users");
+  command->add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_flag("--peers", options->peers,
+                    "Also Draco, zfp, zstd and dead reckoning (DIS), at the threshold as the largest error");
+  command->add_option("--report", options->report,
+                      "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
+  command->add_flag("--json", options->json, "One JSON object: rows[...]");
+  command->footer(
+      "bound: Mbit/s of tracker's decisions at the best fixed probability of each context.\n"
+      "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.\n"
+      "Bits and errors are the same on any number of --threads and --jobs; times are quiet with --jobs 1.");
+  command->callback([options, &run] {
+    if (options->scenes.empty() && options->trajectory.empty())
+      throw CLI::RequiredError("--scene or --trajectory");
+    run = [options] { return run_bandwidth(*options); };
+  });
+}
+
+}  // namespace tandem::lab

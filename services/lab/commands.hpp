@@ -1,0 +1,14 @@
+#pragma once
+// The subcommands of `tandem` for evaluation.
+
+#include "services/tool/commands.hpp"
+
+namespace tandem::lab {
+
+using tool::Run;
+
+/// As those in services/tool/commands.hpp.
+void add_bench(CLI::App& app, Run& run);
+void add_export(CLI::App& app, Run& run);
+
+}  // namespace tandem::lab

@@ -1,0 +1,86 @@
+// `tandem export`: the full simulation's trajectory as X.npy and X.json.
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "services/lab/bench.hpp"
+#include "services/lab/scene_source.hpp"
+#include "services/lab/trajectory.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "services/tool/progress.hpp"
+
+namespace tandem::lab {
+namespace {
+
+struct ExportOptions {
+  std::string scene;
+  SceneRun run;
+  std::string out;
+};
+
+Result<void> export_trajectory(const ExportOptions& options) {
+  const auto scene = scenes::load_scene(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
+  auto source = make_source(*scene, options.run);
+  if (!source) return tl::unexpected(source.error());
+  sessions::SessionChoice choice;
+  choice.bodies = options.run.bodies;
+  const auto session = sessions::plan_session(*scene, choice);
+  if (!session) return tl::unexpected(session.error());
+  auto writer = TrajectoryWriter::create(options.out, options.run.bodies);
+  if (!writer) return tl::unexpected(writer.error());
+  auto replay = Replay::create(*source->simulation, std::move(source->script), session->lattice,
+                               static_cast<TypeId>(session->types.size()));
+  if (!replay) return tl::unexpected(replay.error());
+  TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m,
+                      {},          options.scene};
+  // A scene by its path is found from everywhere.
+  if (scene->path == options.scene) info.scene = std::filesystem::absolute(scene->path).string();
+  tool::Progress progress(fmt::format("{}, {} bodies: frame", scene->name, options.run.bodies),
+                          options.run.frames);
+  for (Frame frame = 0;; ++frame) {
+    info.gravity.push_back(replay->simulation().gravity());
+    if (auto appended = writer->append(replay->simulation().bodies()); !appended) return appended;
+    if (frame == options.run.frames) break;
+    if (auto stepped = replay->next(); !stepped) return stepped;
+    progress.at(frame);
+  }
+  return writer->finish(info);
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, Run& run) {
+  CLI::App* command = app.add_subcommand(
+      "export",
+      "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity), and X.json.");
+  command->footer(kTrajectoryFormat);
+  const auto options = std::make_shared<ExportOptions>();
+  options->run.bodies = 10000;
+  options->run.frames = 1000;
+  command->add_option("--scene", options->scene, "Scene by name or file")->required();
+  command->add_option("--bodies", options->run.bodies, "Number of bodies")
+      ->check(CLI::Range(1U, scenes::kMaxBodies))
+      ->capture_default_str();
+  command->add_option("--frames", options->run.frames, "Frames after the start")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
+      ->capture_default_str();
+  command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
+      ->capture_default_str();
+  command->add_option("--threads", options->run.threads, "Of the engine")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+      ->check(CLI::Range(1U, scenes::kMaxUsers));
+  command->add_option("--out", options->out, "The .npy file; the .json beside it")->required();
+  command->callback([options, &run] {
+    run = [options] {
+      const auto exported = export_trajectory(*options);
+      return exported ? 0 : report("export", exported.error());
+    };
+  });
+}
+
+}  // namespace tandem::lab

@@ -1,0 +1,192 @@
+// `tandem bench framerate`: updates a second of a user behind a slow link, as in the thesis's table 5.6.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <sstream>
+
+#include "services/lab/bench.hpp"
+#include "services/lab/framerate/enclave.hpp"
+#include "services/lab/framerate/framerate.hpp"
+#include "services/lab/paper_numbers.hpp"
+
+namespace tandem::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kCommand = "bench framerate";
+// What the thesis's phone did with the full simulation of its first scene with 10,000 bodies.
+constexpr double kPhoneUpdatesPerS = 4.4;
+
+std::atomic<bool> stopped = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+struct FramerateOptions {
+  std::vector<std::string> scenes{"half_pipe"};
+  std::vector<std::uint32_t> bodies{10000};
+  std::vector<std::string> methods{std::string(kClientOnly), "none", "entropy", "limited", "tracker"};
+  std::string device = "thin";
+  std::string tandemd;
+  std::uint32_t users = 0;
+  FramerateSetup setup;
+  double delay_ms = 5, queue_ms = 50;
+  bool json = false;
+};
+
+/// `tandemd` beside this program, as installed and as built, or else in PATH.
+std::string find_server(const fs::path& self) {
+  std::vector<fs::path> places{self.parent_path() / "tandemd", self.parent_path() / "../server/tandemd"};
+  const char* const search = std::getenv("PATH");
+  std::istringstream folders(search == nullptr ? "" : search);
+  for (std::string folder; std::getline(folders, folder, ':');)
+    places.push_back(fs::path(folder) / "tandemd");
+  const auto found = std::find_if(places.begin(), places.end(),
+                                  [](const fs::path& place) { return access(place.c_str(), X_OK) == 0; });
+  return found == places.end() ? std::string() : found->lexically_normal().string();
+}
+
+bool streams(const FramerateOptions& options) {
+  return std::any_of(options.methods.begin(), options.methods.end(),
+                     [](const std::string& method) { return method != kClientOnly; });
+}
+
+/// All that can be wrong before minutes have passed.
+Result<void> prepare(FramerateOptions& options) {
+  options.setup.link.delay_ns = std::llround(options.delay_ms * 1e6);
+  options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
+  options.setup.tandem = fs::read_symlink("/proc/self/exe").string();
+  if (!streams(options) || options.setup.kind == LinkKind::kMemory) return {};
+  options.setup.tandemd = options.tandemd.empty() ? find_server(options.setup.tandem) : options.tandemd;
+  if (access(options.setup.tandemd.c_str(), X_OK) != 0)
+    return fail(ErrorCode::kInvalidArgument, "no tandemd found; say where it is with --server");
+  if (const auto tried = make_enclave("10.77.0.1"); !tried) {
+    return fail(ErrorCode::kIo,
+                fmt::format("cannot make a network of its own ({}): run it as root with /dev/net/tun, or "
+                            "take --link memory",
+                            tried.error().message));
+  }
+  return {};
+}
+
+void tell(const std::string& line) {
+  if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K{}", line);
+}
+
+int run_framerate(FramerateOptions options) {
+  const auto scenes = load_scenes(options.scenes);
+  if (!scenes) return report(kCommand, scenes.error());
+  if (const auto ready = prepare(options); !ready) return report(kCommand, ready.error());
+  // Everything made here ends with the objects that hold it.
+  std::signal(SIGINT, [](int) { stopped = true; });
+  std::signal(SIGTERM, [](int) { stopped = true; });
+  options.setup.stop = &stopped;
+  std::unique_ptr<ThinDevice> device;
+  std::optional<Calibration> calibration;
+  if (options.device == "thin") {
+    device = ThinDevice::create();
+    const auto found = calibrate(options.setup, *device, kPhoneUpdatesPerS, tell);
+    if (!found) return report(kCommand, found.error());
+    calibration = *found;
+    options.setup.slowdown = found->slowdown;
+  }
+  const bool only_papers = options.scenes == std::vector<std::string>{"all"};
+  std::vector<FramerateRow> rows;
+  for (const scenes::Scene& scene : *scenes) {
+    for (const std::uint32_t bodies : options.bodies) {
+      if (only_papers && !paper_updates_per_s(static_cast<int>(scene.number), bodies, "entropy")) continue;
+      for (const std::string& method : options.methods) {
+        FramerateRow& row = rows.emplace_back();
+        row.scene = scene.name;
+        const auto in_paper = paper_framerate_users(static_cast<int>(scene.number));
+        row.users = options.users != 0 ? options.users : in_paper.value_or(scene.users);
+        if (row.users == in_paper) row.number = static_cast<int>(scene.number);
+        row.bodies = bodies;
+        row.method = method;
+        tell(fmt::format("{} with {} bodies, {}", row.scene, row.bodies, row.method));
+        measure_row(options.setup, device.get(), row);
+        if (stopped) return report(kCommand, Error{ErrorCode::kIo, "stopped"});
+      }
+    }
+  }
+  tell("");
+  if (options.json) {
+    fmt::print("{}\n", to_json(rows, device ? device->name() : std::string(), calibration));
+  } else {
+    if (calibration) {
+      fmt::print(
+          "thin device: {:.1f} % of a processor by {}; client-only there: {:.1f} updates/s (paper: {})\n",
+          100 * calibration->share, device->name(), calibration->updates_per_s, kPhoneUpdatesPerS);
+    }
+    fmt::print("{}", to_table(rows));
+  }
+  const bool all = std::all_of(rows.begin(), rows.end(), [](const FramerateRow& row) {
+    return row.missing.empty() || row.method == kClientOnly;
+  });
+  return all && std::fflush(stdout) == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_framerate(CLI::App& bench, Run& run) {
+  CLI::App* command = bench.add_subcommand(
+      "framerate", "Updates a second of a user behind a slow link, as the thesis's table 5.6.");
+  const auto options = std::make_shared<FramerateOptions>();
+  command
+      ->add_option("--scene", options->scenes,
+                   "Scenes by name or file, separated by commas; all: the rows of the paper's table")
+      ->delimiter(',')
+      ->capture_default_str();
+  add_bodies_option(*command, options->bodies);
+  std::vector<std::string> methods{std::string(kClientOnly)};
+  for (const std::string_view name : codec_names()) methods.emplace_back(name);
+  command->add_option("--method", options->methods, "client-only or codecs, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember(methods))
+      ->capture_default_str();
+  command->add_option("--device", options->device, "Of the measured user: this machine, or a slow processor")
+      ->check(CLI::IsMember({"native", "thin"}))
+      ->capture_default_str();
+  command
+      ->add_option("--users", options->users,
+                   "Users of each scene (default: as in the paper's table 5.5, else the scene's)")
+      ->check(CLI::Range(1, 16));
+  command->add_option("--seconds", options->setup.seconds, "Measured for each row, from the first update on")
+      ->check(CLI::Range(1.0, 600.0))
+      ->capture_default_str();
+  command->add_option("--seed", options->setup.seed, "Of the start block and the scripted inputs")
+      ->capture_default_str();
+  command
+      ->add_option("--link", options->setup.kind,
+                   "namespaces: DDS between processes, as root; memory: one process, simulated time")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, LinkKind>{
+          {"namespaces", LinkKind::kNamespaces}, {"memory", LinkKind::kMemory}}))
+      ->default_str("namespaces");
+  command->add_option("--rate", options->setup.link.bits_per_s, "Of the link, bit/s each way")
+      ->check(CLI::Range(1e4, 1e10))
+      ->capture_default_str();
+  command->add_option("--delay", options->delay_ms, "Of the link, ms each way")
+      ->check(CLI::Range(0.0, 10000.0))
+      ->capture_default_str();
+  command->add_option("--queue", options->queue_ms, "Of the link, ms: what would wait longer is dropped")
+      ->check(CLI::Range(0.0, 10000.0))
+      ->capture_default_str();
+  command->add_option("--server", options->tandemd,
+                      "The program tandemd (default: beside this one, or in PATH)");
+  command->add_flag("--json", options->json, "One JSON object: device, rows[...]");
+  command->footer(
+      "Needs root unless with --link memory: server and users run in network namespaces joined by one link.\n"
+      "The thin device gets the share of a processor at which client-only makes the thesis's 4.4 updates/s.");
+  command->callback([options, &run] { run = [options] { return run_framerate(*options); }; });
+}
+
+}  // namespace tandem::lab

@@ -1,0 +1,59 @@
+#pragma once
+// Two network namespaces and the link between them. Nothing outlives the objects: a namespace without
+// processes and descriptors is gone, and its devices with it.
+
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "sdk/transport/simulated/bottleneck.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// A file descriptor that is closed at its end.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd = -1) : fd_(fd) {}
+  ~Descriptor();
+  Descriptor(Descriptor&& other) noexcept : fd_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept;
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return fd_; }
+  int release();
+
+ private:
+  int fd_;
+};
+
+/// A network namespace with `lo` and one device, `tandem0`, whose packets come out of a descriptor.
+struct Enclave {
+  Descriptor name_space;  ///< for setns()
+  Descriptor device;
+};
+
+/// `address`: of its device, IPv4 in 10.77.0.0/24. Errors: kIo, with what was not permitted.
+[[nodiscard]] Result<Enclave> make_enclave(const std::string& address);
+
+struct LinkCounts {
+  std::uint64_t bytes_there = 0, dropped = 0;
+};
+
+/// Carries packets between the devices of two enclaves, which must outlive it, in a thread of its own.
+class Link {
+ public:
+  Link(const Enclave& server, const Enclave& clients, const transport::simulated::BottleneckOptions& options);
+  ~Link();
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+  /// Stops it; what it carried to the clients in its last `seconds`, and dropped in all its time.
+  LinkCounts finish(double seconds);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+  std::jthread thread_;
+};
+
+}  // namespace tandem::lab

@@ -1,0 +1,220 @@
+#include "services/lab/framerate/framerate.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "services/lab/cells.hpp"
+#include "services/lab/framerate/child.hpp"
+#include "services/lab/framerate/enclave.hpp"
+#include "services/lab/paper_numbers.hpp"
+
+namespace tandem::lab {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kServerAddress = "10.77.0.1";
+constexpr const char* kUsersAddress = "10.77.0.2";
+// A thin device takes long to start a program and to read its first snapshot.
+constexpr std::chrono::seconds kStart{60};
+
+/// Unicast only; datagrams that need no fragments, as a home router's link loses fragments dearly.
+std::string dds_config(const char* peer) {
+  return fmt::format(
+      "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"tandem0\" "
+      "multicast=\"false\"/>"
+      "</Interfaces><AllowMulticast>false</AllowMulticast><MaxMessageSize>1400B</MaxMessageSize></General>"
+      "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>16</"
+      "MaxAutoParticipantIndex>"
+      "<Peers><Peer address=\"{}\"/></Peers></Discovery></Domain></CycloneDDS>",
+      peer);
+}
+
+/// Runs a program to its end, as the measured user; the JSON object it prints, and its processor time in
+/// that.
+Result<Json> run(const FramerateSetup& setup, const std::vector<std::string>& arguments, ChildPlace place,
+                 ThinDevice* device) {
+  const auto at_most = kStart + std::chrono::seconds(std::llround(2 * setup.seconds));
+  if (device != nullptr) place.cgroup_procs = device->procs();
+  auto child = Child::start(arguments, place);
+  if (!child) return tl::unexpected(child.error());
+  if (device != nullptr) device->hold(child->pid());
+  auto said = child->finish(at_most, *setup.stop);
+  if (device != nullptr) device->release();
+  if (!said) return fail(said.error().code, fmt::format("{}: {}", arguments[1], said.error().message));
+  Json parsed = Json::parse(*said, nullptr, false);
+  if (parsed.is_discarded()) return fail(ErrorCode::kIo, arguments[1] + " printed no JSON");
+  parsed["cpu_ms"] = child->cpu_ms();
+  return parsed;
+}
+
+Result<double> client_only(const FramerateSetup& setup, ThinDevice* device, const std::string& scene,
+                           std::uint32_t bodies, double seconds) {
+  return run(setup,
+             {setup.tandem, "bench", "engine", "--scene", scene, "--bodies", std::to_string(bodies), "--seed",
+              std::to_string(setup.seed), "--seconds", fmt::format("{}", seconds), "--json"},
+             {}, device)
+      .map([](const Json& json) { return json["updates_per_s"].get<double>(); });
+}
+
+std::vector<std::string> server_command(const FramerateSetup& setup, const FramerateRow& row) {
+  return {setup.tandemd,
+          "--scene",
+          row.scene,
+          "--bodies",
+          std::to_string(row.bodies),
+          "--codec",
+          row.method,
+          "--rate",
+          "max",
+          "--stall-timeout",
+          "off",
+          "--window",
+          "2",
+          "--lead",
+          "1",
+          "--scripted",
+          "--users",
+          std::to_string(row.users),
+          "--wait-for",
+          std::to_string(row.users),
+          "--seed",
+          std::to_string(setup.seed)};
+}
+
+std::vector<std::string> user_command(const FramerateSetup& setup, double seconds) {
+  return {setup.tandem, "join", "--lead", "1", "--seconds", fmt::format("{}", seconds), "--json"};
+}
+
+Result<void> stream(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row) {
+  auto server_side = make_enclave(kServerAddress);
+  if (!server_side) return tl::unexpected(server_side.error());
+  auto users_side = make_enclave(kUsersAddress);
+  if (!users_side) return tl::unexpected(users_side.error());
+  Link link(*server_side, *users_side, setup.link);
+  const ChildPlace at_server{&*server_side, {}, dds_config(kUsersAddress)};
+  const ChildPlace at_users{&*users_side, {}, dds_config(kServerAddress)};
+  auto server = Child::start(server_command(setup, row), at_server);
+  if (!server) return tl::unexpected(server.error());
+  // The others play longer than the measured one.
+  std::vector<Child> others;
+  for (std::uint32_t i = 1; i < row.users; ++i) {
+    auto other = Child::start(user_command(setup, 3600), at_users);
+    if (!other) return tl::unexpected(other.error());
+    others.push_back(std::move(*other));
+  }
+  const auto json = run(setup, user_command(setup, setup.seconds), at_users, device);
+  const LinkCounts carried = link.finish(setup.seconds);
+  if (!json) return tl::unexpected(json.error());
+  row.updates_per_s = (*json)["frames_applied"].get<double>() / setup.seconds;
+  row.client_ms_p50 = (*json)["client_ms"]["p50"].get<double>();
+  row.latency_ms_p50 = (*json)["latency_ms"]["p50"].get<double>();
+  row.client_cpu_ms = (*json)["cpu_ms"].get<double>() / (*json)["frames_applied"].get<double>();
+  row.resyncs = (*json)["resyncs"].get<std::uint64_t>();
+  row.link_mbit_per_s = static_cast<double>(carried.bytes_there) * 8 / kBitsPerMbit / setup.seconds;
+  row.dropped = carried.dropped;
+  return {};
+}
+
+std::optional<double> in_paper(const FramerateRow& row) {
+  return row.number ? paper_updates_per_s(*row.number, row.bodies, row.method) : std::nullopt;
+}
+
+}  // namespace
+
+void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row) {
+  row.device = device == nullptr ? "native" : "thin";
+  row.seconds = setup.seconds;
+  if (row.method == kClientOnly) {
+    if (row.users > 1) {
+      row.missing = "without a server there is one user";
+      return;
+    }
+    const auto rate = client_only(setup, device, row.scene, row.bodies, setup.seconds);
+    if (rate) row.updates_per_s = *rate;
+    if (!rate) row.missing = rate.error().message;
+    return;
+  }
+  const auto streamed =
+      setup.kind == LinkKind::kMemory ? play_in_memory(setup, row) : stream(setup, device, row);
+  if (!streamed) row.missing = streamed.error().message;
+}
+
+Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, double updates_per_s,
+                              const std::function<void(const std::string&)>& progress) {
+  constexpr const char* kScene = "half_pipe";
+  constexpr std::uint32_t kBodies = 10000;
+  constexpr int kMostTries = 6;
+  progress("thin device: client-only at full speed");
+  const auto native = client_only(setup, nullptr, kScene, kBodies, 3);
+  if (!native) return tl::unexpected(native.error());
+  Calibration found{.share = updates_per_s / *native};
+  for (int i = 0; i < kMostTries; ++i) {
+    if (auto set = device.set_share(found.share); !set) return tl::unexpected(set.error());
+    progress(fmt::format("thin device: client-only with {:.1f} % of a processor", 100 * found.share));
+    // As long as a row is measured: bodies that fall cost less than bodies that lie.
+    const auto rate = client_only(setup, &device, kScene, kBodies, setup.seconds);
+    if (!rate) return tl::unexpected(rate.error());
+    found.updates_per_s = *rate;
+    found.slowdown = *native / *rate;
+    const double off = *rate / updates_per_s;
+    if (std::abs(off - 1) < 0.05) break;
+    if (i + 1 < kMostTries) found.share = std::min(found.share / off, 1.0);
+  }
+  return found;
+}
+
+std::string to_json(std::span<const FramerateRow> rows, const std::string& device_name,
+                    const std::optional<Calibration>& calibration) {
+  Json list = Json::array();
+  for (const FramerateRow& row : rows) {
+    list.push_back({{"scene", row.scene},
+                    {"number", json_of(row.number)},
+                    {"users", row.users},
+                    {"bodies", row.bodies},
+                    {"method", row.method},
+                    {"device", row.device},
+                    {"updates_per_s", row.missing.empty() ? Json(row.updates_per_s) : Json(nullptr)},
+                    {"paper_updates_per_s", json_of(in_paper(row))},
+                    {"seconds", row.seconds},
+                    {"client_cpu_ms", json_of(row.client_cpu_ms)},
+                    {"client_ms_p50", json_of(row.client_ms_p50)},
+                    {"latency_ms_p50", json_of(row.latency_ms_p50)},
+                    {"link_mbit_per_s", json_of(row.link_mbit_per_s)},
+                    {"dropped", json_of(row.dropped)},
+                    {"resyncs", json_of(row.resyncs)},
+                    {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});
+  }
+  Json device(nullptr);
+  if (calibration) {
+    device = {{"by", device_name},
+              {"processor_share", calibration->share},
+              {"client_only_updates_per_s", calibration->updates_per_s}};
+  }
+  return Json{{"device", device}, {"rows", list}}.dump();
+}
+
+std::string to_table(std::span<const FramerateRow> rows) {
+  std::string text =
+      fmt::format("{:<12} {:>5} {:>7} {:<12} {:<7} {:>9} {:>7} {:>10} {:>10} {:>11} {:>8} {:>7}\n", "scene",
+                  "users", "bodies", "method", "device", "updates/s", "paper", "client ms", "latency ms",
+                  "link Mbit/s", "dropped", "rejoins");
+  for (const FramerateRow& row : rows) {
+    text += fmt::format("{:<12} {:>5} {:>7} {:<12} {:<7} ", row.scene, row.users, row.bodies, row.method,
+                        row.device);
+    if (!row.missing.empty()) {
+      text += fmt::format("not measured: {}\n", row.missing);
+      continue;
+    }
+    text +=
+        fmt::format("{:>9.1f} {:>7} {:>10} {:>10} {:>11} {:>8} {:>7}\n", row.updates_per_s,
+                    rounded(in_paper(row), 1), rounded(row.client_ms_p50, 2), rounded(row.latency_ms_p50, 1),
+                    rounded(row.link_mbit_per_s, 2), row.dropped ? fmt::format("{}", *row.dropped) : "-",
+                    row.resyncs ? fmt::format("{}", *row.resyncs) : "-");
+  }
+  return text;
+}
+
+}  // namespace tandem::lab

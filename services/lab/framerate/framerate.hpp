@@ -1,0 +1,84 @@
+#pragma once
+// What `tandem bench framerate` measures: how often a user's picture of a scene is updated (thesis,
+// table 5.6).
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdk/transport/simulated/bottleneck.hpp"
+#include "services/lab/framerate/thin_device.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// The thesis's "client only": the full simulation on the client, no server and no network.
+inline constexpr std::string_view kClientOnly = "client-only";
+
+/// One row of the result.
+struct FramerateRow {
+  std::string scene;
+  std::optional<int> number;  ///< of the paper's scene, 1..5
+  std::uint32_t users = 1, bodies = 0;
+  std::string method;  ///< client-only, or a codec
+  std::string device;  ///< native or thin
+  double seconds = 0;  ///< that were measured
+  double updates_per_s = 0;
+  // With a server:
+  std::optional<double> client_ms_p50, latency_ms_p50;
+  std::optional<double> client_cpu_ms;            ///< an update; DDS, start and snapshot included
+  std::optional<double> link_mbit_per_s;          ///< to all users together, 2^20 bits, with all protocol
+  std::optional<std::uint64_t> dropped, resyncs;  ///< packets the link's queue had no room for; rejoins
+  std::string missing;                            ///< not empty: why nothing was measured
+};
+
+/// Where server and users meet.
+enum class LinkKind : std::uint8_t {
+  kNamespaces,  ///< DDS between processes in network namespaces: the real thing, for root only
+  kMemory,      ///< all in one process and in simulated time: for everybody, without what DDS costs
+};
+
+/// How all rows are measured.
+struct FramerateSetup {
+  std::string tandem, tandemd;  ///< paths of the programs
+  transport::simulated::BottleneckOptions link;
+  LinkKind kind = LinkKind::kNamespaces;
+  double slowdown = 1;  ///< kMemory: of the measured user's processor
+  double seconds = 10;  ///< from the first update on
+  std::uint64_t seed = 1;
+  const std::atomic<bool>* stop = nullptr;  ///< ends a row early; must outlive the measurement
+};
+
+/// Fills a row's measured fields: runs the programs, on `device` for the first of its users where that is not
+/// null. `row` says scene, users, bodies, method. Errors end up in `missing`.
+void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row);
+
+/// The server's and the users' programs in one thread, on a simulated network with the setup's link. Time is
+/// simulated: what a program computes takes as long as it takes here, times the slowdown for the first user.
+/// Fills the row as measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
+[[nodiscard]] Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row);
+
+/// A thin device as it was set.
+struct Calibration {
+  double share = 1, updates_per_s = 0;
+  double slowdown = 1;  ///< against this machine's whole processor
+};
+
+/// Sets the device's share of a processor so that client-only makes `updates_per_s` of the paper's first
+/// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
+/// share. Errors: kIo.
+[[nodiscard]] Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device,
+                                            double updates_per_s,
+                                            const std::function<void(const std::string&)>& progress);
+
+/// {"device": {...} or null, "rows": [...]}, one line.
+[[nodiscard]] std::string to_json(std::span<const FramerateRow> rows, const std::string& device_name,
+                                  const std::optional<Calibration>& calibration);
+/// A table for people, with the paper's numbers beside ours.
+[[nodiscard]] std::string to_table(std::span<const FramerateRow> rows);
+
+}  // namespace tandem::lab

@@ -1,0 +1,45 @@
+#pragma once
+// What others would send for the same frames at the same largest error: general compressors, and dead
+// reckoning as in DIS.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "services/host/simulation.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// What all peers are told about a run.
+struct PeerSetting {
+  std::uint32_t bodies = 0;
+  double threshold = 0;  ///< scene units: the largest Euclidean error of a position
+  double dt_s = 0;
+};
+
+/// Sends positions frame by frame. What it does not send at all (velocities, spawns) is in its favour.
+class Peer {
+ public:
+  virtual ~Peer() = default;
+  /// The bytes for the bodies of the next frame; `seen` (three columns, one value a body) becomes what a
+  /// receiver shows. Errors: kUnsupported when a library fails.
+  [[nodiscard]] virtual Result<std::size_t> send(const engine::Bodies& bodies,
+                                                 std::array<std::vector<double>, 3>& seen) = 0;
+};
+
+/// One way to send; `make` is null when the library was not there at build time.
+struct PeerKind {
+  std::string_view name;
+  std::string_view missing;  ///< the Debian package that would bring it
+  std::unique_ptr<Peer> (*make)(const PeerSetting& setting);
+};
+
+/// In the order of their rows.
+[[nodiscard]] const std::vector<PeerKind>& peer_kinds();
+
+}  // namespace tandem::lab

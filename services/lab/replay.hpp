@@ -1,0 +1,68 @@
+#pragma once
+// A simulation with its scripted inputs, put on the lattice frame by frame: a server's work without a
+// network.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/clock.hpp"
+#include "services/host/lattice_choice.hpp"
+#include "services/host/mirror.hpp"
+#include "services/host/simulation.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// Acts in the step that produces `frame`.
+struct TimedInput {
+  Frame frame = 0;
+  engine::Input input;
+};
+
+/// Steps `simulation`, which must outlive this object and was not stepped yet. Not thread-safe.
+class Replay {
+ public:
+  /// `script` ascends by frame. Errors: kInvalidArgument when gravity or damping do not fit the lattice.
+  static Result<Replay> create(engine::Simulation& simulation, std::vector<TimedInput> script,
+                               const host::Lattice& lattice, TypeId type_count);
+
+  /// Produces the next frame. Errors: kInvalidArgument for a scripted input that the simulation refuses.
+  Result<void> next();
+
+  [[nodiscard]] Frame frame() const { return frame_; }
+  [[nodiscard]] const State& target() const { return mirror_.target(); }
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return mirror_.lifecycle(); }
+  /// Inputs that change the predicted step and act in the step that produced frame().
+  [[nodiscard]] std::span<const ScheduledDrive> scheduled() const { return scheduled_; }
+  /// In force before the first step.
+  [[nodiscard]] const Drive& start_drive() const { return start_drive_; }
+  [[nodiscard]] const engine::Simulation& simulation() const { return *simulation_; }
+  /// Of the last next(): the engine's step, and putting its result on the lattice.
+  [[nodiscard]] double step_ms() const { return step_ms_; }
+  [[nodiscard]] double mirror_ms() const { return mirror_ms_; }
+
+ private:
+  Replay(engine::Simulation& simulation, std::vector<TimedInput> script, const host::Lattice& lattice,
+         TypeId type_count, const Drive& start_drive);
+  Result<void> take(const engine::Input& input);
+  void schedule(const Drive& drive);
+  /// A recorded trajectory changes its gravity without an input.
+  Result<void> follow_gravity();
+
+  engine::Simulation* simulation_;
+  std::vector<TimedInput> script_;
+  host::Lattice lattice_;
+  host::Mirror mirror_;
+  Drive start_drive_, drive_;
+  std::vector<ScheduledDrive> scheduled_;
+  std::size_t next_input_ = 0;
+  std::uint64_t input_number_ = 0;
+  Frame frame_ = 0;
+  double step_ms_ = 0, mirror_ms_ = 0;
+};
+
+using transport::steady_ns;
+
+}  // namespace tandem::lab

@@ -1,0 +1,77 @@
+#include "services/lab/train.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "sdk/core/codec/paper/training.hpp"
+
+namespace tandem::lab {
+namespace {
+
+constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
+
+/// What a session corrected in one pass over the source.
+Result<CodecStatistics> observe(const host::HostConfig& session, const std::function<Result<Source>()>& make,
+                                std::uint64_t frames, const std::function<void(Frame)>& progress) {
+  auto source = make();
+  if (!source) return tl::unexpected(source.error());
+  auto replay = Replay::create(*source->simulation, std::move(source->script), session.lattice,
+                               static_cast<TypeId>(session.types.size()));
+  if (!replay) return tl::unexpected(replay.error());
+  auto timeline = ServerTimeline::create(host::timeline_config(session, source->simulation->capacity()), 1);
+  if (!timeline) return tl::unexpected(timeline.error());
+  CodecStatistics observed;
+  timeline->start(0, replay->target(), replay->start_drive());
+  timeline->set_statistics(&observed);
+  for (Frame frame = 1; frame <= frames; ++frame) {
+    if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
+    for (const ScheduledDrive& input : replay->scheduled()) {
+      if (auto scheduled = timeline->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
+    }
+    timeline->advance(replay->target(), replay->lifecycle());
+    progress(frame);
+  }
+  return observed;
+}
+
+std::vector<std::uint8_t> lengths(std::span<const std::byte> tables, std::size_t first) {
+  std::vector<std::uint8_t> result;
+  for (const std::byte length : tables.subspan(first, kSymbols)) {
+    result.push_back(std::to_integer<std::uint8_t>(length));
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice choice,
+                                   const std::function<Result<Source>()>& make, std::uint64_t frames,
+                                   const std::function<void(Frame)>& progress) {
+  scene.trained.clear();
+  choice.codec = "selective";
+  choice.predictor = "ballistic";
+  const auto first = sessions::plan_session(scene, choice);
+  if (!first) return tl::unexpected(first.error());
+  const auto ranges = observe(*first, make, frames, progress);
+  if (!ranges) return tl::unexpected(ranges.error());
+  scenes::TrainedTable table;
+  table.bodies = choice.bodies;
+  table.threshold_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  // A run without any correction still needs a range; one unit is the least there is.
+  table.position_range_m = kMargin * std::max(1U, ranges->largest_position) / first->lattice.position_scale();
+  table.velocity_range_m_per_s =
+      kMargin * std::max(1U, ranges->largest_velocity) / first->lattice.velocity_scale();
+
+  scene.trained = {table};
+  choice.codec = "quantized";
+  const auto second = sessions::plan_session(scene, choice);
+  if (!second) return tl::unexpected(second.error());
+  const auto counts = observe(*second, make, frames, [&](Frame frame) { progress(frames + frame); });
+  if (!counts) return tl::unexpected(counts.error());
+  const std::vector<std::byte> tables = trained_tables(*counts);
+  table.position_code_lengths = lengths(tables, 0);
+  table.velocity_code_lengths = lengths(tables, kSymbols);
+  return table;
+}
+
+}  // namespace tandem::lab

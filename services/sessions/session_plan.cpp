@@ -1,0 +1,120 @@
+#include "services/sessions/session_plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/tracker/filter.hpp"
+#include "services/host/block_threads.hpp"
+#include "services/sessions/contact_plan.hpp"
+
+namespace tandem::sessions {
+namespace {
+
+// Automatic quality moves between these multiples of the threshold it starts from.
+constexpr double kFinest = 0.25;
+constexpr double kCoarsest = 4;
+// Beyond, even a fast client would spend most of a frame on its predicted step.
+constexpr std::uint32_t kMostBodiesOfField = 50'000;
+
+std::vector<std::byte> codec_tables(const std::string& codec, const scenes::TrainedTable& table) {
+  std::vector<std::byte> bytes;
+  if (codec != "entropy" && codec != "limited") return bytes;
+  for (const auto* lengths : {&table.position_code_lengths, &table.velocity_code_lengths}) {
+    for (const std::uint8_t length : *lengths) bytes.push_back(std::byte{length});
+  }
+  return bytes.empty() ? default_code_tables() : bytes;
+}
+
+// Cells are as large as the largest bodies, and hold so many smaller ones at most.
+bool alike(const std::vector<engine::ParticleType>& types) {
+  if (types.empty()) return false;
+  const auto [smallest, largest] = std::ranges::minmax(types, {}, &engine::ParticleType::radius);
+  return smallest.radius >= 0.5F * largest.radius;
+}
+
+// Sets the predictor and its constants.
+Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice,
+                              const host::Lattice& lattice, host::HostConfig& config) {
+  const bool automatic = choice.predictor == "auto";
+  const bool field_pays =
+      choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
+  config.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
+  if (config.predictor != "field" && config.predictor != "contact") return {};
+  auto constants = contact_constants(scene, lattice, config.predictor);
+  if (constants) {
+    config.predictor_constants = std::move(*constants);
+  } else if (automatic) {
+    config.predictor = "ballistic";
+  } else {
+    return tl::unexpected(constants.error());
+  }
+  return {};
+}
+
+// Decay and gains of the first frame, and what the later ones aim at.
+Result<void> choose_gains(host::HostConfig& config) {
+  if (config.codec != "tracker") return {};
+  // What the constants make of the predictor, which may be another than the name says.
+  const auto predictor = make_predictor(config.predictor, 1, config.predictor_constants);
+  if (!predictor) return tl::unexpected(predictor.error());
+  const std::string_view kind = (*predictor)->name();
+  config.parameters = with_first_gains(config.parameters, kind);
+  config.gains = host::usual_gain_goal(kind);
+  return {};
+}
+
+}  // namespace
+
+Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
+  const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  const double threshold_m =
+      choice.automatic ? std::min(stated_m, choice.max_error_m.value_or(stated_m)) : stated_m;
+  const double finest_m = choice.automatic ? threshold_m * kFinest : threshold_m;
+  const auto lattice = host::choose_lattice(finest_m, scene.extent_m, scene.dt_s);
+  if (!lattice) return tl::unexpected(lattice.error());
+  const scenes::TrainedTable* trained = scenes::nearest_table(scene.trained, choice.bodies, threshold_m);
+  const scenes::TrainedTable table = trained == nullptr ? scenes::TrainedTable{} : *trained;
+  const auto parameters =
+      host::codec_parameters(*lattice, threshold_m, table.position_range_m, table.velocity_range_m_per_s);
+  if (!parameters) return tl::unexpected(parameters.error());
+
+  host::HostConfig config;
+  if (choice.automatic) {
+    const auto units = [&](double metres) {
+      return static_cast<std::int32_t>(
+          std::clamp(std::round(metres * lattice->position_scale()), 1.0, double{kPositionLimit}));
+    };
+    config.quality = host::QualityGoal{choice.target_mbit_per_s, units(finest_m),
+                                       units(choice.max_error_m.value_or(threshold_m * kCoarsest))};
+  }
+  config.lattice = *lattice;
+  config.parameters = *parameters;
+  config.frame_rate_hz = 1 / scene.dt_s;
+  config.codec = choice.codec;
+  config.codec_tables = codec_tables(choice.codec, table);
+  if (choice.codec == "limited") config.budget = choice.budget_bytes.value_or(kPaperBudgetBytes);
+  if (choice.codec == "tracker") config.budget = choice.budget_bytes.value_or(kNoBudget);
+  if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
+    return tl::unexpected(chosen.error());
+  if (auto gained = choose_gains(config); !gained) return tl::unexpected(gained.error());
+  config.run_blocks = host::blocks_on_threads(choice.threads);
+  config.scene = scene.name;
+  config.scene_description = scene.text;
+  config.types.clear();
+  for (const scenes::BodyType& type : scene.types) {
+    config.types.push_back(
+        {.name = type.name, .radius = static_cast<float>(type.radius_m), .colour_rgba = type.colour_rgba});
+  }
+  return config;
+}
+
+Result<std::size_t> largest_delta_bytes(const host::HostConfig& config, std::uint32_t capacity) {
+  return ServerTimeline::create(host::timeline_config(config, capacity), config.epoch)
+      .map([](const ServerTimeline& timeline) { return timeline.payload_bound(); });
+}
+
+}  // namespace tandem::sessions

@@ -1,0 +1,67 @@
+#include "services/tandemd/console.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "services/host/mbit.hpp"
+
+namespace tandem::daemon {
+
+std::string gains_text(const CodecParameters& parameters) {
+  if (parameters.decay == 0) return {};  // no tracker
+  return fmt::format("gains {:.2f} {:.3f} decay {:.1f} %", parameters.velocity_gain / 32768.0,
+                     parameters.acceleration_gain / 65536.0, parameters.decay / 655.36);
+}
+
+std::string coding_text(const host::HostConfig& config) {
+  std::string text = fmt::format("codec {}, predictor {}", config.codec, config.predictor);
+  const auto metres = [&](std::int32_t units) { return units * config.lattice.unit; };
+  if (config.codec != "none")
+    text += fmt::format(", threshold {:.4g} m", metres(config.parameters.threshold));
+  if (config.quality) {
+    text += fmt::format(" (automatic, up to {:.4g} m)", metres(config.quality->largest_threshold));
+    if (config.quality->target_mbit_per_s > 0)
+      text += fmt::format(", target {} Mbit/s", config.quality->target_mbit_per_s);
+  }
+  if (config.budget != kNoBudget) text += fmt::format(", budget {} bytes a frame", config.budget);
+  return text;
+}
+
+Console::Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
+Console::~Console() { clear_line(); }
+
+void Console::clear_line() {
+  if (line_shown_) fmt::print(stderr, "\r\x1b[K");
+  line_shown_ = false;
+}
+
+void Console::show(host::Host& host, std::int64_t now_ns) {
+  for (const std::string& notice : host.take_notices()) {
+    clear_line();
+    spdlog::info(notice);
+  }
+  if (!terminal_ || now_ns < next_ns_) return;
+  const host::HostTotals totals = host.totals();
+  const double elapsed_s = std::max(static_cast<double>(now_ns - last_ns_) * 1e-9, 1e-9);
+  const double frames = static_cast<double>(totals.frames - last_.frames);
+  const double bits = static_cast<double>(totals.payload_bytes - last_.payload_bytes) * 8;
+  const double corrected = static_cast<double>(totals.corrected - last_.corrected);
+  clear_line();
+  fmt::print(stderr,
+             "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
+             " window {}  threshold {:.3g} m  {}",
+             host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s,
+             frames > 0 ? corrected / frames : 0, host.report().frame_ms, host.participants(),
+             host.observers(), host.window(), host.threshold_m(), gains_text(host.parameters()));
+  std::fflush(stderr);
+  line_shown_ = true;
+  last_ = totals;
+  last_ns_ = now_ns;
+  next_ns_ = now_ns + host::kSecond;
+}
+
+}  // namespace tandem::daemon

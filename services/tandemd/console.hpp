@@ -1,0 +1,39 @@
+#pragma once
+// What tandemd shows while it runs: log lines, and on a terminal one live line.
+
+#include <cstdint>
+#include <string>
+
+#include "services/host/host.hpp"
+
+namespace tandem::daemon {
+
+/// Gains and decay of codec `tracker`; nothing for the others.
+[[nodiscard]] std::string gains_text(const CodecParameters& parameters);
+
+/// How bodies are predicted and corrected from the first frame on: codec, predictor, threshold, and what
+/// binds them.
+[[nodiscard]] std::string coding_text(const host::HostConfig& config);
+
+/// Writes to stderr. Not thread-safe.
+class Console {
+ public:
+  Console();
+  ~Console();
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  /// Logs the host's notices and, once a second on a terminal, rewrites the live line.
+  void show(host::Host& host, std::int64_t now_ns);
+
+ private:
+  void clear_line();
+
+  bool terminal_;
+  bool line_shown_ = false;
+  std::int64_t next_ns_ = 0;
+  host::HostTotals last_;
+  std::int64_t last_ns_ = 0;
+};
+
+}  // namespace tandem::daemon

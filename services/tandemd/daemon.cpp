@@ -1,0 +1,241 @@
+#include "services/tandemd/daemon.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <utility>
+
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/limits.hpp"
+#include "services/host/host.hpp"
+#include "services/host/mbit.hpp"
+#include "services/host/publisher.hpp"
+#include "services/scenes/scene.hpp"
+#include "services/scenes/script.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "services/tandemd/console.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using transport::steady_ns;
+using transport::wall_ns;
+
+int report_error(const Error& error, int exit_code) {
+  spdlog::error(error.message);
+  return exit_code;
+}
+
+/// Lines `epoch,frame,hash`.
+class HashLog {
+ public:
+  [[nodiscard]] Result<void> open(const std::string& path, Epoch epoch) {
+    epoch_ = epoch;
+    path_ = path;
+    if (path.empty()) return {};
+    file_.reset(std::fopen(path.c_str(), "w"));
+    if (!file_) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", path));
+    std::setvbuf(file_.get(), nullptr, _IOLBF, BUFSIZ);  // whole lines, also of a server that is killed
+    return {};
+  }
+  void add(Frame frame, std::uint64_t hash) {
+    if (file_) fmt::print(file_.get(), "{},{},{}\n", epoch_, frame, to_hex(hash));
+  }
+  /// A full disk shows at the latest here.
+  [[nodiscard]] Result<void> close() {
+    if (!file_) return {};
+    const bool failed = std::ferror(file_.get()) != 0;
+    if (std::fclose(file_.release()) != 0 || failed) {
+      return fail(ErrorCode::kIo, fmt::format("{}: not all hashes could be written", path_));
+    }
+    return {};
+  }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> file_;
+  std::string path_;
+  Epoch epoch_ = 0;
+};
+
+/// Sends what the scene's users would, each input in time for its frame.
+class Script {
+ public:
+  Script(const scenes::Scene& scene, const Options& options) : scene_(&scene), options_(&options) {}
+
+  void send_due(host::Host& host) {
+    if (!options_->scripted) return;
+    const Frame latest = host.frame() + 1 + options_->lead;
+    if (latest >= generated_to_) generate(latest);
+    for (; next_ < inputs_.size() && inputs_[next_].frame <= latest; ++next_) {
+      const auto sent = host.inject(inputs_[next_].input);
+      if (!sent) spdlog::warn("scripted input for frame {}: {}", inputs_[next_].frame, sent.error().message);
+    }
+  }
+
+ private:
+  // A longer list only appends, so what was sent already is skipped by its number.
+  void generate(Frame latest) {
+    constexpr Frame kAhead = 3000;
+    generated_to_ = latest + kAhead;
+    inputs_ = scenes::scripted_inputs(*scene_, options_->seed, options_->users, generated_to_);
+  }
+
+  const scenes::Scene* scene_;
+  const Options* options_;
+  std::vector<scenes::ScriptedInput> inputs_;
+  std::size_t next_ = 0;
+  Frame generated_to_ = 0;
+};
+
+Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& options) {
+  sessions::SessionChoice choice;
+  choice.bodies = options.bodies;
+  choice.codec = options.codec;
+  choice.predictor = options.predictor;
+  choice.threshold_m = options.threshold_m;
+  choice.threshold_scale = options.threshold_scale;
+  choice.automatic = options.automatic;
+  choice.target_mbit_per_s = options.target_mbit_per_s;
+  choice.max_error_m = options.max_error_m;
+  choice.budget_bytes = options.budget_bytes;
+  choice.threads = options.threads;
+  return sessions::plan_session(scene, choice).map([&](host::HostConfig config) {
+    config.session = options.session;
+    config.epoch = static_cast<Epoch>(wall_ns() / host::kMillisecond);
+    if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
+    config.free_rate = options.free_rate;
+    config.lead = options.lead;
+    config.window = options.window;
+    config.stall_timeout_ns.reset();
+    if (options.stall_timeout_s)
+      config.stall_timeout_ns = static_cast<std::int64_t>(*options.stall_timeout_s * 1e9);
+    config.wait_for = options.wait_for;
+    config.client_limit = options.client_limit;
+    config.clock_ns = &steady_ns;
+    return config;
+  });
+}
+
+Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
+                                                         const Options& options,
+                                                         const std::atomic<bool>& stop) {
+  const auto largest = sessions::largest_delta_bytes(config, options.bodies);
+  if (!largest) return tl::unexpected(largest.error());
+  transport::DdsOptions dds;
+  dds.domain = options.domain;
+  dds.session = options.session;
+  dds.delta_depth = transport::delta_depth(
+      config.window_ceiling, static_cast<std::uint32_t>((*largest + host::kPartBytes - 1) / host::kPartBytes),
+      static_cast<std::uint32_t>(host::kPartBytes));
+  dds.stop = &stop;
+  return transport::make_dds_server_port(dds);
+}
+
+enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame };
+
+Ending serve(host::Host& host, transport::ServerPort& port, Script& script, HashLog& hashes,
+             const Options& options, const std::atomic<bool>& stop) {
+  Console console;
+  const std::int64_t duration_ns =
+      options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
+  std::int64_t end_ns = steady_ns() + duration_ns;
+  bool running = false;
+  hashes.add(host.frame(), host.hash());
+  while (!stop.load(std::memory_order_relaxed)) {
+    const std::int64_t now_ns = steady_ns();
+    if (host.poll(now_ns, wall_ns())) hashes.add(host.report().frame, host.report().hash);
+    if (host.state() == host::Host::State::kRefused) return Ending::kRefused;
+    if (host.state() == host::Host::State::kRunning) {
+      if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;
+      script.send_due(host);
+    }
+    console.show(host, now_ns);
+    if (now_ns >= end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
+    const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
+    if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
+  }
+  return Ending::kDone;
+}
+
+void print_report(const host::HostTotals& totals, double frame_rate_hz, bool json) {
+  const double per_frame = totals.frames == 0 ? 0 : 1 / static_cast<double>(totals.frames);
+  const double mbit_per_s =
+      static_cast<double>(totals.payload_bytes) * 8 / kBitsPerMbit * per_frame * frame_rate_hz;
+  spdlog::info(
+      "{} frames, {:.3f} Mbit/s at the nominal rate, {:.2f} ms a frame (p99 {:.2f}), {} clients, {} stalls "
+      "({} ms), {} inputs refused",
+      totals.frames, mbit_per_s, totals.frame_ms_p50, totals.frame_ms_p99, totals.clients_seen, totals.stalls,
+      totals.suspended_ms, totals.refused_inputs);
+  if (!json) return;
+  const nlohmann::ordered_json object{
+      {"frames", totals.frames},
+      {"mbit_per_s", mbit_per_s},
+      {"frame_ms", {{"p50", totals.frame_ms_p50}, {"p99", totals.frame_ms_p99}}},
+      {"clients_seen", totals.clients_seen},
+      {"stalls", totals.stalls},
+      {"refused_inputs", totals.refused_inputs}};
+  fmt::print("{}\n", object.dump());
+}
+
+// What was queued last still goes out, unless the middleware does not take it.
+void flush(const host::Outbox& outbox) {
+  for (int i = 0; i < 200 && outbox.size() > 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+}
+
+}  // namespace
+
+int run_daemon(const Options& options, const std::atomic<bool>& stop) {
+  const auto scene = scenes::load_scene(options.scene);
+  if (!scene) return report_error(scene.error(), 2);
+  auto config = configure(*scene, options);
+  if (!config) return report_error(config.error(), 2);
+  auto simulation = scenes::make_simulation(*scene, options.bodies, options.seed, options.threads);
+  if (!simulation) return report_error(simulation.error(), 2);
+  HashLog hashes;
+  if (const auto opened = hashes.open(options.hash_log, config->epoch); !opened)
+    return report_error(opened.error(), 1);
+
+  auto port = open_port(*config, options, stop);
+  if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+  const double frame_rate_hz = config->frame_rate_hz;
+  const std::string coding = coding_text(*config);
+  auto host = host::Host::create(std::move(*config), **simulation, **port);
+  if (!host) return report_error(host.error(), 2);
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name, options.bodies,
+               coding, options.session, options.domain, (*host)->session().epoch);
+
+  host::Publisher publisher((*host)->outbox(), **port);
+  Script script(*scene, options);
+  const Ending ending = serve(**host, **port, script, hashes, options, stop);
+  flush((*host)->outbox());
+  publisher.stop();
+  if (publisher.failures() > 0) {
+    spdlog::warn("{} writes failed, the last: {}", publisher.failures(), publisher.last_failure());
+  }
+  const auto closed = hashes.close();
+  if (!closed) spdlog::error(closed.error().message);
+  if (ending == Ending::kRefused) return report_error(*(*host)->error(), 1);
+  if (options.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
+  if (const std::string gains = gains_text((*host)->parameters()); !gains.empty())
+    spdlog::info("at the end: {}", gains);
+  print_report((*host)->totals(), frame_rate_hz, options.json);
+  if (ending == Ending::kNobodyCame) {
+    return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
+                                                          options.wait_for, *options.duration_s)},
+                        1);
+  }
+  return closed ? 0 : 1;
+}
+
+}  // namespace tandem::daemon

@@ -1,0 +1,152 @@
+#include <gtest/gtest.h>
+
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+transport::Received<transport::SessionMessage> rival(std::int64_t epoch_difference_ms, std::uint8_t tag) {
+  transport::SessionMessage session;
+  session.session = "unit";
+  session.epoch = static_cast<Epoch>(static_cast<std::int64_t>(test_config().epoch) + epoch_difference_ms);
+  return {session, participant(tag)};
+}
+
+HostConfig claiming_config() {
+  HostConfig config = test_config();
+  config.claim_ns = kSecond / 2;
+  return config;
+}
+
+TEST(Claim, AnnouncesNothingForHalfASecondAndThenTheSession) {
+  Bench bench(claiming_config());
+  bench.poll();
+  bench.run_ms(499);
+  EXPECT_EQ(bench.host->state(), Host::State::kClaiming);
+  EXPECT_TRUE(bench.port.order.empty());
+  bench.run_ms(2);
+  EXPECT_EQ(bench.host->state(), Host::State::kRunning);
+  ASSERT_FALSE(bench.port.order.empty());
+  EXPECT_EQ(bench.port.order.front(), "session");
+}
+
+TEST(Claim, ASecondServerSeesTheFirstAndRefusesNamingIt) {
+  Bench bench(claiming_config());
+  bench.poll();
+  bench.run_ms(300);
+  bench.port.rivals.push_back(rival(-60'000, 0x0B));
+  bench.run_ms(1);
+  EXPECT_EQ(bench.host->state(), Host::State::kRefused);
+  ASSERT_TRUE(bench.host->error());
+  EXPECT_EQ(bench.host->error()->code, ErrorCode::kConflict);
+  EXPECT_NE(bench.host->error()->message.find("1699999940000"), std::string::npos);
+  EXPECT_NE(bench.host->error()->message.find("0b0b0b0b"), std::string::npos);
+  EXPECT_TRUE(bench.port.order.empty());
+}
+
+TEST(Claim, BeforeAnnouncingEvenAHigherGuidWins) {
+  Bench bench(claiming_config());
+  bench.port.rivals.push_back(rival(10, 0xFF));
+  bench.poll();
+  EXPECT_EQ(bench.host->state(), Host::State::kRefused);
+}
+
+TEST(Claim, OfTwoStartingAtOnceTheLowerGuidStays) {
+  Bench lower;
+  lower.poll();
+  lower.port.rivals.push_back(rival(-1500, 0xAB));
+  lower.run_ms(1000);
+  EXPECT_EQ(lower.host->state(), Host::State::kRunning);
+
+  Bench higher;
+  higher.poll();
+  higher.port.rivals.push_back(rival(1500, 0xA9));
+  higher.run_ms(1000);
+  EXPECT_EQ(higher.host->state(), Host::State::kRefused);
+  EXPECT_EQ(higher.host->error()->code, ErrorCode::kConflict);
+}
+
+TEST(Claim, AServerOlderByMoreThanTwoSecondsStaysWhateverItsGuid) {
+  Bench older;
+  older.poll();
+  older.port.rivals.push_back(rival(2001, 0x01));
+  older.run_ms(1000);
+  EXPECT_EQ(older.host->state(), Host::State::kRunning);
+
+  Bench younger;
+  younger.poll();
+  younger.port.rivals.push_back(rival(-2001, 0xFF));
+  younger.run_ms(1000);
+  EXPECT_EQ(younger.host->state(), Host::State::kRefused);
+}
+
+TEST(Claim, ARefusedServerProducesNothingMore) {
+  Bench bench(claiming_config());
+  bench.port.rivals.push_back(rival(-60'000, 0x0B));
+  bench.poll();
+  bench.port.rivals.clear();
+  bench.run_ms(2000);
+  EXPECT_EQ(bench.host->state(), Host::State::kRefused);
+  EXPECT_TRUE(bench.port.order.empty());
+  EXPECT_EQ(bench.simulation.steps, 0U);
+}
+
+TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
+  FakeSimulation simulation(4);
+  FakePort port(participant(1));
+  const auto refused = [&](const std::function<void(HostConfig&)>& spoil) {
+    HostConfig config = test_config();
+    spoil(config);
+    return !Host::create(std::move(config), simulation, port).has_value();
+  };
+  EXPECT_FALSE(refused([](HostConfig&) {}));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.session = "a*"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.session.clear(); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.frame_rate_hz = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.frame_rate_hz = std::nan(""); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.lead = 2; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.window = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.window = 25; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.client_limit = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.types.clear(); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.epoch = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.codec = "morse"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.predictor = "oracle"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.parameters.threshold = 0; }));
+}
+
+TEST(HostCreate, RefusesASimulationWhoseColumnsAreTooShort) {
+  FakeSimulation simulation(4);
+  simulation.velocity[1].pop_back();
+  FakePort port(participant(1));
+  const auto host = Host::create(test_config(), simulation, port);
+  ASSERT_FALSE(host);
+  EXPECT_EQ(host.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(HostCreate, DescribesTheSessionCompletely) {
+  HostConfig config = test_config();
+  config.scene = "half_pipe";
+  config.scene_description = "name: \"half_pipe\"";
+  config.types = {{.name = "ball", .radius = 0.1F, .colour_rgba = 0xFF0000FF}};
+  Bench bench(config);
+  bench.poll();
+  ASSERT_EQ(bench.port.sessions.size(), 1U);
+  const auto& session = bench.port.sessions[0];
+  EXPECT_EQ(session, bench.host->session());
+  EXPECT_EQ(session.epoch, config.epoch);
+  EXPECT_EQ(session.capacity, 4U);
+  EXPECT_EQ(session.lattice_unit, config.lattice.unit);
+  EXPECT_EQ(session.threshold, 4096);
+  EXPECT_EQ(session.lead, 1U);
+  EXPECT_EQ(session.window_ceiling, 24U);
+  EXPECT_EQ(session.codec, "selective");
+  EXPECT_EQ(session.scene, "half_pipe");
+  EXPECT_EQ(session.types, config.types);
+  EXPECT_EQ(session.layout_hash, transport::layout_hash(session));
+  EXPECT_GT(session.max_delta_bytes, 0U);
+  EXPECT_GT(session.max_snapshot_bytes, 0U);
+}
+
+}  // namespace
+}  // namespace tandem::host

@@ -1,0 +1,277 @@
+#pragma once
+// Stand-ins for the host's two neighbours, and a bench that drives a host by a manual clock.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdk/transport/port.hpp"
+#include "services/host/host.hpp"
+#include "services/host/simulation.hpp"
+
+namespace tandem::host {
+
+/// Bodies that only the test moves. Gravity and pushes are taken as the particle engine takes them.
+class FakeSimulation final : public engine::Simulation {
+ public:
+  explicit FakeSimulation(std::uint32_t capacity) : alive(capacity, 1), type(capacity, 0) {
+    for (auto& column : position) column.assign(capacity, 0.0F);
+    for (auto& column : velocity) column.assign(capacity, 0.0F);
+  }
+
+  [[nodiscard]] std::uint32_t capacity() const override { return static_cast<std::uint32_t>(alive.size()); }
+  [[nodiscard]] double dt_s() const override { return 1.0 / 30; }
+  [[nodiscard]] engine::Vec3 gravity() const override { return gravity_in_force; }
+  [[nodiscard]] double damping_per_s() const override { return 0; }
+  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override {
+    using Effect = engine::Classification::Effect;
+    engine::Classification effect;
+    if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kGravity) && input.values.size() == 3) {
+      const bool large = std::ranges::any_of(input.values, [](double v) { return !(std::abs(v) <= 1000); });
+      effect.effect = large ? Effect::kRefused : Effect::kScheduled;
+      std::copy_n(input.values.begin(), 3, effect.gravity.begin());
+    } else if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kPush) &&
+               input.values.size() == 7) {
+      effect.effect = Effect::kImmediate;
+    }
+    return effect;
+  }
+  void apply(const engine::Input& input) override {
+    applied.emplace_back(steps + 1, input);
+    if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kGravity)) {
+      std::copy_n(input.values.begin(), 3, gravity_in_force.begin());
+    }
+  }
+  void step() override {
+    ++steps;
+    events_now.clear();
+    if (on_step) on_step(steps);
+  }
+  [[nodiscard]] engine::Bodies bodies() const override {
+    return {.position = {position[0], position[1], position[2]},
+            .velocity = {velocity[0], velocity[1], velocity[2]},
+            .alive = alive,
+            .type = type};
+  }
+  [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
+  [[nodiscard]] std::uint32_t colliding() const override { return 0; }
+  void save(std::vector<std::byte>& out) const override { out.clear(); }
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) override { return bytes.empty(); }
+
+  std::array<std::vector<float>, 3> position, velocity;
+  std::vector<std::uint8_t> alive;
+  std::vector<std::uint16_t> type;
+  std::vector<engine::Event> events_now;
+  engine::Vec3 gravity_in_force{};
+  std::function<void(std::uint64_t step)> on_step;
+  std::uint64_t steps = 0;
+  std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in
+};
+
+/// What the test puts in is taken; what the host's outbox held is kept by kind and in order.
+class FakePort final : public transport::ServerPort {
+ public:
+  explicit FakePort(transport::ParticipantId self) : self_(self) {}
+
+  [[nodiscard]] transport::ParticipantId self() const override { return self_; }
+  void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
+    out.insert(out.end(), rivals.begin(), rivals.end());
+  }
+  Result<void> write(const transport::SessionMessage& m) override { return keep(sessions, m, "session"); }
+  Result<void> write(const transport::DeltaMessage& m) override { return keep(deltas, m, "delta"); }
+  Result<void> write(const transport::ScheduledInputMessage& m) override {
+    return keep(scheduled, m, "scheduled");
+  }
+  Result<void> write(const transport::SnapshotMessage& m) override { return keep(snapshots, m, "snapshot"); }
+  Result<void> write(const transport::ReplyMessage& m) override { return keep(replies, m, "reply"); }
+  Result<void> write(const transport::ServerStatusMessage& m) override { return keep(statuses, m, "status"); }
+  Result<void> dispose_snapshots() override {
+    order.emplace_back("dispose");
+    ++disposals;
+    return {};
+  }
+  void take(std::vector<transport::Received<transport::InputMessage>>& out) override { move(inputs, out); }
+  void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
+  [[nodiscard]] bool joined(const transport::ParticipantId& id) override { return !unmatched.contains(id); }
+  [[nodiscard]] bool alive(const transport::ParticipantId& id) override { return !dead.contains(id); }
+  [[nodiscard]] std::uint64_t dropped() const override { return 0; }
+  void wait(std::chrono::nanoseconds /*timeout*/) override {}
+
+  std::vector<transport::Received<transport::SessionMessage>> rivals;
+  std::vector<transport::Received<transport::InputMessage>> inputs;
+  std::vector<transport::Received<transport::AckMessage>> acks;
+  std::set<transport::ParticipantId> unmatched, dead;
+  std::vector<transport::SessionMessage> sessions;
+  std::vector<transport::DeltaMessage> deltas;
+  std::vector<transport::ScheduledInputMessage> scheduled;
+  std::vector<transport::SnapshotMessage> snapshots;
+  std::vector<transport::ReplyMessage> replies;
+  std::vector<transport::ServerStatusMessage> statuses;
+  std::vector<std::string> order;  // kinds, as written
+  int disposals = 0;
+  int failing_writes = 0;  // the next so many deltas are refused
+
+ private:
+  template <class M>
+  Result<void> keep(std::vector<M>& kept, const M& message, const char* kind) {
+    if (std::is_same_v<M, transport::DeltaMessage> && failing_writes > 0) {
+      --failing_writes;
+      return fail(ErrorCode::kTransport, "refused by the test");
+    }
+    kept.push_back(message);
+    order.emplace_back(kind);
+    return {};
+  }
+  template <class M>
+  static void move(std::vector<M>& from, std::vector<M>& out) {
+    out.insert(out.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+    from.clear();
+  }
+  transport::ParticipantId self_;
+};
+
+[[nodiscard]] inline transport::ParticipantId participant(std::uint8_t tag) {
+  transport::ParticipantId id;
+  id.bytes.fill(tag);
+  return id;
+}
+
+/// Thresholds of 1/64 m in a world of 64 m; unit 2^-18 m.
+[[nodiscard]] inline HostConfig test_config() {
+  HostConfig config;
+  config.session = "unit";
+  config.epoch = 1'700'000'000'000;
+  config.codec = "selective";
+  config.lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
+  config.parameters = *codec_parameters(config.lattice, 1.0 / 64, 0, 0);
+  config.claim_ns = 0;
+  return config;
+}
+
+/// A host, its neighbours and a clock. Clients are imitated by ack() and input().
+class Bench {
+ public:
+  static constexpr std::int64_t kPeriod = kSecond / 30 + 1;  // a poll this far on finds the next frame due
+
+  explicit Bench(HostConfig config = test_config(), std::uint32_t capacity = 4)
+      : simulation(capacity), port(participant(0xAA)) {
+    auto made = Host::create(std::move(config), simulation, port);
+    if (!made) throw std::runtime_error(made.error().message);
+    host = std::move(*made);
+  }
+
+  bool poll() {
+    const bool produced = host->poll(now, kWallStart + now);
+    if (draining) drained();
+    return produced;
+  }
+  void drained() {
+    while (const auto message = host->outbox().pop(std::chrono::nanoseconds{0})) {
+      if (!publish(port, *message)) ++failed_writes;
+    }
+  }
+  /// Polls once a millisecond.
+  void run_ms(std::int64_t ms) {
+    for (std::int64_t i = 0; i < ms; ++i) {
+      now += kMillisecond;
+      if (on_ms) on_ms();
+      poll();
+    }
+  }
+  /// Announces and produces frames until the last delta is `frame`, one period apart.
+  void run_to(Frame frame) {
+    for (int i = 0; i < 10'000 && host->frame() < frame; ++i) {
+      now += kPeriod;
+      poll();
+    }
+  }
+
+  transport::AckMessage ack(transport::ClientId client, transport::Phase phase, Frame applied,
+                            transport::Role role = transport::Role::kParticipant,
+                            std::uint32_t attempt = 1) const {
+    transport::AckMessage ack;
+    ack.client = client;
+    ack.epoch = host->session().epoch;
+    ack.phase = phase;
+    ack.applied = applied;
+    ack.simulated = applied;
+    ack.role_wanted = role;
+    ack.clock_ns = now;
+    ack.join_attempt = attempt;
+    return ack;
+  }
+  void send(const transport::AckMessage& message) {
+    port.acks.push_back({message, participant(static_cast<std::uint8_t>(message.client))});
+  }
+  void joining(transport::ClientId client, std::uint32_t attempt = 1,
+               transport::Role role = transport::Role::kParticipant) {
+    send(ack(client, transport::Phase::kJoining, 0, role, attempt));
+  }
+  void playing(transport::ClientId client, Frame applied,
+               transport::Role role = transport::Role::kParticipant) {
+    send(ack(client, transport::Phase::kPlaying, applied, role));
+  }
+  /// A client that plays and is caught up.
+  void enter(transport::ClientId client, transport::Role role = transport::Role::kParticipant) {
+    joining(client, 1, role);
+    poll();
+    playing(client, host->frame(), role);
+    poll();
+  }
+
+  transport::InputMessage gravity(transport::ClientId client, std::uint64_t number, double z = -5) const {
+    transport::InputMessage input;
+    input.client = client;
+    input.epoch = host->session().epoch;
+    input.number = number;
+    input.kind = static_cast<std::uint32_t>(transport::InputKind::kGravity);
+    input.values = {0, 0, z};
+    return input;
+  }
+  transport::InputMessage push(transport::ClientId client, std::uint64_t number) const {
+    auto input = gravity(client, number);
+    input.kind = static_cast<std::uint32_t>(transport::InputKind::kPush);
+    input.values = {0, 0, 0, 1, 0, 0, 1};
+    return input;
+  }
+  void send(const transport::InputMessage& message) {
+    port.inputs.push_back({message, participant(static_cast<std::uint8_t>(message.client))});
+  }
+  /// The outcome of an input as the last reply to the client tells it.
+  [[nodiscard]] std::optional<transport::ReplyEntry> outcome(transport::ClientId client,
+                                                             std::uint64_t number) const {
+    const auto* reply = last_reply(client);
+    if (reply == nullptr) return std::nullopt;
+    for (auto entry = reply->entries.rbegin(); entry != reply->entries.rend(); ++entry) {
+      if (entry->number == number) return *entry;
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] transport::Reason refusal(transport::ClientId client, std::uint64_t number) const {
+    const auto entry = outcome(client, number);
+    return entry ? static_cast<transport::Reason>(entry->code) : transport::Reason::kNone;
+  }
+  [[nodiscard]] const transport::ReplyMessage* last_reply(transport::ClientId client) const {
+    for (auto reply = port.replies.rbegin(); reply != port.replies.rend(); ++reply) {
+      if (reply->client == client) return &*reply;
+    }
+    return nullptr;
+  }
+
+  static constexpr std::int64_t kWallStart = 1'700'000'000 * kSecond;
+  FakeSimulation simulation;
+  FakePort port;
+  std::unique_ptr<Host> host;
+  std::int64_t now = 5 * kSecond;
+  bool draining = true;
+  int failed_writes = 0;
+  std::function<void()> on_ms;
+};
+
+}  // namespace tandem::host

@@ -1,0 +1,111 @@
+// Decay and gains that the server chooses while a session runs.
+#include "services/host/gains.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+constexpr std::uint32_t kBodies = 1000;
+constexpr CodecParameters kStart{.threshold = 1000, .decay = 3000, .velocity_gain = 26214};
+
+/// Decisions on corrections that all have these cosines; the parameters in force at the end.
+CodecParameters decide(double agreement, double forwardness, int decisions, std::uint64_t corrections = 600) {
+  GainControl control({}, kBodies, kStart);
+  CodecParameters parameters = kStart;
+  for (int frame = 0; frame < 15 * decisions; ++frame) {
+    GainEvidence& seen = control.evidence();
+    seen.repeated = seen.driven = corrections;
+    seen.agreement = agreement * static_cast<double>(corrections);
+    seen.forwardness = forwardness * static_cast<double>(corrections);
+    control.after_frame(parameters);
+  }
+  return parameters;
+}
+
+TEST(Gains, GrowWhereCorrectionsAgreeAndShrinkWhereTheyDoNot) {
+  EXPECT_GT(decide(0.6, 0.2, 20).velocity_gain, kStart.velocity_gain);
+  EXPECT_LT(decide(-0.1, 0.2, 20).velocity_gain, kStart.velocity_gain);
+}
+
+TEST(Gains, TheLearnedAccelerationIsKeptWhileCorrectionsFollowIt) {
+  const CodecParameters kept = decide(0.25, 0.6, 5);
+  const CodecParameters dropped = decide(0.25, -0.3, 5);
+  EXPECT_LT(kept.decay, kStart.decay);
+  EXPECT_GT(dropped.decay, kStart.decay);
+  EXPECT_GT(kept.acceleration_gain, dropped.acceleration_gain);
+}
+
+TEST(Gains, StayWhereCorrectionsAreAsWantedOrTooFew) {
+  EXPECT_EQ(decide(0.25, 0.2, 50), kStart);
+  EXPECT_EQ(decide(0.6, -0.3, 50, 0), kStart);
+  EXPECT_EQ(decide(0.6, -0.3, 2, 2), kStart) << "two of a thousand bodies say little";
+}
+
+TEST(Gains, StayInTheirLimitsForEver) {
+  const CodecParameters most = decide(1, 1, 1000);
+  const CodecParameters least = decide(-1, -1, 1000);
+  const auto near_limit = [](double value, double limit) { return std::abs(value / limit - 1) < 0.31; };
+  EXPECT_PRED2(near_limit, most.velocity_gain / 32768.0, 1.8);
+  EXPECT_PRED2(near_limit, least.velocity_gain / 32768.0, 0.35);
+  EXPECT_PRED2(near_limit, most.decay, 15);
+  EXPECT_PRED2(near_limit, least.decay, 60000);
+}
+
+TEST(Gains, AreDecidedEveryFifteenFrames) {
+  GainControl control({}, kBodies, kStart);
+  CodecParameters parameters = kStart;
+  for (int frame = 1; frame <= 15; ++frame) {
+    control.evidence().driven += 100;
+    control.evidence().forwardness -= 50;
+    EXPECT_EQ(control.after_frame(parameters), frame == 15);
+  }
+}
+
+TEST(Gains, AreChosenAtRunTimeForTrackerAlone) {
+  const auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  sessions::SessionChoice choice;
+  choice.bodies = 1000;
+  EXPECT_TRUE(sessions::plan_session(*scene, choice)->gains);
+  choice.codec = "entropy";
+  EXPECT_FALSE(sessions::plan_session(*scene, choice)->gains);
+}
+
+TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
+  HostConfig config = test_config();
+  config.codec = "tracker";
+  config.codec_tables.clear();
+  config.parameters.decay = 13000;
+  config.gains = GainGoal{};
+  Bench bench(config);
+  bench.simulation.on_step = [&](std::uint64_t step) {  // to and fro: no force is worth remembering
+    for (auto& column : bench.simulation.position) {
+      for (float& p : column) p += step % 16 < 8 ? 0.07F : -0.07F;
+    }
+  };
+  bench.enter(2);
+  bench.on_ms = [&] { bench.playing(2, bench.host->frame()); };
+  bench.run_ms(100);
+  bench.joining(1);
+  bench.run_ms(300);
+  auto client = *ClientTimeline::create(timeline_config(config, bench.host->session().capacity));
+  ASSERT_TRUE(client.load(bench.port.snapshots.back().bytes, bench.host->session().epoch));
+  bench.run_ms(20'000);
+  for (const auto& delta : bench.port.deltas) {
+    if (delta.frame <= client.applied()) continue;
+    const auto applied = client.apply(delta.frame, delta.last_input, delta.hash, delta.payload);
+    ASSERT_TRUE(applied) << applied.error().message;
+  }
+  EXPECT_NE(bench.host->parameters(), config.parameters);
+  EXPECT_EQ(client.parameters(), bench.host->parameters());
+}
+
+}  // namespace
+}  // namespace tandem::host

@@ -1,0 +1,263 @@
+// How clients get in and what they are told.
+#include <gtest/gtest.h>
+
+#include "sdk/core/timeline/timeline.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+using transport::Phase;
+using transport::Reason;
+using transport::Role;
+
+class JoinTest : public ::testing::Test {
+ protected:
+  JoinTest() {
+    bench.poll();
+    bench.run_to(10);
+  }
+  Bench bench;
+};
+
+TEST_F(JoinTest, ASnapshotIsMadeOnDemandOnly) {
+  bench.run_ms(2000);
+  EXPECT_TRUE(bench.port.snapshots.empty());
+  bench.joining(1);
+  bench.run_ms(150);
+  ASSERT_EQ(bench.port.snapshots.size(), 1U);
+  EXPECT_EQ(bench.port.snapshots[0].epoch, bench.host->session().epoch);
+  EXPECT_EQ(bench.port.snapshots[0].slot, bench.port.snapshots[0].frame % 4);
+  EXPECT_LE(bench.port.snapshots[0].bytes.size(), bench.host->session().max_snapshot_bytes);
+}
+
+TEST_F(JoinTest, TheSnapshotWaitsUntilAllThreeWritersMatchedThatParticipant) {
+  bench.port.unmatched.insert(participant(1));
+  bench.joining(1);
+  bench.run_ms(3000);
+  EXPECT_TRUE(bench.port.snapshots.empty());
+  bench.port.unmatched.clear();
+  bench.run_ms(150);
+  EXPECT_EQ(bench.port.snapshots.size(), 1U);
+}
+
+TEST_F(JoinTest, JoinersAreCollectedForATenthOfASecondAndShareOneSnapshot) {
+  bench.joining(1);
+  bench.run_ms(50);
+  bench.joining(2);
+  bench.joining(3);
+  bench.run_ms(49);
+  EXPECT_TRUE(bench.port.snapshots.empty());
+  bench.run_ms(3);
+  EXPECT_EQ(bench.port.snapshots.size(), 1U);
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.port.snapshots.size(), 1U) << "all three are served";
+}
+
+TEST_F(JoinTest, TheSnapshotIsCutRightAfterADeltaAndLeavesBehindIt) {
+  bench.joining(1);
+  bench.run_ms(150);
+  const auto snapshot = std::ranges::find(bench.port.order, "snapshot");
+  const auto deltas_before = std::count(bench.port.order.begin(), snapshot, "delta");
+  EXPECT_EQ(bench.port.snapshots[0].frame, static_cast<Frame>(deltas_before));
+}
+
+TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {
+  bench.simulation.on_step = [this](std::uint64_t step) {
+    for (auto& column : bench.simulation.position) column[1] += 0.1F * static_cast<float>(step % 7);
+  };
+  bench.enter(2);
+  bench.on_ms = [this] { bench.playing(2, bench.host->frame()); };
+  bench.run_ms(100);
+  bench.joining(1);
+  bench.run_ms(90);
+  bench.send(bench.gravity(2, 1));  // pending when the snapshot is cut, or acting around it
+  bench.run_ms(300);
+  const auto& session = bench.host->session();
+  TimelineConfig config;
+  config.capacity = session.capacity;
+  config.codec = session.codec;
+  config.parameters = {session.threshold, session.position_step, session.velocity_step};
+  config.predictor = session.predictor;
+  config.max_lead = session.lead;
+  auto client = ClientTimeline::create(config);
+  ASSERT_TRUE(client);
+  const auto& snapshot = bench.port.snapshots.back();
+  ASSERT_TRUE(client->load(snapshot.bytes, session.epoch));
+  EXPECT_EQ(client->applied(), snapshot.frame);
+  for (const auto& input : bench.port.scheduled) {
+    const ScheduledDrive drive{
+        input.number,
+        input.frame,
+        {{input.values[0], input.values[1], input.values[2]}, static_cast<std::uint16_t>(input.values[3])}};
+    ASSERT_TRUE(client->schedule(drive));
+  }
+  for (const auto& delta : bench.port.deltas) {
+    if (delta.frame <= snapshot.frame) continue;
+    const auto applied = client->apply(delta.frame, delta.last_input, delta.hash, delta.payload);
+    ASSERT_TRUE(applied) << applied.error().message;
+  }
+  EXPECT_EQ(client->applied(), bench.host->frame());
+  EXPECT_EQ(client->hash(), bench.host->hash());
+  EXPECT_EQ(client->drive().gravity[2], to_drive(test_config().lattice, {0, 0, -5}, 0)->gravity[2]);
+}
+
+TEST_F(JoinTest, TheSameJoinerGetsAnotherOnlyAfterItAsksAgain) {
+  bench.joining(1, 1);
+  bench.run_ms(150);
+  for (int i = 0; i < 20; ++i) {
+    bench.joining(1, 1);
+    bench.run_ms(100);
+  }
+  EXPECT_EQ(bench.port.snapshots.size(), 1U);
+  bench.joining(1, 2);
+  bench.run_ms(150);
+  EXPECT_EQ(bench.port.snapshots.size(), 2U);
+}
+
+TEST_F(JoinTest, OrAfterFiveSecondsHavePassed) {
+  bench.joining(1);
+  bench.run_ms(4900);
+  EXPECT_EQ(bench.port.snapshots.size(), 1U);
+  bench.run_ms(400);
+  EXPECT_EQ(bench.port.snapshots.size(), 2U);
+}
+
+TEST_F(JoinTest, SnapshotsAreDisposedWhenNobodyJoins) {
+  bench.joining(1);
+  bench.joining(2);
+  bench.run_ms(150);
+  bench.playing(1, bench.host->frame());
+  bench.run_ms(50);
+  EXPECT_EQ(bench.port.disposals, 0) << "client 2 still joins";
+  bench.playing(2, bench.host->frame());
+  bench.run_ms(50);
+  EXPECT_EQ(bench.port.disposals, 1);
+  bench.run_ms(5000);
+  EXPECT_EQ(bench.port.disposals, 1);
+}
+
+TEST_F(JoinTest, AJoinerThatDiesKeepsNoSnapshotAlive) {
+  bench.joining(1);
+  bench.run_ms(150);
+  bench.port.dead.insert(participant(1));
+  bench.run_ms(500);
+  EXPECT_EQ(bench.port.disposals, 1);
+}
+
+TEST_F(JoinTest, AJoinerIsServedWhileTheServerIsSuspended) {
+  bench.enter(2);
+  bench.run_ms(300);  // suspended: client 2 is silent
+  const Frame held = bench.host->frame();
+  bench.joining(1);
+  bench.run_ms(110);
+  ASSERT_FALSE(bench.port.snapshots.empty());
+  EXPECT_EQ(bench.port.snapshots.back().frame, held);
+}
+
+TEST_F(JoinTest, ARoleAndPhaseAreConfirmedByReplies) {
+  bench.joining(1);
+  bench.run_ms(20);
+  ASSERT_NE(bench.last_reply(1), nullptr);
+  EXPECT_EQ(bench.last_reply(1)->role, Role::kParticipant);
+  EXPECT_EQ(bench.last_reply(1)->phase, Phase::kJoining);
+  bench.playing(1, bench.host->frame(), Role::kObserver);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.last_reply(1)->role, Role::kObserver);
+  EXPECT_EQ(bench.last_reply(1)->phase, Phase::kPlaying);
+}
+
+TEST_F(JoinTest, WithoutAChangeRepliesGoOutAtTwoHertzAtMostAndEchoTheClock) {
+  bench.enter(1);
+  bench.on_ms = [this] { bench.playing(1, bench.host->frame()); };
+  bench.run_ms(100);
+  const std::size_t before = bench.port.replies.size();
+  bench.run_ms(10'000);
+  EXPECT_GE(bench.port.replies.size() - before, 18U);
+  EXPECT_LE(bench.port.replies.size() - before, 20U);
+  const auto& reply = bench.port.replies.back();
+  EXPECT_LT(bench.now - reply.client_clock_ns, kSecond);
+  EXPECT_EQ(reply.server_time_ns - Bench::kWallStart, reply.client_clock_ns)
+      << "answered in the poll it came";
+}
+
+TEST_F(JoinTest, ASilentClientIsSentNoReplies) {
+  bench.enter(1, Role::kObserver);
+  bench.run_ms(100);
+  const std::size_t before = bench.port.replies.size();
+  bench.run_ms(10'000);
+  EXPECT_EQ(bench.port.replies.size(), before);
+}
+
+TEST_F(JoinTest, AWrongProtocolVersionIsAnsweredWithItsReasonAndIgnored) {
+  auto ack = bench.ack(1, Phase::kPlaying, 0);
+  ack.protocol_version = transport::kProtocolVersion + 1;
+  for (int i = 0; i < 100; ++i) {
+    bench.send(ack);
+    bench.run_ms(10);
+  }
+  ASSERT_NE(bench.last_reply(1), nullptr);
+  EXPECT_EQ(bench.last_reply(1)->reason, static_cast<std::uint32_t>(Reason::kProtocolVersion));
+  EXPECT_LE(bench.port.replies.size(), 3U) << "twice a second at most";
+  EXPECT_EQ(bench.host->totals().clients_seen, 0U);
+  EXPECT_EQ(bench.host->totals().refused_messages, 100U);
+  EXPECT_GT(bench.host->frame(), 35U) << "and not waited for";
+}
+
+TEST_F(JoinTest, AnAcknowledgementOfAnotherEpochIsIgnored) {
+  auto ack = bench.ack(1, Phase::kPlaying, 5);
+  ack.epoch += 1;
+  bench.send(ack);
+  bench.run_ms(50);
+  EXPECT_EQ(bench.host->totals().clients_seen, 0U);
+  EXPECT_EQ(bench.host->totals().refused_messages, 1U);
+}
+
+TEST_F(JoinTest, UnreadableAcknowledgementsAreRefusedAndCounted) {
+  auto phase = bench.ack(1, static_cast<Phase>(7), 0);
+  auto role = bench.ack(1, Phase::kJoining, 0, static_cast<Role>(7));
+  auto nobody = bench.ack(0, Phase::kJoining, 0);
+  bench.send(phase);
+  bench.send(role);
+  bench.send(nobody);
+  bench.run_ms(50);
+  EXPECT_EQ(bench.host->totals().refused_messages, 3U);
+  EXPECT_EQ(bench.host->totals().clients_seen, 0U);
+}
+
+TEST(ClientLimit, ClientsBeyondTheLimitAreToldAndSeatsOfTheDeadAreGivenAway) {
+  HostConfig config = test_config();
+  config.client_limit = 2;
+  Bench bench(config);
+  bench.poll();
+  bench.joining(1);
+  bench.joining(2);
+  bench.joining(3);
+  bench.run_ms(20);
+  ASSERT_NE(bench.last_reply(3), nullptr);
+  EXPECT_EQ(bench.last_reply(3)->reason, static_cast<std::uint32_t>(Reason::kFull));
+  EXPECT_EQ(bench.host->totals().clients_seen, 2U);
+  bench.port.dead.insert(participant(2));
+  bench.run_ms(500);
+  bench.joining(3);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().clients_seen, 3U);
+  EXPECT_EQ(bench.last_reply(3)->reason, static_cast<std::uint32_t>(Reason::kNone));
+}
+
+TEST(ClientLimit, OneParticipantHoldsSixteenClientsAtMost) {
+  Bench bench;
+  bench.poll();
+  for (transport::ClientId id = 1; id <= 20; ++id) {
+    bench.port.acks.push_back({bench.ack(id, Phase::kJoining, 0), participant(1)});
+  }
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().clients_seen, 16U);
+  EXPECT_EQ(bench.last_reply(17)->reason, static_cast<std::uint32_t>(Reason::kFull));
+  bench.joining(21);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().clients_seen, 17U) << "another participant's client finds a seat";
+}
+
+}  // namespace
+}  // namespace tandem::host

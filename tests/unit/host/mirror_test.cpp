@@ -1,0 +1,247 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <random>
+
+#include "services/host/mirror.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+using engine::Event;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+class MirrorTest : public ::testing::Test {
+ protected:
+  MirrorTest() { mirror.start(simulation.bodies()); }
+  void update(std::vector<Event> events = {}) { mirror.update(simulation.bodies(), events); }
+  [[nodiscard]] std::vector<std::pair<LifecycleKind, Slot>> records() const {
+    std::vector<std::pair<LifecycleKind, Slot>> all;
+    for (const auto& record : mirror.lifecycle()) all.emplace_back(record.kind, record.slot);
+    return all;
+  }
+  using Records = std::vector<std::pair<LifecycleKind, Slot>>;
+
+  Lattice lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
+  FakeSimulation simulation{4};
+  Mirror mirror{lattice, 4, 3};
+};
+
+TEST_F(MirrorTest, RoundsPositionsAndVelocitiesToTheNearestUnit) {
+  simulation.position[0][1] = 1.5F;
+  simulation.position[1][1] = -0.25F;
+  simulation.velocity[2][1] = -3.0F;
+  update();
+  EXPECT_EQ(mirror.target().p(0)[1], 3 << 17);
+  EXPECT_EQ(mirror.target().p(1)[1], -(1 << 16));
+  EXPECT_EQ(mirror.target().v(2)[1], -std::lround(0.1 * (1 << 18) * 64));
+  EXPECT_TRUE(mirror.lifecycle().empty());
+}
+
+TEST_F(MirrorTest, QuantisationErrsByHalfAUnitAtMost) {
+  const std::uint32_t seed = 20240711;
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> anywhere(-64, 64);
+  std::vector<float> in(1003);
+  for (float& x : in) x = anywhere(random);
+  std::vector<std::int32_t> out(in.size()), off(in.size());
+  quantise_column(in, lattice.position_scale(), kPositionLimit, 1e9F, out, off);
+  for (std::size_t i = 0; i < in.size(); ++i) {
+    EXPECT_LE(std::abs(out[i] - double{in[i]} * lattice.position_scale()), 0.5);
+    EXPECT_EQ(off[i], 0);
+  }
+}
+
+TEST_F(MirrorTest, FastBodiesSaturateAndStay) {
+  simulation.velocity[0][0] = 1e30F;
+  simulation.velocity[1][0] = -1e30F;
+  update();
+  EXPECT_EQ(mirror.target().v(0)[0], kVelocityLimit);
+  EXPECT_EQ(mirror.target().v(1)[0], -kVelocityLimit);
+  EXPECT_TRUE(mirror.lifecycle().empty());
+}
+
+TEST_F(MirrorTest, ABodyThatLeavesTheLatticeIsDespawned) {
+  simulation.position[2][3] = 5000;  // the lattice reaches 4096 m
+  update();
+  EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 3}}));
+  EXPECT_EQ(mirror.target().alive()[3], 0);
+  EXPECT_EQ(mirror.target().p(2)[3], 0);
+  EXPECT_EQ(mirror.expelled(), 1U);
+}
+
+TEST_F(MirrorTest, NanAndInfinityDespawnTheBodyAndTouchNoOther) {
+  simulation.position[0][0] = kNan;
+  simulation.velocity[1][1] = kInfinity;
+  simulation.velocity[2][2] = kNan;
+  simulation.position[0][3] = 2;
+  update();
+  EXPECT_EQ(
+      records(),
+      (Records{{LifecycleKind::kDespawn, 0}, {LifecycleKind::kDespawn, 1}, {LifecycleKind::kDespawn, 2}}));
+  EXPECT_EQ(mirror.target().p(0)[3], 1 << 19);
+  EXPECT_EQ(mirror.target().alive_count(), 1U);
+}
+
+TEST_F(MirrorTest, AnExpelledBodyStaysAwayEvenWhenItDriftsBack) {
+  simulation.position[0][2] = 5000;
+  update();
+  simulation.position[0][2] = 1;
+  update();
+  EXPECT_TRUE(mirror.lifecycle().empty());
+  EXPECT_EQ(mirror.target().alive()[2], 0);
+}
+
+TEST_F(MirrorTest, AnExpelledBodyComesBackAsANewOneWhenTheEngineTeleportsIt) {
+  simulation.position[0][2] = 5000;
+  update();
+  simulation.position[0][2] = 1;
+  update({{Event::Kind::kTeleported, 2}});
+  ASSERT_EQ(records(), (Records{{LifecycleKind::kSpawn, 2}}));
+  EXPECT_EQ(mirror.lifecycle()[0].generation, 1);
+}
+
+TEST_F(MirrorTest, DespawnAndSpawnFollowTheBodiesEvenWithoutEvents) {
+  simulation.alive[1] = 0;
+  update();
+  EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 1}}));
+  simulation.alive[1] = 1;
+  simulation.type[1] = 2;
+  simulation.position[0][1] = 3;
+  update();
+  ASSERT_EQ(records(), (Records{{LifecycleKind::kSpawn, 1}}));
+  EXPECT_EQ(mirror.lifecycle()[0].type, 2);
+  EXPECT_EQ(mirror.lifecycle()[0].generation, 1);
+  EXPECT_EQ(mirror.lifecycle()[0].body.p[0], 3 << 18);
+  EXPECT_EQ(mirror.target().generation()[1], 1);
+}
+
+TEST_F(MirrorTest, ReuseWithinOneStepIsADespawnAndThenASpawn) {
+  update({{Event::Kind::kDespawned, 1}, {Event::Kind::kSpawned, 1}});
+  EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 1}, {LifecycleKind::kSpawn, 1}}));
+  EXPECT_EQ(mirror.target().generation()[1], 1);
+}
+
+TEST_F(MirrorTest, ASpawnAndDespawnWithinOneStepIsNothingForADeadSlot) {
+  simulation.alive[1] = 0;
+  update();
+  update({{Event::Kind::kDespawned, 1}, {Event::Kind::kSpawned, 1}});
+  EXPECT_TRUE(mirror.lifecycle().empty());
+}
+
+TEST_F(MirrorTest, GenerationsCountReuseAndWrapAfter256) {
+  for (int i = 1; i <= 300; ++i) {
+    simulation.alive[0] = 0;
+    update();
+    simulation.alive[0] = 1;
+    update();
+    ASSERT_EQ(mirror.target().generation()[0], static_cast<std::uint8_t>(i));
+  }
+}
+
+TEST_F(MirrorTest, ASlotUsedForTheFirstTimeIsGenerationZero) {
+  FakeSimulation later(4);
+  later.alive[2] = 0;
+  Mirror other(lattice, 4, 3);
+  other.start(later.bodies());
+  later.alive[2] = 1;
+  other.update(later.bodies(), {});
+  ASSERT_EQ(other.lifecycle().size(), 1U);
+  EXPECT_EQ(other.lifecycle()[0].generation, 0);
+}
+
+TEST_F(MirrorTest, TeleportCarriesTheNewPlace) {
+  simulation.position[1][0] = -7;
+  update({{Event::Kind::kTeleported, 0}});
+  ASSERT_EQ(records(), (Records{{LifecycleKind::kTeleport, 0}}));
+  EXPECT_EQ(mirror.lifecycle()[0].body.p[1], -(7 << 18));
+}
+
+TEST_F(MirrorTest, TypeChangeIsARecordOfItsOwn) {
+  simulation.type[2] = 1;
+  update({{Event::Kind::kTypeChanged, 2}});
+  ASSERT_EQ(records(), (Records{{LifecycleKind::kTypeChange, 2}}));
+  EXPECT_EQ(mirror.lifecycle()[0].type, 1);
+  update();
+  EXPECT_TRUE(mirror.lifecycle().empty());
+}
+
+TEST_F(MirrorTest, TeleportAndTypeChangeInOneStepArriveInTwoFrames) {
+  simulation.type[2] = 1;
+  update({{Event::Kind::kTeleported, 2}, {Event::Kind::kTypeChanged, 2}});
+  EXPECT_EQ(records(), (Records{{LifecycleKind::kTeleport, 2}}));
+  update();
+  EXPECT_EQ(records(), (Records{{LifecycleKind::kTypeChange, 2}}));
+}
+
+TEST_F(MirrorTest, ABodyOfAnUnlistedTypeIsNotShown) {
+  simulation.type[3] = 3;
+  update();
+  EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 3}}));
+}
+
+TEST_F(MirrorTest, EventsOutOfRangeAreIgnored) {
+  update({{Event::Kind::kTeleported, 4}, {Event::Kind::kSpawned, 0xFFFFFFFF}});
+  EXPECT_TRUE(mirror.lifecycle().empty());
+}
+
+TEST_F(MirrorTest, DeadSlotsAreZeroWhateverTheEngineLeavesInThem) {
+  simulation.alive[0] = 0;
+  simulation.position[0][0] = kNan;
+  simulation.velocity[0][0] = 12;
+  simulation.type[0] = 2;
+  update();
+  State zero(4);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(mirror.target().p(i)[0], 0);
+    EXPECT_EQ(mirror.target().v(i)[0], 0);
+  }
+  EXPECT_EQ(mirror.target().type()[0], 0);
+}
+
+TEST_F(MirrorTest, RecordsAscendBySlotWithDespawnBeforeSpawn) {
+  const std::uint32_t seed = 77;
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  FakeSimulation crowd(64);
+  Mirror follower(lattice, 64, 3);
+  follower.start(crowd.bodies());
+  State replica = follower.target();
+  for (int step = 0; step < 500; ++step) {
+    std::vector<Event> events;
+    for (Slot s = 0; s < 64; ++s) {
+      const auto dice = random() % 16;
+      if (dice == 0) crowd.alive[s] ^= 1U;
+      if (dice == 1) events.push_back({Event::Kind::kTeleported, s});
+      if (dice == 2) events.push_back({Event::Kind::kSpawned, s});
+      if (dice == 3) crowd.type[s] = static_cast<std::uint16_t>(random() % 4);
+      if (dice == 4) crowd.position[0][s] = random() % 4 == 0 ? kNan : static_cast<float>(random() % 5000);
+    }
+    follower.update(crowd.bodies(), events);
+    const LifecycleRecord* before = nullptr;
+    for (const LifecycleRecord& record : follower.lifecycle()) {
+      if (before != nullptr && before->slot == record.slot) {
+        EXPECT_EQ(before->kind, LifecycleKind::kDespawn);
+        EXPECT_EQ(record.kind, LifecycleKind::kSpawn);
+      } else if (before != nullptr) {
+        EXPECT_LT(before->slot, record.slot);
+      }
+      before = &record;
+      if (record.kind == LifecycleKind::kDespawn) replica.despawn(record.slot);
+      if (record.kind == LifecycleKind::kSpawn)
+        replica.spawn(record.slot, record.generation, record.type, record.body);
+      if (record.kind == LifecycleKind::kTypeChange) replica.type()[record.slot] = record.type;
+    }
+    ASSERT_TRUE(std::ranges::equal(replica.alive(), follower.target().alive()));
+    ASSERT_TRUE(std::ranges::equal(replica.generation(), follower.target().generation()));
+    ASSERT_TRUE(std::ranges::equal(replica.type(), follower.target().type()));
+  }
+}
+
+}  // namespace
+}  // namespace tandem::host

@@ -1,0 +1,167 @@
+// The small parts by themselves.
+#include <gtest/gtest.h>
+
+#include "services/host/durations.hpp"
+#include "services/host/outbox.hpp"
+#include "services/host/pacing.hpp"
+#include "services/host/stall_meter.hpp"
+#include "services/host/window.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+TEST(StallMeter, ForgetsAChargeAfterTenSeconds) {
+  StallMeter meter;
+  meter.charge(7 * kSecond, 300 * kMillisecond);
+  EXPECT_EQ(meter.total_ns(7 * kSecond), 300 * kMillisecond);
+  EXPECT_EQ(meter.total_ns(17 * kSecond), 300 * kMillisecond);
+  EXPECT_EQ(meter.total_ns(17 * kSecond + 100 * kMillisecond), 0);
+}
+
+TEST(StallMeter, AddsChargesWithinTheWindowAndDropsThemOneByOne) {
+  StallMeter meter;
+  for (int i = 0; i < 20; ++i) meter.charge(i * kSecond, 10 * kMillisecond);
+  EXPECT_EQ(meter.total_ns(19 * kSecond), 110 * kMillisecond);
+  EXPECT_EQ(meter.total_ns(24 * kSecond), 60 * kMillisecond);
+  EXPECT_EQ(meter.total_ns(1000 * kSecond), 0);
+}
+
+TEST(PublishTimes, RemembersRecentFramesOnly) {
+  PublishTimes times;
+  EXPECT_FALSE(times.of(0));
+  EXPECT_FALSE(times.of(5));
+  for (Frame f = 1; f <= 200; ++f) times.published(f, static_cast<std::int64_t>(f) * 10);
+  EXPECT_EQ(times.of(200), 2000);
+  EXPECT_EQ(times.of(73), 730);
+  EXPECT_FALSE(times.of(72));
+  EXPECT_FALSE(times.of(201));
+}
+
+TEST(RoundTrip, SettlesOnASteadyRoundTrip) {
+  RoundTrip trip;
+  EXPECT_EQ(trip.high_ns(), 0);
+  trip.measured(80 * kMillisecond);
+  EXPECT_EQ(trip.high_ns(), 240 * kMillisecond);
+  for (int i = 0; i < 100; ++i) trip.measured(80 * kMillisecond);
+  EXPECT_NEAR(static_cast<double>(trip.high_ns()), 80e6, 1e3);
+}
+
+TEST(WindowFor, CoversTheRoundTripBetweenTwoAndTheCeiling) {
+  constexpr std::int64_t kPeriodNs = kSecond / 30;
+  EXPECT_EQ(window_for(0, kPeriodNs, 24), 2U);
+  EXPECT_EQ(window_for(2 * kMillisecond, kPeriodNs, 24), 2U);
+  EXPECT_EQ(window_for(100 * kMillisecond, kPeriodNs, 24), 5U);
+  EXPECT_EQ(window_for(5 * kSecond, kPeriodNs, 24), 24U);
+  EXPECT_EQ(window_for(5 * kSecond, 0, 24), 24U);
+}
+
+TEST(Pacing, DeadlinesAreAbsoluteSoThatLatenessDoesNotAddUp) {
+  Pacing pacing(50, false);
+  pacing.start(0);
+  std::int64_t now = 0;
+  for (int i = 0; i < 100; ++i) {
+    now = pacing.deadline_ns() + 3 * kMillisecond;
+    ASSERT_TRUE(pacing.due(now));
+    pacing.frame_started(now, false);
+  }
+  EXPECT_EQ(pacing.deadline_ns(), 100 * 20 * kMillisecond);
+}
+
+TEST(Pacing, AfterASuspensionThereIsNoCatchUp) {
+  Pacing pacing(50, false);
+  pacing.start(0);
+  pacing.frame_started(0, false);
+  pacing.frame_started(45 * kMillisecond, true);
+  EXPECT_EQ(pacing.deadline_ns(), 65 * kMillisecond);
+}
+
+TEST(Pacing, ALongHiccupIsNotSprintedAfter) {
+  Pacing pacing(50, false);
+  pacing.start(0);
+  pacing.frame_started(0, false);
+  pacing.frame_started(kSecond, false);
+  EXPECT_EQ(pacing.deadline_ns(), kSecond + 20 * kMillisecond);
+}
+
+TEST(Pacing, AtAFreeRateEveryFrameIsDueButWaitingCountsFromTheNominalPeriod) {
+  Pacing pacing(50, true);
+  pacing.start(0);
+  pacing.frame_started(kMillisecond, false);
+  EXPECT_TRUE(pacing.due(kMillisecond));
+  EXPECT_EQ(pacing.suspended_from_ns(), 21 * kMillisecond);
+  for (int i = 2; i < 100; ++i) pacing.frame_started(i * kMillisecond, false);
+  EXPECT_NEAR(static_cast<double>(pacing.period_ns()), 1e6, 1e4);
+}
+
+TEST(Durations, TellsPercentilesWithinOneBin) {
+  Durations durations;
+  EXPECT_EQ(durations.percentile_ms(0.5), 0);
+  for (int i = 1; i <= 100; ++i) durations.add(i * 0.1);
+  EXPECT_NEAR(durations.percentile_ms(0.5), 5.0, 0.011);
+  EXPECT_NEAR(durations.percentile_ms(0.99), 9.9, 0.011);
+  durations.add(1e9);
+  durations.add(-1);
+  EXPECT_EQ(durations.count(), 102U);
+  durations.clear();
+  EXPECT_EQ(durations.percentile_ms(0.99), 0);
+}
+
+transport::DeltaMessage delta(Frame frame, std::uint32_t part, std::uint32_t parts) {
+  transport::DeltaMessage message;
+  message.frame = frame;
+  message.part = part;
+  message.parts = parts;
+  return message;
+}
+
+TEST(Outbox, KeepsOneOrderOverAllKinds) {
+  Outbox outbox({});
+  ASSERT_TRUE(outbox.push(transport::ScheduledInputMessage{}));
+  ASSERT_TRUE(outbox.push(delta(1, 0, 1)));
+  ASSERT_TRUE(outbox.push(transport::SnapshotMessage{}));
+  using std::chrono::nanoseconds;
+  EXPECT_TRUE(std::holds_alternative<transport::ScheduledInputMessage>(*outbox.pop(nanoseconds{0})));
+  EXPECT_TRUE(std::holds_alternative<transport::DeltaMessage>(*outbox.pop(nanoseconds{0})));
+  EXPECT_TRUE(std::holds_alternative<transport::SnapshotMessage>(*outbox.pop(nanoseconds{0})));
+  EXPECT_FALSE(outbox.pop(nanoseconds{0}));
+  EXPECT_EQ(outbox.high_water(), 3U);
+}
+
+TEST(Outbox, CountsADeltaOnceWhateverItsParts) {
+  Outbox outbox({.frames = 2, .snapshots = 1, .control = 1});
+  for (Frame f = 1; f <= 2; ++f) {
+    EXPECT_TRUE(outbox.has_frame_room());
+    for (std::uint32_t part = 0; part < 3; ++part) ASSERT_TRUE(outbox.push(delta(f, part, 3)));
+  }
+  EXPECT_FALSE(outbox.has_frame_room());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_TRUE(outbox.has_frame_room());
+}
+
+TEST(Outbox, ADeltaIsUnwrittenUntilTheNextMessageIsAskedFor) {
+  Outbox outbox({});
+  ASSERT_TRUE(outbox.push(delta(1, 0, 1)));
+  ASSERT_TRUE(outbox.push(delta(2, 0, 1)));
+  EXPECT_EQ(outbox.unwritten_frames(), 2U);
+  ASSERT_TRUE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 2U);
+  ASSERT_TRUE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 1U);
+  EXPECT_FALSE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 0U);
+}
+
+TEST(Outbox, EachKindIsBoundedByItself) {
+  Outbox outbox({.frames = 1, .snapshots = 1, .control = 1});
+  EXPECT_TRUE(outbox.push(delta(1, 0, 1)));
+  EXPECT_FALSE(outbox.push(delta(2, 0, 1)));
+  EXPECT_TRUE(outbox.push(transport::SnapshotMessage{}));
+  EXPECT_FALSE(outbox.push(transport::SnapshotMessage{}));
+  EXPECT_TRUE(outbox.push(transport::ReplyMessage{}));
+  EXPECT_FALSE(outbox.push(transport::ServerStatusMessage{}));
+  EXPECT_EQ(outbox.size(), 3U);
+}
+
+}  // namespace
+}  // namespace tandem::host

@@ -1,0 +1,182 @@
+// What leaves the host, and what happens when it can not.
+#include <gtest/gtest.h>
+
+#include "sdk/core/lattice/hash.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+TEST(Publish, TheFirstDeltaIsFrameOneAndEveryFrameFollows) {
+  Bench bench;
+  bench.poll();
+  bench.run_to(50);
+  ASSERT_EQ(bench.port.deltas.size(), 50U);
+  for (std::size_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(bench.port.deltas[i].frame, i + 1);
+    EXPECT_EQ(bench.port.deltas[i].parts, 1U);
+    EXPECT_EQ(bench.port.deltas[i].epoch, test_config().epoch);
+    EXPECT_EQ(bench.port.deltas[i].last_input, 0U);
+  }
+  EXPECT_EQ(bench.port.deltas.back().server_time_ns, Bench::kWallStart + bench.now);
+}
+
+TEST(Publish, DeltasCarryTheHashOfTheAgreedState) {
+  Bench bench;
+  bench.simulation.on_step = [&](std::uint64_t step) {
+    bench.simulation.position[0][2] = static_cast<float>(step);
+  };
+  bench.poll();
+  bench.run_to(20);
+  EXPECT_EQ(bench.port.deltas.back().hash, StateHasher().hash(bench.host->agreed()));
+  EXPECT_EQ(bench.port.deltas.back().hash, bench.host->hash());
+  EXPECT_EQ(bench.host->report().hash, bench.host->hash());
+  EXPECT_EQ(bench.host->report().corrected, 1U);
+}
+
+TEST(Publish, FramesContinueFromAStartFrame) {
+  HostConfig config = test_config();
+  config.start_frame = 1000;
+  Bench bench(config);
+  bench.poll();
+  bench.run_to(1001);
+  EXPECT_EQ(bench.port.deltas.front().frame, 1001U);
+}
+
+TEST(Publish, LargeDeltasAreCutIntoPartsOfSixtyThousandBytes) {
+  HostConfig config = test_config();
+  config.codec = "none";
+  Bench bench(config, 10'000);
+  bench.poll();
+  bench.run_to(2);
+  const std::size_t size = bench.host->report().payload_bytes;
+  ASSERT_GT(size, 240'000U);
+  const auto parts = static_cast<std::uint32_t>((size + 59'999) / 60'000);
+  ASSERT_EQ(bench.port.deltas.size(), 2U * parts);
+  std::size_t sum = 0;
+  for (std::uint32_t i = 0; i < parts; ++i) {
+    const auto& delta = bench.port.deltas[parts + i];
+    EXPECT_EQ(delta.frame, 2U);
+    EXPECT_EQ(delta.part, i);
+    EXPECT_EQ(delta.parts, parts);
+    EXPECT_LE(delta.payload.size(), 60'000U);
+    EXPECT_EQ(delta.hash, bench.host->hash());
+    sum += delta.payload.size();
+  }
+  EXPECT_EQ(sum, size);
+  EXPECT_LE(size, bench.host->session().max_delta_bytes);
+}
+
+TEST(Publish, AFullQueueSuspendsTheServerAndNoDeltaIsDropped) {
+  Bench bench;
+  bench.poll();
+  bench.draining = false;
+  bench.run_ms(5000);
+  const Frame held = bench.host->frame();
+  EXPECT_EQ(held, 1 + test_config().outbox.frames);
+  EXPECT_EQ(bench.simulation.steps, held);
+  bench.draining = true;
+  bench.run_ms(1000);
+  EXPECT_NEAR(static_cast<double>(bench.host->frame() - held), 30, 1) << "and there is no catch-up";
+  for (std::size_t i = 0; i < bench.port.deltas.size(); ++i) ASSERT_EQ(bench.port.deltas[i].frame, i + 1);
+}
+
+TEST(Publish, EveryQueueStaysBoundedWhenNothingIsWritten) {
+  HostConfig config = test_config();
+  config.outbox = {.frames = 4, .snapshots = 2, .control = 50};
+  Bench bench(config);
+  bench.poll();
+  bench.enter(1);
+  bench.draining = false;
+  bench.on_ms = [&] { bench.playing(1, bench.host->frame()); };
+  for (std::uint64_t i = 1; i < 3000; ++i) {
+    bench.send(bench.gravity(1, i));
+    bench.joining(2, static_cast<std::uint32_t>(i));
+    bench.run_ms(10);
+  }
+  EXPECT_LE(bench.host->outbox().size(), 56U);
+  EXPECT_GT(bench.host->totals().refused_inputs, 0U);
+}
+
+TEST(Publish, StatusGoesOutOnceASecondWithReadableFigures) {
+  Bench bench;
+  bench.simulation.on_step = [&](std::uint64_t) { bench.simulation.position[0][0] += 1; };
+  bench.poll();
+  bench.enter(1);
+  bench.enter(2, transport::Role::kObserver);
+  bench.on_ms = [&] { bench.playing(1, bench.host->frame()); };
+  bench.port.statuses.clear();
+  bench.run_ms(10'000);
+  ASSERT_EQ(bench.port.statuses.size(), 10U);
+  const auto& status = bench.port.statuses.back();
+  EXPECT_EQ(status.session, "unit");
+  EXPECT_EQ(status.bodies, 4U);
+  EXPECT_EQ(status.participants, 1U);
+  EXPECT_EQ(status.observers, 1U);
+  EXPECT_EQ(status.window, 2U);
+  EXPECT_NEAR(status.frame_rate_hz, 30, 1);
+  EXPECT_NEAR(status.corrected_per_frame, 1, 1e-9);
+  EXPECT_NEAR(status.raw_mbit_per_s, 4 * 24 * 8 * 30 / 1048576.0, 1e-3);
+  EXPECT_NEAR(status.mbit_per_s, static_cast<double>(bench.host->report().payload_bytes) * 8 * 30 / 1048576,
+              1e-3);
+  EXPECT_EQ(status.payload_bytes, bench.host->totals().payload_bytes);
+}
+
+TEST(Publish, BodiesThatComeAndGoTravelAsLifecycleAndTheCountFollows) {
+  Bench bench;
+  bench.poll();
+  bench.run_to(5);
+  bench.simulation.alive[1] = 0;
+  bench.run_to(6);
+  EXPECT_EQ(bench.host->agreed().alive()[1], 0);
+  bench.simulation.alive[1] = 1;
+  bench.simulation.position[2][1] = 9;
+  bench.run_to(7);
+  EXPECT_EQ(bench.host->agreed().alive()[1], 1);
+  EXPECT_EQ(bench.host->agreed().generation()[1], 1);
+  EXPECT_EQ(bench.host->agreed().p(2)[1], 9 << 18);
+  EXPECT_EQ(bench.host->agreed().alive_count(), 4U);
+}
+
+TEST(Publish, ABodyThatTurnsIntoNanIsDespawnedAndTheStreamGoesOn) {
+  Bench bench;
+  bench.poll();
+  bench.run_to(5);
+  bench.simulation.position[0][3] = std::nanf("");
+  bench.run_to(8);
+  EXPECT_EQ(bench.host->agreed().alive_count(), 3U);
+  EXPECT_EQ(bench.host->frame(), 8U);
+}
+
+TEST(Publish, TheAgreedStateFollowsTheSimulationWithinTheThreshold) {
+  Bench bench;
+  bench.simulation.on_step = [&](std::uint64_t step) {
+    bench.simulation.position[0][0] = 0.01F * static_cast<float>(step * step % 97);
+  };
+  bench.poll();
+  for (Frame frame = 1; frame < 200; ++frame) {
+    bench.run_to(frame);
+    const double agreed = bench.host->agreed().p(0)[0] * test_config().lattice.unit;
+    ASSERT_LE(std::abs(agreed - double{bench.simulation.position[0][0]}), 1.0 / 64 + 1e-5);
+  }
+}
+
+TEST(Publish, TwoHostsOfTheSameInputsPublishTheSameBytes) {
+  std::vector<transport::DeltaMessage> first;
+  for (int run = 0; run < 2; ++run) {
+    Bench bench;
+    bench.simulation.on_step = [&](std::uint64_t step) {
+      bench.simulation.position[step % 3][step % 4] += 0.3F * static_cast<float>(step % 5);
+    };
+    bench.poll();
+    bench.enter(1);
+    bench.on_ms = [&] { bench.playing(1, bench.host->frame()); };
+    bench.send(bench.gravity(1, 1));
+    bench.run_ms(2000);
+    if (run == 0) first = bench.port.deltas;
+    EXPECT_EQ(first, bench.port.deltas);
+  }
+}
+
+}  // namespace
+}  // namespace tandem::host

@@ -1,0 +1,283 @@
+// Parameters that change while a session runs, set by hand or chosen by automatic quality.
+#include "services/host/quality.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sdk/core/codec/paper/training.hpp"
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::host {
+namespace {
+
+constexpr CodecParameters kStart{.threshold = 1000, .position_step = 100, .velocity_step = 100};
+
+QualityControl control_of(const QualityGoal& goal, StepRule steps = StepRule::kFollow) {
+  return {goal, steps, kStart, 1000, 30};
+}
+
+/// `seconds` of frames of `bytes` each; the parameters in force at the end.
+CodecParameters run(QualityControl& control, int seconds, std::size_t bytes, CodecParameters parameters) {
+  for (int frame = 0; frame < 30 * seconds; ++frame) control.after_frame(bytes, 10, parameters);
+  return parameters;
+}
+
+constexpr std::size_t kMbitBytes = (1 << 20) / 8 / 30;  // a frame at 1 Mbit/s
+
+TEST(Quality, DecidesFourTimesASecond) {
+  QualityControl control =
+      control_of({.target_mbit_per_s = 1, .smallest_threshold = 10, .largest_threshold = 9000});
+  CodecParameters parameters = kStart;
+  for (int frame = 1; frame < 8; ++frame) EXPECT_FALSE(control.after_frame(10 * kMbitBytes, 10, parameters));
+  EXPECT_TRUE(control.after_frame(10 * kMbitBytes, 10, parameters));
+}
+
+TEST(Quality, SettlesNearTheTargetWhereBitsFallWithTheThreshold) {
+  QualityControl control =
+      control_of({.target_mbit_per_s = 1, .smallest_threshold = 10, .largest_threshold = 100000});
+  CodecParameters parameters = kStart;
+  double mbit = 0;
+  for (int second = 0; second < 40; ++second) {
+    mbit = 3000.0 / parameters.threshold;  // a scene that takes 3 Mbit/s at the start
+    parameters = run(control, 1, static_cast<std::size_t>(mbit * kMbitBytes), parameters);
+  }
+  EXPECT_NEAR(mbit, 1, 0.05);
+}
+
+TEST(Quality, NeverLeavesItsLimits) {
+  QualityControl control =
+      control_of({.target_mbit_per_s = 1, .smallest_threshold = 400, .largest_threshold = 3000});
+  EXPECT_EQ(run(control, 30, 100 * kMbitBytes, kStart).threshold, 3000) << "the stated maximum error";
+  EXPECT_EQ(run(control, 60, 0, kStart).threshold, 400);
+}
+
+TEST(Quality, WithoutATargetTheThresholdStaysAndRangesFollowWhatIsCorrected) {
+  QualityControl control = control_of({.smallest_threshold = 1000, .largest_threshold = 1000});
+  control.statistics().bodies = 1;
+  control.statistics().largest_position = 127000;
+  control.statistics().largest_velocity = 1270;
+  CodecParameters grown = kStart;
+  while (!control.after_frame(500, 10, grown)) continue;
+  EXPECT_EQ(grown.threshold, 1000);
+  EXPECT_EQ(grown.position_step, 1100) << "1.1 times the largest residual, at once";
+  EXPECT_EQ(grown.velocity_step, 97) << "down slowly";
+  EXPECT_EQ(run(control, 10, 500, grown), grown) << "nothing was corrected: nothing was learnt";
+}
+
+TEST(Quality, StepsOfACodecThatDoesNotReadThemStay) {
+  QualityControl control =
+      control_of({.smallest_threshold = 1000, .largest_threshold = 1000}, StepRule::kLeave);
+  control.statistics().bodies = 1;
+  control.statistics().largest_position = 127000;
+  EXPECT_EQ(run(control, 1, 500, kStart), kStart);
+  EXPECT_EQ(step_rule("tracker", false), StepRule::kLeave);
+}
+
+TEST(Quality, StepsThatCodeTablesWereTrainedForAreTheSmallestAndScaleWithTheThreshold) {
+  QualityControl control = control_of({1, 10, 2000}, step_rule("entropy", true));
+  CodecParameters parameters = kStart;
+  for (int frame = 0; frame < 300; ++frame) {
+    control.statistics().bodies = 1;
+    control.statistics().largest_position = 127;
+    control.after_frame(100 * kMbitBytes, 10, parameters);
+  }
+  EXPECT_EQ(parameters, (CodecParameters{.threshold = 2000, .position_step = 200, .velocity_step = 200}));
+}
+
+TEST(Quality, FinerThanAtTheStartOnlyWhereCorrectionsTellWhatItCosts) {
+  const QualityGoal goal{.target_mbit_per_s = 1, .smallest_threshold = 10, .largest_threshold = 9000};
+  QualityControl quiet = control_of(goal);
+  CodecParameters parameters = kStart;
+  for (int frame = 0; frame < 300; ++frame) quiet.after_frame(4, 0, parameters);
+  EXPECT_EQ(parameters.threshold, kStart.threshold);
+  parameters.threshold = 4000;
+  for (int frame = 0; frame < 300; ++frame) quiet.after_frame(4, 0, parameters);
+  EXPECT_EQ(parameters.threshold, kStart.threshold) << "what was coarse does not stay so";
+  EXPECT_LT(run(quiet, 10, 4, kStart).threshold, kStart.threshold);
+}
+
+TEST(Quality, RisesFasterThanItFalls) {
+  const QualityGoal goal{.target_mbit_per_s = 1, .smallest_threshold = 10, .largest_threshold = 9000};
+  QualityControl high = control_of(goal), low = control_of(goal);
+  CodecParameters risen = kStart, fallen = kStart;
+  while (!high.after_frame(10 * kMbitBytes, 10, risen)) continue;
+  while (!low.after_frame(kMbitBytes / 10, 10, fallen)) continue;
+  EXPECT_EQ(risen.threshold, 2000);
+  EXPECT_EQ(fallen.threshold, 800);
+}
+
+TEST(Quality, ATargetOutOfReachIsSaidAfterTwoSecondsAndTakenBackAfterTwo) {
+  QualityControl control = control_of({1, 400, 1000});
+  EXPECT_FALSE((run(control, 1, 3 * kMbitBytes, kStart), control.out_of_reach()));
+  EXPECT_TRUE((run(control, 2, 3 * kMbitBytes, kStart), control.out_of_reach()));
+  const CodecParameters finer{.threshold = 500};
+  EXPECT_TRUE((run(control, 1, kMbitBytes, finer), control.out_of_reach()));
+  EXPECT_FALSE((run(control, 2, kMbitBytes, finer), control.out_of_reach()));
+}
+
+TEST(Quality, ABudgetThatHoldsTheRateBelowTheTargetIsRefused) {
+  HostConfig config = test_config();
+  config.codec = "limited";
+  config.codec_tables = default_code_tables();
+  config.quality = QualityGoal{1, 1, kPositionLimit};
+  config.budget = least_budget(*config.quality, config.frame_rate_hz);
+  EXPECT_GT(config.budget, kMbitBytes);
+  EXPECT_NO_THROW(Bench bench(config));
+  --config.budget;
+  EXPECT_THROW(Bench bench(config), std::runtime_error);
+}
+
+/// Payload of `seconds` of the scene at a fixed threshold.
+std::uint64_t payload_bytes(const scenes::Scene& scene, const std::string& codec, bool automatic,
+                            int seconds) {
+  constexpr std::uint64_t kSeed = 1;
+  sessions::SessionChoice choice;
+  choice.bodies = 300;
+  choice.codec = codec;
+  choice.automatic = automatic;
+  HostConfig config = sessions::plan_session(scene, choice).value();
+  config.claim_ns = 0;
+  const auto simulation = scenes::make_simulation(scene, choice.bodies, kSeed, 1).value();
+  FakePort port(participant(0xAA));
+  const auto host = Host::create(config, *simulation, port).value();
+  const auto frames = static_cast<Frame>(seconds / scene.dt_s);
+  std::int64_t now = kSecond;
+  while (host->frame() < frames && now < 1000 * kSecond) {
+    now += Bench::kPeriod;
+    host->poll(now, now);
+    while (host->outbox().pop(std::chrono::nanoseconds{0})) continue;
+  }
+  EXPECT_EQ(host->frame(), frames);
+  return host->totals().payload_bytes;
+}
+
+TEST(Quality, AutomaticRangesCostHardlyMoreThanTrainedOnes) {
+  const auto scene = scenes::load_scene("half_pipe_3");
+  ASSERT_TRUE(scene);
+  for (const char* codec : {"entropy", "limited"}) {
+    const auto trained = static_cast<double>(payload_bytes(*scene, codec, false, 10));
+    const auto automatic = static_cast<double>(payload_bytes(*scene, codec, true, 10));
+    EXPECT_GT(trained, 10000) << "something was corrected";
+    EXPECT_LT(automatic, 1.03 * trained) << codec;
+  }
+}
+
+TEST(Quality, LimitsThatExcludeTheThresholdAreRefused) {
+  EXPECT_TRUE(valid_goal({0, 1000, 1000}, kStart));
+  EXPECT_FALSE(valid_goal({0, 1001, 2000}, kStart));
+  EXPECT_FALSE(valid_goal({0, 1, 999}, kStart));
+  EXPECT_FALSE(valid_goal({-1, 1, 2000}, kStart));
+  EXPECT_FALSE(valid_goal({std::nan(""), 1, 2000}, kStart));
+  EXPECT_FALSE(valid_goal({0, 0, 2000}, kStart));
+  HostConfig config = test_config();
+  config.quality = QualityGoal{0, 1, 1};
+  EXPECT_THROW(Bench bench(config), std::runtime_error);
+}
+
+/// A bench with a participant that keeps up and a second one whose snapshot a client timeline starts from.
+class RuntimeQuality : public ::testing::Test {
+ protected:
+  explicit RuntimeQuality(HostConfig config = test_config()) : bench(std::move(config)) {
+    bench.simulation.on_step = [this](std::uint64_t step) {
+      for (auto& column : bench.simulation.position)
+        column[1] += 0.05F * static_cast<float>(step % 7) - 0.15F;
+    };
+    bench.enter(2);
+    bench.on_ms = [this] { bench.playing(2, bench.host->frame()); };
+    bench.run_ms(100);
+    bench.joining(1);
+    bench.run_ms(300);
+    const auto& session = bench.host->session();
+    TimelineConfig timeline;
+    timeline.capacity = session.capacity;
+    timeline.codec = session.codec;
+    timeline.codec_tables = session.codec_tables;
+    timeline.parameters = {session.threshold, session.position_step, session.velocity_step};
+    timeline.predictor = session.predictor;
+    timeline.max_lead = session.lead;
+    client.emplace(std::move(*ClientTimeline::create(timeline)));
+    EXPECT_TRUE(client->load(bench.port.snapshots.back().bytes, session.epoch));
+  }
+  /// Lets the client apply all that was published; every hash is checked on the way.
+  void follow() {
+    for (const auto& delta : bench.port.deltas) {
+      if (delta.frame <= client->applied()) continue;
+      const auto applied = client->apply(delta.frame, delta.last_input, delta.hash, delta.payload);
+      ASSERT_TRUE(applied) << applied.error().message;
+    }
+    EXPECT_EQ(client->hash(), bench.host->hash());
+  }
+
+  Bench bench;
+  std::optional<ClientTimeline> client;
+};
+
+TEST_F(RuntimeQuality, ParametersSetByHandTravelInTheNextDeltaAndClientsFollow) {
+  follow();
+  CodecParameters coarse = bench.host->parameters();
+  coarse.threshold *= 16;
+  coarse.velocity_step *= 2;
+  ASSERT_TRUE(bench.host->set_parameters(coarse));
+  EXPECT_EQ(client->parameters(), test_config().parameters);
+  const Frame before = bench.host->frame();
+  bench.run_ms(40);
+  ASSERT_EQ(bench.host->frame(), before + 1);
+  follow();
+  EXPECT_EQ(client->parameters(), coarse);
+  bench.run_ms(500);
+  follow();
+}
+
+TEST_F(RuntimeQuality, ParametersOutOfRangeAreRefusedAndChangeNothing) {
+  CodecParameters bad = bench.host->parameters();
+  bad.position_step = 0;
+  EXPECT_FALSE(bench.host->set_parameters(bad));
+  EXPECT_EQ(bench.host->parameters(), test_config().parameters);
+}
+
+HostConfig automatic() {
+  HostConfig config = test_config();
+  config.codec = "quantized";
+  config.quality = QualityGoal{0.005, config.parameters.threshold, 64 * config.parameters.threshold};
+  return config;
+}
+
+class AutomaticQuality : public RuntimeQuality {
+ protected:
+  AutomaticQuality() : RuntimeQuality(automatic()) {}
+};
+
+TEST_F(AutomaticQuality, TheHostFollowsItsTargetAndClientsFollowTheHost) {
+  bench.run_ms(20'000);
+  follow();
+  EXPECT_NE(bench.host->parameters(), automatic().parameters);
+  EXPECT_EQ(client->parameters(), bench.host->parameters());
+  EXPECT_FALSE(bench.host->set_parameters(automatic().parameters)) << "nobody else decides then";
+}
+
+TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedError) {
+  const auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  sessions::SessionChoice choice;
+  choice.bodies = 1000;
+  choice.automatic = true;
+  choice.target_mbit_per_s = 0.5;
+  auto plan = sessions::plan_session(*scene, choice);
+  ASSERT_TRUE(plan);
+  ASSERT_TRUE(plan->quality);
+  EXPECT_NEAR(plan->parameters.threshold * plan->lattice.unit, scene->threshold_m, 1e-6);
+  EXPECT_NEAR(plan->quality->smallest_threshold * plan->lattice.unit, scene->threshold_m / 4, 1e-6);
+  EXPECT_NEAR(plan->quality->largest_threshold * plan->lattice.unit, scene->threshold_m * 4, 1e-6);
+  choice.max_error_m = scene->threshold_m / 2;
+  plan = sessions::plan_session(*scene, choice);
+  ASSERT_TRUE(plan) << "a smaller error is where it starts";
+  EXPECT_TRUE(valid_goal(*plan->quality, plan->parameters));
+  EXPECT_NEAR(plan->parameters.threshold * plan->lattice.unit, scene->threshold_m / 2, 1e-6);
+  EXPECT_EQ(plan->quality->largest_threshold, plan->parameters.threshold);
+}
+
+}  // namespace
+}  // namespace tandem::host
