@@ -45,7 +45,7 @@ struct FramerateOptions {
 
 /// `tandemd` beside this program, as installed and as built, or else in PATH.
 std::string find_server(const fs::path& self) {
-  std::vector<fs::path> places{self.parent_path() / "tandemd", self.parent_path() / "../server/tandemd"};
+  std::vector<fs::path> places{self.parent_path() / "tandemd", self.parent_path() / "../tandemd/tandemd"};
   const char* const search = std::getenv("PATH");
   std::istringstream folders(search == nullptr ? "" : search);
   for (std::string folder; std::getline(folders, folder, ':');)
