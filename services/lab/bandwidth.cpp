@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <utility>
 
-#include "services/lab/cells.hpp"
+#include "services/host/mbit.hpp"
 #include "services/lab/peers.hpp"
 
 namespace tandem::lab {
@@ -314,94 +313,6 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     row.step_ms = step_ms;
   }
   return rows;
-}
-
-namespace {
-
-std::optional<double> mbit_in_paper(const BandwidthRow& row) {
-  return row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt;
-}
-
-std::optional<double> colliding_in_paper(const BandwidthRow& row) {
-  return row.number ? paper_colliding_per_frame(*row.number, row.bodies) : std::nullopt;
-}
-
-}  // namespace
-
-std::string to_json(std::span<const BandwidthRow> rows) {
-  using Json = nlohmann::ordered_json;
-  Json list = Json::array();
-  for (const BandwidthRow& row : rows) {
-    const auto measured = [&](double value) { return row.missing.empty() ? Json(value) : Json(nullptr); };
-    const bool is_peer = row.predictor.empty() && !row.codec.empty();
-    const auto ours = [&](double value) { return is_peer ? Json(nullptr) : Json(value); };
-    list.push_back({{"scene", row.scene},
-                    {"number", json_of(row.number)},
-                    {"bodies", row.bodies},
-                    {"codec", row.codec},
-                    {"predictor", row.predictor},
-                    {"decay", ours(row.parameters.decay / 65536.0)},
-                    {"velocity_gain", ours(row.parameters.velocity_gain / 32768.0)},
-                    {"acceleration_gain", ours(row.parameters.acceleration_gain / 65536.0)},
-                    {"threads", row.threads},
-                    {"seed", row.seed},
-                    {"frames", row.frames},
-                    {"dt_s", row.dt_s},
-                    {"threshold", row.threshold},
-                    {"lattice_unit", row.lattice_unit},
-                    {"mbit_per_s", measured(row.mbit_per_s)},
-                    {"paper_mbit_per_s", json_of(mbit_in_paper(row))},
-                    {"ideal_mbit_per_s", json_of(row.ideal_mbit_per_s)},
-                    {"bound_mbit_per_s", json_of(row.bound_mbit_per_s)},
-                    {"max_error", measured(row.max_error)},
-                    {"rms_error", measured(row.rms_error)},
-                    {"max_snap", ours(row.max_snap)},
-                    {"rms_snap", ours(row.rms_snap)},
-                    {"corrected_per_frame", ours(row.corrected_per_frame)},
-                    {"colliding_per_frame", json_of(row.colliding_per_frame)},
-                    {"paper_colliding_per_frame", json_of(colliding_in_paper(row))},
-                    {"step_ms", row.step_ms},
-                    {"predict_ms", ours(row.predict_ms)},
-                    {"encode_ms", ours(row.encode_ms)},
-                    {"decode_ms", ours(row.decode_ms)},
-                    {"apply_ms", ours(row.apply_ms)},
-                    {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});
-  }
-  return Json{{"rows", list}}.dump();
-}
-
-std::string to_table(std::span<const BandwidthRow> rows) {
-  std::string text = fmt::format(
-      "{:<12} {:>7} {:<10} {:<9} {:>8} {:>7} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>8} {:>8} "
-      "{:>8} "
-      "{:>8} "
-      "{:>8}\n",
-      "scene", "bodies", "codec", "predictor", "Mbit/s", "paper", "bound", "max err", "rms err", "threshold",
-      "rms snap", "corrected", "colliding", "paper", "step ms", "predict", "encode", "decode", "apply");
-  for (const BandwidthRow& row : rows) {
-    if (!row.missing.empty()) {
-      text += fmt::format("{:<12} {:>7} {:<10} not in this build: {} was missing\n", row.scene, row.bodies,
-                          row.codec, row.missing);
-      continue;
-    }
-    if (row.predictor.empty()) {
-      text += fmt::format("{:<12} {:>7} {:<10} {:<9} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f}\n",
-                          row.scene, row.bodies, row.codec, "-", row.mbit_per_s, "-", "-", row.max_error,
-                          row.rms_error, row.threshold);
-      continue;
-    }
-    text += fmt::format(
-        "{:<12} {:>7} {:<10} {:<9} {:>8.3f} {:>7} {:>7} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.5f} {:>9.1f} {:>9} "
-        "{:>7} "
-        "{:>8.3f} "
-        "{:>8.3f} "
-        "{:>8.3f} {:>8.3f} {:>8.3f}\n",
-        row.scene, row.bodies, row.codec, row.predictor, row.mbit_per_s, rounded(mbit_in_paper(row), 2),
-        rounded(row.bound_mbit_per_s, 3), row.max_error, row.rms_error, row.threshold, row.rms_snap,
-        row.corrected_per_frame, rounded(row.colliding_per_frame, 0), rounded(colliding_in_paper(row), 0),
-        row.step_ms, row.predict_ms, row.encode_ms, row.decode_ms, row.apply_ms);
-  }
-  return text;
 }
 
 }  // namespace tandem::lab

@@ -10,7 +10,6 @@
 
 #include "sdk/core/timeline/timeline.hpp"
 #include "services/host/host.hpp"
-#include "services/lab/paper_numbers.hpp"
 #include "services/lab/replay.hpp"
 #include "tandem/result.hpp"
 
@@ -55,10 +54,5 @@ struct BandwidthRow {
                                                                   std::uint64_t frames,
                                                                   const std::function<void(Frame)>& progress,
                                                                   std::optional<double> peer_threshold = {});
-
-/// {"rows": [...]}, one line.
-[[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows);
-/// A table for people, with the paper's numbers beside ours.
-[[nodiscard]] std::string to_table(std::span<const BandwidthRow> rows);
 
 }  // namespace tandem::lab

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "services/lab/bandwidth_columns.hpp"
 #include "services/tool/output_file.hpp"
 
 namespace tandem::lab {
@@ -37,35 +38,6 @@ std::string file_name(const BandwidthRow& row) {
 /// Of `count` frames from `first` on.
 double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count) {
   return lab::mbit_per_s(std::span(row.bytes).subspan(first, count), row.dt_s);
-}
-
-std::string rows_csv(Rows rows) {
-  std::string text =
-      "scene,number,bodies,codec,predictor,decay,velocity_gain,acceleration_gain,seed,frames,threshold,mbit_"
-      "per_s,paper_mbit_per_s,ideal_mbit_per_"
-      "s,"
-      "bound_mbit_per_s,max_error,"
-      "rms_error,max_snap,rms_snap,corrected_per_frame,colliding_per_frame,missing\n";
-  const auto number = [](const std::optional<double>& value) {
-    return value ? fmt::format("{}", *value) : std::string();
-  };
-  for (const BandwidthRow& row : rows) {
-    const auto measured = [&](double value) { return row.missing.empty() ? fmt::format("{}", value) : ""; };
-    const auto gain = [&](double value) { return row.codec == "tracker" ? fmt::format("{}", value) : ""; };
-    text +=
-        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.scene,
-                    row.number ? fmt::format("{}", *row.number) : "", row.bodies, row.codec, row.predictor,
-                    gain(row.parameters.decay / 65536.0), gain(row.parameters.velocity_gain / 32768.0),
-                    gain(row.parameters.acceleration_gain / 65536.0), row.seed, row.frames, row.threshold,
-                    measured(row.mbit_per_s),
-                    number(row.number ? paper_mbit_per_s(*row.number, row.bodies, row.codec) : std::nullopt),
-                    number(row.ideal_mbit_per_s), number(row.bound_mbit_per_s), measured(row.max_error),
-                    measured(row.rms_error), row.predictor.empty() ? "" : measured(row.max_snap),
-                    row.predictor.empty() ? "" : measured(row.rms_snap),
-                    row.predictor.empty() ? "" : measured(row.corrected_per_frame),
-                    number(row.colliding_per_frame), row.missing);
-  }
-  return text;
 }
 
 std::string series_csv(Rows rows) {
@@ -166,7 +138,7 @@ Result<void> write_report(const std::string& directory, std::span<const Bandwidt
   const std::string whole = directory + "/report.json";
   std::filesystem::remove(whole, error);
   if (error) return fail(ErrorCode::kIo, fmt::format("{}: cannot remove: {}", whole, error.message()));
-  if (auto written = write_file(directory + "/rows.csv", rows_csv(rows)); !written) return written;
+  if (auto written = write_file(directory + "/rows.csv", to_csv(rows)); !written) return written;
   for (std::size_t first = 0; first < rows.size();) {
     const BandwidthRow& start = rows[first];
     const auto last = std::find_if(

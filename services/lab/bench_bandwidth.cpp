@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "services/lab/bandwidth.hpp"
+#include "services/lab/bandwidth_columns.hpp"
 #include "services/lab/bandwidth_report.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/train.hpp"

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string_view>
 
-#include "services/host/mbit.hpp"
 
 namespace tandem::lab {
 

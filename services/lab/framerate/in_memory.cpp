@@ -7,9 +7,9 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
+#include "services/host/mbit.hpp"
 #include "services/host/outbox.hpp"
 #include "services/lab/framerate/framerate.hpp"
-#include "services/lab/paper_numbers.hpp"
 #include "services/lab/scene_source.hpp"
 #include "services/sessions/session_plan.hpp"
 

@@ -2,9 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include <nlohmann/json.hpp>
-
 #include "sdk/core/codec/paper/training.hpp"
+#include "services/lab/bandwidth_columns.hpp"
+#include "services/lab/paper_numbers.hpp"
 #include "services/lab/peers.hpp"
 #include "tests/unit/lab/bouncing.hpp"
 
@@ -113,24 +113,6 @@ TEST(Bandwidth, adaptive_codecs_show_what_their_decisions_took_and_the_bound_bes
   ASSERT_TRUE(row.ideal_mbit_per_s && row.bound_mbit_per_s);
   EXPECT_LE(*row.bound_mbit_per_s, *row.ideal_mbit_per_s);
   EXPECT_LE(*row.ideal_mbit_per_s, row.mbit_per_s);
-}
-
-TEST(Bandwidth, rows_have_the_agreed_fields) {
-  BandwidthRow row;
-  row.scene = "half_pipe";
-  const auto json = nlohmann::json::parse(to_json(std::vector{row}));
-  ASSERT_EQ(json["rows"].size(), 1U);
-  std::vector<std::string> keys;
-  for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
-  EXPECT_THAT(keys, ::testing::UnorderedElementsAre(
-                        "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain",
-                        "acceleration_gain", "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit",
-                        "mbit_per_s", "ideal_mbit_per_s", "bound_mbit_per_s", "max_error", "rms_error",
-                        "max_snap", "rms_snap", "corrected_per_frame", "colliding_per_frame", "step_ms",
-                        "predict_ms", "encode_ms", "decode_ms", "apply_ms", "paper_mbit_per_s",
-                        "paper_colliding_per_frame", "missing"));
-  EXPECT_TRUE(json["rows"][0]["number"].is_null());
-  EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
 }
 
 TEST(Bandwidth, peers_keep_to_the_same_largest_error_and_name_a_missing_library) {
