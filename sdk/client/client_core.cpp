@@ -178,7 +178,7 @@ void ClientCore::Impl::send_status(Now now) {
         static_cast<std::uint32_t>(epoch->joining ? transport::Phase::kJoining : transport::Phase::kPlaying);
   }
   status.lag_ms = statistics.smoothed_latency_ns / 1e6;
-  status.client_ms_p50 = statistics.frame_cost.at_ms(0.5);
+  status.client_ms_p50 = statistics.frame_cost.quantile_ms(0.5);
   status.mbit_per_s = last_status_ns == 0 ? 0 : static_cast<double>(bytes) * 8 / (1U << 20U) / elapsed_s;
   status.frames_applied = statistics.frames_applied;
   status.resyncs = statistics.resyncs;
@@ -268,12 +268,12 @@ ClientStatus ClientCore::status() const {
   out.refused_messages = figures.refused_messages + figures.foreign_messages + self.port.dropped();
   out.payload_bytes = figures.payload_bytes;
   out.mbit_per_s = figures.mbit_per_s();
-  out.latency_ms_p50 = figures.latency.at_ms(0.5);
-  out.latency_ms_p99 = figures.latency.at_ms(0.99);
-  out.input_latency_ms_p50 = figures.input_latency.at_ms(0.5);
-  out.input_latency_ms_p99 = figures.input_latency.at_ms(0.99);
-  out.client_ms_p50 = figures.frame_cost.at_ms(0.5);
-  out.client_ms_p99 = figures.frame_cost.at_ms(0.99);
+  out.latency_ms_p50 = figures.latency.quantile_ms(0.5);
+  out.latency_ms_p99 = figures.latency.quantile_ms(0.99);
+  out.input_latency_ms_p50 = figures.input_latency.quantile_ms(0.5);
+  out.input_latency_ms_p99 = figures.input_latency.quantile_ms(0.99);
+  out.client_ms_p50 = figures.frame_cost.quantile_ms(0.5);
+  out.client_ms_p99 = figures.frame_cost.quantile_ms(0.99);
   out.join_ms = static_cast<double>(figures.join_ns) / 1e6;
   out.inputs_sent = figures.inputs_sent;
   out.inputs_acted = figures.inputs_acted;

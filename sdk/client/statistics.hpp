@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "sdk/client/quantiles.hpp"
+#include "sdk/statistics/duration_histogram.hpp"
 
 namespace tandem::client {
 
@@ -35,10 +35,10 @@ struct Statistics {
   std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
   std::int64_t join_ns = 0;                                ///< last join
   std::size_t queue_high_water = 0;
-  double smoothed_latency_ns = 0;  ///< publish to applied, over about the last half second
-  Quantiles latency;               ///< publish to applied
-  Quantiles input_latency;         ///< sent to the frame it acted on applied
-  Quantiles frame_cost;            ///< decode, apply and simulate, per applied frame
+  double smoothed_latency_ns = 0;   ///< publish to applied, over about the last half second
+  DurationHistogram latency;        ///< publish to applied
+  DurationHistogram input_latency;  ///< sent to the frame it acted on applied
+  DurationHistogram frame_cost;     ///< decode, apply and simulate, per applied frame
 
   void add_latency(std::int64_t latency_ns) {
     latency.add(latency_ns);

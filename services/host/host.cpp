@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/statistics/duration_histogram.hpp"
 #include "services/host/claim.hpp"
-#include "services/host/durations.hpp"
 #include "services/host/inputs.hpp"
 #include "services/host/joins.hpp"
 #include "services/host/mbit.hpp"
@@ -213,7 +213,7 @@ struct Host::Impl {
 
   FrameReport report;
   HostTotals totals;
-  Durations frame_durations, second_durations;
+  DurationHistogram frame_durations, second_durations;
   HostTotals second_totals;  // at the last status
   std::int64_t second_ns = 0;
   std::uint32_t bodies = 0;
@@ -373,8 +373,8 @@ void Host::Impl::produce_frame() {
   ++totals.frames;
   totals.payload_bytes += report.payload_bytes;
   totals.corrected += report.corrected;
-  frame_durations.add(report.frame_ms);
-  second_durations.add(report.frame_ms);
+  frame_durations.add_ms(report.frame_ms);
+  second_durations.add_ms(report.frame_ms);
 }
 
 bool Host::Impl::choose_quality(const ServerTimeline::FrameResult& result) {
@@ -442,8 +442,8 @@ void Host::Impl::publish_status() {
   status.mbit_per_s =
       static_cast<double>(totals.payload_bytes - second_totals.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
   status.raw_mbit_per_s = bodies * kRawBytesPerBody * 8 * status.frame_rate_hz / kBitsPerMbit;
-  status.frame_ms_p50 = second_durations.percentile_ms(0.5);
-  status.frame_ms_p99 = second_durations.percentile_ms(0.99);
+  status.frame_ms_p50 = second_durations.quantile_ms(0.5);
+  status.frame_ms_p99 = second_durations.quantile_ms(0.99);
   status.corrected_per_frame = static_cast<double>(totals.corrected - second_totals.corrected) * per_frame;
   status.bodies = bodies;
   status.participants = roster.counted();
@@ -531,8 +531,8 @@ HostTotals Host::totals() const {
   totals.refused_messages += impl_->port->dropped();
   totals.demotions = impl_->roster.demotions();
   totals.clients_seen = impl_->roster.seen();
-  totals.frame_ms_p50 = impl_->frame_durations.percentile_ms(0.5);
-  totals.frame_ms_p99 = impl_->frame_durations.percentile_ms(0.99);
+  totals.frame_ms_p50 = impl_->frame_durations.quantile_ms(0.5);
+  totals.frame_ms_p99 = impl_->frame_durations.quantile_ms(0.99);
   return totals;
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "sdk/statistics/duration_histogram.hpp"
 #include "services/host/mbit.hpp"
 #include "services/lab/peers.hpp"
 
@@ -14,21 +15,6 @@ namespace tandem::lab {
 namespace {
 
 constexpr Epoch kEpoch = 1;
-
-/// Durations of one kind; the median at the end.
-class Durations {
- public:
-  void add(double ms) { ms_.push_back(static_cast<float>(ms)); }
-  [[nodiscard]] double median() {
-    if (ms_.empty()) return 0;
-    const auto middle = ms_.begin() + static_cast<std::ptrdiff_t>(ms_.size() / 2);
-    std::nth_element(ms_.begin(), middle, ms_.end());
-    return *middle;
-  }
-
- private:
-  std::vector<float> ms_;
-};
 
 /// Euclidean distances of what a client shows to the simulation's floats, over all bodies that are shown.
 class Errors {
@@ -113,7 +99,7 @@ struct Lane {
   std::unique_ptr<host::GainControl> gains;  // stays where it is, with its evidence
   Errors errors;
   Snaps snaps;
-  Durations predict, encode, decode, apply;
+  DurationHistogram predict, encode, decode, apply;
 };
 
 Result<Lane> make_lane(const host::HostConfig& session, const Replay& replay) {
@@ -143,8 +129,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   }
   const ServerTimeline::FrameResult frame =
       lane.server.advance(replay.target(), replay.lifecycle(), lane.session->budget);
-  lane.predict.add(frame.predict_ms);
-  lane.encode.add(frame.encode_ms + replay.mirror_ms());
+  lane.predict.add_ms(frame.predict_ms);
+  lane.encode.add_ms(frame.encode_ms + replay.mirror_ms());
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
   if (lane.gains && lane.gains->after_frame(lane.parameters)) lane.server.set_parameters(lane.parameters);
@@ -152,8 +138,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.client.step(1);
   lane.snaps.before(lane.client.state(frame.frame));
   auto applied = lane.client.apply(frame.frame, frame.last_input, frame.hash, frame.payload);
-  lane.decode.add(lane.client.timings().decode_ms);
-  lane.apply.add(lane.client.timings().apply_ms);
+  lane.decode.add_ms(lane.client.timings().decode_ms);
+  lane.apply.add_ms(lane.client.timings().apply_ms);
   if (!applied) return applied;
   const State& agreed = lane.client.state(frame.frame);
   lane.snaps.after(agreed, lane.client.touched(), replay.lifecycle());
@@ -192,10 +178,10 @@ BandwidthRow row_of(Lane& lane, double frames) {
   lane.errors.fill(row);
   lane.snaps.fill(row, session.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
-  row.predict_ms = lane.predict.median();
-  row.encode_ms = lane.encode.median();
-  row.decode_ms = lane.decode.median();
-  row.apply_ms = lane.apply.median();
+  row.predict_ms = lane.predict.quantile_ms(0.5);
+  row.encode_ms = lane.encode.quantile_ms(0.5);
+  row.decode_ms = lane.decode.quantile_ms(0.5);
+  row.apply_ms = lane.apply.quantile_ms(0.5);
   return row;
 }
 
@@ -278,11 +264,11 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     if (!made) return tl::unexpected(made.error());
     peers = std::move(*made);
   }
-  Durations step;
+  DurationHistogram step;
   std::vector<std::uint32_t> colliding;
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay.next(); !stepped) return tl::unexpected(stepped.error());
-    step.add(replay.step_ms());
+    step.add_ms(replay.step_ms());
     colliding.push_back(replay.simulation().colliding());
     for (Lane& lane : lanes) {
       if (auto advanced = advance(lane, replay); !advanced) {
@@ -297,7 +283,7 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     progress(frame);
   }
 
-  const double step_ms = step.median();
+  const double step_ms = step.quantile_ms(0.5);
   std::vector<BandwidthRow> rows;
   rows.reserve(lanes.size() + peers.size());
   for (Lane& lane : lanes) rows.push_back(row_of(lane, static_cast<double>(frames)));

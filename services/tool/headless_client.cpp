@@ -9,6 +9,7 @@
 #include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/scenes/script.hpp"
 
@@ -199,8 +200,8 @@ bool HeadlessClient::succeeded() const {
 
 nlohmann::ordered_json HeadlessClient::report() const {
   const client::Statistics& figures = core_->statistics();
-  const auto pair = [](const client::Quantiles& q) {
-    return nlohmann::ordered_json{{"p50", q.at_ms(0.5)}, {"p99", q.at_ms(0.99)}};
+  const auto pair = [](const DurationHistogram& q) {
+    return nlohmann::ordered_json{{"p50", q.quantile_ms(0.5)}, {"p99", q.quantile_ms(0.99)}};
   };
   nlohmann::ordered_json out;
   out["frames_applied"] = figures.frames_applied;
@@ -235,9 +236,9 @@ std::string HeadlessClient::summary() const {
       "{}{} frames, last {} with hash {}, {:.3f} Mbit/s; latency {:.2f} / {:.2f} ms, client {:.3f} / {:.3f} "
       "ms (p50 / p99); joined in {:.0f} ms; {} resyncs, {} mismatches; inputs: {} sent, {} refused\n",
       options_.name, figures.frames_applied, last_frame_, to_hex(last_hash_), figures.mbit_per_s(),
-      figures.latency.at_ms(0.5), figures.latency.at_ms(0.99), figures.frame_cost.at_ms(0.5),
-      figures.frame_cost.at_ms(0.99), first_join_ms_.value_or(0), figures.resyncs, figures.hash_mismatches,
-      figures.inputs_sent, figures.inputs_refused);
+      figures.latency.quantile_ms(0.5), figures.latency.quantile_ms(0.99),
+      figures.frame_cost.quantile_ms(0.5), figures.frame_cost.quantile_ms(0.99), first_join_ms_.value_or(0),
+      figures.resyncs, figures.hash_mismatches, figures.inputs_sent, figures.inputs_refused);
 }
 
 }  // namespace tandem::tool

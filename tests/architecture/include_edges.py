@@ -34,11 +34,12 @@ EDGES = {
     "sdk/transport": CORE,
     "sdk/transport/simulated": CORE + ["sdk/transport"],
     "sdk/transport/dds": CORE + ["sdk/transport"],
-    "sdk/client": TIMELINE + ["public", "sdk/transport"],
+    "sdk/statistics": [],
+    "sdk/client": TIMELINE + ["public", "sdk/statistics", "sdk/transport"],
     "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
     "sdk/examples": ["public"],
     "services/workers": [],
-    "services/host": TIMELINE + ["sdk/transport", "services/workers"],
+    "services/host": TIMELINE + ["sdk/statistics", "sdk/transport", "services/workers"],
     "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
     "services/scenes": ["public/result.hpp", "services/engine/particles"] + SIMULATION,
     "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
@@ -46,11 +47,11 @@ EDGES = {
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions"],
     "services/tool": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "services/scenes"],
+    + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds", "services/scenes"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
-    + ["services/host", "services/scenes", "services/sessions", "services/tool"],
+    + ["sdk/statistics", "services/host", "services/scenes", "services/sessions", "services/tool"],
     "tests": ["*"],
 }
 

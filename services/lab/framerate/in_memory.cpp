@@ -129,8 +129,8 @@ Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row) {
     if (!first_ns && seen.frames_applied > 0) first_ns = now_ns;
   }
   row.updates_per_s = static_cast<double>(seen.frames_applied) / setup.seconds;
-  row.client_ms_p50 = seen.frame_cost.at_ms(0.5) * setup.slowdown;
-  row.latency_ms_p50 = seen.latency.at_ms(0.5);
+  row.client_ms_p50 = seen.frame_cost.quantile_ms(0.5) * setup.slowdown;
+  row.latency_ms_p50 = seen.latency.quantile_ms(0.5);
   row.resyncs = seen.resyncs;
   row.link_mbit_per_s = static_cast<double>(down->bytes()) * 8 / kBitsPerMbit / setup.seconds;
   row.dropped = down->dropped() + up->dropped();

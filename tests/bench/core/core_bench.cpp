@@ -3,13 +3,13 @@
 #include <benchmark/benchmark.h>
 #include <time.h>
 
-#include <algorithm>
-#include <chrono>
 #include <string>
 #include <vector>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/timeline/timeline.hpp"
+#include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/clock.hpp"
 #include "services/host/block_threads.hpp"
 #include "tests/property/synthetic.hpp"
 
@@ -31,8 +31,13 @@ struct Recording {
   std::vector<std::byte> snapshot;
   std::vector<Delta> deltas;
   double corrected = 0;
-  std::vector<double> predict_us, encode_us, hash_us;
 };
+
+struct ServerTimes {
+  DurationHistogram predict, encode, hash;
+};
+
+double median_us(const DurationHistogram& durations) { return 1e3 * durations.quantile_ms(0.5); }
 
 // Time of this thread on a core: what others run on the machine does not count.
 std::int64_t now_ns() {
@@ -42,7 +47,7 @@ std::int64_t now_ns() {
 }
 
 // Bodies in a box of 2^23 units whose full simulation pushes one in ten beyond the threshold each frame.
-Recording record(std::string_view codec) {
+Recording record(std::string_view codec, ServerTimes& times) {
   Recording r;
   r.config.capacity = kBodies;
   r.config.type_count = synthetic::kTypes;
@@ -75,33 +80,22 @@ Recording record(std::string_view codec) {
     const auto frame = server.advance(target, {});
     r.deltas.push_back({frame.frame, frame.hash, {frame.payload.begin(), frame.payload.end()}});
     r.corrected += static_cast<double>(frame.corrected) / kFrames;
-    r.predict_us.push_back(1e3 * frame.predict_ms);
-    r.encode_us.push_back(1e3 * frame.encode_ms);
-    r.hash_us.push_back(1e3 * frame.hash_ms);
+    times.predict.add_ms(frame.predict_ms);
+    times.encode.add_ms(frame.encode_ms);
+    times.hash.add_ms(frame.hash_ms);
   }
   return r;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 void server_frame(benchmark::State& bench, std::string_view codec) {
-  std::vector<double> predict, encode, hash;
+  ServerTimes times;
   Recording r;
-  for (auto _ : bench) {
-    r = record(codec);
-    predict.push_back(median(r.predict_us));
-    encode.push_back(median(r.encode_us));
-    hash.push_back(median(r.hash_us));
-  }
+  for (auto _ : bench) r = record(codec, times);
   double bytes = 0;
   for (const Delta& delta : r.deltas) bytes += static_cast<double>(delta.payload.size()) / kFrames;
-  bench.counters["predict_us"] = median(predict);
-  bench.counters["encode_us"] = median(encode);
-  bench.counters["hash_us"] = median(hash);
+  bench.counters["predict_us"] = median_us(times.predict);
+  bench.counters["encode_us"] = median_us(times.encode);
+  bench.counters["hash_us"] = median_us(times.hash);
   bench.counters["corrected"] = r.corrected;
   bench.counters["bytes"] = bytes;
   bench.counters["snapshot_B_per_body"] = static_cast<double>(r.snapshot.size()) / kBodies;
@@ -109,10 +103,11 @@ void server_frame(benchmark::State& bench, std::string_view codec) {
 
 // Lead 1: simulate a frame ahead, then take the delta of the frame before it.
 void client_frame(benchmark::State& bench, std::string_view codec) {
-  const Recording r = record(codec);
+  ServerTimes ignored;
+  const Recording r = record(codec, ignored);
   auto client = *ClientTimeline::create(r.config);
   client.set_clock(now_ns);
-  std::vector<double> total_us, decode_us, apply_us;
+  DurationHistogram total, decode, apply;
   std::size_t next = kFrames;
   for (auto _ : bench) {
     if (next == kFrames) {
@@ -127,13 +122,13 @@ void client_frame(benchmark::State& bench, std::string_view codec) {
     const std::int64_t taken = now_ns() - start;
     if (!applied) bench.SkipWithError("delta refused");
     bench.SetIterationTime(static_cast<double>(taken) * 1e-9);
-    total_us.push_back(static_cast<double>(taken) * 1e-3);
-    decode_us.push_back(1e3 * client.timings().decode_ms);
-    apply_us.push_back(1e3 * client.timings().apply_ms);
+    total.add(taken);
+    decode.add_ms(client.timings().decode_ms);
+    apply.add_ms(client.timings().apply_ms);
   }
-  bench.counters["p50_us"] = median(total_us);
-  bench.counters["decode_us"] = median(decode_us);
-  bench.counters["apply_us"] = median(apply_us);
+  bench.counters["p50_us"] = median_us(total);
+  bench.counters["decode_us"] = median_us(decode);
+  bench.counters["apply_us"] = median_us(apply);
 }
 
 // Blocks side by side: wall time of encode() and decode() at 65,536 bodies in four blocks.
@@ -152,24 +147,21 @@ void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   std::vector<std::byte> out(server.bound());
   State held = state;
   State target = state;
-  std::vector<double> encode_us, decode_us;
-  const auto us_since = [](std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
-  };
+  DurationHistogram encode, decode;
   for (auto _ : bench) {
     for (Slot slot = 0; slot < kMany; ++slot) {
       if (random.one_in(10)) target.p(random.below(3))[slot] += random.one_in(2) ? 5000 : -5000;
     }
-    const auto start = std::chrono::steady_clock::now();
+    const std::int64_t start_ns = transport::steady_ns();
     const auto encoded = server.encode(state, target, {}, kNoBudget, out);
-    encode_us.push_back(us_since(start));
-    const auto middle = std::chrono::steady_clock::now();
+    const std::int64_t encoded_ns = transport::steady_ns();
+    encode.add(encoded_ns - start_ns);
     const bool good = client.decode(held, std::span(out).first(encoded.size_bytes)).has_value();
-    decode_us.push_back(us_since(middle));
+    decode.add(transport::steady_ns() - encoded_ns);
     if (!good || held != state) bench.SkipWithError("client differs");
   }
-  bench.counters["encode_us"] = median(encode_us);
-  bench.counters["decode_us"] = median(decode_us);
+  bench.counters["encode_us"] = median_us(encode);
+  bench.counters["decode_us"] = median_us(decode);
 }
 
 const bool kRegistered = [] {

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "sdk/client/quantiles.hpp"
 #include "sdk/client/server_clock.hpp"
 
 namespace tandem::client {
@@ -85,25 +84,6 @@ TEST(Pacer, ASuspensionShiftsAllFramesThatFollow) {
     pacer.on_delta(f, kOffset + published, published);
   }
   EXPECT_NEAR(pacer.server_frame(100 * period + 2000 * kMs), 100, 0.01);
-}
-
-TEST(Quantiles, ArePreciseToTwoPerCent) {
-  Quantiles q;
-  for (std::int64_t i = 1; i <= 1000; ++i) q.add(i * 10'000);
-  EXPECT_NEAR(q.at_ms(0.5), 5.0, 0.1);
-  EXPECT_NEAR(q.at_ms(0.99), 9.9, 0.2);
-  EXPECT_NEAR(q.at_ms(0), 0.01, 0.0002);
-  EXPECT_EQ(Quantiles().at_ms(0.5), 0);
-}
-
-TEST(Quantiles, TakeAnyDuration) {
-  Quantiles q;
-  q.add(-5);
-  q.add(0);
-  q.add(std::numeric_limits<std::int64_t>::max());
-  EXPECT_EQ(q.count(), 3U);
-  EXPECT_EQ(q.at_ms(0), 0);
-  EXPECT_GT(q.at_ms(1), 1e6);
 }
 
 }  // namespace

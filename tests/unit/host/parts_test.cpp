@@ -1,7 +1,6 @@
 // The small parts by themselves.
 #include <gtest/gtest.h>
 
-#include "services/host/durations.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/pacing.hpp"
 #include "services/host/stall_meter.hpp"
@@ -92,19 +91,6 @@ TEST(Pacing, AtAFreeRateEveryFrameIsDueButWaitingCountsFromTheNominalPeriod) {
   EXPECT_EQ(pacing.suspended_from_ns(), 21 * kMillisecond);
   for (int i = 2; i < 100; ++i) pacing.frame_started(i * kMillisecond, false);
   EXPECT_NEAR(static_cast<double>(pacing.period_ns()), 1e6, 1e4);
-}
-
-TEST(Durations, TellsPercentilesWithinOneBin) {
-  Durations durations;
-  EXPECT_EQ(durations.percentile_ms(0.5), 0);
-  for (int i = 1; i <= 100; ++i) durations.add(i * 0.1);
-  EXPECT_NEAR(durations.percentile_ms(0.5), 5.0, 0.011);
-  EXPECT_NEAR(durations.percentile_ms(0.99), 9.9, 0.011);
-  durations.add(1e9);
-  durations.add(-1);
-  EXPECT_EQ(durations.count(), 102U);
-  durations.clear();
-  EXPECT_EQ(durations.percentile_ms(0.99), 0);
 }
 
 transport::DeltaMessage delta(Frame frame, std::uint32_t part, std::uint32_t parts) {
