@@ -129,8 +129,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   }
   const ServerTimeline::FrameResult frame =
       lane.server.advance(replay.target(), replay.lifecycle(), lane.session->budget);
-  lane.predict.add_ms(frame.predict_ms);
-  lane.encode.add_ms(frame.encode_ms + replay.mirror_ms());
+  lane.predict.add(frame.predict_ns);
+  lane.encode.add(frame.encode_ns + replay.mirror_ns());
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
   if (lane.gains && lane.gains->after_frame(lane.parameters)) lane.server.set_parameters(lane.parameters);
@@ -138,8 +138,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.client.step(1);
   lane.snaps.before(lane.client.state(frame.frame));
   auto applied = lane.client.apply(frame.frame, frame.last_input, frame.hash, frame.payload);
-  lane.decode.add_ms(lane.client.timings().decode_ms);
-  lane.apply.add_ms(lane.client.timings().apply_ms);
+  lane.decode.add(lane.client.timings().decode_ns);
+  lane.apply.add(lane.client.timings().apply_ns);
   if (!applied) return applied;
   const State& agreed = lane.client.state(frame.frame);
   lane.snaps.after(agreed, lane.client.touched(), replay.lifecycle());
@@ -268,7 +268,7 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
   std::vector<std::uint32_t> colliding;
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay.next(); !stepped) return tl::unexpected(stepped.error());
-    step.add_ms(replay.step_ms());
+    step.add(replay.step_ns());
     colliding.push_back(replay.simulation().colliding());
     for (Lane& lane : lanes) {
       if (auto advanced = advance(lane, replay); !advanced) {

@@ -64,9 +64,9 @@ Result<void> Replay::next() {
   const std::int64_t before = steady_ns();
   simulation_->step();
   const std::int64_t stepped = steady_ns();
-  step_ms_ = static_cast<double>(stepped - before) / 1e6;
+  step_ns_ = stepped - before;
   mirror_.update(simulation_->bodies(), simulation_->events());
-  mirror_ms_ = static_cast<double>(steady_ns() - stepped) / 1e6;
+  mirror_ns_ = steady_ns() - stepped;
   return {};
 }
 

@@ -40,8 +40,8 @@ class Replay {
   [[nodiscard]] const Drive& start_drive() const { return start_drive_; }
   [[nodiscard]] const engine::Simulation& simulation() const { return *simulation_; }
   /// Of the last next(): the engine's step, and putting its result on the lattice.
-  [[nodiscard]] double step_ms() const { return step_ms_; }
-  [[nodiscard]] double mirror_ms() const { return mirror_ms_; }
+  [[nodiscard]] std::int64_t step_ns() const { return step_ns_; }
+  [[nodiscard]] std::int64_t mirror_ns() const { return mirror_ns_; }
 
  private:
   Replay(engine::Simulation& simulation, std::vector<TimedInput> script, const host::Lattice& lattice,
@@ -60,7 +60,7 @@ class Replay {
   std::size_t next_input_ = 0;
   std::uint64_t input_number_ = 0;
   Frame frame_ = 0;
-  double step_ms_ = 0, mirror_ms_ = 0;
+  std::int64_t step_ns_ = 0, mirror_ns_ = 0;
 };
 
 using transport::steady_ns;

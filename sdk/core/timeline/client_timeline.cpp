@@ -139,10 +139,10 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.applied = frame;
   m.now = std::max(m.now, frame);
   m.inputs.forget(frame);
-  m.timings.decode_ms = watch.lap_ms();
+  m.timings.decode_ns = watch.lap_ns();
   m.hash = m.hasher.hash(m.at(frame).state, m.parts.delta.codec().body_state());
   m.resimulate();
-  m.timings.apply_ms = watch.lap_ms();
+  m.timings.apply_ns = watch.lap_ns();
   if (m.hash != hash) {
     return fail(ErrorCode::kMismatch, "frame " + std::to_string(frame) + " is " + to_hex(m.hash) +
                                           ", the server has " + to_hex(hash));

@@ -75,11 +75,11 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   m.drive.decay = m.parts.delta.parameters().decay;
   m.inputs.forget(m.frame);
   m.parts.predictor->step(m.state, m.state, m.drive);
-  result.predict_ms = watch.lap_ms();
+  result.predict_ns = watch.lap_ns();
   const DeltaCodec::Encoded encoded = m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload);
-  result.encode_ms = watch.lap_ms();
+  result.encode_ns = watch.lap_ns();
   m.hash = m.hasher.hash(m.state, m.parts.delta.codec().body_state());
-  result.hash_ms = watch.lap_ms();
+  result.hash_ns = watch.lap_ns();
   result.frame = m.frame;
   result.last_input = m.inputs.held_to();
   result.hash = m.hash;

@@ -2,6 +2,7 @@
 // Stretches of time by a clock that the caller owns; nothing where there is none.
 
 #include <cstdint>
+#include <utility>
 
 namespace tandem {
 
@@ -9,13 +10,11 @@ class Stopwatch {
  public:
   using Clock = std::int64_t (*)();  ///< monotonic, nanoseconds; may be null
   explicit Stopwatch(Clock clock) : clock_(clock), last_ns_(clock != nullptr ? clock() : 0) {}
-  /// Milliseconds since construction or the last lap; 0 without a clock.
-  double lap_ms() {
+  /// Since construction or the last lap; 0 without a clock.
+  std::int64_t lap_ns() {
     if (clock_ == nullptr) return 0;
     const std::int64_t now_ns = clock_();
-    const double ms = static_cast<double>(now_ns - last_ns_) * 1e-6;
-    last_ns_ = now_ns;
-    return ms;
+    return now_ns - std::exchange(last_ns_, now_ns);
   }
 
  private:

@@ -70,7 +70,7 @@ class ServerTimeline {
     std::size_t correction_bytes = 0;
     std::uint32_t corrected = 0;
     /// Encoding applies as it goes. Filled only when a clock was given: set_clock().
-    double predict_ms = 0, encode_ms = 0, hash_ms = 0;
+    std::int64_t predict_ns = 0, encode_ns = 0, hash_ns = 0;
   };
   /// Predicts the next frame, encodes towards `target` and applies. Allocates nothing after the first few
   /// frames.
@@ -148,7 +148,7 @@ class ClientTimeline {
   /// Of the last apply(): decoding and correcting the frame; checking its hash and re-simulating. Zero
   /// without a clock.
   struct Timings {
-    double decode_ms = 0, apply_ms = 0;
+    std::int64_t decode_ns = 0, apply_ns = 0;
   };
   [[nodiscard]] Timings timings() const;
   /// For measurement only, as ServerTimeline::set_clock().

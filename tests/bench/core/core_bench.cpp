@@ -80,9 +80,9 @@ Recording record(std::string_view codec, ServerTimes& times) {
     const auto frame = server.advance(target, {});
     r.deltas.push_back({frame.frame, frame.hash, {frame.payload.begin(), frame.payload.end()}});
     r.corrected += static_cast<double>(frame.corrected) / kFrames;
-    times.predict.add_ms(frame.predict_ms);
-    times.encode.add_ms(frame.encode_ms);
-    times.hash.add_ms(frame.hash_ms);
+    times.predict.add(frame.predict_ns);
+    times.encode.add(frame.encode_ns);
+    times.hash.add(frame.hash_ns);
   }
   return r;
 }
@@ -123,8 +123,8 @@ void client_frame(benchmark::State& bench, std::string_view codec) {
     if (!applied) bench.SkipWithError("delta refused");
     bench.SetIterationTime(static_cast<double>(taken) * 1e-9);
     total.add(taken);
-    decode.add_ms(client.timings().decode_ms);
-    apply.add_ms(client.timings().apply_ms);
+    decode.add(client.timings().decode_ns);
+    apply.add(client.timings().apply_ns);
   }
   bench.counters["p50_us"] = median_us(total);
   bench.counters["decode_us"] = median_us(decode);

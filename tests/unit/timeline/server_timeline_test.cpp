@@ -75,15 +75,15 @@ TEST(ServerTimeline, InputsAreNumberedWithoutGapsAndLieInTheFuture) {
 TEST(ServerTimeline, TimesAreMeasuredByTheClockItIsGiven) {
   auto server = server_of(config_for("entropy", 1));
   server.start(0, State(1), Drive{});
-  EXPECT_EQ(server.advance(State(1), {}).predict_ms, 0);
+  EXPECT_EQ(server.advance(State(1), {}).predict_ns, 0);
   server.set_clock([] {
     static std::int64_t now_ns = 0;
     return now_ns += 1'000'000;
   });
   const auto frame = server.advance(State(1), {});
-  EXPECT_DOUBLE_EQ(frame.predict_ms, 1);
-  EXPECT_DOUBLE_EQ(frame.encode_ms, 1);
-  EXPECT_DOUBLE_EQ(frame.hash_ms, 1);
+  EXPECT_EQ(frame.predict_ns, 1'000'000);
+  EXPECT_EQ(frame.encode_ns, 1'000'000);
+  EXPECT_EQ(frame.hash_ns, 1'000'000);
 }
 
 TEST(ServerTimeline, NoPayloadOrSnapshotExceedsItsBound) {
