@@ -107,7 +107,7 @@ void ClientCore::Impl::adopt(const transport::Received<transport::SessionMessage
                                 std::to_string(epoch->lead));
   }
   log(LogLevel::kInfo, "found session '" + session->session + "', scene '" + session->scene + "', " +
-                           std::to_string(session->capacity) + " slots, epoch " +
+                           std::to_string(session->layout.capacity) + " slots, epoch " +
                            std::to_string(session->epoch));
 }
 

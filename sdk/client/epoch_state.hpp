@@ -20,10 +20,10 @@ struct EpochState {
       : session(std::move(announced)),
         server(announced_by),
         timeline(std::move(made_timeline)),
-        lead(std::min(wanted_lead, session.lead)),
+        lead(std::min(wanted_lead, session.layout.lead)),
         assembly({.delta_bytes = session.max_delta_bytes}),
         pacer(session.frame_rate_hz),
-        sampler(session.capacity, session.lattice_unit) {}
+        sampler(session.layout.capacity, session.lattice_unit) {}
 
   transport::SessionMessage session;
   transport::ParticipantId server;

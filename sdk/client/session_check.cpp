@@ -1,7 +1,6 @@
 #include "sdk/client/session_check.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "sdk/transport/port.hpp"
 
@@ -21,18 +20,17 @@ Result<void> check_values(const transport::SessionMessage& s) {
     return fail(ErrorCode::kMalformed, "session refused: " + what);
   };
   if (s.epoch == 0) return bad("epoch 0");
-  if (s.capacity == 0 || s.capacity > kMaxCapacity) return bad("capacity " + std::to_string(s.capacity));
+  if (auto good = check_layout(s.layout); !good) return bad(good.error().message);
   if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))
     return bad("frame rate out of range");
   if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
-  if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
-  if (s.types.empty() || s.types.size() > std::numeric_limits<TypeId>::max())
-    return bad("no list of body types");
+  if (s.layout.lead > kDefinedLead)
+    return bad("lead " + std::to_string(s.layout.lead) + ", at most 1 is defined");
+  if (s.types.size() != s.layout.type_count) return bad("a list of " + std::to_string(s.types.size()) + " body types");
   for (const auto& type : s.types) {
     if (!std::isfinite(type.radius) || type.radius < 0) return bad("radius of type " + type.name);
   }
-  if (s.threshold <= 0 || s.position_step <= 0 || s.velocity_step <= 0) return bad("codec parameters");
-  const std::uint64_t most = kMaxFixedBytes + kMaxBytesPerSlot * s.capacity;
+  const std::uint64_t most = kMaxFixedBytes + kMaxBytesPerSlot * s.layout.capacity;
   if (s.max_delta_bytes > most) return bad("deltas of " + std::to_string(s.max_delta_bytes) + " bytes");
   if (s.max_snapshot_bytes > most)
     return bad("snapshots of " + std::to_string(s.max_snapshot_bytes) + " bytes");
@@ -41,7 +39,7 @@ Result<void> check_values(const transport::SessionMessage& s) {
 
 }  // namespace
 
-Result<TimelineConfig> check_session(const transport::SessionMessage& session) {
+Result<Layout> check_session(const transport::SessionMessage& session) {
   if (session.protocol_version != transport::kProtocolVersion) {
     return fail(ErrorCode::kUnsupported, "the server speaks protocol version " +
                                              std::to_string(session.protocol_version) + ", this client " +
@@ -51,16 +49,7 @@ Result<TimelineConfig> check_session(const transport::SessionMessage& session) {
   if (transport::layout_hash(session) != session.layout_hash) {
     return fail(ErrorCode::kMismatch, "the session's layout hash differs from what this client computes");
   }
-  TimelineConfig config;
-  config.capacity = session.capacity;
-  config.type_count = static_cast<TypeId>(session.types.size());
-  config.codec = session.codec;
-  config.codec_tables = session.codec_tables;
-  config.parameters = {session.threshold, session.position_step, session.velocity_step};
-  config.predictor = session.predictor;
-  config.predictor_constants = session.predictor_constants;
-  config.max_lead = session.lead;
-  return config;
+  return session.layout;
 }
 
 }  // namespace tandem::client

@@ -16,17 +16,18 @@ bool is_phase(Phase phase) { return phase == Phase::kJoining || phase == Phase::
 }  // namespace
 
 bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
-  return check_session_name(message.session).has_value() && message.capacity >= 1 &&
-         message.capacity <= kMaxCapacity && is_positive(message.frame_rate_hz) &&
+  return check_session_name(message.session).has_value() && message.layout.capacity >= 1 &&
+         message.layout.capacity <= kMaxCapacity && is_positive(message.frame_rate_hz) &&
          is_positive(message.lattice_unit) && message.window_ceiling >= 1 &&
          message.window_ceiling <= kMaxWindowCeiling && message.max_delta_bytes <= kMaxSampleBytes &&
-         message.max_snapshot_bytes <= kMaxSampleBytes && is_name(message.codec) &&
-         is_name(message.predictor) && is_name(message.scene) &&
+         message.max_snapshot_bytes <= kMaxSampleBytes && is_name(message.layout.codec) &&
+         is_name(message.layout.predictor) && is_name(message.scene) &&
          message.scene_description.size() <= kMaxDescriptionBytes &&
-         message.predictor_constants.size() <= kMaxPredictorConstants && message.types.size() <= kMaxTypes &&
+         message.layout.predictor_constants.size() <= kMaxPredictorConstants &&
+         message.types.size() <= kMaxTypes &&
          std::all_of(message.types.begin(), message.types.end(),
                      [](const BodyType& type) { return is_name(type.name) && std::isfinite(type.radius); }) &&
-         message.codec_tables.size() <= kMaxTableBytes;
+         message.layout.codec_tables.size() <= kMaxTableBytes;
 }
 
 bool within_limits(const DeltaMessage& message, const Limits& limits) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/layout/layout.hpp"
 
 namespace tandem::transport {
 
@@ -49,23 +50,17 @@ struct SessionMessage {
   std::string session;  ///< key; no wildcard characters, 1..64 bytes of [A-Za-z0-9._-]
   Epoch epoch = 0;      ///< ms of wall clock at the server's start
   std::uint32_t protocol_version = kProtocolVersion;
-  std::uint64_t layout_hash = 0;  ///< XXH3-64 of the canonical layout text; see layout_hash() below
-  std::uint32_t capacity = 0;
+  std::uint64_t layout_hash = 0;  ///< see layout_hash() in port.hpp
+  Layout layout;                  ///< lead 0 or 1; gains are not on the wire
   double frame_rate_hz = 30;
   double lattice_unit = 0;  ///< scene units per lattice unit
-  std::uint32_t lead = 1;   ///< A, 0 or 1
   std::uint32_t window_ceiling = 24;
   std::uint32_t max_delta_bytes = 0;  ///< of a whole payload
   std::uint32_t max_snapshot_bytes = 0;
-  std::string codec;
-  std::int32_t threshold = 0, position_step = 1, velocity_step = 1;  ///< CodecParameters at frame 0
-  std::string predictor;
   std::uint32_t client_cost_ns = 0;  ///< client cost class: ns per body and frame on one desktop core
   std::string scene;                 ///< name
   std::string scene_description;     ///< the geometry as protobuf text (idl/scene.proto), for drawing
-  std::vector<std::int32_t> predictor_constants;
-  std::vector<BodyType> types;
-  Bytes codec_tables;
+  std::vector<BodyType> types;       ///< layout.type_count of them
   bool operator==(const SessionMessage&) const = default;
 };
 

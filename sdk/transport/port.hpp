@@ -90,9 +90,8 @@ class ClientPort {
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
 [[nodiscard]] Result<void> check_session_name(const std::string& name);
 
-/// XXH3-64 over everything of the session that decides how bytes are read and stepped: version, capacity,
-/// codec and its tables and parameters, predictor and its constants, lead, lattice unit, type count. A client
-/// that computes another value refuses the session.
+/// Over everything of the session that decides how bytes are read, stepped and scaled: its layout, protocol
+/// version and lattice unit. A client that computes another value refuses the session.
 [[nodiscard]] std::uint64_t layout_hash(const SessionMessage& session);
 
 }  // namespace tandem::transport

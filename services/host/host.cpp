@@ -37,7 +37,7 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   };
   if (!(config.frame_rate_hz >= 1 && config.frame_rate_hz <= 1000))
     return refuse("frame rate must lie in 1..1000 Hz");
-  if (config.lead > 1) return refuse("lead must be 0 or 1");
+  if (config.layout.lead > 1) return refuse("lead must be 0 or 1");
   if (config.window_ceiling < 1 || config.window_ceiling > 64)
     return refuse("window ceiling must lie in 1..64");
   if (config.window && (*config.window < 1 || *config.window > config.window_ceiling)) {
@@ -45,8 +45,9 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   }
   if (config.client_limit == 0 || config.participant_limit == 0)
     return refuse("client limits must be positive");
-  if (config.types.empty() || config.types.size() > 65535) return refuse("1..65535 body types are needed");
-  if (config.quality && !valid_goal(*config.quality, config.parameters)) {
+  if (config.types.size() != config.layout.type_count)
+    return refuse(fmt::format("{} body types, {} described", config.layout.type_count, config.types.size()));
+  if (config.quality && !valid_goal(*config.quality, config.layout.parameters)) {
     return refuse("automatic quality: the threshold must lie between its smallest and its largest");
   }
   if (config.quality && config.budget < least_budget(*config.quality, config.frame_rate_hz)) {
@@ -57,9 +58,8 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   }
   if (config.epoch == 0) return refuse("epoch must not be 0");
   const std::uint32_t capacity = simulation.capacity();
-  if (capacity == 0 || capacity > kMaxCapacity) {
-    return refuse(fmt::format("{} bodies: the limit is {}", capacity, kMaxCapacity));
-  }
+  if (capacity != config.layout.capacity)
+    return refuse(fmt::format("{} slots for a simulation of {}", config.layout.capacity, capacity));
   const engine::Bodies bodies = simulation.bodies();
   bool whole = bodies.alive.size() == capacity && bodies.type.size() == capacity;
   for (const auto& column : bodies.position) whole = whole && column.size() == capacity;
@@ -68,48 +68,25 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   return {};
 }
 
-transport::SessionMessage session_message(const HostConfig& config, std::uint32_t capacity,
-                                          const ServerTimeline& timeline) {
+transport::SessionMessage session_message(const HostConfig& config, const ServerTimeline& timeline) {
   transport::SessionMessage session;
   session.session = config.session;
   session.epoch = config.epoch;
-  session.capacity = capacity;
+  session.layout = config.layout;
   session.frame_rate_hz = config.frame_rate_hz;
   session.lattice_unit = config.lattice.unit;
-  session.lead = config.lead;
   session.window_ceiling = config.window_ceiling;
   session.max_delta_bytes = static_cast<std::uint32_t>(timeline.payload_bound());
   session.max_snapshot_bytes = static_cast<std::uint32_t>(timeline.snapshot_bound());
-  session.codec = config.codec;
-  session.threshold = config.parameters.threshold;
-  session.position_step = config.parameters.position_step;
-  session.velocity_step = config.parameters.velocity_step;
-  session.predictor = config.predictor;
   session.client_cost_ns = config.client_cost_ns;
   session.scene = config.scene;
   session.scene_description = config.scene_description;
-  session.predictor_constants = config.predictor_constants;
   session.types = config.types;
-  session.codec_tables = config.codec_tables;
   session.layout_hash = transport::layout_hash(session);
   return session;
 }
 
 }  // namespace
-
-TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity) {
-  TimelineConfig timeline;
-  timeline.capacity = capacity;
-  timeline.type_count = static_cast<TypeId>(config.types.size());
-  timeline.codec = config.codec;
-  timeline.codec_tables = config.codec_tables;
-  timeline.parameters = config.parameters;
-  timeline.predictor = config.predictor;
-  timeline.predictor_constants = config.predictor_constants;
-  timeline.max_lead = config.lead;
-  timeline.run_blocks = config.run_blocks;
-  return timeline;
-}
 
 struct Host::Impl {
   Impl(HostConfig configuration, engine::Simulation& full, transport::ServerPort& endpoints,
@@ -118,7 +95,7 @@ struct Host::Impl {
         simulation(&full),
         port(&endpoints),
         timeline(std::move(server)),
-        mirror(config.lattice, full.capacity(), static_cast<TypeId>(config.types.size())),
+        mirror(config.lattice, full.capacity(), config.layout.type_count),
         outbox(config.outbox),
         roster({.epoch = config.epoch,
                 .client_limit = config.client_limit,
@@ -126,22 +103,23 @@ struct Host::Impl {
                 .stall_timeout_ns = config.stall_timeout_ns,
                 .fixed_window = config.window,
                 .window_ceiling = config.window_ceiling}),
-        inputs({.epoch = config.epoch, .lead = config.lead, .lattice = config.lattice}, full, timeline,
+        inputs({.epoch = config.epoch, .lead = config.layout.lead, .lattice = config.lattice}, full, timeline,
                outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate),
-        session(session_message(config, full.capacity(), timeline)) {
+        session(session_message(config, timeline)),
+        parameters(config.layout.parameters) {
     mirror.start(full.bodies());
     timeline.start(config.start_frame, mirror.target(), drive);
     timeline.set_clock(config.clock_ns);
     if (config.quality) {
-      const StepRule steps = step_rule(config.codec, !config.codec_tables.empty());
-      quality.emplace(*config.quality, steps, config.parameters, full.capacity(), config.frame_rate_hz);
+      const StepRule steps = step_rule(config.layout.codec, !config.layout.codec_tables.empty());
+      quality.emplace(*config.quality, steps, parameters, full.capacity(), config.frame_rate_hz);
       if (steps != StepRule::kLeave) timeline.set_statistics(&quality->statistics());
     }
     if (config.gains) {
-      gains.emplace(*config.gains, full.capacity(), config.parameters);
+      gains.emplace(*config.gains, full.capacity(), parameters);
       timeline.set_evidence(&gains->evidence());
     }
     bodies = mirror.target().alive_count();
@@ -176,10 +154,6 @@ struct Host::Impl {
   bool choose_quality(const ServerTimeline::FrameResult& result);
   void publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns);
   void note_foreigner(transport::ClientId client);
-  void use(const CodecParameters& parameters) {
-    config.parameters = parameters;
-    timeline.set_parameters(parameters);
-  }
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
 
@@ -199,6 +173,7 @@ struct Host::Impl {
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
   transport::SessionMessage session;
+  CodecParameters parameters;  // in force
 
   State state = State::kClaiming;
   std::optional<Error> error;
@@ -362,8 +337,8 @@ void Host::Impl::produce_frame() {
   publish(result, wall_ns + (applied - start));
   times.published(result.frame, now_ns);
   const bool coarser = quality && choose_quality(result);
-  const bool steered = gains && gains->after_frame(config.parameters);
-  if (coarser || steered) timeline.set_parameters(config.parameters);
+  const bool steered = gains && gains->after_frame(parameters);
+  if (coarser || steered) timeline.set_parameters(parameters);
   report = {.frame = result.frame,
             .hash = result.hash,
             .payload_bytes = result.payload.size(),
@@ -379,7 +354,7 @@ void Host::Impl::produce_frame() {
 
 bool Host::Impl::choose_quality(const ServerTimeline::FrameResult& result) {
   const bool before = quality->out_of_reach();
-  const bool changed = quality->after_frame(result.payload.size(), result.corrected, config.parameters);
+  const bool changed = quality->after_frame(result.payload.size(), result.corrected, parameters);
   if (quality->out_of_reach() != before && notices.size() < kMostNotices) {
     const double target = config.quality->target_mbit_per_s;
     notices.push_back(before
@@ -487,7 +462,7 @@ Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
   auto drive = to_drive(config.lattice, simulation.gravity(), simulation.damping_per_s());
   if (!drive) return tl::unexpected(drive.error());
-  auto timeline = ServerTimeline::create(timeline_config(config, simulation.capacity()), config.epoch);
+  auto timeline = ServerTimeline::create(config.layout, config.epoch, {.run_blocks = config.run_blocks});
   if (!timeline) return tl::unexpected(timeline.error());
   auto impl = std::make_unique<Impl>(std::move(config), simulation, port, std::move(*timeline), *drive);
   return std::unique_ptr<Host>(new Host(std::move(impl)));
@@ -511,11 +486,12 @@ Result<Frame> Host::inject(const engine::Input& input) { return impl_->inputs.in
 Result<void> Host::set_parameters(const CodecParameters& parameters) {
   if (!valid_parameters(parameters)) return fail(ErrorCode::kInvalidArgument, "parameters out of range");
   if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
-  impl_->use(parameters);
+  impl_->parameters = parameters;
+  impl_->timeline.set_parameters(parameters);
   return {};
 }
-const CodecParameters& Host::parameters() const { return impl_->config.parameters; }
-double Host::threshold_m() const { return impl_->config.parameters.threshold * impl_->config.lattice.unit; }
+const CodecParameters& Host::parameters() const { return impl_->parameters; }
+double Host::threshold_m() const { return impl_->parameters.threshold * impl_->config.lattice.unit; }
 const transport::SessionMessage& Host::session() const { return impl_->session; }
 Frame Host::frame() const { return impl_->timeline.frame(); }
 const tandem::State& Host::agreed() const { return impl_->timeline.state(); }

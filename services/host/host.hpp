@@ -33,7 +33,6 @@ struct HostConfig {
 
   double frame_rate_hz = 30;            ///< nominal; decides the period and what a client is blamed for
   bool free_rate = false;               ///< as fast as window and queue allow (--rate max)
-  std::uint32_t lead = 1;               ///< A, 0 or 1
   std::optional<std::uint32_t> window;  ///< frames; empty: automatic from measured round trips
   std::uint32_t window_ceiling = 24;
   std::optional<std::int64_t> stall_timeout_ns = kSecond / 2;  ///< empty: nobody is demoted
@@ -43,20 +42,17 @@ struct HostConfig {
   std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
   Outbox::Limits outbox;
 
+  Layout layout;  ///< capacity: the simulation's; lead: 0 or 1
   Lattice lattice;
-  std::size_t budget = kNoBudget;  ///< bytes of a frame; spawns and parameters go first
-  std::string codec = "entropy";
-  std::vector<std::byte> codec_tables;
-  CodecParameters parameters;          ///< of the first frame
+  std::size_t budget = kNoBudget;      ///< bytes of a frame; spawns and parameters go first
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: so do decay and gains
-  std::string predictor = "ballistic";
-  std::vector<std::int32_t> predictor_constants;
-  RunBlocks run_blocks;  ///< threads for the codec; empty: none of its own
+  RunBlocks run_blocks;                ///< threads for the codec; empty: none of its own
 
   std::uint32_t client_cost_ns = 2;
   std::string scene;
   std::string scene_description;
+  /// layout.type_count of them.
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
 
   /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
@@ -143,8 +139,5 @@ class Host {
   explicit Host(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
-
-/// What both sides of the session build their timelines from.
-[[nodiscard]] TimelineConfig timeline_config(const HostConfig& config, std::uint32_t capacity);
 
 }  // namespace tandem::host

@@ -83,7 +83,7 @@ struct Lane {
         account(std::move(books)),
         server(std::move(server_side)),
         client(std::move(client_side)),
-        parameters(config.parameters) {
+        parameters(config.layout.parameters) {
     if (!config.gains) return;
     gains = std::make_unique<host::GainControl>(*config.gains, bodies, parameters);
     server.set_evidence(&gains->evidence());
@@ -103,13 +103,11 @@ struct Lane {
 };
 
 Result<Lane> make_lane(const host::HostConfig& session, const Replay& replay) {
-  TimelineConfig config = host::timeline_config(session, replay.simulation().capacity());
   auto account = std::make_unique<CodeAccount>();
-  config.account = account.get();
-  auto server = ServerTimeline::create(config, kEpoch);
+  auto server = ServerTimeline::create(session.layout, kEpoch,
+                                       {.run_blocks = session.run_blocks, .account = account.get()});
   if (!server) return tl::unexpected(server.error());
-  config.account = nullptr;
-  auto client = ClientTimeline::create(config);
+  auto client = ClientTimeline::create(session.layout, {.run_blocks = session.run_blocks});
   if (!client) return tl::unexpected(client.error());
   server->set_clock(&steady_ns);
   client->set_clock(&steady_ns);
@@ -165,8 +163,8 @@ double conditional_entropy(const CodeAccount& account) {
 BandwidthRow row_of(Lane& lane, double frames) {
   const host::HostConfig& session = *lane.session;
   BandwidthRow row;
-  row.codec = session.codec;
-  row.predictor = session.predictor;
+  row.codec = session.layout.codec;
+  row.predictor = session.layout.predictor;
   row.parameters = lane.parameters;
   row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
@@ -254,7 +252,7 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
   for (const host::HostConfig& session : sessions) {
     auto lane = make_lane(session, replay);
     if (!lane)
-      return fail(lane.error().code, fmt::format("codec {}: {}", session.codec, lane.error().message));
+      return fail(lane.error().code, fmt::format("codec {}: {}", session.layout.codec, lane.error().message));
     lanes.push_back(std::move(*lane));
   }
   std::vector<PeerLane> peers;
@@ -272,8 +270,8 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     colliding.push_back(replay.simulation().colliding());
     for (Lane& lane : lanes) {
       if (auto advanced = advance(lane, replay); !advanced) {
-        return fail(advanced.error().code, fmt::format("codec {}, frame {}: {}", lane.session->codec, frame,
-                                                       advanced.error().message));
+        return fail(advanced.error().code, fmt::format("codec {}, frame {}: {}", lane.session->layout.codec,
+                                                       frame, advanced.error().message));
       }
     }
     for (PeerLane& peer : peers) {

@@ -57,7 +57,7 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
     sessions.push_back(std::move(*session));
   }
   auto replay = Replay::create(*source.simulation, std::move(source.script), sessions[0].lattice,
-                               static_cast<TypeId>(scene.types.size()));
+                               sessions[0].layout.type_count);
   if (!replay) return tl::unexpected(replay.error());
   const double threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   auto rows = measure_bandwidth(*replay, sessions, frames, progress,

@@ -32,7 +32,7 @@ Result<void> export_trajectory(const ExportOptions& options) {
   auto writer = TrajectoryWriter::create(options.out, options.run.bodies);
   if (!writer) return tl::unexpected(writer.error());
   auto replay = Replay::create(*source->simulation, std::move(source->script), session->lattice,
-                               static_cast<TypeId>(session->types.size()));
+                               session->layout.type_count);
   if (!replay) return tl::unexpected(replay.error());
   TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m,
                       {},          options.scene};

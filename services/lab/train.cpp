@@ -16,9 +16,9 @@ Result<CodecStatistics> observe(const host::HostConfig& session, const std::func
   auto source = make();
   if (!source) return tl::unexpected(source.error());
   auto replay = Replay::create(*source->simulation, std::move(source->script), session.lattice,
-                               static_cast<TypeId>(session.types.size()));
+                               session.layout.type_count);
   if (!replay) return tl::unexpected(replay.error());
-  auto timeline = ServerTimeline::create(host::timeline_config(session, source->simulation->capacity()), 1);
+  auto timeline = ServerTimeline::create(session.layout, 1);
   if (!timeline) return tl::unexpected(timeline.error());
   CodecStatistics observed;
   timeline->start(0, replay->target(), replay->start_drive());

@@ -42,13 +42,13 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
   const bool automatic = choice.predictor == "auto";
   const bool field_pays =
       choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
-  config.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
-  if (config.predictor != "field" && config.predictor != "contact") return {};
-  auto constants = contact_constants(scene, lattice, config.predictor);
+  config.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
+  if (config.layout.predictor != "field" && config.layout.predictor != "contact") return {};
+  auto constants = contact_constants(scene, lattice, config.layout.predictor);
   if (constants) {
-    config.predictor_constants = std::move(*constants);
+    config.layout.predictor_constants = std::move(*constants);
   } else if (automatic) {
-    config.predictor = "ballistic";
+    config.layout.predictor = "ballistic";
   } else {
     return tl::unexpected(constants.error());
   }
@@ -57,12 +57,12 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
 
 // Decay and gains of the first frame, and what the later ones aim at.
 Result<void> choose_gains(host::HostConfig& config) {
-  if (config.codec != "tracker") return {};
+  if (config.layout.codec != "tracker") return {};
   // What the constants make of the predictor, which may be another than the name says.
-  const auto predictor = make_predictor(config.predictor, 1, config.predictor_constants);
+  const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
   const std::string_view kind = (*predictor)->name();
-  config.parameters = with_first_gains(config.parameters, kind);
+  config.layout.parameters = with_first_gains(config.layout.parameters, kind);
   config.gains = host::usual_gain_goal(kind);
   return {};
 }
@@ -92,10 +92,11 @@ Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionC
                                        units(choice.max_error_m.value_or(threshold_m * kCoarsest))};
   }
   config.lattice = *lattice;
-  config.parameters = *parameters;
+  config.layout.parameters = *parameters;
+  config.layout.capacity = choice.bodies;
   config.frame_rate_hz = 1 / scene.dt_s;
-  config.codec = choice.codec;
-  config.codec_tables = codec_tables(choice.codec, table);
+  config.layout.codec = choice.codec;
+  config.layout.codec_tables = codec_tables(choice.codec, table);
   if (choice.codec == "limited") config.budget = choice.budget_bytes.value_or(kPaperBudgetBytes);
   if (choice.codec == "tracker") config.budget = choice.budget_bytes.value_or(kNoBudget);
   if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
@@ -109,12 +110,14 @@ Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionC
     config.types.push_back(
         {.name = type.name, .radius = static_cast<float>(type.radius_m), .colour_rgba = type.colour_rgba});
   }
+  config.layout.type_count = static_cast<TypeId>(config.types.size());
   return config;
 }
 
-Result<std::size_t> largest_delta_bytes(const host::HostConfig& config, std::uint32_t capacity) {
-  return ServerTimeline::create(host::timeline_config(config, capacity), config.epoch)
-      .map([](const ServerTimeline& timeline) { return timeline.payload_bound(); });
+Result<std::size_t> largest_delta_bytes(const host::HostConfig& config) {
+  return ServerTimeline::create(config.layout, config.epoch).map([](const ServerTimeline& timeline) {
+    return timeline.payload_bound();
+  });
 }
 
 }  // namespace tandem::sessions

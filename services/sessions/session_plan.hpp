@@ -32,14 +32,14 @@ struct SessionChoice {
   std::uint32_t threads = 1;  ///< of the codec, where a session has several blocks
 };
 
-/// The part of a host's configuration that follows from scene and choice: lattice, codec with tables,
-/// parameters and budget, predictor, types, names. The rest keeps its defaults. Where nothing was trained for
+/// The part of a host's configuration that follows from scene and choice: layout, lattice, budget, goals,
+/// names. The rest keeps its defaults. Where nothing was trained for
 /// this size and threshold, the nearest table is used, and the built-in one for a scene that was never
 /// trained. Errors: kInvalidArgument (the threshold, or a world too large for it).
 [[nodiscard]] Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice);
 
 /// Most bytes a delta of this session can take: what a transport must be ready for before the host exists.
 /// Errors: as Host::create for codec and predictor.
-[[nodiscard]] Result<std::size_t> largest_delta_bytes(const host::HostConfig& config, std::uint32_t capacity);
+[[nodiscard]] Result<std::size_t> largest_delta_bytes(const host::HostConfig& config);
 
 }  // namespace tandem::sessions

@@ -18,10 +18,10 @@ std::string gains_text(const CodecParameters& parameters) {
 }
 
 std::string coding_text(const host::HostConfig& config) {
-  std::string text = fmt::format("codec {}, predictor {}", config.codec, config.predictor);
+  std::string text = fmt::format("codec {}, predictor {}", config.layout.codec, config.layout.predictor);
   const auto metres = [&](std::int32_t units) { return units * config.lattice.unit; };
-  if (config.codec != "none")
-    text += fmt::format(", threshold {:.4g} m", metres(config.parameters.threshold));
+  if (config.layout.codec != "none")
+    text += fmt::format(", threshold {:.4g} m", metres(config.layout.parameters.threshold));
   if (config.quality) {
     text += fmt::format(" (automatic, up to {:.4g} m)", metres(config.quality->largest_threshold));
     if (config.quality->target_mbit_per_s > 0)

@@ -114,7 +114,7 @@ Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& op
     config.epoch = static_cast<Epoch>(wall_ns() / host::kMillisecond);
     if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
     config.free_rate = options.free_rate;
-    config.lead = options.lead;
+    config.layout.lead = options.lead;
     config.window = options.window;
     config.stall_timeout_ns.reset();
     if (options.stall_timeout_s)
@@ -129,7 +129,7 @@ Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& op
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
                                                          const Options& options,
                                                          const std::atomic<bool>& stop) {
-  const auto largest = sessions::largest_delta_bytes(config, options.bodies);
+  const auto largest = sessions::largest_delta_bytes(config);
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;

@@ -17,23 +17,25 @@ SKIPPED = {"build", ".git"}
 # Project folders that a folder may include, besides itself; the longest matching folder of a file decides.
 # A name ending in .hpp is that header alone. "public" is sdk/include/tandem.
 CORE = ["public/result.hpp", "sdk/core/lattice"]
+LAYOUT = CORE + ["sdk/core/layout"]
 PREDICT = ["sdk/core/predict", "sdk/core/predict/ballistic", "sdk/core/predict/contact"]
 CODEC = ["sdk/core/codec", "sdk/core/codec/paper", "sdk/core/codec/tracker"]
-TIMELINE = CORE + PREDICT + CODEC + ["sdk/core/timeline"]
+TIMELINE = LAYOUT + PREDICT + CODEC + ["sdk/core/timeline"]
 SIMULATION = ["services/host/simulation.hpp"]
 EDGES = {
     "sdk/include": [],
     "sdk/core/lattice": ["public/result.hpp"],
+    "sdk/core/layout": CORE,
     "sdk/core/predict": CORE + PREDICT,
     "sdk/core/predict/ballistic": CORE + ["sdk/core/predict"],
     "sdk/core/predict/contact": CORE + ["sdk/core/predict"],
-    "sdk/core/codec": CORE + CODEC,
-    "sdk/core/codec/paper": CORE + ["sdk/core/codec"],
-    "sdk/core/codec/tracker": CORE + ["sdk/core/codec"],
+    "sdk/core/codec": LAYOUT + CODEC,
+    "sdk/core/codec/paper": LAYOUT + ["sdk/core/codec"],
+    "sdk/core/codec/tracker": LAYOUT + ["sdk/core/codec"],
     "sdk/core/timeline": TIMELINE,
-    "sdk/transport": CORE,
-    "sdk/transport/simulated": CORE + ["sdk/transport"],
-    "sdk/transport/dds": CORE + ["sdk/transport"],
+    "sdk/transport": LAYOUT,
+    "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
+    "sdk/transport/dds": LAYOUT + ["sdk/transport"],
     "sdk/statistics": [],
     "sdk/client": TIMELINE + ["public", "sdk/statistics", "sdk/transport"],
     "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
@@ -43,7 +45,7 @@ EDGES = {
     "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
     "services/scenes": ["public/result.hpp", "services/engine/particles"] + SIMULATION,
     "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
-    "services/tandemd": CORE
+    "services/tandemd": LAYOUT
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions"],
     "services/tool": TIMELINE

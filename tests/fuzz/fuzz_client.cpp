@@ -95,7 +95,7 @@ class Run {
         session.layout_hash ^= program_.number();
         break;
       case 3:
-        session.capacity = static_cast<std::uint32_t>(program_.number() % 4096);
+        session.layout.capacity = static_cast<std::uint32_t>(program_.number() % 4096);
         break;
       case 4:
         session.frame_rate_hz = program_.real();
@@ -104,7 +104,7 @@ class Run {
         session.lattice_unit = program_.real();
         break;
       case 6:
-        session.lead = static_cast<std::uint32_t>(program_.number());
+        session.layout.lead = static_cast<std::uint32_t>(program_.number());
         break;
       case 7:
         session.window_ceiling = static_cast<std::uint32_t>(program_.number());
@@ -113,22 +113,22 @@ class Run {
         session.max_delta_bytes = static_cast<std::uint32_t>(program_.number());
         break;
       case 9:
-        session.codec = codec_names()[program_.u8() % codec_names().size()];
+        session.layout.codec = codec_names()[program_.u8() % codec_names().size()];
         break;
       case 10:
-        session.threshold = program_.i32();
+        session.layout.parameters.threshold = program_.i32();
         break;
       case 11:
-        session.position_step = program_.i32();
+        session.layout.parameters.position_step = program_.i32();
         break;
       case 12:
-        session.predictor = program_.u8() % 2 == 0 ? "nonsense" : "";
+        session.layout.predictor = program_.u8() % 2 == 0 ? "nonsense" : "";
         break;
       case 13:
-        session.predictor_constants.assign(program_.u8(), program_.i32());
+        session.layout.predictor_constants.assign(program_.u8(), program_.i32());
         break;
       case 14:
-        session.codec_tables = program_.bytes(600);
+        session.layout.codec_tables = program_.bytes(600);
         break;
       default:
         session.max_snapshot_bytes = static_cast<std::uint32_t>(program_.number());

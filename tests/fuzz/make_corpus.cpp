@@ -77,15 +77,15 @@ bool write_streams(const std::filesystem::path& folder) {
 }
 
 bool write_snapshots(const std::filesystem::path& folder) {
-  TimelineConfig config;
-  config.capacity = kCapacity;
-  config.type_count = synthetic::kTypes;
-  config.codec = "quantized";
-  config.parameters = kParameters;
-  config.predictor = "ballistic";
+  Layout layout;
+  layout.capacity = kCapacity;
+  layout.type_count = synthetic::kTypes;
+  layout.codec = "quantized";
+  layout.parameters = kParameters;
+  layout.predictor = "ballistic";
   for (const std::uint64_t dead_one_in : {0U, 1U, 3U}) {
     synthetic::Random random(2);
-    auto server = ServerTimeline::create(config, 1);
+    auto server = ServerTimeline::create(layout, 1);
     if (!server) return false;
     server->start(10, synthetic::random_state(random, kCapacity, dead_one_in), Drive{{0, -640, 0}, 10});
     for (std::uint64_t number = 1; number <= dead_one_in; ++number) {

@@ -143,13 +143,13 @@ TEST(GoldenBytes, ThatNoEncoderOfOursWritesAreDecodedToo) {
 }
 
 TEST(GoldenBytes, OfASnapshot) {
-  TimelineConfig config;
-  config.capacity = 9;
-  config.type_count = synthetic::kTypes;
-  config.codec = "quantized";
-  config.parameters = kParameters;
-  config.predictor = "ballistic";
-  auto server = *ServerTimeline::create(config, 0x0102);
+  Layout layout;
+  layout.capacity = 9;
+  layout.type_count = synthetic::kTypes;
+  layout.codec = "quantized";
+  layout.parameters = kParameters;
+  layout.predictor = "ballistic";
+  auto server = *ServerTimeline::create(layout, 0x0102);
   State state(9);
   state.spawn(1, 5, 0, {{-1, 100, 7}, {64, 0, 0}});
   state.spawn(8, 6, 2, {{2, 100, 8}, {64, 0, 0}});
@@ -174,7 +174,7 @@ TEST(GoldenBytes, OfASnapshot) {
       "00 00000000  00 00000000  00 00000000"
       "00000000";
   EXPECT_EQ(to_text(bytes), to_text(from_text(golden)));
-  auto client = *ClientTimeline::create(config);
+  auto client = *ClientTimeline::create(layout);
   const auto loaded = client.load(from_text(golden), 0x0102);
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_EQ(client.state(3), state);

@@ -33,16 +33,16 @@ std::vector<std::int32_t> contact_constants() {
 // Runs one session; mixes the hash of every frame into `digest`. False if the client ever disagrees.
 bool run(std::string_view codec, std::string_view predictor, synthetic::Random& random,
          std::uint64_t& digest) {
-  TimelineConfig config;
-  config.capacity = kCapacity;
-  config.type_count = synthetic::kTypes;
-  config.codec = codec;
-  config.codec_tables = synthetic::tables_for(codec);
-  config.parameters = {200, 16, 64, 100};
-  config.predictor = predictor;
-  if (predictor != kBallistic) config.predictor_constants = contact_constants();
-  auto server = ServerTimeline::create(config, 1);
-  auto client = ClientTimeline::create(config);
+  Layout layout;
+  layout.capacity = kCapacity;
+  layout.type_count = synthetic::kTypes;
+  layout.codec = codec;
+  layout.codec_tables = synthetic::tables_for(codec);
+  layout.parameters = {200, 16, 64, 100};
+  layout.predictor = predictor;
+  if (predictor != kBallistic) layout.predictor_constants = contact_constants();
+  auto server = ServerTimeline::create(layout, 1);
+  auto client = ClientTimeline::create(layout);
   if (!server || !client) return false;
   server->start(0, synthetic::random_state(random, kCapacity), Drive{{0, -640, 0}, 300});
   std::vector<std::byte> snapshot;
@@ -56,7 +56,7 @@ bool run(std::string_view codec, std::string_view predictor, synthetic::Random& 
     }
     if (random.one_in(30)) {
       const auto share = [&random] { return static_cast<std::uint16_t>(random.below(65536)); };
-      CodecParameters parameters = config.parameters;
+      CodecParameters parameters = layout.parameters;
       parameters.decay = share();
       parameters.velocity_gain = share();
       parameters.acceleration_gain = share();

@@ -80,20 +80,20 @@ TEST(HostileSnapshot, AMutatedSnapshotIsRefused) {
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   Random random(kSeed);
   for (const std::uint32_t capacity : {1U, 30U, 200U}) {
-    TimelineConfig config;
-    config.capacity = capacity;
-    config.type_count = synthetic::kTypes;
-    config.codec = "entropy";
-    config.codec_tables = default_code_tables();
-    config.parameters = kParameters;
-    config.predictor = "ballistic";
-    auto server = *ServerTimeline::create(config, 5);
+    Layout layout;
+    layout.capacity = capacity;
+    layout.type_count = synthetic::kTypes;
+    layout.codec = "entropy";
+    layout.codec_tables = default_code_tables();
+    layout.parameters = kParameters;
+    layout.predictor = "ballistic";
+    auto server = *ServerTimeline::create(layout, 5);
     const State start = synthetic::random_state(random, capacity);
     server.start(100, start, Drive{{1, 2, 3}, 4});
     ASSERT_TRUE(server.schedule({1, 105, Drive{{9, 9, 9}, 1}}));
     Bytes snapshot;
     server.snapshot(snapshot);
-    auto client = *ClientTimeline::create(config);
+    auto client = *ClientTimeline::create(layout);
     for (int round = 0; round < 4000; ++round) {
       Bytes mutated = snapshot;
       synthetic::mutate(random, mutated);

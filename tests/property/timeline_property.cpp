@@ -77,16 +77,16 @@ struct Delta {
 class Scenario {
  public:
   Scenario(Random& random, Kind kind, std::uint32_t lead) : random_(random) {
-    config_.capacity = static_cast<std::uint32_t>(1 + random.below(60));
-    config_.type_count = synthetic::kTypes;
-    config_.codec = codec_names()[random.below(codec_names().size())];
-    config_.codec_tables = synthetic::tables_for(config_.codec);
-    config_.parameters = {200, 16, 64, 300};
-    config_.max_lead = lead;
-    server_.emplace(*ServerTimeline::create(config_, 1, make(kind, config_.capacity)));
-    client_.emplace(*ClientTimeline::create(config_, make(kind, config_.capacity)));
-    reference_ = make(kind, config_.capacity);
-    server_->start(random.below(1000), synthetic::random_state(random, config_.capacity), random_drive());
+    layout_.capacity = static_cast<std::uint32_t>(1 + random.below(60));
+    layout_.type_count = synthetic::kTypes;
+    layout_.codec = codec_names()[random.below(codec_names().size())];
+    layout_.codec_tables = synthetic::tables_for(layout_.codec);
+    layout_.parameters = {200, 16, 64, 300};
+    layout_.lead = lead;
+    server_.emplace(*ServerTimeline::create(layout_, 1, make(kind, layout_.capacity)));
+    client_.emplace(*ClientTimeline::create(layout_, make(kind, layout_.capacity)));
+    reference_ = make(kind, layout_.capacity);
+    server_->start(random.below(1000), synthetic::random_state(random, layout_.capacity), random_drive());
   }
 
   void join() {
@@ -103,7 +103,7 @@ class Scenario {
   void server_frame() {
     while (random_.one_in(3)) {
       const ScheduledDrive input{server_->last_input() + 1,
-                                 server_->frame() + 1 + config_.max_lead + random_.below(3), random_drive()};
+                                 server_->frame() + 1 + layout_.lead + random_.below(3), random_drive()};
       RC_ASSERT(server_->schedule(input).has_value());
       inputs_.push_back(input);
       all_inputs_[input.number] = input;
@@ -148,7 +148,7 @@ class Scenario {
   /// simulation of the agreed frame says.
   void check_ahead() {
     RC_ASSERT(client_->now() >= client_->applied());
-    RC_ASSERT(client_->now() <= client_->applied() + config_.max_lead);
+    RC_ASSERT(client_->now() <= client_->applied() + layout_.lead);
     if (!inputs_.empty()) return;
     State state = client_->state(client_->applied());
     Drive drive = client_->drive();
@@ -178,7 +178,7 @@ class Scenario {
   }
 
   Random& random_;
-  TimelineConfig config_;
+  Layout layout_;
   std::optional<ServerTimeline> server_;
   std::optional<ClientTimeline> client_;
   std::unique_ptr<Predictor> reference_;

@@ -18,10 +18,10 @@ struct ClientTimeline::Impl {
     Drive drive;
   };
 
-  Impl(TimelineParts made, const TimelineConfig& config)
-      : parts(std::move(made)), type_count(config.type_count), max_lead(config.max_lead) {
+  Impl(TimelineParts made, const Layout& layout)
+      : parts(std::move(made)), type_count(layout.type_count), max_lead(layout.lead) {
     // With lead 0 the next frame still needs a place while its delta is being checked.
-    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(config.capacity), Drive{}});
+    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(layout.capacity), Drive{}});
   }
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }
@@ -65,17 +65,17 @@ struct ClientTimeline::Impl {
   Stopwatch::Clock clock = nullptr;
 };
 
-Result<ClientTimeline> ClientTimeline::create(const TimelineConfig& config) {
-  auto predictor = make_predictor(config.predictor, config.capacity, config.predictor_constants);
+Result<ClientTimeline> ClientTimeline::create(const Layout& layout, const LocalOptions& local) {
+  auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
   if (!predictor) return tl::unexpected<Error>(predictor.error());
-  return create(config, std::move(*predictor));
+  return create(layout, std::move(*predictor), local);
 }
 
-Result<ClientTimeline> ClientTimeline::create(const TimelineConfig& config,
-                                              std::unique_ptr<Predictor> predictor) {
-  auto parts = make_parts(config, std::move(predictor));
+Result<ClientTimeline> ClientTimeline::create(const Layout& layout, std::unique_ptr<Predictor> predictor,
+                                              const LocalOptions& local) {
+  auto parts = make_parts(layout, local, std::move(predictor));
   if (!parts) return tl::unexpected<Error>(parts.error());
-  return ClientTimeline(std::make_unique<Impl>(std::move(*parts), config));
+  return ClientTimeline(std::make_unique<Impl>(std::move(*parts), layout));
 }
 
 ClientTimeline::ClientTimeline(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

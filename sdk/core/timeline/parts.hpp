@@ -12,8 +12,8 @@ struct TimelineParts {
   DeltaCodec delta;
 };
 
-/// Checks `config` and makes its codec. Errors: kUnsupported, kMalformed, kInvalidArgument.
-[[nodiscard]] Result<TimelineParts> make_parts(const TimelineConfig& config,
+/// Checks `layout` and makes its codec. Errors: kUnsupported, kMalformed, kInvalidArgument.
+[[nodiscard]] Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local,
                                                std::unique_ptr<Predictor> predictor);
 
 }  // namespace tandem

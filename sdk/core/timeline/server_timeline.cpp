@@ -27,17 +27,18 @@ struct ServerTimeline::Impl {
   Stopwatch::Clock clock = nullptr;
 };
 
-Result<ServerTimeline> ServerTimeline::create(const TimelineConfig& config, Epoch epoch) {
-  auto predictor = make_predictor(config.predictor, config.capacity, config.predictor_constants);
+Result<ServerTimeline> ServerTimeline::create(const Layout& layout, Epoch epoch, const LocalOptions& local) {
+  auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
   if (!predictor) return tl::unexpected<Error>(predictor.error());
-  return create(config, epoch, std::move(*predictor));
+  return create(layout, epoch, std::move(*predictor), local);
 }
 
-Result<ServerTimeline> ServerTimeline::create(const TimelineConfig& config, Epoch epoch,
-                                              std::unique_ptr<Predictor> predictor) {
-  auto parts = make_parts(config, std::move(predictor));
+Result<ServerTimeline> ServerTimeline::create(const Layout& layout, Epoch epoch,
+                                              std::unique_ptr<Predictor> predictor,
+                                              const LocalOptions& local) {
+  auto parts = make_parts(layout, local, std::move(predictor));
   if (!parts) return tl::unexpected<Error>(parts.error());
-  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), config.capacity, epoch));
+  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), layout.capacity, epoch));
 }
 
 ServerTimeline::ServerTimeline(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -10,25 +10,15 @@
 
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/core/layout/layout.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
 
-/// Frames that any client may simulate beyond its last delta at most. Sessions use 0 or 1.
-inline constexpr std::uint32_t kMaxLead = 8;
-
-/// All that both sides must agree on to build a timeline. Comes from TandemSession.
-struct TimelineConfig {
-  std::uint32_t capacity = 0;
-  TypeId type_count = 1;  ///< types are 0 .. type_count - 1
-  std::string codec;
-  std::vector<std::byte> codec_tables;
-  CodecParameters parameters;
-  std::string predictor;
-  std::vector<std::int32_t> predictor_constants;
-  std::uint32_t max_lead = 1;      ///< A: frames a client may simulate beyond its last delta
-  RunBlocks run_blocks;            ///< not agreed on: how this side codes blocks side by side; see Codec
-  CodeAccount* account = nullptr;  ///< not agreed on: books of this side's codec; see Codec
+/// What one side decides for itself, beside the layout: the other never learns of it, and no byte changes.
+struct LocalOptions {
+  RunBlocks run_blocks;            ///< how this side codes blocks side by side; see Codec
+  CodeAccount* account = nullptr;  ///< books of this side's codec; see Codec
 };
 
 /// An input that changes the predicted step. `number` counts 1, 2, ... within an epoch.
@@ -46,10 +36,10 @@ inline constexpr std::size_t kMaxPendingInputs = 256;
 class ServerTimeline {
  public:
   /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
-  static Result<ServerTimeline> create(const TimelineConfig& config, Epoch epoch);
-  /// With a predictor of the caller's own; the one that `config` names is not looked at.
-  static Result<ServerTimeline> create(const TimelineConfig& config, Epoch epoch,
-                                       std::unique_ptr<Predictor> predictor);
+  static Result<ServerTimeline> create(const Layout& layout, Epoch epoch, const LocalOptions& local = {});
+  /// With a predictor of the caller's own; the one that `layout` names is not looked at.
+  static Result<ServerTimeline> create(const Layout& layout, Epoch epoch,
+                                       std::unique_ptr<Predictor> predictor, const LocalOptions& local = {});
   ServerTimeline(ServerTimeline&&) noexcept;
   ServerTimeline& operator=(ServerTimeline&&) noexcept;
   ServerTimeline(const ServerTimeline&) = delete;
@@ -105,9 +95,10 @@ class ServerTimeline {
 class ClientTimeline {
  public:
   /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
-  static Result<ClientTimeline> create(const TimelineConfig& config);
-  /// With a predictor of the caller's own; the one that `config` names is not looked at.
-  static Result<ClientTimeline> create(const TimelineConfig& config, std::unique_ptr<Predictor> predictor);
+  static Result<ClientTimeline> create(const Layout& layout, const LocalOptions& local = {});
+  /// With a predictor of the caller's own; the one that `layout` names is not looked at.
+  static Result<ClientTimeline> create(const Layout& layout, std::unique_ptr<Predictor> predictor,
+                                       const LocalOptions& local = {});
   ClientTimeline(ClientTimeline&&) noexcept;
   ClientTimeline& operator=(ClientTimeline&&) noexcept;
   ClientTimeline(const ClientTimeline&) = delete;

@@ -38,26 +38,26 @@ dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
   tandem_TandemSession wire{};
   wire.epoch = message.epoch;
   wire.protocol_version = message.protocol_version;
-  wire.capacity = message.capacity;
+  wire.capacity = message.layout.capacity;
   wire.layout_hash = message.layout_hash;
   wire.frame_rate_hz = message.frame_rate_hz;
   wire.lattice_unit = message.lattice_unit;
-  wire.lead = message.lead;
+  wire.lead = message.layout.lead;
   wire.window_ceiling = message.window_ceiling;
   wire.max_delta_bytes = message.max_delta_bytes;
   wire.max_snapshot_bytes = message.max_snapshot_bytes;
-  wire.threshold = message.threshold;
-  wire.position_step = message.position_step;
-  wire.velocity_step = message.velocity_step;
+  wire.threshold = message.layout.parameters.threshold;
+  wire.position_step = message.layout.parameters.position_step;
+  wire.velocity_step = message.layout.parameters.velocity_step;
   wire.client_cost_ns = message.client_cost_ns;
   wire.session = lend(message.session);
-  wire.codec = lend(message.codec);
-  wire.predictor = lend(message.predictor);
+  wire.codec = lend(message.layout.codec);
+  wire.predictor = lend(message.layout.predictor);
   wire.scene = lend(message.scene);
   wire.scene_description = lend(message.scene_description);
-  lend(wire.predictor_constants, message.predictor_constants);
+  lend(wire.predictor_constants, message.layout.predictor_constants);
   lend(wire.types, types);
-  lend(wire.codec_tables, message.codec_tables);
+  lend(wire.codec_tables, message.layout.codec_tables);
   return dds_write(writer, &wire);
 }
 
@@ -65,30 +65,31 @@ SessionMessage to_message(const tandem_TandemSession& wire) {
   SessionMessage message;
   message.epoch = wire.epoch;
   message.protocol_version = wire.protocol_version;
-  message.capacity = wire.capacity;
+  message.layout.capacity = wire.capacity;
   message.layout_hash = wire.layout_hash;
   message.frame_rate_hz = wire.frame_rate_hz;
   message.lattice_unit = wire.lattice_unit;
-  message.lead = wire.lead;
+  message.layout.lead = wire.lead;
   message.window_ceiling = wire.window_ceiling;
   message.max_delta_bytes = wire.max_delta_bytes;
   message.max_snapshot_bytes = wire.max_snapshot_bytes;
-  message.threshold = wire.threshold;
-  message.position_step = wire.position_step;
-  message.velocity_step = wire.velocity_step;
+  message.layout.parameters.threshold = wire.threshold;
+  message.layout.parameters.position_step = wire.position_step;
+  message.layout.parameters.velocity_step = wire.velocity_step;
   message.client_cost_ns = wire.client_cost_ns;
   message.session = to_string(wire.session);
-  message.codec = to_string(wire.codec);
-  message.predictor = to_string(wire.predictor);
+  message.layout.codec = to_string(wire.codec);
+  message.layout.predictor = to_string(wire.predictor);
   message.scene = to_string(wire.scene);
   message.scene_description = to_string(wire.scene_description);
-  message.predictor_constants = to_vector<std::int32_t>(wire.predictor_constants);
+  message.layout.predictor_constants = to_vector<std::int32_t>(wire.predictor_constants);
+  message.layout.type_count = static_cast<TypeId>(wire.types._length);
   message.types.reserve(wire.types._length);
   for (std::uint32_t i = 0; i < wire.types._length; ++i) {
     const tandem_BodyType& type = wire.types._buffer[i];
     message.types.push_back(BodyType{to_string(type.name), type.radius, type.colour_rgba});
   }
-  message.codec_tables = to_vector<std::byte>(wire.codec_tables);
+  message.layout.codec_tables = to_vector<std::byte>(wire.codec_tables);
   return message;
 }
 

@@ -29,7 +29,7 @@ constexpr std::size_t kOverheadBytes = 150;
 struct PayloadBytes {
   std::size_t operator()(const DeltaMessage& m) const { return m.payload.size(); }
   std::size_t operator()(const SnapshotMessage& m) const { return m.bytes.size(); }
-  std::size_t operator()(const SessionMessage& m) const { return m.codec_tables.size(); }
+  std::size_t operator()(const SessionMessage& m) const { return m.layout.codec_tables.size(); }
   std::size_t operator()(const InputMessage& m) const { return 8 * m.values.size() + m.bytes.size(); }
   std::size_t operator()(const ReplyMessage& m) const { return 20 * m.entries.size(); }
   template <class Small>

@@ -27,7 +27,7 @@ struct Delta {
 };
 
 struct Recording {
-  TimelineConfig config;
+  Layout layout;
   std::vector<std::byte> snapshot;
   std::vector<Delta> deltas;
   double corrected = 0;
@@ -49,19 +49,19 @@ std::int64_t now_ns() {
 // Bodies in a box of 2^23 units whose full simulation pushes one in ten beyond the threshold each frame.
 Recording record(std::string_view codec, ServerTimes& times) {
   Recording r;
-  r.config.capacity = kBodies;
-  r.config.type_count = synthetic::kTypes;
-  r.config.codec = codec;
-  r.config.codec_tables = synthetic::tables_for(codec);
-  r.config.parameters = {4096, 256, 1024};
-  r.config.predictor = "ballistic";
+  r.layout.capacity = kBodies;
+  r.layout.type_count = synthetic::kTypes;
+  r.layout.codec = codec;
+  r.layout.codec_tables = synthetic::tables_for(codec);
+  r.layout.parameters = {4096, 256, 1024};
+  r.layout.predictor = "ballistic";
   synthetic::Random random(kSeed);
   State state(kBodies);
   const auto vector = [&random](std::int32_t limit) {
     return Vec3i{random.even(limit), random.even(limit), random.even(limit)};
   };
   for (Slot slot = 0; slot < kBodies; ++slot) state.spawn(slot, 0, 0, {vector(1 << 22), vector(1 << 19)});
-  auto server = *ServerTimeline::create(r.config, 1);
+  auto server = *ServerTimeline::create(r.layout, 1);
   server.set_clock(now_ns);
   server.start(0, state, Drive{{0, -2000, 0}, 300, 0});
   server.snapshot(r.snapshot);
@@ -105,7 +105,7 @@ void server_frame(benchmark::State& bench, std::string_view codec) {
 void client_frame(benchmark::State& bench, std::string_view codec) {
   ServerTimes ignored;
   const Recording r = record(codec, ignored);
-  auto client = *ClientTimeline::create(r.config);
+  auto client = *ClientTimeline::create(r.layout);
   client.set_clock(now_ns);
   DurationHistogram total, decode, apply;
   std::size_t next = kFrames;

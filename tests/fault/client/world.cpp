@@ -108,15 +108,17 @@ void World::start_server() {
   host::HostConfig config;
   config.epoch = epoch_;
   config.start_frame = start_frame_;
-  config.lead = options_.lead;
+  config.layout.lead = options_.lead;
   if (dice_.chance(0.3)) config.window = 2;
-  config.codec = options_.codec;
-  if (config.codec == "limited") config.budget = 600;
-  if (config.codec == "entropy" || config.codec == "limited") config.codec_tables = default_code_tables();
+  config.layout.capacity = kBodies;
+  config.layout.codec = options_.codec;
+  if (config.layout.codec == "limited") config.budget = 600;
+  if (config.layout.codec == "entropy" || config.layout.codec == "limited")
+    config.layout.codec_tables = default_code_tables();
   config.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
-  config.parameters = must(host::codec_parameters(config.lattice, 0.01, 0.1, 2));
-  if (config.codec == "tracker") {
-    config.parameters = with_first_gains(config.parameters, config.predictor);
+  config.layout.parameters = must(host::codec_parameters(config.lattice, 0.01, 0.1, 2));
+  if (config.layout.codec == "tracker") {
+    config.layout.parameters = with_first_gains(config.layout.parameters, config.layout.predictor);
     config.gains = host::GainGoal{};
   }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};

@@ -8,16 +8,16 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
   transport::SessionMessage s;
   s.session = "default";
   s.epoch = epoch;
-  s.capacity = capacity;
+  s.layout.capacity = capacity;
   s.lattice_unit = 0.001;
-  s.lead = lead;
+  s.layout.lead = lead;
   s.max_delta_bytes = 100'000;
   s.max_snapshot_bytes = 100'000;
-  s.codec = "quantized";
-  s.threshold = 50;
-  s.position_step = 40;
-  s.velocity_step = 40;
-  s.predictor = "ballistic";
+  s.layout.codec = "quantized";
+  s.layout.parameters.threshold = 50;
+  s.layout.parameters.position_step = 40;
+  s.layout.parameters.velocity_step = 40;
+  s.layout.predictor = "ballistic";
   s.scene = "test";
   s.types = {{"ball", 0.1F, 0xFFFFFFFF}};
   s.layout_hash = transport::layout_hash(s);
@@ -25,13 +25,7 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
 }
 
 ServerTimeline FakeServer::make(const transport::SessionMessage& s) {
-  TimelineConfig config;
-  config.capacity = s.capacity;
-  config.codec = s.codec;
-  config.parameters = {s.threshold, s.position_step, s.velocity_step};
-  config.predictor = s.predictor;
-  config.max_lead = s.lead;
-  return std::move(*ServerTimeline::create(config, s.epoch));
+  return std::move(*ServerTimeline::create(s.layout, s.epoch));
 }
 
 FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead)
@@ -84,7 +78,7 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
 transport::ScheduledInputMessage FakeServer::schedule(std::int32_t gravity_y) {
   ScheduledDrive input;
   input.number = ++last_number_;
-  input.frame = frame() + 1 + session.lead;
+  input.frame = frame() + 1 + session.layout.lead;
   input.drive = {{0, gravity_y, 0}, 300, 0};
   EXPECT_TRUE(timeline_.schedule(input).has_value());
   transport::ScheduledInputMessage message;

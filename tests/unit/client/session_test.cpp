@@ -49,7 +49,7 @@ TEST_F(SessionTest, AnotherLayoutHashIsRefused) {
 TEST_F(SessionTest, AnUnknownCodecIsRefused) {
   start();
   auto other = server.session;
-  other.codec = "of the future";
+  other.layout.codec = "of the future";
   other.layout_hash = transport::layout_hash(other);
   port.sessions.push_back(from_server(other));
   poll();
@@ -75,17 +75,17 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
     return !check_session(s).has_value();
   };
   EXPECT_FALSE(refused([](auto&) {}));
-  EXPECT_TRUE(refused([](auto& s) { s.capacity = 0; }));
-  EXPECT_TRUE(refused([](auto& s) { s.capacity = kMaxCapacity + 1; }));
+  EXPECT_TRUE(refused([](auto& s) { s.layout.capacity = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.layout.capacity = kMaxCapacity + 1; }));
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 0; }));
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 1e-300; }));  // periods would overflow all clocks
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_TRUE(refused([](auto& s) { s.lattice_unit = std::numeric_limits<double>::infinity(); }));
-  EXPECT_TRUE(refused([](auto& s) { s.lead = 2; }));
+  EXPECT_TRUE(refused([](auto& s) { s.layout.lead = 2; }));
   EXPECT_TRUE(refused([](auto& s) { s.max_delta_bytes = 0xFFFFFFFF; }));
   EXPECT_TRUE(refused([](auto& s) { s.max_snapshot_bytes = 0xFFFFFFFF; }));
   EXPECT_TRUE(refused([](auto& s) { s.types.clear(); }));
-  EXPECT_TRUE(refused([](auto& s) { s.threshold = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.layout.parameters.threshold = 0; }));
   EXPECT_TRUE(refused([](auto& s) { s.epoch = 0; }));
 }
 

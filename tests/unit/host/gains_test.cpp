@@ -80,9 +80,9 @@ TEST(Gains, AreChosenAtRunTimeForTrackerAlone) {
 
 TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
   HostConfig config = test_config();
-  config.codec = "tracker";
-  config.codec_tables.clear();
-  config.parameters.decay = 13000;
+  config.layout.codec = "tracker";
+  config.layout.codec_tables.clear();
+  config.layout.parameters.decay = 13000;
   config.gains = GainGoal{};
   Bench bench(config);
   bench.simulation.on_step = [&](std::uint64_t step) {  // to and fro: no force is worth remembering
@@ -95,7 +95,7 @@ TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
   bench.run_ms(100);
   bench.joining(1);
   bench.run_ms(300);
-  auto client = *ClientTimeline::create(timeline_config(config, bench.host->session().capacity));
+  auto client = *ClientTimeline::create(bench.host->session().layout);
   ASSERT_TRUE(client.load(bench.port.snapshots.back().bytes, bench.host->session().epoch));
   bench.run_ms(20'000);
   for (const auto& delta : bench.port.deltas) {
@@ -103,7 +103,7 @@ TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
     const auto applied = client.apply(delta.frame, delta.last_input, delta.hash, delta.payload);
     ASSERT_TRUE(applied) << applied.error().message;
   }
-  EXPECT_NE(bench.host->parameters(), config.parameters);
+  EXPECT_NE(bench.host->parameters(), config.layout.parameters);
   EXPECT_EQ(client.parameters(), bench.host->parameters());
 }
 

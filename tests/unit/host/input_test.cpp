@@ -65,7 +65,7 @@ class LeadZero : public InputTest {
   LeadZero() : InputTest(config()) {}
   static HostConfig config() {
     HostConfig config = test_config();
-    config.lead = 0;
+    config.layout.lead = 0;
     return config;
   }
 };

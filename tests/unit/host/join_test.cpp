@@ -74,13 +74,7 @@ TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {
   bench.send(bench.gravity(2, 1));  // pending when the snapshot is cut, or acting around it
   bench.run_ms(300);
   const auto& session = bench.host->session();
-  TimelineConfig config;
-  config.capacity = session.capacity;
-  config.codec = session.codec;
-  config.parameters = {session.threshold, session.position_step, session.velocity_step};
-  config.predictor = session.predictor;
-  config.max_lead = session.lead;
-  auto client = ClientTimeline::create(config);
+  auto client = ClientTimeline::create(session.layout);
   ASSERT_TRUE(client);
   const auto& snapshot = bench.port.snapshots.back();
   ASSERT_TRUE(client->load(snapshot.bytes, session.epoch));

@@ -45,7 +45,7 @@ TEST(Publish, FramesContinueFromAStartFrame) {
 
 TEST(Publish, LargeDeltasAreCutIntoPartsOfSixtyThousandBytes) {
   HostConfig config = test_config();
-  config.codec = "none";
+  config.layout.codec = "none";
   Bench bench(config, 10'000);
   bench.poll();
   bench.run_to(2);

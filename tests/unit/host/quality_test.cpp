@@ -120,8 +120,8 @@ TEST(Quality, ATargetOutOfReachIsSaidAfterTwoSecondsAndTakenBackAfterTwo) {
 
 TEST(Quality, ABudgetThatHoldsTheRateBelowTheTargetIsRefused) {
   HostConfig config = test_config();
-  config.codec = "limited";
-  config.codec_tables = default_code_tables();
+  config.layout.codec = "limited";
+  config.layout.codec_tables = default_code_tables();
   config.quality = QualityGoal{1, 1, kPositionLimit};
   config.budget = least_budget(*config.quality, config.frame_rate_hz);
   EXPECT_GT(config.budget, kMbitBytes);
@@ -191,14 +191,7 @@ class RuntimeQuality : public ::testing::Test {
     bench.joining(1);
     bench.run_ms(300);
     const auto& session = bench.host->session();
-    TimelineConfig timeline;
-    timeline.capacity = session.capacity;
-    timeline.codec = session.codec;
-    timeline.codec_tables = session.codec_tables;
-    timeline.parameters = {session.threshold, session.position_step, session.velocity_step};
-    timeline.predictor = session.predictor;
-    timeline.max_lead = session.lead;
-    client.emplace(std::move(*ClientTimeline::create(timeline)));
+    client.emplace(std::move(*ClientTimeline::create(session.layout)));
     EXPECT_TRUE(client->load(bench.port.snapshots.back().bytes, session.epoch));
   }
   /// Lets the client apply all that was published; every hash is checked on the way.
@@ -221,7 +214,7 @@ TEST_F(RuntimeQuality, ParametersSetByHandTravelInTheNextDeltaAndClientsFollow) 
   coarse.threshold *= 16;
   coarse.velocity_step *= 2;
   ASSERT_TRUE(bench.host->set_parameters(coarse));
-  EXPECT_EQ(client->parameters(), test_config().parameters);
+  EXPECT_EQ(client->parameters(), test_config().layout.parameters);
   const Frame before = bench.host->frame();
   bench.run_ms(40);
   ASSERT_EQ(bench.host->frame(), before + 1);
@@ -235,13 +228,14 @@ TEST_F(RuntimeQuality, ParametersOutOfRangeAreRefusedAndChangeNothing) {
   CodecParameters bad = bench.host->parameters();
   bad.position_step = 0;
   EXPECT_FALSE(bench.host->set_parameters(bad));
-  EXPECT_EQ(bench.host->parameters(), test_config().parameters);
+  EXPECT_EQ(bench.host->parameters(), test_config().layout.parameters);
 }
 
 HostConfig automatic() {
   HostConfig config = test_config();
-  config.codec = "quantized";
-  config.quality = QualityGoal{0.005, config.parameters.threshold, 64 * config.parameters.threshold};
+  config.layout.codec = "quantized";
+  config.quality =
+      QualityGoal{0.005, config.layout.parameters.threshold, 64 * config.layout.parameters.threshold};
   return config;
 }
 
@@ -253,9 +247,9 @@ class AutomaticQuality : public RuntimeQuality {
 TEST_F(AutomaticQuality, TheHostFollowsItsTargetAndClientsFollowTheHost) {
   bench.run_ms(20'000);
   follow();
-  EXPECT_NE(bench.host->parameters(), automatic().parameters);
+  EXPECT_NE(bench.host->parameters(), automatic().layout.parameters);
   EXPECT_EQ(client->parameters(), bench.host->parameters());
-  EXPECT_FALSE(bench.host->set_parameters(automatic().parameters)) << "nobody else decides then";
+  EXPECT_FALSE(bench.host->set_parameters(automatic().layout.parameters)) << "nobody else decides then";
 }
 
 TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedError) {
@@ -268,15 +262,15 @@ TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedEr
   auto plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan);
   ASSERT_TRUE(plan->quality);
-  EXPECT_NEAR(plan->parameters.threshold * plan->lattice.unit, scene->threshold_m, 1e-6);
+  EXPECT_NEAR(plan->layout.parameters.threshold * plan->lattice.unit, scene->threshold_m, 1e-6);
   EXPECT_NEAR(plan->quality->smallest_threshold * plan->lattice.unit, scene->threshold_m / 4, 1e-6);
   EXPECT_NEAR(plan->quality->largest_threshold * plan->lattice.unit, scene->threshold_m * 4, 1e-6);
   choice.max_error_m = scene->threshold_m / 2;
   plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan) << "a smaller error is where it starts";
-  EXPECT_TRUE(valid_goal(*plan->quality, plan->parameters));
-  EXPECT_NEAR(plan->parameters.threshold * plan->lattice.unit, scene->threshold_m / 2, 1e-6);
-  EXPECT_EQ(plan->quality->largest_threshold, plan->parameters.threshold);
+  EXPECT_TRUE(valid_goal(*plan->quality, plan->layout.parameters));
+  EXPECT_NEAR(plan->layout.parameters.threshold * plan->lattice.unit, scene->threshold_m / 2, 1e-6);
+  EXPECT_EQ(plan->quality->largest_threshold, plan->layout.parameters.threshold);
 }
 
 }  // namespace

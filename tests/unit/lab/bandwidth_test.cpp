@@ -16,13 +16,14 @@ constexpr double kThreshold = 0.05;
 
 std::vector<host::HostConfig> sessions(const std::vector<std::string>& codecs) {
   host::HostConfig session;
+  session.layout.capacity = kBodies;
   session.lattice = *host::choose_lattice(kThreshold, 100, Bouncing::kDt);
-  session.parameters = *host::codec_parameters(session.lattice, kThreshold, 0, 0);
+  session.layout.parameters = *host::codec_parameters(session.lattice, kThreshold, 0, 0);
   std::vector<host::HostConfig> all;
   for (const std::string& codec : codecs) {
-    session.codec = codec;
+    session.layout.codec = codec;
     session.budget = codec == "limited" ? 100 : kNoBudget;
-    session.codec_tables =
+    session.layout.codec_tables =
         codec == "entropy" || codec == "limited" ? default_code_tables() : std::vector<std::byte>{};
     all.push_back(session);
   }

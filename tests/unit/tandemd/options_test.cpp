@@ -232,8 +232,8 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       EXPECT_EQ(config->types.size(), scene->types.size());
       EXPECT_EQ(config->scene, name);
       EXPECT_EQ(config->budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
-      EXPECT_EQ(config->parameters.threshold, 1 << config->lattice.halvings);
-      const auto largest = sessions::largest_delta_bytes(*config, choice.bodies);
+      EXPECT_EQ(config->layout.parameters.threshold, 1 << config->lattice.halvings);
+      const auto largest = sessions::largest_delta_bytes(*config);
       ASSERT_TRUE(largest) << largest.error().message;
       EXPECT_GT(*largest, 0U);
     }
@@ -265,8 +265,8 @@ TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
     choice.predictor = "contact";
     const auto config = sessions::plan_session(*scene, choice);
     ASSERT_TRUE(config) << config.error().message;
-    EXPECT_TRUE(sessions::largest_delta_bytes(*config, choice.bodies));
-    const auto read = read_contact_constants(config->predictor_constants);
+    EXPECT_TRUE(sessions::largest_delta_bytes(*config));
+    const auto read = read_contact_constants(config->layout.predictor_constants);
     ASSERT_TRUE(read);
     EXPECT_EQ(read->substeps, static_cast<std::int32_t>(scene->world.substeps));
     EXPECT_EQ(read->planes.size(), scene->world.planes.size());
@@ -284,8 +284,8 @@ TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
     choice.bodies = bodies;
     choice.codec = codec;
     const auto config = *sessions::plan_session(*scene, choice);
-    EXPECT_EQ(config.predictor_constants.empty(), config.predictor == "ballistic");
-    return config.predictor;
+    EXPECT_EQ(config.layout.predictor_constants.empty(), config.layout.predictor == "ballistic");
+    return config.layout.predictor;
   };
   EXPECT_EQ(predictor("tracker", 50000), "field");
   EXPECT_EQ(predictor("tracker", 50001), "ballistic");
@@ -301,7 +301,7 @@ TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
   choice.bodies = 1000;
   const auto threshold_m = [&] {
     const auto config = *sessions::plan_session(*scene, choice);
-    return config.parameters.threshold * config.lattice.unit;
+    return config.layout.parameters.threshold * config.lattice.unit;
   };
   EXPECT_NEAR(threshold_m(), scene->threshold_m, 1e-9);
   choice.threshold_scale = 2;

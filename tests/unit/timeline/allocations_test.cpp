@@ -38,9 +38,9 @@ TEST(Allocations, NoneInAFrameOfServerOrClientAfterTheFirst) {
     SCOPED_TRACE(codec);
     Random random(8);
     constexpr std::uint32_t kCapacity = 3000;
-    const TimelineConfig config = config_for(codec, kCapacity);
-    auto server = server_of(config);
-    auto client = client_of(config);
+    const Layout layout = layout_for(codec, kCapacity);
+    auto server = server_of(layout);
+    auto client = client_of(layout);
     server.start(0, random_state(random, kCapacity), Drive{{0, -640, 0}, 10, 0});
     ASSERT_TRUE(client.load(snapshot_of(server), kEpoch));
     std::uint64_t on_server = 0;

@@ -11,8 +11,8 @@ using namespace synthetic;
 /// A server one frame after the client's snapshot, and that client.
 struct Pair {
   explicit Pair(std::uint32_t max_lead = 1, std::string_view codec = "entropy")
-      : server(server_of(config_for(codec, 40, max_lead))),
-        client(client_of(config_for(codec, 40, max_lead))) {
+      : server(server_of(layout_for(codec, 40, max_lead))),
+        client(client_of(layout_for(codec, 40, max_lead))) {
     server.start(10, random_state(random, 40), Drive{{0, -640, 0}, 10, 0});
     EXPECT_TRUE(client.load(snapshot_of(server), kEpoch));
   }
@@ -38,7 +38,7 @@ TEST(ClientTimeline, FollowsTheServerWithEveryCodec) {
 }
 
 TEST(ClientTimeline, HoldsNothingBeforeASnapshot) {
-  auto client = client_of(config_for("entropy", 4));
+  auto client = client_of(layout_for("entropy", 4));
   EXPECT_FALSE(client.playing());
   EXPECT_FALSE(client.step(1));
   EXPECT_EQ(client.apply(1, 0, 0, {}).error().code, ErrorCode::kOutOfOrder);

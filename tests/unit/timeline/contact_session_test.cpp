@@ -14,15 +14,15 @@ namespace {
 constexpr std::uint32_t kCapacity = 120;
 constexpr std::int32_t kRadius = 2000;
 
-TimelineConfig contact_config(const char* predictor, std::uint32_t max_lead) {
-  TimelineConfig config = synthetic::config_for("tracker", kCapacity, max_lead);
+Layout contact_layout(const char* predictor, std::uint32_t lead) {
+  Layout layout = synthetic::layout_for("tracker", kCapacity, lead);
   ContactConstants constants;
   constants.pair = constants.wall = {3641, 410, 410};
   constants.types = {{kRadius, 65536}};
   constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
-  config.predictor = predictor;
-  config.predictor_constants = write_contact_constants(constants);
-  return config;
+  layout.predictor = predictor;
+  layout.predictor_constants = write_contact_constants(constants);
+  return layout;
 }
 
 State heap(std::mt19937_64& random) {
@@ -42,13 +42,13 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
   const auto [name, lead] = GetParam();
-  const TimelineConfig config = contact_config(name, 2);
-  auto server = synthetic::server_of(config);
-  auto client = synthetic::client_of(config);
+  const Layout layout = contact_layout(name, 2);
+  auto server = synthetic::server_of(layout);
+  auto client = synthetic::client_of(layout);
   State target = heap(random);
   server.start(0, target, {{0, -300, 0}, 200, 800});
   ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
-  const auto predictor = *make_predictor(name, kCapacity, config.predictor_constants);
+  const auto predictor = *make_predictor(name, kCapacity, layout.predictor_constants);
   std::uint32_t corrected = 0;
   for (int frame = 0; frame < 100; ++frame) {
     while (client.step(lead)) {

@@ -10,31 +10,29 @@ namespace {
 using namespace synthetic;
 
 TEST(ServerTimeline, RefusesConfigurationsThatMakeNoSession) {
-  const auto code = [](const TimelineConfig& config) {
-    return ServerTimeline::create(config, 1).error().code;
-  };
-  TimelineConfig config = config_for("none", 10);
-  config.codec = "zip";
-  EXPECT_EQ(code(config), ErrorCode::kUnsupported);
-  config = config_for("none", 10);
-  config.predictor = "oracle";
-  EXPECT_EQ(code(config), ErrorCode::kUnsupported);
-  EXPECT_EQ(code(config_for("none", 0)), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(code(config_for("none", kMaxCapacity + 1)), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(code(config_for("none", 10, kMaxLead + 1)), ErrorCode::kInvalidArgument);
-  config = config_for("none", 10);
-  config.parameters.threshold = 0;
-  EXPECT_EQ(code(config), ErrorCode::kInvalidArgument);
-  config = config_for("none", 10);
-  config.type_count = 0;
-  EXPECT_EQ(code(config), ErrorCode::kInvalidArgument);
+  const auto code = [](const Layout& layout) { return ServerTimeline::create(layout, 1).error().code; };
+  Layout layout = layout_for("none", 10);
+  layout.codec = "zip";
+  EXPECT_EQ(code(layout), ErrorCode::kUnsupported);
+  layout = layout_for("none", 10);
+  layout.predictor = "oracle";
+  EXPECT_EQ(code(layout), ErrorCode::kUnsupported);
+  EXPECT_EQ(code(layout_for("none", 0)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(layout_for("none", kMaxCapacity + 1)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(layout_for("none", 10, kMaxLead + 1)), ErrorCode::kInvalidArgument);
+  layout = layout_for("none", 10);
+  layout.parameters.threshold = 0;
+  EXPECT_EQ(code(layout), ErrorCode::kInvalidArgument);
+  layout = layout_for("none", 10);
+  layout.type_count = 0;
+  EXPECT_EQ(code(layout), ErrorCode::kInvalidArgument);
 }
 
 TEST(ServerTimeline, AFrameThatTheTargetPredictsCostsNothing) {
   Random random(1);
   const State start = random_state(random, 50);
   const Drive drive{{0, -640, 0}, 10, 0};
-  auto server = server_of(config_for("entropy", 50));
+  auto server = server_of(layout_for("entropy", 50));
   server.start(7, start, drive);
   State target(50);
   Ballistic().step(start, target, drive);
@@ -47,7 +45,7 @@ TEST(ServerTimeline, AFrameThatTheTargetPredictsCostsNothing) {
 }
 
 TEST(ServerTimeline, AScheduledDriveActsInTheStepThatProducesItsFrame) {
-  auto server = server_of(config_for("entropy", 1));
+  auto server = server_of(layout_for("entropy", 1));
   State state(1);
   state.spawn(0, 0, 0, {});
   server.start(0, state, Drive{});
@@ -62,7 +60,7 @@ TEST(ServerTimeline, AScheduledDriveActsInTheStepThatProducesItsFrame) {
 }
 
 TEST(ServerTimeline, InputsAreNumberedWithoutGapsAndLieInTheFuture) {
-  auto server = server_of(config_for("entropy", 1));
+  auto server = server_of(layout_for("entropy", 1));
   server.start(5, State(1), Drive{});
   EXPECT_EQ(server.schedule({2, 9, {}}).error().code, ErrorCode::kOutOfOrder);
   EXPECT_EQ(server.schedule({1, 5, {}}).error().code, ErrorCode::kOutOfOrder);
@@ -73,7 +71,7 @@ TEST(ServerTimeline, InputsAreNumberedWithoutGapsAndLieInTheFuture) {
 }
 
 TEST(ServerTimeline, TimesAreMeasuredByTheClockItIsGiven) {
-  auto server = server_of(config_for("entropy", 1));
+  auto server = server_of(layout_for("entropy", 1));
   server.start(0, State(1), Drive{});
   EXPECT_EQ(server.advance(State(1), {}).predict_ns, 0);
   server.set_clock([] {
@@ -89,7 +87,7 @@ TEST(ServerTimeline, TimesAreMeasuredByTheClockItIsGiven) {
 TEST(ServerTimeline, NoPayloadOrSnapshotExceedsItsBound) {
   Random random(4);
   for (const std::string_view codec : codec_names()) {
-    auto server = server_of(config_for(codec, 70));
+    auto server = server_of(layout_for(codec, 70));
     server.start(0, random_state(random, 70, 0), Drive{});
     State target = random_state(random, 70, 0);
     std::vector<LifecycleRecord> lifecycle;

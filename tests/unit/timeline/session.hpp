@@ -8,22 +8,20 @@ namespace tandem::synthetic {
 
 inline constexpr Epoch kEpoch = 1'700'000'000'000;
 
-inline TimelineConfig config_for(std::string_view codec, std::uint32_t capacity, std::uint32_t max_lead = 1) {
-  TimelineConfig config;
-  config.capacity = capacity;
-  config.type_count = kTypes;
-  config.codec = codec;
-  config.codec_tables = tables_for(codec);
-  config.parameters = {200, 16, 64};
-  config.predictor = "ballistic";
-  config.max_lead = max_lead;
-  return config;
+inline Layout layout_for(std::string_view codec, std::uint32_t capacity, std::uint32_t lead = 1) {
+  Layout layout;
+  layout.capacity = capacity;
+  layout.type_count = kTypes;
+  layout.codec = codec;
+  layout.codec_tables = tables_for(codec);
+  layout.parameters = {200, 16, 64};
+  layout.predictor = "ballistic";
+  layout.lead = lead;
+  return layout;
 }
 
-inline ServerTimeline server_of(const TimelineConfig& config) {
-  return *ServerTimeline::create(config, kEpoch);
-}
-inline ClientTimeline client_of(const TimelineConfig& config) { return *ClientTimeline::create(config); }
+inline ServerTimeline server_of(const Layout& layout) { return *ServerTimeline::create(layout, kEpoch); }
+inline ClientTimeline client_of(const Layout& layout) { return *ClientTimeline::create(layout); }
 
 inline std::vector<std::byte> snapshot_of(ServerTimeline& server) {
   std::vector<std::byte> bytes;

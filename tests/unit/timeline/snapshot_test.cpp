@@ -120,8 +120,8 @@ TEST(Snapshot, OfAnotherCapacityOrVersionIsRefused) {
 }
 
 TEST(Snapshot, TheHashOfAClientsStateIsChecked) {
-  auto server = server_of(config_for("selective", 3));
-  auto client = client_of(config_for("selective", 3));
+  auto server = server_of(layout_for("selective", 3));
+  auto client = client_of(layout_for("selective", 3));
   State state(3);
   state.spawn(1, 0, 0, {{1, 2, 3}, {}});
   server.start(0, state, {});

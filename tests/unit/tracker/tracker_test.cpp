@@ -27,30 +27,30 @@ Bytes coder_state(const DeltaCodec& delta) {
   return out;
 }
 
-TimelineConfig config_of(std::uint32_t capacity) {
-  TimelineConfig config;
-  config.capacity = capacity;
-  config.type_count = synthetic::kTypes;
-  config.codec = "tracker";
-  config.parameters = with_first_gains(kParameters, "ballistic");
-  config.parameters.decay = 800;  // nothing chooses it here: what suits bodies at rest
-  config.predictor = "ballistic";
-  return config;
+Layout layout_of(std::uint32_t capacity) {
+  Layout layout;
+  layout.capacity = capacity;
+  layout.type_count = synthetic::kTypes;
+  layout.codec = "tracker";
+  layout.parameters = with_first_gains(kParameters, "ballistic");
+  layout.parameters.decay = 800;  // nothing chooses it here: what suits bodies at rest
+  layout.predictor = "ballistic";
+  return layout;
 }
 
 TEST(Tracker, ASnapshotInMidStreamContinuesToTheBit) {
   constexpr std::uint64_t kSeed = 31;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   Random random(kSeed);
-  const TimelineConfig config = config_of(2 * kBlockSlots / 16);
-  auto server = *ServerTimeline::create(config, 1);
-  server.start(0, synthetic::random_state(random, config.capacity), {{0, -640, 0}, 300});
+  const Layout layout = layout_of(2 * kBlockSlots / 16);
+  auto server = *ServerTimeline::create(layout, 1);
+  server.start(0, synthetic::random_state(random, layout.capacity), {{0, -640, 0}, 300});
   std::vector<ClientTimeline> clients;
   Bytes snapshot;
   for (int frame = 0; frame < 60; ++frame) {
     if (frame % 15 == 0) {
       server.snapshot(snapshot);
-      clients.push_back(*ClientTimeline::create(config));
+      clients.push_back(*ClientTimeline::create(layout));
       ASSERT_TRUE(clients.back().load(snapshot, 1));
     }
     State target = synthetic::random_target(random, server.state(), 6);
@@ -227,7 +227,7 @@ TEST(Tracker, AThresholdThatChangesActsInItsOwnDelta) {
 TEST(Tracker, ABodyAtRestOnOthersIsCorrectedRarely) {
   // Gravity pulls the predicted body down every frame; the full simulation holds it. Without a learned
   // acceleration it would be off by the threshold after every six frames.
-  auto server = *ServerTimeline::create(config_of(1), 1);
+  auto server = *ServerTimeline::create(layout_of(1), 1);
   State start(1);
   start.spawn(0, 0, 0, {});
   server.start(0, start, {{0, -700, 0}, 20});

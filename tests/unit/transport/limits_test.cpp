@@ -12,7 +12,7 @@ const Limits kLimits{1000, 2000};
 SessionMessage good_session() {
   SessionMessage session;
   session.session = "a";
-  session.capacity = 1;
+  session.layout.capacity = 1;
   session.lattice_unit = 0.5;
   return session;
 }
@@ -28,23 +28,24 @@ TEST(Limits, ASessionWithinAllLimitsPasses) { EXPECT_TRUE(within_limits(good_ses
 
 TEST(Limits, ASessionBeyondAnyLimitIsRefused) {
   EXPECT_FALSE(session_passes([](auto& s) { s.session = "a*"; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.capacity = 0; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.capacity = kMaxCapacity + 1; }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.layout.capacity = 0; }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.layout.capacity = kMaxCapacity + 1; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.frame_rate_hz = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.lattice_unit = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = kMaxWindowCeiling + 1; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.max_delta_bytes = kMaxSampleBytes + 1; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.max_snapshot_bytes = kMaxSampleBytes + 1; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.codec = std::string(65, 'c'); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.layout.codec = std::string(65, 'c'); }));
   EXPECT_FALSE(
       session_passes([](auto& s) { s.scene_description = std::string(kMaxDescriptionBytes + 1, 's'); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types.resize(kMaxTypes + 1); }));
   EXPECT_FALSE(session_passes([](auto& s) {
     s.types = {BodyType{"t", std::numeric_limits<float>::infinity(), 0}};
   }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.codec_tables.resize(kMaxTableBytes + 1); }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.predictor_constants.resize(kMaxPredictorConstants + 1); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.layout.codec_tables.resize(kMaxTableBytes + 1); }));
+  EXPECT_FALSE(
+      session_passes([](auto& s) { s.layout.predictor_constants.resize(kMaxPredictorConstants + 1); }));
 }
 
 TEST(Limits, AnotherProtocolVersionPassesBecauseItIsAnsweredNotDropped) {

@@ -100,8 +100,8 @@ TEST(SessionName, RefusesWildcardsAndWhatIsNoName) {
 
 TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
   SessionMessage session;
-  session.codec = "entropy";
-  session.predictor = "ballistic";
+  session.layout.codec = "entropy";
+  session.layout.predictor = "ballistic";
   std::set<std::uint64_t> hashes{layout_hash(session)};
   const auto differs = [&](auto&& change) {
     SessionMessage changed = session;
@@ -109,29 +109,29 @@ TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
     return hashes.insert(layout_hash(changed)).second;
   };
   EXPECT_TRUE(differs([](auto& s) { s.protocol_version = 2; }));
-  EXPECT_TRUE(differs([](auto& s) { s.capacity = 1; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.capacity = 1; }));
   EXPECT_TRUE(differs([](auto& s) { s.lattice_unit = 0.5; }));
-  EXPECT_TRUE(differs([](auto& s) { s.lead = 0; }));
-  EXPECT_TRUE(differs([](auto& s) { s.codec = "none"; }));
-  EXPECT_TRUE(differs([](auto& s) { s.codec_tables = Bytes(1); }));
-  EXPECT_TRUE(differs([](auto& s) { s.threshold = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.position_step = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.velocity_step = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.predictor = "field"; }));
-  EXPECT_TRUE(differs([](auto& s) { s.predictor_constants = {1}; }));
-  EXPECT_TRUE(differs([](auto& s) { s.types.resize(1); }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.lead = 0; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.codec = "none"; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.codec_tables = Bytes(1); }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.threshold = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.position_step = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.velocity_step = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.predictor = "field"; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.predictor_constants = {1}; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.type_count = 2; }));
   EXPECT_FALSE(differs([](auto& s) { s.epoch = 5; })) << "a restarted server has the same layout";
   EXPECT_FALSE(differs([](auto& s) { s.scene_description = "x"; })) << "drawing does not matter";
 }
 
 TEST(LayoutHash, OfAFixedSessionIsAFixedNumber) {
   SessionMessage session;
-  session.capacity = 10000;
+  session.layout.capacity = 10000;
   session.lattice_unit = 0.0009765625;
-  session.codec = "entropy";
-  session.threshold = 100;
-  session.predictor = "ballistic";
-  session.types.resize(2);
+  session.layout.codec = "entropy";
+  session.layout.parameters.threshold = 100;
+  session.layout.predictor = "ballistic";
+  session.layout.type_count = 2;
   EXPECT_EQ(layout_hash(session), 0xf2d62373ce44cb3cULL)
       << "part of the protocol: old clients would refuse the session";
 }

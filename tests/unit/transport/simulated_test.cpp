@@ -15,7 +15,7 @@ SessionMessage session(Epoch epoch = kEpoch) {
   SessionMessage message;
   message.session = "s";
   message.epoch = epoch;
-  message.capacity = 10;
+  message.layout.capacity = 10;
   message.lattice_unit = 1;
   message.max_delta_bytes = 100;
   message.max_snapshot_bytes = 100;
