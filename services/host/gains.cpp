@@ -10,7 +10,8 @@ constexpr std::uint32_t kFramesPerDecision = 15;
 
 constexpr GainGoal kFieldGoal{0.1, -0.1};
 
-// How much the logarithms of beta and E move for a cosine, and at most, in one decision.
+// How much the logarithms of beta and E move for a cosine, and at most, in one decision. The logarithms are
+// never taken: beta and E are multiplied by exp(change).
 constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
 constexpr double kDecayRate = 2, kMostDecayChange = 0.7;
 constexpr double kLeastGain = 0.35, kMostGain = 1.8;
@@ -22,6 +23,14 @@ constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
 // Smaller changes, as shares, are not worth the bytes of saying so.
 constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
+
+// exp(x) for |x| <= 1 by its Pade approximant of order [3/3], to 1e-6. Not std::exp: that one may differ from
+// machine to machine in the last bit, and the gains go on the wire.
+double exp_of(double x) {
+  const double even = 120 + 12 * x * x;
+  const double odd = 60 * x + x * x * x;
+  return (even + odd) / (even - odd);
+}
 
 double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(count); }
 
@@ -36,8 +45,8 @@ GainGoal usual_gain_goal(std::string_view predictor) {
 GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters)
     : goal_(goal),
       enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
-      log_decay_(std::log(std::clamp<double>(parameters.decay, kLeastDecay, kMostDecay))),
-      log_gain_(std::log(std::clamp(parameters.velocity_gain / 32768.0, kLeastGain, kMostGain))) {}
+      decay_(std::clamp<double>(parameters.decay, kLeastDecay, kMostDecay)),
+      gain_(std::clamp(parameters.velocity_gain / 32768.0, kLeastGain, kMostGain)) {}
 
 bool GainControl::after_frame(CodecParameters& parameters) {
   if (++frames_ < kFramesPerDecision) return false;
@@ -50,24 +59,23 @@ bool GainControl::after_frame(CodecParameters& parameters) {
   if (seen.repeated > 0) {
     const double off = mean(seen.agreement, seen.repeated) - goal_.agreement;
     const double change = kGainRate * off * belief(seen.repeated, kMoreForGain * enough_);
-    log_gain_ = std::clamp(log_gain_ + std::clamp(change, -kMostGainChange, kMostGainChange),
-                           std::log(kLeastGain), std::log(kMostGain));
+    gain_ = std::clamp(gain_ * exp_of(std::clamp(change, -kMostGainChange, kMostGainChange)), kLeastGain,
+                       kMostGain);
   }
   if (seen.driven > 0) {
     const double off = goal_.forwardness - mean(seen.forwardness, seen.driven);
     const double change = kDecayRate * off * belief(seen.driven, enough_);
-    log_decay_ = std::clamp(log_decay_ + std::clamp(change, -kMostDecayChange, kMostDecayChange),
-                            std::log(kLeastDecay), std::log(kMostDecay));
+    decay_ = std::clamp(decay_ * exp_of(std::clamp(change, -kMostDecayChange, kMostDecayChange)), kLeastDecay,
+                        kMostDecay);
   }
-  const double decay = std::exp(log_decay_);
-  const double gain = 32768 * std::exp(log_gain_);
-  if (!differs(decay, parameters.decay, kDecayDeadBand) &&
+  const double gain = 32768 * gain_;
+  if (!differs(decay_, parameters.decay, kDecayDeadBand) &&
       !differs(gain, parameters.velocity_gain, kGainDeadBand))
     return false;
-  parameters.decay = static_cast<std::uint16_t>(decay);
+  parameters.decay = static_cast<std::uint16_t>(decay_);
   parameters.velocity_gain = static_cast<std::uint16_t>(gain);
   parameters.acceleration_gain =
-      static_cast<std::uint16_t>(65536 * kMostAcceleration * std::min(1.0, kDecayOfMost / decay));
+      static_cast<std::uint16_t>(65536 * kMostAcceleration * std::min(1.0, kDecayOfMost / decay_));
   return true;
 }
 

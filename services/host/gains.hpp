@@ -36,8 +36,8 @@ class GainControl {
 
  private:
   GainGoal goal_;
-  double enough_;                // corrections in one decision, to believe them
-  double log_decay_, log_gain_;  // of E in 1/65536, of beta
+  double enough_;        // corrections in one decision, to believe them
+  double decay_, gain_;  // E in 1/65536, beta
   std::uint32_t frames_ = 0;
   GainEvidence evidence_;
 };

@@ -8,9 +8,6 @@
 namespace tandem::host {
 namespace {
 
-// Bits fall with about the threshold's inverse; the square root keeps a decision from overshooting what it
-// caused.
-constexpr double kExponent = 0.5;
 // Of the threshold in one decision. Up faster than down: what is too fine is paid for by others on the link.
 constexpr double kMostRise = 2, kMostFall = 0.8;
 constexpr double kDeadBand = 0.03;  // around the target, so that a calm scene is left alone
@@ -57,7 +54,9 @@ double QualityControl::ratio() const {
 
 std::int32_t QualityControl::next_threshold(std::int32_t threshold) const {
   if (std::abs(ratio() - 1) <= kDeadBand) return threshold;
-  const double factor = std::clamp(std::pow(std::max(ratio(), 1e-3), kExponent), kMostFall, kMostRise);
+  // Bits fall with about the threshold's inverse; the square root keeps a decision from overshooting what it
+  // caused.
+  const double factor = std::clamp(std::sqrt(std::max(ratio(), 1e-3)), kMostFall, kMostRise);
   const bool quiet = static_cast<double>(corrected_) < kQuiet * bodies_ * frames_;
   const std::int32_t finest = quiet ? std::min(start_.threshold, threshold) : goal_.smallest_threshold;
   return static_cast<std::int32_t>(
