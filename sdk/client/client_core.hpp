@@ -11,8 +11,10 @@
 #include <vector>
 
 #include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/epoch_state.hpp"
 #include "sdk/client/sent_inputs.hpp"
 #include "sdk/client/statistics.hpp"
+#include "sdk/client/status_report.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/client.hpp"
@@ -55,7 +57,7 @@ class ClientCore {
  public:
   /// `port` and `listener` (may be null) must outlive it.
   ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener = nullptr);
-  ~ClientCore();
+  ~ClientCore() = default;
   ClientCore(const ClientCore&) = delete;
   ClientCore& operator=(const ClientCore&) = delete;
   ClientCore(ClientCore&&) = delete;
@@ -72,7 +74,7 @@ class ClientCore {
                              Now now);
 
   [[nodiscard]] ClientPhase phase() const;
-  [[nodiscard]] const Statistics& statistics() const;
+  [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   /// Last announcement that was accepted or refused; null before the first.
   [[nodiscard]] const transport::SessionMessage* session() const;
   /// Null unless playing.
@@ -84,8 +86,74 @@ class ClientCore {
   bool sample(Sample& out, SampleMode mode, Now now);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  /// What a poll takes from the port; kept to reuse its memory.
+  struct Inbox {
+    std::vector<transport::Received<transport::SessionMessage>> sessions;
+    std::vector<transport::Received<transport::DeltaMessage>> deltas;
+    std::vector<transport::Received<transport::ScheduledInputMessage>> inputs;
+    std::vector<transport::Received<transport::SnapshotMessage>> snapshots;
+    std::vector<transport::Received<transport::ReplyMessage>> replies;
+  };
+
+  // client_core.cpp: sessions, acknowledgements, input, status
+  void take_sessions(Now now);
+  void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
+  void take_replies(Now now);
+  void report_outcomes();
+  void send_ack(Now now);
+  void send_status(Now now);
+  [[nodiscard]] std::int64_t next_due_ns(Now now) const;
+
+  // client_stream.cpp: join, play, join again
+  void take_stream(Now now);
+  void take_deltas(Now now);
+  void take_scheduled(Now now);
+  void take_snapshots();
+  void join(Now now);
+  void load(transport::SnapshotMessage&& snapshot, Now now);
+  void play(Now now, std::int64_t since_last_poll_ns);
+  void play_ahead(Now now);
+  void rejoin(ResyncReason reason, const std::string& why, Now now);
+
+  /// Counts what is not of this epoch and this server.
+  template <class M>
+  [[nodiscard]] bool belongs(const transport::Received<M>& received) {
+    if (received.from != epoch_->server) {
+      ++statistics_.foreign_messages;
+      return false;
+    }
+    if (received.message.epoch != epoch_->session.epoch) {
+      ++statistics_.stale_messages;
+      return false;
+    }
+    return true;
+  }
+  [[nodiscard]] std::int64_t measure() const {
+    return options_.measure_ns != nullptr ? options_.measure_ns() : 0;
+  }
+  void log(LogLevel level, std::string_view line) const {
+    if (options_.log) options_.log(level, line);
+  }
+
+  CoreOptions options_;
+  transport::ClientPort& port_;
+  CoreListener silent_;
+  CoreListener& listener_;
+  Statistics statistics_;
+  StatusReport status_report_;
+  SentInputs sent_;
+  std::vector<InputOutcome> outcomes_;  ///< not yet told to the listener
+  Inbox inbox_;
+
+  std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
+  std::string refusal_;                               ///< why it is not
+  std::unique_ptr<EpochState> epoch_;                 ///< null while there is no playable session
+
+  bool server_alive_ = false;
+  bool ack_due_ = false;
+  std::int64_t last_ack_ns_ = 0;
+  std::int64_t last_poll_ns_ = 0;
+  std::int64_t poll_began_ns_ = 0;  ///< by options_.measure_ns
 };
 
 }  // namespace tandem::client

@@ -2,11 +2,14 @@
 #include <algorithm>
 #include <utility>
 
-#include "sdk/client/client_core_impl.hpp"
+#include "sdk/client/client_core.hpp"
 
 namespace tandem::client {
 
 namespace {
+
+// A scheduled input that a delta promised may be this late before the client joins again.
+constexpr std::int64_t kInputPatienceNs = 250'000'000;
 
 // A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
@@ -18,28 +21,29 @@ std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
 
 // Deltas first: whatever scheduled inputs they promise were published before them, so taking the inputs
 // afterwards finds the most.
-void ClientCore::Impl::take_stream(Now now) {
-  if (!epoch->stream_open) return;
+void ClientCore::take_stream(Now now) {
+  if (!epoch_->stream_open) return;
   take_deltas(now);
   take_scheduled(now);
-  take_snapshots(now);
+  take_snapshots();
 }
 
-void ClientCore::Impl::take_deltas(Now now) {
+void ClientCore::take_deltas(Now now) {
   using Outcome = DeltaAssembly::Outcome;
-  deltas.clear();
-  port.take(deltas);
-  for (auto& received : deltas) {
+  inbox_.deltas.clear();
+  port_.take(inbox_.deltas);
+  for (auto& received : inbox_.deltas) {
     if (!belongs(received)) continue;
     const Frame frame = received.message.frame;
     const std::int64_t server_time_ns = received.message.server_time_ns;
     const bool last_part = received.message.part + 1 == received.message.parts;
-    const Outcome outcome = epoch->assembly.add(std::move(received.message));
-    statistics.queue_high_water = std::max(statistics.queue_high_water, epoch->assembly.high_water());
-    if (outcome == Outcome::kStored && last_part) epoch->pacer.on_delta(frame, server_time_ns, now.steady_ns);
+    const Outcome outcome = epoch_->assembly.add(std::move(received.message));
+    statistics_.queue_high_water = std::max(statistics_.queue_high_water, epoch_->assembly.high_water());
+    if (outcome == Outcome::kStored && last_part)
+      epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
     const std::string at = " at frame " + std::to_string(frame);
     if (outcome == Outcome::kRefused) {
-      ++statistics.refused_messages;
+      ++statistics_.refused_messages;
       rejoin(ResyncReason::kRefused, "malformed delta" + at, now);
     } else if (outcome == Outcome::kOverflow) {
       rejoin(ResyncReason::kOverflow, "too many deltas waiting" + at, now);
@@ -51,54 +55,54 @@ void ClientCore::Impl::take_deltas(Now now) {
   }
 }
 
-void ClientCore::Impl::take_scheduled(Now now) {
-  inputs.clear();
-  port.take(inputs);
-  for (const auto& received : inputs) {
+void ClientCore::take_scheduled(Now now) {
+  inbox_.inputs.clear();
+  port_.take(inbox_.inputs);
+  for (const auto& received : inbox_.inputs) {
     if (!belongs(received)) continue;
     const auto input = read_scheduled(received.message);
     if (!input) {
       // Its number stays missing, which brings about a rejoin when a delta needs it.
-      ++statistics.refused_messages;
+      ++statistics_.refused_messages;
       log(LogLevel::kWarning, input.error().message);
       continue;
     }
-    epoch->scheduled.add(*input);
-    listener.on_scheduled(received.message);
-    if (epoch->joining) continue;
-    if (auto scheduled = epoch->timeline.schedule(*input); !scheduled) {
-      ++statistics.refused_messages;
+    epoch_->scheduled.add(*input);
+    listener_.on_scheduled(received.message);
+    if (epoch_->joining) continue;
+    if (auto scheduled = epoch_->timeline.schedule(*input); !scheduled) {
+      ++statistics_.refused_messages;
       rejoin(ResyncReason::kRefused, scheduled.error().message, now);
     }
   }
 }
 
-void ClientCore::Impl::take_snapshots(Now /*now*/) {
-  if (!epoch->joining) return;
-  snapshots.clear();
-  port.take(snapshots);
-  for (auto& received : snapshots) {
+void ClientCore::take_snapshots() {
+  if (!epoch_->joining) return;
+  inbox_.snapshots.clear();
+  port_.take(inbox_.snapshots);
+  for (auto& received : inbox_.snapshots) {
     if (!belongs(received)) continue;
-    if (received.message.bytes.size() > epoch->session.max_snapshot_bytes) {
-      ++statistics.refused_messages;
+    if (received.message.bytes.size() > epoch_->session.max_snapshot_bytes) {
+      ++statistics_.refused_messages;
       continue;
     }
-    epoch->joiner.offer(std::move(received.message));
+    epoch_->joiner.offer(std::move(received.message));
   }
 }
 
-void ClientCore::Impl::join(Now now) {
-  EpochState& e = *epoch;
+void ClientCore::join(Now now) {
+  EpochState& e = *epoch_;
   if (!e.stream_open) {
-    if (auto opened = port.open_stream(e.session); !opened) {
+    if (auto opened = port_.open_stream(e.session); !opened) {
       log(LogLevel::kError, opened.error().message);
       return;
     }
     e.stream_open = true;
   }
   if (e.joiner.poll(now.steady_ns)) {
-    if (auto opened = port.open_snapshots(e.session); !opened) log(LogLevel::kError, opened.error().message);
-    ack_due = true;
+    if (auto opened = port_.open_snapshots(e.session); !opened) log(LogLevel::kError, opened.error().message);
+    ack_due_ = true;
   }
   const CompleteDelta* first = e.assembly.front();
   auto snapshot =
@@ -106,8 +110,8 @@ void ClientCore::Impl::join(Now now) {
   if (snapshot) load(std::move(*snapshot), now);
 }
 
-void ClientCore::Impl::load(transport::SnapshotMessage&& snapshot, Now now) {
-  EpochState& e = *epoch;
+void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
+  EpochState& e = *epoch_;
   auto loaded = e.timeline.load(snapshot.bytes, e.session.epoch);
   if (loaded && e.timeline.applied() != snapshot.frame) {
     loaded = fail(ErrorCode::kMalformed, "snapshot of another frame than announced");
@@ -116,27 +120,27 @@ void ClientCore::Impl::load(transport::SnapshotMessage&& snapshot, Now now) {
     loaded = e.timeline.schedule(it->second);
   }
   if (!loaded) {
-    ++statistics.refused_messages;
-    if (loaded.error().code == ErrorCode::kMismatch) ++statistics.hash_mismatches;
+    ++statistics_.refused_messages;
+    if (loaded.error().code == ErrorCode::kMismatch) ++statistics_.hash_mismatches;
     log(LogLevel::kWarning, "snapshot refused: " + loaded.error().message);
     e.joiner.ask_again(now.steady_ns);
     return;
   }
-  port.close_snapshots();
+  port_.close_snapshots();
   e.assembly.drop_through(snapshot.frame);
   e.sampler.on_loaded();
   e.joining = false;
   e.played = true;
   e.input_missing_ns.reset();
   e.frame_cost_ns = 0;
-  ack_due = true;
-  statistics.join_ns = now.steady_ns - e.join_began_ns;
-  listener.on_snapshot(snapshot);
+  ack_due_ = true;
+  statistics_.join_ns = now.steady_ns - e.join_began_ns;
+  listener_.on_snapshot(snapshot);
   log(LogLevel::kInfo, "playing from frame " + std::to_string(snapshot.frame));
 }
 
-void ClientCore::Impl::play(Now now, std::int64_t since_last_poll_ns) {
-  EpochState& e = *epoch;
+void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
+  EpochState& e = *epoch_;
   play_ahead(now);
   while (const CompleteDelta* delta = e.assembly.front()) {
     if (delta->frame <= e.timeline.applied()) {
@@ -161,30 +165,30 @@ void ClientCore::Impl::play(Now now, std::int64_t since_last_poll_ns) {
     const std::int64_t cost_ns = std::exchange(e.frame_cost_ns, 0) + measure() - began_ns;
     if (!applied) {
       const bool mismatch = applied.error().code == ErrorCode::kMismatch;
-      ++(mismatch ? statistics.hash_mismatches : statistics.refused_messages);
+      ++(mismatch ? statistics_.hash_mismatches : statistics_.refused_messages);
       const std::string why = "frame " + std::to_string(delta->frame) + ": " + applied.error().message;
       e.assembly.pop();  // of no use any more, while those behind it are
       rejoin(mismatch ? ResyncReason::kMismatch : ResyncReason::kRefused, why, now);
       return;
     }
     e.sampler.after_apply(e.timeline);
-    ++statistics.frames_applied;
-    statistics.payload_bytes += delta->payload.size();
-    statistics.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns, delta->server_time_ns));
-    if (options.measure_ns != nullptr) statistics.frame_cost.add(cost_ns);
-    if (statistics.first_applied_ns == 0) statistics.first_applied_ns = now.steady_ns;
-    statistics.last_applied_ns = now.steady_ns;
-    sent.on_applied(delta->frame, now.steady_ns, outcomes);
-    listener.on_applied(e.session.epoch, *delta);
-    ack_due = true;
+    ++statistics_.frames_applied;
+    statistics_.payload_bytes += delta->payload.size();
+    statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta->server_time_ns));
+    if (options_.measure_ns != nullptr) statistics_.frame_cost.add(cost_ns);
+    if (statistics_.first_applied_ns == 0) statistics_.first_applied_ns = now.steady_ns;
+    statistics_.last_applied_ns = now.steady_ns;
+    sent_.on_applied(delta->frame, now.steady_ns, outcomes_);
+    listener_.on_applied(e.session.epoch, *delta);
+    ack_due_ = true;
     e.assembly.pop();
     play_ahead(now);
   }
 }
 
 // Simulates the frames that the server simulates by now, as far as the lead allows.
-void ClientCore::Impl::play_ahead(Now now) {
-  EpochState& e = *epoch;
+void ClientCore::play_ahead(Now now) {
+  EpochState& e = *epoch_;
   if (!e.pacer.known()) return;
   const std::int64_t began_ns = measure();
   while (e.pacer.due_ns(e.timeline.now() + 1) <= now.steady_ns && e.timeline.step(e.lead)) {
@@ -192,36 +196,21 @@ void ClientCore::Impl::play_ahead(Now now) {
   e.frame_cost_ns += measure() - began_ns;
 }
 
-void ClientCore::Impl::rejoin(ResyncReason reason, const std::string& why, Now now) {
-  EpochState& e = *epoch;
-  listener.on_resync(reason);
+void ClientCore::rejoin(ResyncReason reason, const std::string& why, Now now) {
+  EpochState& e = *epoch_;
+  listener_.on_resync(reason);
   if (e.joining) {
     // Not playing yet: the buffer starts again, and the snapshot asked for may still fit what follows.
     if (reason != ResyncReason::kGap && reason != ResyncReason::kLostPart) e.joiner.ask_again(now.steady_ns);
     return;
   }
-  ++statistics.resyncs;
-  ++statistics.resyncs_by_reason[static_cast<std::size_t>(reason)];
+  ++statistics_.resyncs;
+  ++statistics_.resyncs_by_reason[static_cast<std::size_t>(reason)];
   log(LogLevel::kWarning, "joining again: " + why);
   e.joining = true;
   e.join_began_ns = now.steady_ns;
   e.input_missing_ns.reset();
   e.joiner.start(now.steady_ns);
-}
-
-std::int64_t ClientCore::Impl::next_due_ns(Now now) const {
-  std::int64_t due = now.steady_ns + kMaxSleepNs;
-  due = std::min(due, last_status_ns + kStatusPeriodNs);
-  if (epoch != nullptr) {
-    due = std::min(due, last_ack_ns + kAckRepeatNs);
-    if (epoch->joining) {
-      due = std::min(due, epoch->joiner.next_due_ns());
-    } else if (epoch->pacer.known() && epoch->timeline.now() < epoch->timeline.applied() + epoch->lead) {
-      due = std::min(due, epoch->pacer.due_ns(epoch->timeline.now() + 1));
-    }
-  }
-  // Never in the past and never a busy loop, whatever the estimates say.
-  return std::max(due, now.steady_ns + kMillisecondNs / 2);
 }
 
 }  // namespace tandem::client

@@ -26,7 +26,8 @@ Result<void> check_values(const transport::SessionMessage& s) {
   if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
   if (s.layout.lead > kDefinedLead)
     return bad("lead " + std::to_string(s.layout.lead) + ", at most 1 is defined");
-  if (s.types.size() != s.layout.type_count) return bad("a list of " + std::to_string(s.types.size()) + " body types");
+  if (s.types.size() != s.layout.type_count)
+    return bad("a list of " + std::to_string(s.types.size()) + " body types");
   for (const auto& type : s.types) {
     if (!std::isfinite(type.radius) || type.radius < 0) return bad("radius of type " + type.name);
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "sdk/statistics/duration_histogram.hpp"
+#include "tandem/client.hpp"
 
 namespace tandem::client {
 
@@ -51,5 +52,8 @@ struct Statistics {
     return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / (1U << 20U) / (span_ns / 1e9) : 0;
   }
 };
+
+/// The part of a client's status that is figures; the rest is left at its defaults.
+[[nodiscard]] ClientStatus figures(const Statistics& statistics);
 
 }  // namespace tandem::client
