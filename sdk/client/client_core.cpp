@@ -37,6 +37,7 @@ std::int64_t ClientCore::poll(Now now) {
     if (epoch_->joining) join(now);
     if (!epoch_->joining) play(now, since_ns);
     if (epoch_->joining) join(now);
+    epoch_->pictures.on_clock(epoch_->pacer);
     if (ack_due_ || now.steady_ns - last_ack_ns_ >= kAckRepeatNs) send_ack(now);
   }
   report_outcomes();
@@ -74,6 +75,7 @@ void ClientCore::take_sessions(Now now) {
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
   port_.close_snapshots();
   epoch_.reset();
+  pictures_.clear();
   sent_.clear(outcomes_);
   session_ = announcement.message;
   refusal_.clear();
@@ -86,7 +88,8 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
     log(LogLevel::kError, refusal_);
     return;
   }
-  epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*timeline), options_.lead);
+  epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*timeline), options_.lead,
+                                        pictures_);
   epoch_->join_began_ns = now.steady_ns;
   epoch_->joiner.start(now.steady_ns);
   ++statistics_.epochs;
@@ -233,11 +236,17 @@ ClientStatus ClientCore::status() const {
   return out;
 }
 
+void ClientCore::start_sampling() {
+  if (pictures_.wanted()) return;
+  pictures_.want();
+  if (epoch_ && epoch_->timeline.playing()) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer);
+}
+
+// While joining again, the last picture is still there to be drawn, as long as it is of this epoch.
 bool ClientCore::sample(Sample& out, SampleMode mode, Now now) {
-  // While joining again, the last state is still there to be drawn, as long as it is of this epoch.
-  if (!epoch_ || !epoch_->timeline.playing()) return false;
-  epoch_->sampler.sample(epoch_->timeline, epoch_->pacer, now.steady_ns, mode, out);
-  out.epoch = epoch_->session.epoch;
+  const PictureExchange::Reading reading(pictures_);
+  if (reading.picture() == nullptr) return false;
+  sampler_.sample(*reading.picture(), now.steady_ns, mode, out);
   return true;
 }
 

@@ -12,6 +12,8 @@
 
 #include "sdk/client/delta_assembly.hpp"
 #include "sdk/client/epoch_state.hpp"
+#include "sdk/client/picture.hpp"
+#include "sdk/client/sampler.hpp"
 #include "sdk/client/sent_inputs.hpp"
 #include "sdk/client/statistics.hpp"
 #include "sdk/client/status_report.hpp"
@@ -52,7 +54,7 @@ class CoreListener {
   virtual void on_resync(ResyncReason /*reason*/) {}
 };
 
-/// The rules of idl/STATES.md for one client. Every buffer is bounded. Not thread-safe.
+/// The rules of idl/STATES.md for one client. Every buffer is bounded. Not thread-safe, but for sample().
 class ClientCore {
  public:
   /// `port` and `listener` (may be null) must outlive it.
@@ -82,7 +84,9 @@ class ClientCore {
   [[nodiscard]] ClientStatus status() const;
   [[nodiscard]] std::uint32_t join_attempt() const;
 
-  /// See Client::sample().
+  /// Once before the first sample(): from now on each frame is made ready to be drawn.
+  void start_sampling();
+  /// See Client::sample(). From any thread, at any time: never waits for poll().
   bool sample(Sample& out, SampleMode mode, Now now);
 
  private:
@@ -144,6 +148,9 @@ class ClientCore {
   SentInputs sent_;
   std::vector<InputOutcome> outcomes_;  ///< not yet told to the listener
   Inbox inbox_;
+
+  PictureExchange pictures_;
+  Sampler sampler_;  ///< in turns: while reading a picture
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   std::string refusal_;                               ///< why it is not

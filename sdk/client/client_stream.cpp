@@ -73,6 +73,8 @@ void ClientCore::take_scheduled(Now now) {
     if (auto scheduled = epoch_->timeline.schedule(*input); !scheduled) {
       ++statistics_.refused_messages;
       rejoin(ResyncReason::kRefused, scheduled.error().message, now);
+    } else if (input->frame <= epoch_->timeline.now()) {
+      epoch_->pictures.on_simulated(epoch_->timeline, epoch_->pacer);
     }
   }
 }
@@ -128,7 +130,7 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
   }
   port_.close_snapshots();
   e.assembly.drop_through(snapshot.frame);
-  e.sampler.on_loaded();
+  e.pictures.on_loaded(e.timeline, e.pacer);
   e.joining = false;
   e.played = true;
   e.input_missing_ns.reset();
@@ -159,7 +161,6 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
       return;
     }
     e.input_missing_ns.reset();
-    e.sampler.before_apply(e.timeline);
     const std::int64_t began_ns = measure();
     const auto applied = e.timeline.apply(delta->frame, delta->last_input, delta->hash, delta->payload);
     const std::int64_t cost_ns = std::exchange(e.frame_cost_ns, 0) + measure() - began_ns;
@@ -171,7 +172,7 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
       rejoin(mismatch ? ResyncReason::kMismatch : ResyncReason::kRefused, why, now);
       return;
     }
-    e.sampler.after_apply(e.timeline);
+    e.pictures.on_applied(e.timeline, e.pacer);
     ++statistics_.frames_applied;
     statistics_.payload_bytes += delta->payload.size();
     statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta->server_time_ns));
@@ -191,9 +192,11 @@ void ClientCore::play_ahead(Now now) {
   EpochState& e = *epoch_;
   if (!e.pacer.known()) return;
   const std::int64_t began_ns = measure();
+  const Frame simulated = e.timeline.now();
   while (e.pacer.due_ns(e.timeline.now() + 1) <= now.steady_ns && e.timeline.step(e.lead)) {
   }
   e.frame_cost_ns += measure() - began_ns;
+  if (e.timeline.now() != simulated) e.pictures.on_simulated(e.timeline, e.pacer);
 }
 
 void ClientCore::rejoin(ResyncReason reason, const std::string& why, Now now) {

@@ -6,7 +6,7 @@
 
 #include "sdk/client/delta_assembly.hpp"
 #include "sdk/client/joiner.hpp"
-#include "sdk/client/sampler.hpp"
+#include "sdk/client/picture_writer.hpp"
 #include "sdk/client/scheduled_inputs.hpp"
 #include "sdk/client/server_clock.hpp"
 #include "sdk/core/timeline/timeline.hpp"
@@ -16,14 +16,14 @@ namespace tandem::client {
 
 struct EpochState {
   EpochState(transport::SessionMessage announced, const transport::ParticipantId& announced_by,
-             ClientTimeline made_timeline, std::uint32_t wanted_lead)
+             ClientTimeline made_timeline, std::uint32_t wanted_lead, PictureExchange& exchange)
       : session(std::move(announced)),
         server(announced_by),
         timeline(std::move(made_timeline)),
         lead(std::min(wanted_lead, session.layout.lead)),
         assembly({.delta_bytes = session.max_delta_bytes}),
         pacer(session.frame_rate_hz),
-        sampler(session.layout.capacity, session.lattice_unit) {}
+        pictures(exchange, session) {}
 
   transport::SessionMessage session;
   transport::ParticipantId server;
@@ -33,7 +33,7 @@ struct EpochState {
   ScheduledInputs scheduled;
   Joiner joiner;
   Pacer pacer;
-  Sampler sampler;
+  PictureWriter pictures;
 
   bool stream_open = false;
   bool joining = true;

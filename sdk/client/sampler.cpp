@@ -6,137 +6,106 @@
 namespace tandem::client {
 namespace {
 
-// Bits of marks_.
-constexpr std::uint8_t kShown = 1;   // was alive in the previous sample
-constexpr std::uint8_t kJumped = 2;  // teleported since the previous sample
-constexpr std::uint8_t kBroken = 4;  // spawned or teleported in the last delta: previous_ is another place
-constexpr std::uint8_t kFresh = 8;   // do not blend with shown_ in this sample
 constexpr double kVelocityScale = 1.0 / 64;
 
 }  // namespace
 
-void Sampler::enable() {
-  previous_.resize(std::size_t{3} * capacity_);
-  shown_.resize(std::size_t{3} * capacity_);
-  shown_generation_.resize(capacity_);
-  marks_.resize(capacity_);
-  enabled_ = true;
+// Another epoch: whatever is alive in it is new.
+void Sampler::begin(const Picture& picture) {
+  epoch_ = picture.epoch;
+  capacity_ = picture.agreed->alive.size();
+  shown_.assign(3 * capacity_, 0);
+  shown_alive_.assign(capacity_, 0);
+  shown_generation_.assign(capacity_, 0);
+  shown_jumps_.assign(capacity_, 0);
 }
 
-void Sampler::on_loaded() {
-  has_previous_ = false;
-  all_jumped_ = true;
-}
-
-void Sampler::before_apply(const ClientTimeline& timeline) {
-  if (!enabled_) return;
-  for (const Slot slot : broken_) marks_[slot] &= static_cast<std::uint8_t>(~kBroken);
-  broken_.clear();
-  const State& state = timeline.state(timeline.applied());
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto p = state.p(channel);
-    for (std::size_t slot = 0; slot < capacity_; ++slot) previous_[3 * slot + channel] = p[slot];
-  }
-  has_previous_ = true;
-}
-
-void Sampler::after_apply(const ClientTimeline& timeline) {
-  if (!enabled_) return;
-  for (const LifecycleRecord& record : timeline.lifecycle()) {
-    if (record.kind != LifecycleKind::kSpawn && record.kind != LifecycleKind::kTeleport) continue;
-    marks_[record.slot] |= kBroken | kJumped;
-    broken_.push_back(record.slot);
-  }
-}
-
-void Sampler::report_changes(const State& state, Sample& out) {
-  const auto alive = state.alive();
-  const auto generation = state.generation();
+void Sampler::report_changes(const Picture& picture, Sample& out) {
+  const DrawnFrame& agreed = *picture.agreed;
+  const bool all_jumped = load_ != picture.load;
   for (std::size_t slot = 0; slot < capacity_; ++slot) {
-    const bool was = (marks_[slot] & kShown) != 0;
-    const bool is = alive[slot] != 0;
+    const bool was = shown_alive_[slot] != 0;
+    const bool is = agreed.alive[slot] != 0;
     BodyChange change = BodyChange::kNone;
-    if (is && (!was || shown_generation_[slot] != generation[slot])) {
+    if (is && (!was || shown_generation_[slot] != agreed.generation[slot])) {
       change = BodyChange::kNew;
     } else if (was && !is) {
       change = BodyChange::kGone;
-    } else if (is && (all_jumped_ || (marks_[slot] & kJumped) != 0)) {
+    } else if (is && (all_jumped || shown_jumps_[slot] != agreed.jumps[slot])) {
       change = BodyChange::kJumped;
     }
     out.changes[slot] = change;
-    std::uint8_t marks = marks_[slot] & kBroken;
-    if (is) marks |= kShown;
-    if (is && change != BodyChange::kNone) marks |= kFresh;
-    marks_[slot] = marks;
-    shown_generation_[slot] = generation[slot];
   }
-  all_jumped_ = false;
+  load_ = picture.load;
+  shown_alive_ = agreed.alive;
+  shown_generation_ = agreed.generation;
+  shown_jumps_ = agreed.jumps;
 }
 
-void Sampler::interpolate(const State& state, double share, Sample& out) {
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto p = state.p(channel);
-    for (std::size_t slot = 0; slot < capacity_; ++slot) {
+void Sampler::interpolate(const Picture& picture, double share, Sample& out) {
+  const DrawnFrame& agreed = *picture.agreed;
+  const DrawnFrame& before = picture.before != nullptr ? *picture.before : agreed;
+  for (std::size_t slot = 0; slot < capacity_; ++slot) {
+    // Spawned or teleported between the two frames: it was never on the way from one place to the other.
+    const bool jumped = before.jumps[slot] != agreed.jumps[slot];
+    const double lag = jumped ? 0 : 1 - share;
+    for (std::size_t channel = 0; channel < 3; ++channel) {
       const std::size_t at = 3 * slot + channel;
-      double value = p[slot];
-      if (has_previous_ && (marks_[slot] & kBroken) == 0) value -= (value - previous_[at]) * (1 - share);
+      double value = agreed.p[channel][slot];
+      value -= (value - before.p[channel][slot]) * lag;
       shown_[at] = static_cast<float>(value);
-      out.positions[at] = static_cast<float>(value * unit_);
+      out.positions[at] = static_cast<float>(value * picture.lattice_unit);
     }
   }
 }
 
-void Sampler::extrapolate(const State& from, const State& to, double share, double beyond, double blend,
-                          double frames, Sample& out) {
+void Sampler::extrapolate(const Picture& picture, double share, double beyond, double blend, double frames,
+                          Sample& out) {
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto p0 = from.p(channel);
-    const auto p1 = to.p(channel);
-    const auto v = to.v(channel);
+    const auto& p0 = picture.agreed->p[channel];
+    const auto& p1 = picture.ahead->p[channel];
+    const auto& v = picture.ahead->v[channel];
     for (std::size_t slot = 0; slot < capacity_; ++slot) {
       const std::size_t at = 3 * slot + channel;
       const double speed = v[slot] * kVelocityScale;
       double value = p0[slot] + (static_cast<double>(p1[slot]) - p0[slot]) * share + speed * beyond;
       // What was drawn, carried on at the body's speed, is where the eye expects it; the rest is a
       // correction.
-      if ((marks_[slot] & kFresh) == 0) value += (shown_[at] + speed * frames - value) * blend;
+      if (out.changes[slot] == BodyChange::kNone) value += (shown_[at] + speed * frames - value) * blend;
       shown_[at] = static_cast<float>(value);
-      out.positions[at] = static_cast<float>(value * unit_);
+      out.positions[at] = static_cast<float>(value * picture.lattice_unit);
     }
   }
 }
 
-void Sampler::sample(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns, SampleMode mode,
-                     Sample& out) {
-  if (!enabled_) enable();
-  if (out.capacity != capacity_) {
-    out.capacity = capacity_;
-    out.positions.resize(std::size_t{3} * capacity_);
-    out.alive.resize(capacity_);
-    out.generation.resize(capacity_);
-    out.types.resize(capacity_);
-    out.changes.resize(capacity_);
-  }
-  const auto applied = static_cast<double>(timeline.applied());
-  const auto ahead = static_cast<double>(timeline.now() - timeline.applied());
-  const State& agreed = timeline.state(timeline.applied());
+void Sampler::sample(const Picture& picture, std::int64_t now_ns, SampleMode mode, Sample& out) {
+  const DrawnFrame& agreed = *picture.agreed;
+  const Pacer& pacer = picture.pacer;
+  if (epoch_ != picture.epoch || capacity_ != agreed.alive.size()) begin(picture);
+  out.epoch = epoch_;
+  out.capacity = static_cast<std::uint32_t>(capacity_);
+  out.positions.resize(3 * capacity_);
+  out.changes.resize(capacity_);
+  out.alive = agreed.alive;
+  out.generation = agreed.generation;
+  out.types = agreed.type;
+  const auto applied = static_cast<double>(agreed.frame);
+  const auto ahead = static_cast<double>(picture.ahead->frame - agreed.frame);
   const double elapsed_s = std::max(0.0, static_cast<double>(now_ns - last_ns_) / 1e9);
-  report_changes(agreed, out);
+  report_changes(picture, out);
   if (mode == SampleMode::kInterpolate) {
     const double wanted = pacer.known() ? pacer.arrived_frame(now_ns) - 1 : applied;
-    out.frame = std::clamp(wanted, applied - (has_previous_ ? 1 : 0), applied);
-    interpolate(agreed, out.frame - (applied - 1), out);
+    out.frame = std::clamp(wanted, applied - (picture.before != nullptr ? 1 : 0), applied);
+    interpolate(picture, out.frame - (applied - 1), out);
   } else {
     const double wanted = pacer.known() ? pacer.server_frame(now_ns) : applied;
     out.frame = std::clamp(wanted, applied, applied + ahead + 1);
     const double share = ahead > 0 ? std::min(1.0, (out.frame - applied) / ahead) : 1;
-    extrapolate(agreed, timeline.state(timeline.now()), share, std::max(0.0, out.frame - applied - ahead),
-                std::exp(-elapsed_s / kBlendS), std::clamp(out.frame - last_frame_, -2.0, 2.0), out);
+    extrapolate(picture, share, std::max(0.0, out.frame - applied - ahead), std::exp(-elapsed_s / kBlendS),
+                std::clamp(out.frame - last_frame_, -2.0, 2.0), out);
   }
   last_ns_ = now_ns;
   last_frame_ = out.frame;
-  std::copy(agreed.alive().begin(), agreed.alive().end(), out.alive.begin());
-  std::copy(agreed.generation().begin(), agreed.generation().end(), out.generation.begin());
-  std::copy(agreed.type().begin(), agreed.type().end(), out.types.begin());
 }
 
 }  // namespace tandem::client

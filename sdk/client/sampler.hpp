@@ -3,52 +3,37 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "sdk/client/server_clock.hpp"
-#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/client/picture.hpp"
 #include "tandem/client.hpp"
 
 namespace tandem::client {
 
-/// Reads a timeline, never changes it. Costs nothing until the first sample(); from then on 26 bytes a slot.
-/// Not thread-safe.
+/// Remembers what it drew last, 15 bytes a slot, and so can tell what changed and blend corrections in. Not
+/// thread-safe.
 class Sampler {
  public:
   /// Time constant of the blend after a correction. Shorter shows jerks, longer shows bodies off their place.
   static constexpr double kBlendS = 0.1;
 
-  Sampler(std::uint32_t capacity, double lattice_unit) : capacity_(capacity), unit_(lattice_unit) {}
-
-  /// A snapshot was loaded: nothing before it may be blended into what follows.
-  void on_loaded();
-  /// Around ClientTimeline::apply().
-  void before_apply(const ClientTimeline& timeline);
-  void after_apply(const ClientTimeline& timeline);
-
-  void sample(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns, SampleMode mode,
-              Sample& out);
+  void sample(const Picture& picture, std::int64_t now_ns, SampleMode mode, Sample& out);
 
  private:
-  void enable();
-  void report_changes(const State& state, Sample& out);
-  void interpolate(const State& state, double share, Sample& out);
-  void extrapolate(const State& from, const State& to, double share, double beyond, double blend,
-                   double frames, Sample& out);
+  void begin(const Picture& picture);
+  void report_changes(const Picture& picture, Sample& out);
+  void interpolate(const Picture& picture, double share, Sample& out);
+  void extrapolate(const Picture& picture, double share, double beyond, double blend, double frames,
+                   Sample& out);
 
-  std::uint32_t capacity_;
-  double unit_;
-  bool enabled_ = false;
-  bool has_previous_ = false;  // previous_ holds the agreed positions one frame before applied()
-  bool all_jumped_ = true;
+  std::size_t capacity_ = 0;
+  Epoch epoch_ = 0;
+  std::uint64_t load_ = 0;
   std::int64_t last_ns_ = 0;
   double last_frame_ = 0;
-  std::vector<std::int32_t> previous_;  // 3 a slot
-  std::vector<float> shown_;            // 3 a slot, lattice units, as last drawn
-  std::vector<std::uint8_t> shown_generation_;
-  std::vector<std::uint8_t> marks_;
-  std::vector<Slot> broken_;  // slots that spawned or teleported in the last delta
+  // As in the last sample.
+  std::vector<float> shown_;  // 3 a slot, lattice units
+  std::vector<std::uint8_t> shown_alive_, shown_generation_, shown_jumps_;
 };
 
 }  // namespace tandem::client

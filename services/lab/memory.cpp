@@ -44,6 +44,7 @@ Result<MemoryUse> measure_memory(const std::function<Result<HostedSimulation>()>
   options.session = host->session().session;
   options.id = 1;
   auto client = std::make_unique<client::ClientCore>(options, **client_port);
+  client->start_sampling();
 
   auto sample = std::make_unique<Sample>();
   const std::int64_t limit_ns = 10'000'000'000 + static_cast<std::int64_t>(static_cast<double>(frames) * 4e9 *

@@ -46,6 +46,7 @@ class Run {
     options.session = "default";
     options.id = kClient;
     core_ = std::make_unique<ClientCore>(options, port_);
+    core_->start_sampling();
   }
 
   void play() {

@@ -36,7 +36,7 @@ client::CoreOptions core_options(const ClientOptions& options) {
 
 }  // namespace
 
-// The port waits without the lock, so that status() and sample() never wait for the network.
+// The port waits without the lock, so that nobody waits for the network; sample() does without it but once.
 struct Client::Impl {
   Impl(client::CoreOptions core_opts, std::unique_ptr<transport::ClientPort> client_port)
       : port(std::move(client_port)), core(std::move(core_opts), *port) {}
@@ -68,8 +68,9 @@ struct Client::Impl {
   }
 
   std::unique_ptr<transport::ClientPort> port;
-  mutable std::mutex mutex;  // guards core; port->wait() and wake() need no guard
+  mutable std::mutex mutex;  // guards core but for its sample(); port->wait() and wake() need no guard
   client::ClientCore core;
+  std::atomic<bool> sampling = false;
   std::atomic<bool> ending = false;
   std::thread thread;
 };
@@ -160,7 +161,11 @@ std::string Client::scene_description() const {
 }
 
 bool Client::sample(Sample& out, SampleMode mode) {
-  const std::lock_guard lock(impl_->mutex);
+  if (!impl_->sampling) {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->core.start_sampling();
+    impl_->sampling = true;
+  }
   return impl_->core.sample(out, mode, client::now());
 }
 

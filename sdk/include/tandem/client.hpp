@@ -101,7 +101,8 @@ struct Sample {
   std::vector<BodyChange> changes;   ///< against the previous sample() of this client
 };
 
-/// One client of one session. Movable. All members may be called from any thread.
+/// One client of one session. Movable. All members may be called from any thread; all but sample() may have
+/// to wait until the frame in work is applied.
 class TANDEM_API Client {
  public:
   /// Starts looking for the session; returns at once, whether a server is there or not.
@@ -139,8 +140,9 @@ class TANDEM_API Client {
   /// The scene's geometry as protobuf text, for drawing; empty before a session is known.
   [[nodiscard]] std::string scene_description() const;
   /// The bodies as they should be drawn now, at any rate. Never changes what the client holds. Returns false,
-  /// and leaves `out` as it is, before the first snapshot. O(capacity); allocates when the capacity changed
-  /// only.
+  /// and leaves `out` as it is, before the first snapshot. Never waits for the network, for decoding or for
+  /// applying, only for other calls of sample(); but the first call turns sampling on, and waits as the other
+  /// members do. O(capacity); allocates when the capacity changed only.
   bool sample(Sample& out, SampleMode mode = SampleMode::kExtrapolate);
 
  private:

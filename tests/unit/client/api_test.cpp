@@ -1,9 +1,10 @@
-// tandem::Client over DDS, without a server: what an application sees before anybody answers.
+// tandem::Client over DDS, without a server that one could play with: what an application sees before that.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <thread>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "tandem/client.hpp"
 
 namespace tandem {
@@ -64,6 +65,40 @@ TEST_F(ClientApi, MayBeUsedFromSeveralThreadsAndMoved) {
   Sample sample;
   for (int i = 0; i < 200; ++i) EXPECT_FALSE(client.sample(sample));
   other.join();
+}
+
+TEST_F(ClientApi, ASampleDoesNotWaitForThePollInWork) {
+  transport::DdsOptions dds;
+  dds.session = options.session = "sampled";
+  auto server = transport::make_dds_server_port(dds);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  transport::SessionMessage session;
+  session.session = options.session;
+  session.epoch = 1;
+  session.layout.capacity = 1;
+  session.lattice_unit = 1;  // the rest is nothing that one could play, which is worth a line in the log
+  session.types = {{"ball", 1, 0}};
+  ASSERT_TRUE((*server)->write(session).has_value());
+
+  Client* sampled = nullptr;
+  int lines = 0;
+  options.background = false;
+  options.log = [&](LogLevel, std::string_view) {
+    std::thread other([&] {
+      Sample sample;
+      EXPECT_FALSE(sampled->sample(sample));
+    });
+    other.join();  // poll() goes on only when sample() has returned
+    ++lines;
+  };
+  auto client = Client::connect(options);
+  ASSERT_TRUE(client.has_value()) << client.error().message;
+  sampled = &*client;
+  Sample sample;
+  EXPECT_FALSE(client->sample(sample));  // turns sampling on
+  for (int i = 0; i < 200 && lines == 0; ++i) client->poll(0.05);
+  EXPECT_EQ(lines, 1);
+  EXPECT_EQ(client->status().phase, ClientPhase::kRefused);
 }
 
 }  // namespace

@@ -11,8 +11,7 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
   s.layout.capacity = capacity;
   s.lattice_unit = 0.001;
   s.layout.lead = lead;
-  s.max_delta_bytes = 100'000;
-  s.max_snapshot_bytes = 100'000;
+  s.max_delta_bytes = s.max_snapshot_bytes = 100'000 + 64 * capacity;
   s.layout.codec = "quantized";
   s.layout.parameters.threshold = 50;
   s.layout.parameters.position_step = 40;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -59,6 +60,7 @@ class Recorder final : public CoreListener {
   void on_applied(Epoch epoch, const CompleteDelta& delta) override {
     applied.push_back({epoch, delta.frame});
     hashes[delta.frame] = delta.hash;
+    if (in_apply) in_apply();
   }
   void on_snapshot(const transport::SnapshotMessage& snapshot) override { loaded.push_back(snapshot.frame); }
   void on_outcome(const InputOutcome& outcome) override { outcomes.push_back(outcome); }
@@ -69,6 +71,7 @@ class Recorder final : public CoreListener {
   std::map<Frame, std::uint64_t> hashes;
   std::vector<InputOutcome> outcomes;
   std::vector<ResyncReason> resyncs;
+  std::function<void()> in_apply;  ///< runs within poll(), after each frame
 };
 
 /// A client, its port and a server, with time that stands still until a test moves it.

@@ -217,6 +217,7 @@ TEST_F(HostileTest, StrangeClocksDoNoHarm) {
     EXPECT_GT(due, now_ns);
     EXPECT_LE(due, now_ns + 50 * kMs);
     Sample sample;
+    core->start_sampling();
     EXPECT_TRUE(core->sample(sample, SampleMode::kExtrapolate, {now_ns, wall_ns()}));
   }
   EXPECT_EQ(core->timeline()->applied(), 51U);

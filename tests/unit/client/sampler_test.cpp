@@ -8,6 +8,7 @@ namespace {
 class SamplerTest : public ClientTest {
  protected:
   Sample& take(SampleMode mode) {
+    core->start_sampling();
     EXPECT_TRUE(core->sample(sample, mode, {now_ns, wall_ns()}));
     return sample;
   }
@@ -19,6 +20,7 @@ class SamplerTest : public ClientTest {
 
 TEST_F(SamplerTest, BeforeTheFirstSnapshotThereIsNothingToDraw) {
   start();
+  core->start_sampling();
   poll();
   EXPECT_FALSE(core->sample(sample, SampleMode::kExtrapolate, {now_ns, wall_ns()}));
 }

@@ -1,0 +1,49 @@
+#include "sdk/client/picture.hpp"
+
+#include <algorithm>
+
+#include "sdk/core/lattice/assert.hpp"
+
+namespace tandem::client {
+namespace {
+
+bool uses(const Picture& picture, const DrawnFrame& frame) {
+  return picture.before == &frame || picture.agreed == &frame || picture.ahead == &frame;
+}
+
+}  // namespace
+
+DrawnFrame& PictureExchange::unused(const Picture& next) {
+  const std::lock_guard lock(mutex_);
+  const auto found = std::find_if(frames_.begin(), frames_.end(), [&](const DrawnFrame& frame) {
+    return !uses(next, frame) && !(last_ && uses(*last_, frame)) && !(read_ && uses(*read_, frame));
+  });
+  TANDEM_ASSERT(found != frames_.end());
+  return *found;
+}
+
+void PictureExchange::show(const Picture& picture) {
+  const std::lock_guard lock(mutex_);
+  last_ = picture;
+}
+
+void PictureExchange::clear() {
+  const std::lock_guard lock(mutex_);
+  last_.reset();
+}
+
+PictureExchange::Reading::Reading(PictureExchange& exchange) : exchange_(exchange), turn_(exchange.readers_) {
+  const std::lock_guard lock(exchange_.mutex_);
+  exchange_.read_ = exchange_.last_;
+}
+
+PictureExchange::Reading::~Reading() {
+  const std::lock_guard lock(exchange_.mutex_);
+  exchange_.read_.reset();
+}
+
+const Picture* PictureExchange::Reading::picture() const {
+  return exchange_.read_ ? &*exchange_.read_ : nullptr;
+}
+
+}  // namespace tandem::client

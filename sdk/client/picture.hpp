@@ -1,0 +1,87 @@
+#pragma once
+// What is drawn of the client state, handed from the thread that applies to those that sample.
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "sdk/client/server_clock.hpp"
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem::client {
+
+/// The columns of one frame that sampling reads: 29 bytes a slot.
+struct DrawnFrame {
+  Frame frame = 0;
+  std::array<std::vector<std::int32_t>, kPositionChannels> p, v;
+  std::vector<std::uint8_t> alive;
+  std::vector<std::uint8_t> generation;
+  std::vector<TypeId> type;
+  std::vector<std::uint8_t> jumps;  ///< counts the bodies' spawns and teleports since the snapshot, wraps
+};
+
+/// All that one sample() reads, of one moment. The frames belong to a PictureExchange.
+struct Picture {
+  Epoch epoch = 0;
+  double lattice_unit = 0;             ///< scene units
+  std::uint64_t load = 0;              ///< number of the snapshot: across two, every body may have jumped
+  const DrawnFrame* before = nullptr;  ///< the agreed frame before `agreed`; null right after a snapshot
+  const DrawnFrame* agreed = nullptr;  ///< the last frame agreed with the server
+  const DrawnFrame* ahead = nullptr;   ///< the last frame simulated; `agreed` when nothing is ahead of it
+  Pacer pacer;
+};
+
+/// One thread shows pictures, any number read the last one. The mutex between the two sides is held while a
+/// picture's few values are copied, never while the columns of a frame are written or read, so nobody waits
+/// for the other side's work. Readers wait for each other.
+class PictureExchange {
+ public:
+  /// Somebody samples: from now on pictures have to be shown.
+  void want() { wanted_ = true; }
+  [[nodiscard]] bool wanted() const { return wanted_; }
+
+  // For the thread that shows.
+
+  /// A frame to write into, that no reader sees and that neither the last picture nor `next` uses.
+  [[nodiscard]] DrawnFrame& unused(const Picture& next);
+  /// A new number for Picture::load; never the same twice.
+  [[nodiscard]] std::uint64_t count_load() { return ++loads_; }
+  void show(const Picture& picture);
+  /// There is nothing to draw any more.
+  void clear();
+
+  /// Holds the last picture still, for as long as it lives. Made and destroyed by one thread.
+  class Reading {
+   public:
+    explicit Reading(PictureExchange& exchange);
+    ~Reading();
+    Reading(const Reading&) = delete;
+    Reading& operator=(const Reading&) = delete;
+    Reading(Reading&&) = delete;
+    Reading& operator=(Reading&&) = delete;
+    /// Null when there is nothing to draw.
+    [[nodiscard]] const Picture* picture() const;
+
+   private:
+    PictureExchange& exchange_;
+    std::unique_lock<std::mutex> turn_;
+  };
+
+ private:
+  // Three of the last picture, three of the one being read, two of the next.
+  static constexpr std::size_t kFrames = 8;
+
+  std::atomic<bool> wanted_ = false;
+  std::uint64_t loads_ = 0;
+  std::array<DrawnFrame, kFrames> frames_;  // each takes memory when it is first used
+  std::mutex readers_;                      // held while reading
+  std::mutex mutex_;                        // guards what follows
+  std::optional<Picture> last_;
+  std::optional<Picture> read_;  // being read
+};
+
+}  // namespace tandem::client

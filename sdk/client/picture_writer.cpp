@@ -1,0 +1,71 @@
+#include "sdk/client/picture_writer.hpp"
+
+#include <cstddef>
+
+namespace tandem::client {
+
+PictureWriter::PictureWriter(PictureExchange& exchange, const transport::SessionMessage& session)
+    : exchange_(exchange),
+      picture_{.epoch = session.epoch,
+               .lattice_unit = session.lattice_unit,
+               .pacer = Pacer(session.frame_rate_hz)} {}
+
+void PictureWriter::on_loaded(const ClientTimeline& timeline, const Pacer& pacer) {
+  if (!exchange_.wanted()) return;
+  jumps_.assign(timeline.state(timeline.applied()).capacity(), 0);
+  picture_.load = exchange_.count_load();
+  picture_.before = nullptr;
+  picture_.agreed = draw(timeline, timeline.applied());
+  draw_ahead(timeline);
+  show(pacer);
+}
+
+void PictureWriter::on_applied(const ClientTimeline& timeline, const Pacer& pacer) {
+  if (!follows()) return;
+  for (const LifecycleRecord& record : timeline.lifecycle()) {
+    const bool moved = record.kind == LifecycleKind::kSpawn || record.kind == LifecycleKind::kTeleport;
+    if (moved) ++jumps_[record.slot];
+  }
+  picture_.before = picture_.agreed;
+  picture_.agreed = draw(timeline, timeline.applied());
+  draw_ahead(timeline);
+  show(pacer);
+}
+
+void PictureWriter::on_simulated(const ClientTimeline& timeline, const Pacer& pacer) {
+  if (!follows()) return;
+  draw_ahead(timeline);
+  show(pacer);
+}
+
+void PictureWriter::on_clock(const Pacer& pacer) {
+  if (follows()) show(pacer);
+}
+
+void PictureWriter::draw_ahead(const ClientTimeline& timeline) {
+  const bool is_ahead = timeline.now() > timeline.applied();
+  picture_.ahead = is_ahead ? draw(timeline, timeline.now()) : picture_.agreed;
+}
+
+const DrawnFrame* PictureWriter::draw(const ClientTimeline& timeline, Frame frame) {
+  const State& state = timeline.state(frame);
+  DrawnFrame& drawn = exchange_.unused(picture_);
+  const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
+  drawn.frame = frame;
+  for (std::size_t channel = 0; channel < kPositionChannels; ++channel) {
+    copy(state.p(channel), drawn.p[channel]);
+    copy(state.v(channel), drawn.v[channel]);
+  }
+  copy(state.alive(), drawn.alive);
+  copy(state.generation(), drawn.generation);
+  copy(state.type(), drawn.type);
+  copy(jumps_, drawn.jumps);
+  return &drawn;
+}
+
+void PictureWriter::show(const Pacer& pacer) {
+  picture_.pacer = pacer;
+  exchange_.show(picture_);
+}
+
+}  // namespace tandem::client

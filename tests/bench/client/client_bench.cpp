@@ -1,0 +1,90 @@
+// A client's frame and its sample() at 10,000 bodies. Seeded; same bytes every run.
+
+#include <benchmark/benchmark.h>
+#include <time.h>
+
+#include "tests/unit/client/fake_server.hpp"
+
+namespace tandem::client {
+namespace {
+
+constexpr std::uint32_t kBodies = 10000;
+
+// Time of this thread on a core: what others run on the machine does not count.
+double now_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
+}
+
+/// A client that plays, without a listener or a test around it.
+class World {
+ public:
+  World() : core_(options(), port_) {
+    port_.sessions.push_back(from_server(server_.session));
+    poll(kMs);
+    deliver();
+    port_.snapshots.push_back(from_server(server_.snapshot()));
+    poll(kMs);
+    for (int i = 0; i < 30; ++i) frame();
+  }
+
+  /// One frame is simulated ahead when it is due, and corrected when its delta comes, 5 ms later. Returns the
+  /// time that this took.
+  double frame() {
+    const double ahead_s = poll(kFrameNs - 5 * kMs);
+    deliver();
+    return ahead_s + poll(5 * kMs);
+  }
+  bool sample(SampleMode mode) {
+    sampled_ns_ += 4 * kMs;
+    return core_.sample(sample_, mode, {now_ns_ + sampled_ns_ % kFrameNs, 0});
+  }
+  ClientCore& core() { return core_; }
+
+ private:
+  static CoreOptions options() {
+    CoreOptions options;
+    options.session = "default";
+    options.id = kClient;
+    return options;
+  }
+  void deliver() { port_.deltas.push_back(from_server(server_.advance(now_ns_))); }
+  double poll(std::int64_t later_ns) {
+    now_ns_ += later_ns;
+    const double began_s = now_s();
+    core_.poll({now_ns_, now_ns_});
+    return now_s() - began_s;
+  }
+
+  FakeServer server_{1000, kBodies};
+  FakePort port_;
+  ClientCore core_;
+  Sample sample_;
+  std::int64_t now_ns_ = 1'000'000'000'000;
+  std::int64_t sampled_ns_ = 0;
+};
+
+void sample(benchmark::State& state, SampleMode mode) {
+  World world;
+  world.core().start_sampling();
+  for (auto _ : state) {
+    if (!world.sample(mode)) state.SkipWithError("nothing to draw");
+  }
+}
+BENCHMARK_CAPTURE(sample, interpolate, SampleMode::kInterpolate)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(sample, extrapolate, SampleMode::kExtrapolate)->Unit(benchmark::kMicrosecond);
+
+void frame(benchmark::State& state, bool sampling) {
+  World world;
+  if (sampling) world.core().start_sampling();
+  for (auto _ : state) {
+    state.SetIterationTime(world.frame());
+    if (sampling) world.sample(SampleMode::kExtrapolate);
+  }
+}
+BENCHMARK_CAPTURE(frame, unsampled, false)->UseManualTime()->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(frame, sampled, true)->UseManualTime()->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace tandem::client
