@@ -10,11 +10,11 @@
 #include "services/host/claim.hpp"
 #include "services/host/inputs.hpp"
 #include "services/host/joins.hpp"
-#include "services/host/mbit.hpp"
-#include "services/host/mirror.hpp"
 #include "services/host/pacing.hpp"
+#include "services/host/publication.hpp"
 #include "services/host/replies.hpp"
 #include "services/host/roster.hpp"
+#include "services/host/status.hpp"
 #include "services/host/window.hpp"
 
 namespace tandem::host {
@@ -28,7 +28,6 @@ constexpr std::int64_t kLookNs = kSecond / 4;  // between looks for rivals and f
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
 constexpr std::size_t kMostNotices = 256;  // until somebody takes them
-constexpr double kRawBytesPerBody = 24;
 
 Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
   if (auto named = transport::check_session_name(config.session); !named) return named;
@@ -37,7 +36,7 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   };
   if (!(config.frame_rate_hz >= 1 && config.frame_rate_hz <= 1000))
     return refuse("frame rate must lie in 1..1000 Hz");
-  if (config.layout.lead > 1) return refuse("lead must be 0 or 1");
+  if (config.stream.layout.lead > 1) return refuse("lead must be 0 or 1");
   if (config.window_ceiling < 1 || config.window_ceiling > 64)
     return refuse("window ceiling must lie in 1..64");
   if (config.window && (*config.window < 1 || *config.window > config.window_ceiling)) {
@@ -45,57 +44,24 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   }
   if (config.client_limit == 0 || config.participant_limit == 0)
     return refuse("client limits must be positive");
-  if (config.types.size() != config.layout.type_count)
-    return refuse(fmt::format("{} body types, {} described", config.layout.type_count, config.types.size()));
-  if (config.quality && !valid_goal(*config.quality, config.layout.parameters)) {
-    return refuse("automatic quality: the threshold must lie between its smallest and its largest");
-  }
-  if (config.quality && config.budget < least_budget(*config.quality, config.frame_rate_hz)) {
-    return refuse(fmt::format(
-        "a budget of {} bytes a frame is too tight for a target of {} Mbit/s, which needs at least {} bytes",
-        config.budget, config.quality->target_mbit_per_s,
-        least_budget(*config.quality, config.frame_rate_hz)));
-  }
+  if (config.types.size() != config.stream.layout.type_count)
+    return refuse(
+        fmt::format("{} body types, {} described", config.stream.layout.type_count, config.types.size()));
   if (config.epoch == 0) return refuse("epoch must not be 0");
   const std::uint32_t capacity = simulation.capacity();
-  if (capacity != config.layout.capacity)
-    return refuse(fmt::format("{} slots for a simulation of {}", config.layout.capacity, capacity));
-  const engine::Bodies bodies = simulation.bodies();
-  bool whole = bodies.alive.size() == capacity && bodies.type.size() == capacity;
-  for (const auto& column : bodies.position) whole = whole && column.size() == capacity;
-  for (const auto& column : bodies.velocity) whole = whole && column.size() == capacity;
-  if (!whole) return refuse("the simulation's body columns are not of its capacity");
+  if (capacity != config.stream.layout.capacity)
+    return refuse(fmt::format("{} slots for a simulation of {}", config.stream.layout.capacity, capacity));
   return {};
-}
-
-transport::SessionMessage session_message(const HostConfig& config, const ServerTimeline& timeline) {
-  transport::SessionMessage session;
-  session.session = config.session;
-  session.epoch = config.epoch;
-  session.layout = config.layout;
-  session.frame_rate_hz = config.frame_rate_hz;
-  session.lattice_unit = config.lattice.unit;
-  session.window_ceiling = config.window_ceiling;
-  session.max_delta_bytes = static_cast<std::uint32_t>(timeline.payload_bound());
-  session.max_snapshot_bytes = static_cast<std::uint32_t>(timeline.snapshot_bound());
-  session.client_cost_ns = config.client_cost_ns;
-  session.scene = config.scene;
-  session.scene_description = config.scene_description;
-  session.types = config.types;
-  session.layout_hash = transport::layout_hash(session);
-  return session;
 }
 
 }  // namespace
 
 struct Host::Impl {
-  Impl(HostConfig configuration, engine::Simulation& full, transport::ServerPort& endpoints,
-       ServerTimeline server, const Drive& drive)
+  Impl(HostConfig configuration, engine::Simulation& full, transport::ServerPort& endpoints, Stream started)
       : config(std::move(configuration)),
         simulation(&full),
         port(&endpoints),
-        timeline(std::move(server)),
-        mirror(config.lattice, full.capacity(), config.layout.type_count),
+        stream(std::move(started)),
         outbox(config.outbox),
         roster({.epoch = config.epoch,
                 .client_limit = config.client_limit,
@@ -103,36 +69,23 @@ struct Host::Impl {
                 .stall_timeout_ns = config.stall_timeout_ns,
                 .fixed_window = config.window,
                 .window_ceiling = config.window_ceiling}),
-        inputs({.epoch = config.epoch, .lead = config.layout.lead, .lattice = config.lattice}, full, timeline,
-               outbox),
+        inputs(config.epoch, full, stream, outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate),
-        session(session_message(config, timeline)),
-        parameters(config.layout.parameters) {
-    mirror.start(full.bodies());
-    timeline.start(config.start_frame, mirror.target(), drive);
-    timeline.set_clock(config.clock_ns);
-    if (config.quality) {
-      const StepRule steps = step_rule(config.layout.codec, !config.layout.codec_tables.empty());
-      quality.emplace(*config.quality, steps, parameters, full.capacity(), config.frame_rate_hz);
-      if (steps != StepRule::kLeave) timeline.set_statistics(&quality->statistics());
-    }
-    if (config.gains) {
-      gains.emplace(*config.gains, full.capacity(), parameters);
-      timeline.set_evidence(&gains->evidence());
-    }
-    bodies = mirror.target().alive_count();
+        status(config.session, config.epoch, outbox),
+        session(session_message(config, stream)) {
+    stream.set_clock(config.clock_ns);
     report.frame = config.start_frame;
-    report.hash = timeline.hash();
+    report.hash = stream.hash();
   }
 
   // --- What the rules see ---
   [[nodiscard]] Roster::Now moment() const {
     const Frame unwritten = outbox.unwritten_frames();
     return {.ns = now_ns,
-            .frame = timeline.frame(),
-            .written = timeline.frame() - std::min(timeline.frame(), unwritten),
+            .frame = stream.frame(),
+            .written = stream.frame() - std::min(stream.frame(), unwritten),
             .period_ns = pacing.period_ns()};
   }
   [[nodiscard]] std::int64_t clock() const { return config.clock_ns == nullptr ? 0 : config.clock_ns(); }
@@ -151,17 +104,17 @@ struct Host::Impl {
   void digest(const transport::Received<transport::AckMessage>& ack);
   void digest(const transport::Received<transport::InputMessage>& input);
   void produce_frame();
-  bool choose_quality(const ServerTimeline::FrameResult& result);
-  void publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns);
+  [[nodiscard]] HostTotals totals_now() const;
+  void note(std::string notice);
   void note_foreigner(transport::ClientId client);
+  void note_target();
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
 
   HostConfig config;
   engine::Simulation* simulation;
   transport::ServerPort* port;
-  ServerTimeline timeline;
-  Mirror mirror;
+  Stream stream;
   Outbox outbox;
   Roster roster;
   InputDesk inputs;
@@ -170,16 +123,14 @@ struct Host::Impl {
   Claim claim;
   Pacing pacing;
   PublishTimes times;
-  std::optional<QualityControl> quality;
-  std::optional<GainControl> gains;
+  StatusDesk status;
   transport::SessionMessage session;
-  CodecParameters parameters;  // in force
 
   State state = State::kClaiming;
   std::optional<Error> error;
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
   std::optional<std::int64_t> first_poll_ns;
-  std::int64_t last_look_ns = 0, next_status_ns = 0, last_foreign_note_ns = INT64_MIN;
+  std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
   Waiting waiting = Waiting::kNothing;  // what the due frame waits for, since the last poll
   Frame written_then = 0;               // at the last poll
   bool held = false;                    // the due frame had to wait
@@ -188,11 +139,7 @@ struct Host::Impl {
 
   FrameReport report;
   HostTotals totals;
-  DurationHistogram frame_durations, second_durations;
-  HostTotals second_totals;  // at the last status
-  std::int64_t second_ns = 0;
-  std::uint32_t bodies = 0;
-  std::vector<std::byte> snapshot;
+  DurationHistogram frame_durations;
   std::vector<std::string> notices;
   std::vector<transport::Received<transport::AckMessage>> acks;
   std::vector<transport::Received<transport::InputMessage>> input_samples;
@@ -201,7 +148,7 @@ struct Host::Impl {
 bool Host::Impl::poll() {
   if (!first_poll_ns) {
     first_poll_ns = now_ns;
-    second_ns = now_ns;
+    status.start(now_ns);
   }
   bool produced = false;
   if (state == State::kClaiming) claim_name();
@@ -283,11 +230,24 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
                  now_ns, wall_ns);
 }
 
+void Host::Impl::note(std::string notice) {
+  if (notices.size() < kMostNotices) notices.push_back(std::move(notice));
+}
+
 void Host::Impl::note_foreigner(transport::ClientId client) {
   if (last_foreign_note_ns != INT64_MIN && now_ns - last_foreign_note_ns < kSecond) return;
   last_foreign_note_ns = now_ns;
-  if (notices.size() >= kMostNotices) return;
-  notices.push_back(fmt::format("client {} is used by a second participant: refused", client_name(client)));
+  note(fmt::format("client {} is used by a second participant: refused", client_name(client)));
+}
+
+void Host::Impl::note_target() {
+  const QualityGoal& goal = *config.stream.quality;
+  if (!stream.target_out_of_reach()) {
+    note(fmt::format("the target of {} Mbit/s is kept again", goal.target_mbit_per_s));
+    return;
+  }
+  note(fmt::format("the target of {} Mbit/s is exceeded even at the largest threshold, {:.3g} m",
+                   goal.target_mbit_per_s, goal.largest_threshold * config.stream.lattice.unit));
 }
 
 void Host::Impl::look_around() {
@@ -321,121 +281,61 @@ bool Host::Impl::advance_if_due() {
   return true;
 }
 
+// One stream so far. A second one would be produced from the same step, side by side with the first.
 void Host::Impl::produce_frame() {
   roster.frame_starts(moment());
   const std::int64_t start = clock();
-  inputs.apply(timeline.frame() + 1);
+  inputs.apply(stream.frame() + 1);
   simulation->step();
   const std::int64_t stepped = clock();
-  mirror.update(simulation->bodies(), simulation->events());
-  for (const LifecycleRecord& record : mirror.lifecycle()) {
-    if (record.kind == LifecycleKind::kSpawn) ++bodies;
-    if (record.kind == LifecycleKind::kDespawn) --bodies;
-  }
-  const auto result = timeline.advance(mirror.target(), mirror.lifecycle(), config.budget);
-  const std::int64_t applied = clock();
-  publish(result, wall_ns + (applied - start));
-  times.published(result.frame, now_ns);
-  const bool coarser = quality && choose_quality(result);
-  const bool steered = gains && gains->after_frame(parameters);
-  if (coarser || steered) timeline.set_parameters(parameters);
-  report = {.frame = result.frame,
-            .hash = result.hash,
-            .payload_bytes = result.payload.size(),
-            .corrected = result.corrected,
-            .frame_ms = static_cast<double>(applied - start) * 1e-6,
+  const bool was_out_of_reach = stream.target_out_of_reach();
+  const Stream::FrameResult frame = stream.produce(simulation->bodies(), simulation->events());
+  const std::int64_t produced = clock();
+  push_delta(outbox, config.epoch, frame, wall_ns + (produced - start));
+  times.published(frame.frame, now_ns);
+  if (stream.target_out_of_reach() != was_out_of_reach) note_target();
+  report = {.frame = frame.frame,
+            .hash = frame.hash,
+            .payload_bytes = frame.payload.size(),
+            .corrected = frame.corrected,
+            .frame_ms = static_cast<double>(produced - start) * 1e-6,
             .step_ms = static_cast<double>(stepped - start) * 1e-6};
   ++totals.frames;
   totals.payload_bytes += report.payload_bytes;
   totals.corrected += report.corrected;
   frame_durations.add_ms(report.frame_ms);
-  second_durations.add_ms(report.frame_ms);
-}
-
-bool Host::Impl::choose_quality(const ServerTimeline::FrameResult& result) {
-  const bool before = quality->out_of_reach();
-  const bool changed = quality->after_frame(result.payload.size(), result.corrected, parameters);
-  if (quality->out_of_reach() != before && notices.size() < kMostNotices) {
-    const double target = config.quality->target_mbit_per_s;
-    notices.push_back(before
-                          ? fmt::format("the target of {} Mbit/s is kept again", target)
-                          : fmt::format("the target of {} Mbit/s is exceeded even at the largest threshold, "
-                                        "{:.3g} m",
-                                        target, config.quality->largest_threshold * config.lattice.unit));
-  }
-  return changed;
-}
-
-void Host::Impl::publish(const ServerTimeline::FrameResult& result, std::int64_t published_wall_ns) {
-  const std::size_t size = result.payload.size();
-  const std::size_t parts = std::max<std::size_t>((size + kPartBytes - 1) / kPartBytes, 1);
-  for (std::size_t part = 0; part < parts; ++part) {
-    const auto bytes =
-        result.payload.subspan(part * kPartBytes, std::min(kPartBytes, size - part * kPartBytes));
-    transport::DeltaMessage delta;
-    delta.epoch = config.epoch;
-    delta.frame = result.frame;
-    delta.part = static_cast<std::uint32_t>(part);
-    delta.parts = static_cast<std::uint32_t>(parts);
-    delta.last_input = result.last_input;
-    delta.server_time_ns = published_wall_ns;
-    delta.hash = result.hash;
-    delta.payload.assign(bytes.begin(), bytes.end());
-    // There is room: it was made sure of before the frame started, and this thread is the only producer.
-    static_cast<void>(outbox.push(std::move(delta)));
-  }
+  status.frame_took(report.frame_ms);
 }
 
 void Host::Impl::serve_joiners() {
-  if (joins.due(roster.accounts(), *port, now_ns) && outbox.has_snapshot_room()) {
-    timeline.snapshot(snapshot);
-    transport::SnapshotMessage message;
-    message.slot = static_cast<std::uint32_t>(timeline.frame() % 4);
-    message.epoch = config.epoch;
-    message.frame = timeline.frame();
-    message.bytes = snapshot;
-    if (outbox.push(std::move(message))) {
-      joins.served(roster.accounts(), now_ns);
-      ++totals.snapshots;
-    }
+  if (joins.due(roster.accounts(), *port, now_ns) && push_snapshot(outbox, config.epoch, stream)) {
+    joins.served(roster.accounts(), now_ns);
+    ++totals.snapshots;
   }
   if (joins.dispose_due(roster.accounts()) && outbox.push(DisposeSnapshots{})) joins.disposed();
 }
 
+HostTotals Host::Impl::totals_now() const {
+  HostTotals now = totals;
+  now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
+  now.refused_inputs += inputs.refused();
+  now.refused_messages += port->dropped();
+  now.demotions = roster.demotions();
+  now.clients_seen = roster.seen();
+  now.frame_ms_p50 = frame_durations.quantile_ms(0.5);
+  now.frame_ms_p99 = frame_durations.quantile_ms(0.99);
+  return now;
+}
+
 void Host::Impl::publish_status() {
-  if (now_ns < next_status_ns) return;
-  next_status_ns = now_ns + kSecond;
-  const double elapsed_s = std::max(static_cast<double>(now_ns - second_ns) * 1e-9, 1e-9);
-  const auto frames = static_cast<double>(totals.frames - second_totals.frames);
-  const double per_frame = frames > 0 ? 1 / frames : 0;
-  transport::ServerStatusMessage status;
-  status.session = config.session;
-  status.epoch = config.epoch;
-  status.frame = timeline.frame();
-  status.uptime_s = static_cast<double>(now_ns - *first_poll_ns) * 1e-9;
-  status.frame_rate_hz = frames / elapsed_s;
-  status.mbit_per_s =
-      static_cast<double>(totals.payload_bytes - second_totals.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
-  status.raw_mbit_per_s = bodies * kRawBytesPerBody * 8 * status.frame_rate_hz / kBitsPerMbit;
-  status.frame_ms_p50 = second_durations.quantile_ms(0.5);
-  status.frame_ms_p99 = second_durations.quantile_ms(0.99);
-  status.corrected_per_frame = static_cast<double>(totals.corrected - second_totals.corrected) * per_frame;
-  status.bodies = bodies;
-  status.participants = roster.counted();
-  status.observers = roster.watching();
-  status.window = roster.window();
-  status.payload_bytes = totals.payload_bytes;
-  status.stalls = totals.stalls;
-  status.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
-  status.refused_inputs = totals.refused_inputs + inputs.refused();
-  status.refused_messages = totals.refused_messages + port->dropped();
-  status.snapshots = totals.snapshots;
-  status.queue_high_water = static_cast<std::uint32_t>(outbox.high_water());
-  // Best effort: without room this second's figures are lost.
-  if (!outbox.push(std::move(status))) return;
-  second_totals = totals;
-  second_ns = now_ns;
-  second_durations.clear();
+  if (!status.due(now_ns)) return;
+  status.publish(totals_now(),
+                 {.frame = stream.frame(),
+                  .bodies = stream.bodies(),
+                  .participants = roster.counted(),
+                  .observers = roster.watching(),
+                  .window = roster.window()},
+                 now_ns);
 }
 
 void Host::Impl::plan_wake() {
@@ -460,11 +360,15 @@ void Host::Impl::plan_wake() {
 Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation& simulation,
                                            transport::ServerPort& port) {
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
-  auto drive = to_drive(config.lattice, simulation.gravity(), simulation.damping_per_s());
+  const auto drive = to_drive(config.stream.lattice, simulation.gravity(), simulation.damping_per_s());
   if (!drive) return tl::unexpected(drive.error());
-  auto timeline = ServerTimeline::create(config.layout, config.epoch, {.run_blocks = config.run_blocks});
-  if (!timeline) return tl::unexpected(timeline.error());
-  auto impl = std::make_unique<Impl>(std::move(config), simulation, port, std::move(*timeline), *drive);
+  auto stream = Stream::create(config.stream, {.bodies = simulation.bodies(),
+                                               .drive = *drive,
+                                               .epoch = config.epoch,
+                                               .frame = config.start_frame,
+                                               .frame_rate_hz = config.frame_rate_hz});
+  if (!stream) return tl::unexpected(stream.error());
+  auto impl = std::make_unique<Impl>(std::move(config), simulation, port, std::move(*stream));
   return std::unique_ptr<Host>(new Host(std::move(impl)));
 }
 
@@ -484,33 +388,19 @@ const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
 Result<Frame> Host::inject(const engine::Input& input) { return impl_->inputs.inject(input); }
 Result<void> Host::set_parameters(const CodecParameters& parameters) {
-  if (!valid_parameters(parameters)) return fail(ErrorCode::kInvalidArgument, "parameters out of range");
-  if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
-  impl_->parameters = parameters;
-  impl_->timeline.set_parameters(parameters);
-  return {};
+  return impl_->stream.set_parameters(parameters);
 }
-const CodecParameters& Host::parameters() const { return impl_->parameters; }
-double Host::threshold_m() const { return impl_->parameters.threshold * impl_->config.lattice.unit; }
+const CodecParameters& Host::parameters() const { return impl_->stream.parameters(); }
+double Host::threshold_m() const { return impl_->stream.threshold_m(); }
 const transport::SessionMessage& Host::session() const { return impl_->session; }
-Frame Host::frame() const { return impl_->timeline.frame(); }
-const tandem::State& Host::agreed() const { return impl_->timeline.state(); }
+Frame Host::frame() const { return impl_->stream.frame(); }
+const tandem::State& Host::agreed() const { return impl_->stream.agreed(); }
 std::uint64_t Host::hash() const { return impl_->report.hash; }
 std::uint32_t Host::window() const { return impl_->roster.window(); }
 std::uint32_t Host::participants() const { return impl_->roster.counted(); }
 std::uint32_t Host::observers() const { return impl_->roster.watching(); }
 
-HostTotals Host::totals() const {
-  HostTotals totals = impl_->totals;
-  totals.suspended_ms = static_cast<std::uint64_t>(impl_->suspended_ns / kMillisecond);
-  totals.refused_inputs += impl_->inputs.refused();
-  totals.refused_messages += impl_->port->dropped();
-  totals.demotions = impl_->roster.demotions();
-  totals.clients_seen = impl_->roster.seen();
-  totals.frame_ms_p50 = impl_->frame_durations.quantile_ms(0.5);
-  totals.frame_ms_p99 = impl_->frame_durations.quantile_ms(0.99);
-  return totals;
-}
+HostTotals Host::totals() const { return impl_->totals_now(); }
 
 std::vector<std::string> Host::take_notices() {
   std::vector<std::string> all = std::move(impl_->notices);

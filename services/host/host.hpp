@@ -1,22 +1,17 @@
 #pragma once
-// The host: drives a full simulation, predicts, encodes and publishes it, and answers its clients. All rules
-// of behaviour over time (idl/STATES.md) live behind it; it owns no thread, reads no clock and writes to no
-// socket.
+// The host: drives a full simulation, publishes its stream, and answers its clients. All rules of behaviour
+// over time (idl/STATES.md) live behind it; it owns no thread, reads no clock and writes to no socket.
 
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/port.hpp"
-#include "services/host/gains.hpp"
-#include "services/host/lattice_choice.hpp"
 #include "services/host/outbox.hpp"
-#include "services/host/quality.hpp"
 #include "services/host/simulation.hpp"
+#include "services/host/stream.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::host {
@@ -42,17 +37,12 @@ struct HostConfig {
   std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
   Outbox::Limits outbox;
 
-  Layout layout;  ///< capacity: the simulation's; lead: 0 or 1
-  Lattice lattice;
-  std::size_t budget = kNoBudget;      ///< bytes of a frame; spawns and parameters go first
-  std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
-  std::optional<GainGoal> gains;       ///< empty: so do decay and gains
-  RunBlocks run_blocks;                ///< threads for the codec; empty: none of its own
+  /// Of all bodies; layout.capacity is the simulation's, its lead 0 or 1.
+  StreamConfig stream;
 
-  std::uint32_t client_cost_ns = 2;
   std::string scene;
   std::string scene_description;
-  /// layout.type_count of them.
+  /// layout.type_count of them: what clients draw.
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
 
   /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
@@ -116,9 +106,7 @@ class Host {
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
   Result<Frame> inject(const engine::Input& input);
 
-  /// What the decoder reads (threshold, quantisation steps, gains), in force from the next frame on. Travels
-  /// in that frame's delta; clients need nothing else. With HostConfig::gains, gains stay so until the next
-  /// decision. Errors: kInvalidArgument (out of range, or automatic quality is on).
+  /// What the decoder reads (threshold, quantisation steps, gains): see Stream::set_parameters().
   [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
   [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                 ///< of the next frame, scene units

@@ -44,7 +44,7 @@ bool may_play(const Account& account) {
 
 Reason InputDesk::handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns) {
   account.reply.due = true;
-  if (input.epoch != rules_.epoch) {
+  if (input.epoch != epoch_) {
     // Its number belongs to another epoch's count, so it must not enter this one's outcomes.
     ++refused_;
     account.reply.once = Reason::kStaleEpoch;
@@ -95,20 +95,20 @@ Reason InputDesk::accept(const engine::Input& input, const Source& source, Frame
 
 Reason InputDesk::schedule(const engine::Input& input, const engine::Classification& effect,
                            const Source& source, Frame& acts_on) {
-  const auto drive = to_drive(rules_.lattice, effect.gravity, effect.damping_per_s);
+  const auto drive = to_drive(stream_->config().lattice, effect.gravity, effect.damping_per_s);
   if (!drive) return Reason::kInvalid;
   // s + A: no client can have simulated it, as none is further than A beyond delta s - 1.
-  const Frame frame = next_frame() + rules_.lead;
+  const Frame frame = next_frame() + stream_->config().layout.lead;
   if (scheduling_frame_ != frame) scheduled_now_ = 0;
   if (scheduled_now_ >= kMostScheduledPerFrame || !outbox_->has_control_room()) return Reason::kRateLimited;
-  const std::uint64_t number = timeline_->last_input() + 1;
-  if (!timeline_->schedule({.number = number, .frame = frame, .drive = *drive})) return Reason::kRateLimited;
+  const std::uint64_t number = stream_->last_input() + 1;
+  if (!stream_->schedule({.number = number, .frame = frame, .drive = *drive})) return Reason::kRateLimited;
   scheduling_frame_ = frame;
   ++scheduled_now_;
   scheduled_.push_back({frame, input});
   acts_on = frame;
   const bool queued = outbox_->push(transport::ScheduledInputMessage{
-      .epoch = rules_.epoch,
+      .epoch = epoch_,
       .number = number,
       .frame = frame,
       .source_client = source.client,

@@ -4,12 +4,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/messages.hpp"
-#include "services/host/lattice_choice.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/roster.hpp"
 #include "services/host/simulation.hpp"
+#include "services/host/stream.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::host {
@@ -25,13 +24,8 @@ inline constexpr std::uint32_t kMostScheduledPerFrame = 100;
 /// Validates inputs, gives them their frame and hands them to the simulation in time. Not thread-safe.
 class InputDesk {
  public:
-  struct Rules {
-    Epoch epoch = 0;
-    std::uint32_t lead = 1;
-    Lattice lattice;
-  };
-  InputDesk(const Rules& rules, engine::Simulation& simulation, ServerTimeline& timeline, Outbox& outbox)
-      : rules_(rules), simulation_(&simulation), timeline_(&timeline), outbox_(&outbox) {}
+  InputDesk(Epoch epoch, engine::Simulation& simulation, Stream& stream, Outbox& outbox)
+      : epoch_(epoch), simulation_(&simulation), stream_(&stream), outbox_(&outbox) {}
 
   /// Decides one input of a known client; the outcome stands in its account and is what this returns.
   transport::Reason handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns);
@@ -57,11 +51,11 @@ class InputDesk {
   transport::Reason accept(const engine::Input& input, const Source& source, Frame& acts_on);
   transport::Reason schedule(const engine::Input& input, const engine::Classification& effect,
                              const Source& source, Frame& acts_on);
-  [[nodiscard]] Frame next_frame() const { return timeline_->frame() + 1; }
+  [[nodiscard]] Frame next_frame() const { return stream_->frame() + 1; }
 
-  Rules rules_;
+  Epoch epoch_;
   engine::Simulation* simulation_;
-  ServerTimeline* timeline_;
+  Stream* stream_;
   Outbox* outbox_;
   std::vector<Waiting> scheduled_;        // in the order of their numbers, so ascending by frame
   std::vector<engine::Input> immediate_;  // in the order of arrival

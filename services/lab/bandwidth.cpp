@@ -75,63 +75,52 @@ class Snaps {
   std::uint64_t count_ = 0;
 };
 
-/// One session's server and client, and what they were seen to do.
+/// A stream with a client of its own, and what they were seen to do.
 struct Lane {
-  Lane(const host::HostConfig& config, std::unique_ptr<CodeAccount> books, ServerTimeline server_side,
-       ClientTimeline client_side, std::uint32_t bodies)
-      : session(&config),
-        account(std::move(books)),
-        server(std::move(server_side)),
-        client(std::move(client_side)),
-        parameters(config.layout.parameters) {
-    if (!config.gains) return;
-    gains = std::make_unique<host::GainControl>(*config.gains, bodies, parameters);
-    server.set_evidence(&gains->evidence());
-  }
+  Lane(std::unique_ptr<CodeAccount> books, host::Stream server_side, ClientTimeline client_side)
+      : account(std::move(books)), stream(std::move(server_side)), client(std::move(client_side)) {}
 
-  const host::HostConfig* session;
-  std::unique_ptr<CodeAccount> account;
-  ServerTimeline server;
+  std::unique_ptr<CodeAccount> account;  // the stream adds to it
+  host::Stream stream;
   ClientTimeline client;
   std::vector<std::uint32_t> bytes;
   std::uint64_t corrected = 0;
-  CodecParameters parameters;
-  std::unique_ptr<host::GainControl> gains;  // stays where it is, with its evidence
   Errors errors;
   Snaps snaps;
   DurationHistogram predict, encode, decode, apply;
 };
 
-Result<Lane> make_lane(const host::HostConfig& session, const Replay& replay) {
-  auto account = std::make_unique<CodeAccount>();
-  auto server = ServerTimeline::create(session.layout, kEpoch,
-                                       {.run_blocks = session.run_blocks, .account = account.get()});
-  if (!server) return tl::unexpected(server.error());
-  auto client = ClientTimeline::create(session.layout, {.run_blocks = session.run_blocks});
+Result<Lane> make_lane(host::StreamConfig config, const Replay& replay) {
+  auto client = ClientTimeline::create(config.layout, {.run_blocks = config.local.run_blocks});
   if (!client) return tl::unexpected(client.error());
-  server->set_clock(&steady_ns);
+  auto account = std::make_unique<CodeAccount>();
+  config.local.account = account.get();
+  const engine::Simulation& simulation = replay.simulation();
+  auto stream = host::Stream::create(std::move(config), {.bodies = simulation.bodies(),
+                                                         .drive = replay.start_drive(),
+                                                         .epoch = kEpoch,
+                                                         .frame_rate_hz = 1 / simulation.dt_s()});
+  if (!stream) return tl::unexpected(stream.error());
+  stream->set_clock(&steady_ns);
   client->set_clock(&steady_ns);
-  server->start(0, replay.target(), replay.start_drive());
   std::vector<std::byte> snapshot;
-  server->snapshot(snapshot);
+  stream->snapshot(snapshot);
   if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
-  return Lane(session, std::move(account), std::move(*server), std::move(*client),
-              replay.simulation().capacity());
+  return Lane(std::move(account), std::move(*stream), std::move(*client));
 }
 
-/// One frame of one session: the server's half, then the client's.
+/// One frame of one stream: the server's half, then the client's.
 Result<void> advance(Lane& lane, const Replay& replay) {
   for (const ScheduledDrive& input : replay.scheduled()) {
-    auto scheduled = lane.server.schedule(input).and_then([&] { return lane.client.schedule(input); });
+    auto scheduled = lane.stream.schedule(input).and_then([&] { return lane.client.schedule(input); });
     if (!scheduled) return scheduled;
   }
-  const ServerTimeline::FrameResult frame =
-      lane.server.advance(replay.target(), replay.lifecycle(), lane.session->budget);
+  const engine::Simulation& simulation = replay.simulation();
+  const host::Stream::FrameResult frame = lane.stream.produce(simulation.bodies(), simulation.events());
   lane.predict.add(frame.predict_ns);
-  lane.encode.add(frame.encode_ns + replay.mirror_ns());
+  lane.encode.add(frame.mirror_ns + frame.encode_ns);
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
-  if (lane.gains && lane.gains->after_frame(lane.parameters)) lane.server.set_parameters(lane.parameters);
 
   lane.client.step(1);
   lane.snaps.before(lane.client.state(frame.frame));
@@ -140,9 +129,9 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.apply.add(lane.client.timings().apply_ns);
   if (!applied) return applied;
   const State& agreed = lane.client.state(frame.frame);
-  lane.snaps.after(agreed, lane.client.touched(), replay.lifecycle());
-  const double unit = lane.session->lattice.unit;
-  lane.errors.add(agreed.alive(), replay.simulation().bodies(),
+  lane.snaps.after(agreed, lane.client.touched(), frame.lifecycle);
+  const double unit = lane.stream.config().lattice.unit;
+  lane.errors.add(agreed.alive(), simulation.bodies(),
                   [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; });
   return {};
 }
@@ -161,20 +150,20 @@ double conditional_entropy(const CodeAccount& account) {
 
 /// What a lane measured over `frames` frames.
 BandwidthRow row_of(Lane& lane, double frames) {
-  const host::HostConfig& session = *lane.session;
+  const host::StreamConfig& stream = lane.stream.config();
   BandwidthRow row;
-  row.codec = session.layout.codec;
-  row.predictor = session.layout.predictor;
-  row.parameters = lane.parameters;
-  row.mbit_per_s = mbit_per_s(lane.bytes, session.lattice.dt_s);
+  row.codec = stream.layout.codec;
+  row.predictor = stream.layout.predictor;
+  row.parameters = lane.stream.parameters();
+  row.mbit_per_s = mbit_per_s(lane.bytes, stream.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
   if (!lane.account->decisions.empty()) {
-    const double per_s = frames * session.lattice.dt_s * kBitsPerMbit;
+    const double per_s = frames * stream.lattice.dt_s * kBitsPerMbit;
     row.ideal_mbit_per_s = lane.account->ideal_bits / per_s;
     row.bound_mbit_per_s = conditional_entropy(*lane.account) / per_s;
   }
   lane.errors.fill(row);
-  lane.snaps.fill(row, session.lattice.unit);
+  lane.snaps.fill(row, stream.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
   row.predict_ms = lane.predict.quantile_ms(0.5);
   row.encode_ms = lane.encode.quantile_ms(0.5);
@@ -242,17 +231,17 @@ double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
 }
 
 Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
-                                                    std::span<const host::HostConfig> sessions,
+                                                    std::span<const host::StreamConfig> streams,
                                                     std::uint64_t frames,
                                                     const std::function<void(Frame)>& progress,
                                                     std::optional<double> peer_threshold) {
   const double dt_s = replay.simulation().dt_s();
   std::vector<Lane> lanes;
-  lanes.reserve(sessions.size());
-  for (const host::HostConfig& session : sessions) {
-    auto lane = make_lane(session, replay);
+  lanes.reserve(streams.size());
+  for (const host::StreamConfig& stream : streams) {
+    auto lane = make_lane(stream, replay);
     if (!lane)
-      return fail(lane.error().code, fmt::format("codec {}: {}", session.layout.codec, lane.error().message));
+      return fail(lane.error().code, fmt::format("codec {}: {}", stream.layout.codec, lane.error().message));
     lanes.push_back(std::move(*lane));
   }
   std::vector<PeerLane> peers;
@@ -270,8 +259,9 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     colliding.push_back(replay.simulation().colliding());
     for (Lane& lane : lanes) {
       if (auto advanced = advance(lane, replay); !advanced) {
-        return fail(advanced.error().code, fmt::format("codec {}, frame {}: {}", lane.session->layout.codec,
-                                                       frame, advanced.error().message));
+        return fail(advanced.error().code,
+                    fmt::format("codec {}, frame {}: {}", lane.stream.config().layout.codec, frame,
+                                advanced.error().message));
       }
     }
     for (PeerLane& peer : peers) {
@@ -291,7 +281,7 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
     row.bodies = replay.simulation().capacity();
     row.frames = frames;
     row.dt_s = dt_s;
-    row.lattice_unit = sessions.empty() ? 0 : sessions.front().lattice.unit;
+    if (!streams.empty()) row.lattice_unit = streams.front().lattice.unit;
     row.colliding_per_frame = static_cast<double>(contacts) / static_cast<double>(frames);
     row.colliding = colliding;
     row.step_ms = step_ms;

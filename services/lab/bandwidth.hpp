@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
-#include "services/host/host.hpp"
+#include "services/host/stream.hpp"
 #include "services/lab/replay.hpp"
 #include "tandem/result.hpp"
 
@@ -44,13 +44,13 @@ struct BandwidthRow {
 /// Mean of frames of `dt_s` seconds, not none.
 [[nodiscard]] double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s);
 
-/// Runs `replay` for `frames` frames. In each of `sessions`, which differ in codec and predictor and share
-/// the replay's lattice, a server's timeline encodes every frame, and a client's timeline decodes it and
-/// checks the hash. Fills the measured fields of a row per session; `progress` gets the frame. Errors: what
-/// the timelines and the replay refuse; kMismatch when a client's state ever differs. With a `peer_threshold`
-/// (scene units) rows of all peers follow, at that largest error on the same frames.
+/// Runs `replay` for `frames` frames. Each of `streams`, which share the replay's lattice, produces every
+/// frame as a host's would, and a client's timeline decodes it and checks the hash. Fills the measured fields
+/// of a row per stream; `progress` gets the frame. Errors: what the streams and the replay refuse; kMismatch
+/// when a client's state ever differs. With a `peer_threshold` (scene units) rows of all peers follow, at
+/// that largest error on the same frames.
 [[nodiscard]] Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
-                                                                  std::span<const host::HostConfig> sessions,
+                                                                  std::span<const host::StreamConfig> streams,
                                                                   std::uint64_t frames,
                                                                   const std::function<void(Frame)>& progress,
                                                                   std::optional<double> peer_threshold = {});

@@ -47,20 +47,19 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
   sessions::SessionChoice choice = options.choice;
   choice.bodies = source.simulation->capacity();
   choice.threads = options.run.threads;
-  std::vector<host::HostConfig> sessions;
+  std::vector<host::StreamConfig> streams;
   for (const std::string& codec : options.codecs) {
     choice.codec = codec;
     // The paper's codecs are what tracker is compared with: always as the paper has them.
     choice.predictor = codec == "tracker" ? options.choice.predictor : "ballistic";
-    auto session = sessions::plan_session(scene, choice);
-    if (!session) return tl::unexpected(session.error());
-    sessions.push_back(std::move(*session));
+    auto stream = sessions::plan_stream(scene, choice);
+    if (!stream) return tl::unexpected(stream.error());
+    streams.push_back(std::move(*stream));
   }
-  auto replay = Replay::create(*source.simulation, std::move(source.script), sessions[0].lattice,
-                               sessions[0].layout.type_count);
+  auto replay = Replay::create(*source.simulation, std::move(source.script), streams[0].lattice);
   if (!replay) return tl::unexpected(replay.error());
   const double threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
-  auto rows = measure_bandwidth(*replay, sessions, frames, progress,
+  auto rows = measure_bandwidth(*replay, streams, frames, progress,
                                 options.peers ? std::optional(threshold) : std::nullopt);
   if (!rows) return rows;
   for (BandwidthRow& row : *rows) {

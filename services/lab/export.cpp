@@ -27,12 +27,11 @@ Result<void> export_trajectory(const ExportOptions& options) {
   if (!source) return tl::unexpected(source.error());
   sessions::SessionChoice choice;
   choice.bodies = options.run.bodies;
-  const auto session = sessions::plan_session(*scene, choice);
-  if (!session) return tl::unexpected(session.error());
+  const auto stream = sessions::plan_stream(*scene, choice);
+  if (!stream) return tl::unexpected(stream.error());
   auto writer = TrajectoryWriter::create(options.out, options.run.bodies);
   if (!writer) return tl::unexpected(writer.error());
-  auto replay = Replay::create(*source->simulation, std::move(source->script), session->lattice,
-                               session->layout.type_count);
+  auto replay = Replay::create(*source->simulation, std::move(source->script), stream->lattice);
   if (!replay) return tl::unexpected(replay.error());
   TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m,
                       {},          options.scene};

@@ -8,22 +8,17 @@
 namespace tandem::lab {
 
 Replay::Replay(engine::Simulation& simulation, std::vector<TimedInput> script, const host::Lattice& lattice,
-               TypeId type_count, const Drive& start_drive)
+               const Drive& start_drive)
     : simulation_(&simulation),
       script_(std::move(script)),
       lattice_(lattice),
-      mirror_(lattice, simulation.capacity(), type_count),
       start_drive_(start_drive),
-      drive_(start_drive) {
-  mirror_.start(simulation.bodies());
-}
+      drive_(start_drive) {}
 
 Result<Replay> Replay::create(engine::Simulation& simulation, std::vector<TimedInput> script,
-                              const host::Lattice& lattice, TypeId type_count) {
+                              const host::Lattice& lattice) {
   return host::to_drive(lattice, simulation.gravity(), simulation.damping_per_s())
-      .map([&](const Drive& drive) {
-        return Replay(simulation, std::move(script), lattice, type_count, drive);
-      });
+      .map([&](const Drive& drive) { return Replay(simulation, std::move(script), lattice, drive); });
 }
 
 Result<void> Replay::take(const engine::Input& input) {
@@ -63,10 +58,7 @@ Result<void> Replay::next() {
   if (auto followed = follow_gravity(); !followed) return followed;
   const std::int64_t before = steady_ns();
   simulation_->step();
-  const std::int64_t stepped = steady_ns();
-  step_ns_ = stepped - before;
-  mirror_.update(simulation_->bodies(), simulation_->events());
-  mirror_ns_ = steady_ns() - stepped;
+  step_ns_ = steady_ns() - before;
   return {};
 }
 

@@ -1,6 +1,5 @@
 #pragma once
-// A simulation with its scripted inputs, put on the lattice frame by frame: a server's work without a
-// network.
+// A simulation with its scripted inputs, frame by frame: what drives streams where there are no clients.
 
 #include <cstdint>
 #include <span>
@@ -9,7 +8,6 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/clock.hpp"
 #include "services/host/lattice_choice.hpp"
-#include "services/host/mirror.hpp"
 #include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
 
@@ -26,26 +24,23 @@ class Replay {
  public:
   /// `script` ascends by frame. Errors: kInvalidArgument when gravity or damping do not fit the lattice.
   static Result<Replay> create(engine::Simulation& simulation, std::vector<TimedInput> script,
-                               const host::Lattice& lattice, TypeId type_count);
+                               const host::Lattice& lattice);
 
   /// Produces the next frame. Errors: kInvalidArgument for a scripted input that the simulation refuses.
   Result<void> next();
 
   [[nodiscard]] Frame frame() const { return frame_; }
-  [[nodiscard]] const State& target() const { return mirror_.target(); }
-  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return mirror_.lifecycle(); }
   /// Inputs that change the predicted step and act in the step that produced frame().
   [[nodiscard]] std::span<const ScheduledDrive> scheduled() const { return scheduled_; }
   /// In force before the first step.
   [[nodiscard]] const Drive& start_drive() const { return start_drive_; }
   [[nodiscard]] const engine::Simulation& simulation() const { return *simulation_; }
-  /// Of the last next(): the engine's step, and putting its result on the lattice.
+  /// Of the last next(): the engine's step.
   [[nodiscard]] std::int64_t step_ns() const { return step_ns_; }
-  [[nodiscard]] std::int64_t mirror_ns() const { return mirror_ns_; }
 
  private:
   Replay(engine::Simulation& simulation, std::vector<TimedInput> script, const host::Lattice& lattice,
-         TypeId type_count, const Drive& start_drive);
+         const Drive& start_drive);
   Result<void> take(const engine::Input& input);
   void schedule(const Drive& drive);
   /// A recorded trajectory changes its gravity without an input.
@@ -54,13 +49,12 @@ class Replay {
   engine::Simulation* simulation_;
   std::vector<TimedInput> script_;
   host::Lattice lattice_;
-  host::Mirror mirror_;
   Drive start_drive_, drive_;
   std::vector<ScheduledDrive> scheduled_;
   std::size_t next_input_ = 0;
   std::uint64_t input_number_ = 0;
   Frame frame_ = 0;
-  std::int64_t step_ns_ = 0, mirror_ns_ = 0;
+  std::int64_t step_ns_ = 0;
 };
 
 using transport::steady_ns;

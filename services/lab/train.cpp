@@ -10,25 +10,24 @@ namespace {
 
 constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
 
-/// What a session corrected in one pass over the source.
-Result<CodecStatistics> observe(const host::HostConfig& session, const std::function<Result<Source>()>& make,
+/// What a stream corrected in one pass over the source.
+Result<CodecStatistics> observe(const host::StreamConfig& config, const std::function<Result<Source>()>& make,
                                 std::uint64_t frames, const std::function<void(Frame)>& progress) {
   auto source = make();
   if (!source) return tl::unexpected(source.error());
-  auto replay = Replay::create(*source->simulation, std::move(source->script), session.lattice,
-                               session.layout.type_count);
+  const engine::Simulation& simulation = *source->simulation;
+  auto replay = Replay::create(*source->simulation, std::move(source->script), config.lattice);
   if (!replay) return tl::unexpected(replay.error());
-  auto timeline = ServerTimeline::create(session.layout, 1);
-  if (!timeline) return tl::unexpected(timeline.error());
+  auto stream = host::Stream::create(config, {.bodies = simulation.bodies(), .drive = replay->start_drive()});
+  if (!stream) return tl::unexpected(stream.error());
   CodecStatistics observed;
-  timeline->start(0, replay->target(), replay->start_drive());
-  timeline->set_statistics(&observed);
+  stream->set_statistics(&observed);
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
     for (const ScheduledDrive& input : replay->scheduled()) {
-      if (auto scheduled = timeline->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
+      if (auto scheduled = stream->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
     }
-    timeline->advance(replay->target(), replay->lifecycle());
+    stream->produce(simulation.bodies(), simulation.events());
     progress(frame);
   }
   return observed;
@@ -50,7 +49,8 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
   scene.trained.clear();
   choice.codec = "selective";
   choice.predictor = "ballistic";
-  const auto first = sessions::plan_session(scene, choice);
+  choice.automatic = false;
+  const auto first = sessions::plan_stream(scene, choice);
   if (!first) return tl::unexpected(first.error());
   const auto ranges = observe(*first, make, frames, progress);
   if (!ranges) return tl::unexpected(ranges.error());
@@ -64,7 +64,7 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
 
   scene.trained = {table};
   choice.codec = "quantized";
-  const auto second = sessions::plan_session(scene, choice);
+  const auto second = sessions::plan_stream(scene, choice);
   if (!second) return tl::unexpected(second.error());
   const auto counts = observe(*second, make, frames, [&](Frame frame) { progress(frames + frame); });
   if (!counts) return tl::unexpected(counts.error());

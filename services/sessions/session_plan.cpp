@@ -38,17 +38,17 @@ bool alike(const std::vector<engine::ParticleType>& types) {
 
 // Sets the predictor and its constants.
 Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice,
-                              const host::Lattice& lattice, host::HostConfig& config) {
+                              host::StreamConfig& stream) {
   const bool automatic = choice.predictor == "auto";
   const bool field_pays =
       choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
-  config.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
-  if (config.layout.predictor != "field" && config.layout.predictor != "contact") return {};
-  auto constants = contact_constants(scene, lattice, config.layout.predictor);
+  stream.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
+  if (stream.layout.predictor != "field" && stream.layout.predictor != "contact") return {};
+  auto constants = contact_constants(scene, stream.lattice, stream.layout.predictor);
   if (constants) {
-    config.layout.predictor_constants = std::move(*constants);
+    stream.layout.predictor_constants = std::move(*constants);
   } else if (automatic) {
-    config.layout.predictor = "ballistic";
+    stream.layout.predictor = "ballistic";
   } else {
     return tl::unexpected(constants.error());
   }
@@ -56,20 +56,20 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
 }
 
 // Decay and gains of the first frame, and what the later ones aim at.
-Result<void> choose_gains(host::HostConfig& config) {
-  if (config.layout.codec != "tracker") return {};
+Result<void> choose_gains(host::StreamConfig& stream) {
+  if (stream.layout.codec != "tracker") return {};
   // What the constants make of the predictor, which may be another than the name says.
-  const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
+  const auto predictor = make_predictor(stream.layout.predictor, 1, stream.layout.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
   const std::string_view kind = (*predictor)->name();
-  config.layout.parameters = with_first_gains(config.layout.parameters, kind);
-  config.gains = host::usual_gain_goal(kind);
+  stream.layout.parameters = with_first_gains(stream.layout.parameters, kind);
+  stream.gains = host::usual_gain_goal(kind);
   return {};
 }
 
 }  // namespace
 
-Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
+Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice) {
   const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   const double threshold_m =
       choice.automatic ? std::min(stated_m, choice.max_error_m.value_or(stated_m)) : stated_m;
@@ -82,40 +82,47 @@ Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionC
       host::codec_parameters(*lattice, threshold_m, table.position_range_m, table.velocity_range_m_per_s);
   if (!parameters) return tl::unexpected(parameters.error());
 
-  host::HostConfig config;
+  host::StreamConfig stream;
   if (choice.automatic) {
     const auto units = [&](double metres) {
       return static_cast<std::int32_t>(
           std::clamp(std::round(metres * lattice->position_scale()), 1.0, double{kPositionLimit}));
     };
-    config.quality = host::QualityGoal{choice.target_mbit_per_s, units(finest_m),
+    stream.quality = host::QualityGoal{choice.target_mbit_per_s, units(finest_m),
                                        units(choice.max_error_m.value_or(threshold_m * kCoarsest))};
   }
-  config.lattice = *lattice;
-  config.layout.parameters = *parameters;
-  config.layout.capacity = choice.bodies;
-  config.frame_rate_hz = 1 / scene.dt_s;
-  config.layout.codec = choice.codec;
-  config.layout.codec_tables = codec_tables(choice.codec, table);
-  if (choice.codec == "limited") config.budget = choice.budget_bytes.value_or(kPaperBudgetBytes);
-  if (choice.codec == "tracker") config.budget = choice.budget_bytes.value_or(kNoBudget);
-  if (auto chosen = choose_predictor(scene, choice, *lattice, config); !chosen)
-    return tl::unexpected(chosen.error());
-  if (auto gained = choose_gains(config); !gained) return tl::unexpected(gained.error());
-  config.run_blocks = host::blocks_on_threads(choice.threads);
-  config.scene = scene.name;
-  config.scene_description = scene.text;
-  config.types.clear();
-  for (const scenes::BodyType& type : scene.types) {
-    config.types.push_back(
-        {.name = type.name, .radius = static_cast<float>(type.radius_m), .colour_rgba = type.colour_rgba});
-  }
-  config.layout.type_count = static_cast<TypeId>(config.types.size());
-  return config;
+  stream.lattice = *lattice;
+  stream.layout.capacity = choice.bodies;
+  stream.layout.type_count = static_cast<TypeId>(scene.types.size());
+  stream.layout.parameters = *parameters;
+  stream.layout.codec = choice.codec;
+  stream.layout.codec_tables = codec_tables(choice.codec, table);
+  if (choice.codec == "limited") stream.budget = choice.budget_bytes.value_or(kPaperBudgetBytes);
+  if (choice.codec == "tracker") stream.budget = choice.budget_bytes.value_or(kNoBudget);
+  if (auto chosen = choose_predictor(scene, choice, stream); !chosen) return tl::unexpected(chosen.error());
+  if (auto gained = choose_gains(stream); !gained) return tl::unexpected(gained.error());
+  stream.local.run_blocks = host::blocks_on_threads(choice.threads);
+  return stream;
 }
 
-Result<std::size_t> largest_delta_bytes(const host::HostConfig& config) {
-  return ServerTimeline::create(config.layout, config.epoch).map([](const ServerTimeline& timeline) {
+Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
+  return plan_stream(scene, choice).map([&](host::StreamConfig&& stream) {
+    host::HostConfig config;
+    config.stream = std::move(stream);
+    config.frame_rate_hz = 1 / scene.dt_s;
+    config.scene = scene.name;
+    config.scene_description = scene.text;
+    config.types.clear();
+    for (const scenes::BodyType& type : scene.types) {
+      config.types.push_back(
+          {.name = type.name, .radius = static_cast<float>(type.radius_m), .colour_rgba = type.colour_rgba});
+    }
+    return config;
+  });
+}
+
+Result<std::size_t> largest_delta_bytes(const host::StreamConfig& stream) {
+  return ServerTimeline::create(stream.layout, Epoch{1}).map([](const ServerTimeline& timeline) {
     return timeline.payload_bound();
   });
 }

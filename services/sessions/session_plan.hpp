@@ -32,14 +32,17 @@ struct SessionChoice {
   std::uint32_t threads = 1;  ///< of the codec, where a session has several blocks
 };
 
-/// The part of a host's configuration that follows from scene and choice: layout, lattice, budget, goals,
-/// names. The rest keeps its defaults. Where nothing was trained for
-/// this size and threshold, the nearest table is used, and the built-in one for a scene that was never
-/// trained. Errors: kInvalidArgument (the threshold, or a world too large for it).
+/// The stream that follows from scene and choice. Where nothing was trained for this size and threshold, the
+/// nearest table is used, and the built-in one for a scene that was never trained. Errors: kInvalidArgument
+/// (the threshold, or a world too large for it).
+[[nodiscard]] Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice);
+
+/// A host's configuration with that stream, the scene's frame rate, types and names; the rest keeps its
+/// defaults. Errors: as plan_stream().
 [[nodiscard]] Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice);
 
-/// Most bytes a delta of this session can take: what a transport must be ready for before the host exists.
-/// Errors: as Host::create for codec and predictor.
-[[nodiscard]] Result<std::size_t> largest_delta_bytes(const host::HostConfig& config);
+/// Most bytes a delta of this stream can take: what a transport must be ready for before the host exists.
+/// Errors: as Stream::create() for codec and predictor.
+[[nodiscard]] Result<std::size_t> largest_delta_bytes(const host::StreamConfig& stream);
 
 }  // namespace tandem::sessions

@@ -17,17 +17,17 @@ std::string gains_text(const CodecParameters& parameters) {
                      parameters.acceleration_gain / 65536.0, parameters.decay / 655.36);
 }
 
-std::string coding_text(const host::HostConfig& config) {
-  std::string text = fmt::format("codec {}, predictor {}", config.layout.codec, config.layout.predictor);
-  const auto metres = [&](std::int32_t units) { return units * config.lattice.unit; };
-  if (config.layout.codec != "none")
-    text += fmt::format(", threshold {:.4g} m", metres(config.layout.parameters.threshold));
-  if (config.quality) {
-    text += fmt::format(" (automatic, up to {:.4g} m)", metres(config.quality->largest_threshold));
-    if (config.quality->target_mbit_per_s > 0)
-      text += fmt::format(", target {} Mbit/s", config.quality->target_mbit_per_s);
+std::string coding_text(const host::StreamConfig& stream) {
+  std::string text = fmt::format("codec {}, predictor {}", stream.layout.codec, stream.layout.predictor);
+  const auto metres = [&](std::int32_t units) { return units * stream.lattice.unit; };
+  if (stream.layout.codec != "none")
+    text += fmt::format(", threshold {:.4g} m", metres(stream.layout.parameters.threshold));
+  if (stream.quality) {
+    text += fmt::format(" (automatic, up to {:.4g} m)", metres(stream.quality->largest_threshold));
+    if (stream.quality->target_mbit_per_s > 0)
+      text += fmt::format(", target {} Mbit/s", stream.quality->target_mbit_per_s);
   }
-  if (config.budget != kNoBudget) text += fmt::format(", budget {} bytes a frame", config.budget);
+  if (stream.budget != kNoBudget) text += fmt::format(", budget {} bytes a frame", stream.budget);
   return text;
 }
 

@@ -13,7 +13,7 @@ namespace tandem::daemon {
 
 /// How bodies are predicted and corrected from the first frame on: codec, predictor, threshold, and what
 /// binds them.
-[[nodiscard]] std::string coding_text(const host::HostConfig& config);
+[[nodiscard]] std::string coding_text(const host::StreamConfig& stream);
 
 /// Writes to stderr. Not thread-safe.
 class Console {

@@ -114,7 +114,7 @@ Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& op
     config.epoch = static_cast<Epoch>(wall_ns() / host::kMillisecond);
     if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
     config.free_rate = options.free_rate;
-    config.layout.lead = options.lead;
+    config.stream.layout.lead = options.lead;
     config.window = options.window;
     config.stall_timeout_ns.reset();
     if (options.stall_timeout_s)
@@ -129,7 +129,7 @@ Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& op
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
                                                          const Options& options,
                                                          const std::atomic<bool>& stop) {
-  const auto largest = sessions::largest_delta_bytes(config);
+  const auto largest = sessions::largest_delta_bytes(config.stream);
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;
@@ -209,7 +209,7 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   auto port = open_port(*config, options, stop);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
-  const std::string coding = coding_text(*config);
+  const std::string coding = coding_text(config->stream);
   auto host = host::Host::create(std::move(*config), **simulation, **port);
   if (!host) return report_error(host.error(), 2);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name, options.bodies,

@@ -108,18 +108,19 @@ void World::start_server() {
   host::HostConfig config;
   config.epoch = epoch_;
   config.start_frame = start_frame_;
-  config.layout.lead = options_.lead;
+  config.stream.layout.lead = options_.lead;
   if (dice_.chance(0.3)) config.window = 2;
-  config.layout.capacity = kBodies;
-  config.layout.codec = options_.codec;
-  if (config.layout.codec == "limited") config.budget = 600;
-  if (config.layout.codec == "entropy" || config.layout.codec == "limited")
-    config.layout.codec_tables = default_code_tables();
-  config.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
-  config.layout.parameters = must(host::codec_parameters(config.lattice, 0.01, 0.1, 2));
-  if (config.layout.codec == "tracker") {
-    config.layout.parameters = with_first_gains(config.layout.parameters, config.layout.predictor);
-    config.gains = host::GainGoal{};
+  config.stream.layout.capacity = kBodies;
+  config.stream.layout.codec = options_.codec;
+  if (config.stream.layout.codec == "limited") config.stream.budget = 600;
+  if (config.stream.layout.codec == "entropy" || config.stream.layout.codec == "limited")
+    config.stream.layout.codec_tables = default_code_tables();
+  config.stream.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
+  config.stream.layout.parameters = must(host::codec_parameters(config.stream.lattice, 0.01, 0.1, 2));
+  if (config.stream.layout.codec == "tracker") {
+    config.stream.layout.parameters =
+        with_first_gains(config.stream.layout.parameters, config.stream.layout.predictor);
+    config.stream.gains = host::GainGoal{};
   }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};
   host_ = must(host::Host::create(config, *simulation_, *server_port_));

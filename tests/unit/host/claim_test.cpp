@@ -104,15 +104,15 @@ TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
   EXPECT_TRUE(refused([](HostConfig& c) { c.session.clear(); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.frame_rate_hz = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.frame_rate_hz = std::nan(""); }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.layout.lead = 2; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.lead = 2; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.window = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.window = 25; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.client_limit = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types.clear(); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.epoch = 0; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.layout.codec = "morse"; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.layout.predictor = "oracle"; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.layout.parameters.threshold = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.codec = "morse"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.predictor = "oracle"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.parameters.threshold = 0; }));
 }
 
 TEST(HostCreate, RefusesASimulationWhoseColumnsAreTooShort) {
@@ -136,7 +136,7 @@ TEST(HostCreate, DescribesTheSessionCompletely) {
   EXPECT_EQ(session, bench.host->session());
   EXPECT_EQ(session.epoch, config.epoch);
   EXPECT_EQ(session.layout.capacity, 4U);
-  EXPECT_EQ(session.lattice_unit, config.lattice.unit);
+  EXPECT_EQ(session.lattice_unit, config.stream.lattice.unit);
   EXPECT_EQ(session.layout.parameters.threshold, 4096);
   EXPECT_EQ(session.layout.lead, 1U);
   EXPECT_EQ(session.window_ceiling, 24U);

@@ -147,10 +147,10 @@ class FakePort final : public transport::ServerPort {
   HostConfig config;
   config.session = "unit";
   config.epoch = 1'700'000'000'000;
-  config.layout.capacity = 4;
-  config.layout.codec = "selective";
-  config.lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
-  config.layout.parameters = *codec_parameters(config.lattice, 1.0 / 64, 0, 0);
+  config.stream.layout.capacity = 4;
+  config.stream.layout.codec = "selective";
+  config.stream.lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
+  config.stream.layout.parameters = *codec_parameters(config.stream.lattice, 1.0 / 64, 0, 0);
   config.claim_ns = 0;
   return config;
 }
@@ -162,7 +162,7 @@ class Bench {
 
   explicit Bench(HostConfig config = test_config(), std::uint32_t capacity = 4)
       : simulation(capacity), port(participant(0xAA)) {
-    config.layout.capacity = capacity;
+    config.stream.layout.capacity = capacity;
     auto made = Host::create(std::move(config), simulation, port);
     if (!made) throw std::runtime_error(made.error().message);
     host = std::move(*made);

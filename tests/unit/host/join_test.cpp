@@ -93,7 +93,7 @@ TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {
   }
   EXPECT_EQ(client->applied(), bench.host->frame());
   EXPECT_EQ(client->hash(), bench.host->hash());
-  EXPECT_EQ(client->drive().gravity[2], to_drive(test_config().lattice, {0, 0, -5}, 0)->gravity[2]);
+  EXPECT_EQ(client->drive().gravity[2], to_drive(test_config().stream.lattice, {0, 0, -5}, 0)->gravity[2]);
 }
 
 TEST_F(JoinTest, TheSameJoinerGetsAnotherOnlyAfterItAsksAgain) {

@@ -45,7 +45,7 @@ TEST(Publish, FramesContinueFromAStartFrame) {
 
 TEST(Publish, LargeDeltasAreCutIntoPartsOfSixtyThousandBytes) {
   HostConfig config = test_config();
-  config.layout.codec = "none";
+  config.stream.layout.codec = "none";
   Bench bench(config, 10'000);
   bench.poll();
   bench.run_to(2);
@@ -156,7 +156,7 @@ TEST(Publish, TheAgreedStateFollowsTheSimulationWithinTheThreshold) {
   bench.poll();
   for (Frame frame = 1; frame < 200; ++frame) {
     bench.run_to(frame);
-    const double agreed = bench.host->agreed().p(0)[0] * test_config().lattice.unit;
+    const double agreed = bench.host->agreed().p(0)[0] * test_config().stream.lattice.unit;
     ASSERT_LE(std::abs(agreed - double{bench.simulation.position[0][0]}), 1.0 / 64 + 1e-5);
   }
 }

@@ -120,13 +120,13 @@ TEST(Quality, ATargetOutOfReachIsSaidAfterTwoSecondsAndTakenBackAfterTwo) {
 
 TEST(Quality, ABudgetThatHoldsTheRateBelowTheTargetIsRefused) {
   HostConfig config = test_config();
-  config.layout.codec = "limited";
-  config.layout.codec_tables = default_code_tables();
-  config.quality = QualityGoal{1, 1, kPositionLimit};
-  config.budget = least_budget(*config.quality, config.frame_rate_hz);
-  EXPECT_GT(config.budget, kMbitBytes);
+  config.stream.layout.codec = "limited";
+  config.stream.layout.codec_tables = default_code_tables();
+  config.stream.quality = QualityGoal{1, 1, kPositionLimit};
+  config.stream.budget = least_budget(*config.stream.quality, config.frame_rate_hz);
+  EXPECT_GT(config.stream.budget, kMbitBytes);
   EXPECT_NO_THROW(Bench bench(config));
-  --config.budget;
+  --config.stream.budget;
   EXPECT_THROW(Bench bench(config), std::runtime_error);
 }
 
@@ -173,7 +173,7 @@ TEST(Quality, LimitsThatExcludeTheThresholdAreRefused) {
   EXPECT_FALSE(valid_goal({std::nan(""), 1, 2000}, kStart));
   EXPECT_FALSE(valid_goal({0, 0, 2000}, kStart));
   HostConfig config = test_config();
-  config.quality = QualityGoal{0, 1, 1};
+  config.stream.quality = QualityGoal{0, 1, 1};
   EXPECT_THROW(Bench bench(config), std::runtime_error);
 }
 
@@ -214,7 +214,7 @@ TEST_F(RuntimeQuality, ParametersSetByHandTravelInTheNextDeltaAndClientsFollow) 
   coarse.threshold *= 16;
   coarse.velocity_step *= 2;
   ASSERT_TRUE(bench.host->set_parameters(coarse));
-  EXPECT_EQ(client->parameters(), test_config().layout.parameters);
+  EXPECT_EQ(client->parameters(), test_config().stream.layout.parameters);
   const Frame before = bench.host->frame();
   bench.run_ms(40);
   ASSERT_EQ(bench.host->frame(), before + 1);
@@ -228,14 +228,14 @@ TEST_F(RuntimeQuality, ParametersOutOfRangeAreRefusedAndChangeNothing) {
   CodecParameters bad = bench.host->parameters();
   bad.position_step = 0;
   EXPECT_FALSE(bench.host->set_parameters(bad));
-  EXPECT_EQ(bench.host->parameters(), test_config().layout.parameters);
+  EXPECT_EQ(bench.host->parameters(), test_config().stream.layout.parameters);
 }
 
 HostConfig automatic() {
   HostConfig config = test_config();
-  config.layout.codec = "quantized";
-  config.quality =
-      QualityGoal{0.005, config.layout.parameters.threshold, 64 * config.layout.parameters.threshold};
+  config.stream.layout.codec = "quantized";
+  config.stream.quality = QualityGoal{0.005, config.stream.layout.parameters.threshold,
+                                      64 * config.stream.layout.parameters.threshold};
   return config;
 }
 
@@ -247,9 +247,10 @@ class AutomaticQuality : public RuntimeQuality {
 TEST_F(AutomaticQuality, TheHostFollowsItsTargetAndClientsFollowTheHost) {
   bench.run_ms(20'000);
   follow();
-  EXPECT_NE(bench.host->parameters(), automatic().layout.parameters);
+  EXPECT_NE(bench.host->parameters(), automatic().stream.layout.parameters);
   EXPECT_EQ(client->parameters(), bench.host->parameters());
-  EXPECT_FALSE(bench.host->set_parameters(automatic().layout.parameters)) << "nobody else decides then";
+  EXPECT_FALSE(bench.host->set_parameters(automatic().stream.layout.parameters))
+      << "nobody else decides then";
 }
 
 TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedError) {
@@ -261,16 +262,19 @@ TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedEr
   choice.target_mbit_per_s = 0.5;
   auto plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan);
-  ASSERT_TRUE(plan->quality);
-  EXPECT_NEAR(plan->layout.parameters.threshold * plan->lattice.unit, scene->threshold_m, 1e-6);
-  EXPECT_NEAR(plan->quality->smallest_threshold * plan->lattice.unit, scene->threshold_m / 4, 1e-6);
-  EXPECT_NEAR(plan->quality->largest_threshold * plan->lattice.unit, scene->threshold_m * 4, 1e-6);
+  ASSERT_TRUE(plan->stream.quality);
+  EXPECT_NEAR(plan->stream.layout.parameters.threshold * plan->stream.lattice.unit, scene->threshold_m, 1e-6);
+  EXPECT_NEAR(plan->stream.quality->smallest_threshold * plan->stream.lattice.unit, scene->threshold_m / 4,
+              1e-6);
+  EXPECT_NEAR(plan->stream.quality->largest_threshold * plan->stream.lattice.unit, scene->threshold_m * 4,
+              1e-6);
   choice.max_error_m = scene->threshold_m / 2;
   plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan) << "a smaller error is where it starts";
-  EXPECT_TRUE(valid_goal(*plan->quality, plan->layout.parameters));
-  EXPECT_NEAR(plan->layout.parameters.threshold * plan->lattice.unit, scene->threshold_m / 2, 1e-6);
-  EXPECT_EQ(plan->quality->largest_threshold, plan->layout.parameters.threshold);
+  EXPECT_TRUE(valid_goal(*plan->stream.quality, plan->stream.layout.parameters));
+  EXPECT_NEAR(plan->stream.layout.parameters.threshold * plan->stream.lattice.unit, scene->threshold_m / 2,
+              1e-6);
+  EXPECT_EQ(plan->stream.quality->largest_threshold, plan->stream.layout.parameters.threshold);
 }
 
 }  // namespace

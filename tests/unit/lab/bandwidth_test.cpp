@@ -14,18 +14,18 @@ namespace {
 constexpr std::uint32_t kBodies = 500;
 constexpr double kThreshold = 0.05;
 
-std::vector<host::HostConfig> sessions(const std::vector<std::string>& codecs) {
-  host::HostConfig session;
-  session.layout.capacity = kBodies;
-  session.lattice = *host::choose_lattice(kThreshold, 100, Bouncing::kDt);
-  session.layout.parameters = *host::codec_parameters(session.lattice, kThreshold, 0, 0);
-  std::vector<host::HostConfig> all;
+std::vector<host::StreamConfig> streams(const std::vector<std::string>& codecs) {
+  host::StreamConfig stream;
+  stream.layout.capacity = kBodies;
+  stream.lattice = *host::choose_lattice(kThreshold, 100, Bouncing::kDt);
+  stream.layout.parameters = *host::codec_parameters(stream.lattice, kThreshold, 0, 0);
+  std::vector<host::StreamConfig> all;
   for (const std::string& codec : codecs) {
-    session.layout.codec = codec;
-    session.budget = codec == "limited" ? 100 : kNoBudget;
-    session.layout.codec_tables =
+    stream.layout.codec = codec;
+    stream.budget = codec == "limited" ? 100 : kNoBudget;
+    stream.layout.codec_tables =
         codec == "entropy" || codec == "limited" ? default_code_tables() : std::vector<std::byte>{};
-    all.push_back(session);
+    all.push_back(stream);
   }
   return all;
 }
@@ -33,8 +33,8 @@ const std::vector<std::string> kPaper{"none", "selective", "quantized", "entropy
 
 std::vector<BandwidthRow> measure(std::vector<TimedInput> script, std::uint64_t frames) {
   Bouncing simulation(kBodies);
-  const auto all = sessions(kPaper);
-  auto replay = Replay::create(simulation, std::move(script), all[0].lattice, 1);
+  const auto all = streams(kPaper);
+  auto replay = Replay::create(simulation, std::move(script), all[0].lattice);
   EXPECT_TRUE(replay) << replay.error().message;
   std::uint64_t last = 0;
   auto rows = measure_bandwidth(*replay, all, frames, [&last](Frame frame) { last = frame; });
@@ -75,8 +75,8 @@ TEST(Bandwidth, scripted_gravity_reaches_both_sides_on_its_frame) {
 
 TEST(Bandwidth, a_refused_scripted_input_names_its_frame) {
   Bouncing simulation(kBodies);
-  const auto all = sessions(kPaper);
-  auto replay = Replay::create(simulation, {{3, {}}}, all[0].lattice, 1);
+  const auto all = streams(kPaper);
+  auto replay = Replay::create(simulation, {{3, {}}}, all[0].lattice);
   ASSERT_TRUE(replay);
   const auto rows = measure_bandwidth(*replay, all, 5, [](Frame) {});
   ASSERT_FALSE(rows);
@@ -85,8 +85,8 @@ TEST(Bandwidth, a_refused_scripted_input_names_its_frame) {
 
 TEST(Bandwidth, an_unknown_codec_is_named) {
   Bouncing simulation(kBodies);
-  const auto all = sessions({"zip"});
-  auto replay = Replay::create(simulation, {}, all[0].lattice, 1);
+  const auto all = streams({"zip"});
+  auto replay = Replay::create(simulation, {}, all[0].lattice);
   ASSERT_TRUE(replay);
   const auto rows = measure_bandwidth(*replay, all, 5, [](Frame) {});
   ASSERT_FALSE(rows);
@@ -104,8 +104,8 @@ TEST(Bandwidth, knows_the_papers_table) {
 
 TEST(Bandwidth, adaptive_codecs_show_what_their_decisions_took_and_the_bound_beside_it) {
   Bouncing simulation(kBodies);
-  const auto all = sessions({"entropy", "tracker"});
-  auto replay = Replay::create(simulation, {}, all[0].lattice, 1);
+  const auto all = streams({"entropy", "tracker"});
+  auto replay = Replay::create(simulation, {}, all[0].lattice);
   ASSERT_TRUE(replay);
   const auto rows = measure_bandwidth(*replay, all, 120, [](Frame) {});
   ASSERT_TRUE(rows) << rows.error().message;
@@ -118,8 +118,8 @@ TEST(Bandwidth, adaptive_codecs_show_what_their_decisions_took_and_the_bound_bes
 
 TEST(Bandwidth, peers_keep_to_the_same_largest_error_and_name_a_missing_library) {
   Bouncing simulation(kBodies);
-  const auto all = sessions({"selective"});
-  auto replay = Replay::create(simulation, {}, all[0].lattice, 1);
+  const auto all = streams({"selective"});
+  auto replay = Replay::create(simulation, {}, all[0].lattice);
   ASSERT_TRUE(replay);
   const auto rows = measure_bandwidth(
       *replay, all, 60, [](Frame) {}, kThreshold);

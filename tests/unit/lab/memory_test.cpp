@@ -13,11 +13,12 @@ Result<MemoryUse> measure(std::uint32_t bodies) {
       [bodies]() -> Result<HostedSimulation> {
         HostedSimulation hosted;
         hosted.simulation = std::make_unique<Bouncing>(bodies);
-        hosted.config.lattice = *host::choose_lattice(0.05, 1000, Bouncing::kDt);
-        hosted.config.layout.parameters = *host::codec_parameters(hosted.config.lattice, 0.05, 0, 0);
-        hosted.config.layout.capacity = bodies;
-        hosted.config.layout.codec = "entropy";
-        hosted.config.layout.codec_tables = default_code_tables();
+        hosted.config.stream.lattice = *host::choose_lattice(0.05, 1000, Bouncing::kDt);
+        hosted.config.stream.layout.parameters =
+            *host::codec_parameters(hosted.config.stream.lattice, 0.05, 0, 0);
+        hosted.config.stream.layout.capacity = bodies;
+        hosted.config.stream.layout.codec = "entropy";
+        hosted.config.stream.layout.codec_tables = default_code_tables();
         return hosted;
       },
       20);

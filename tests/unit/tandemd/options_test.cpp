@@ -231,9 +231,9 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       ASSERT_TRUE(config) << config.error().message;
       EXPECT_EQ(config->types.size(), scene->types.size());
       EXPECT_EQ(config->scene, name);
-      EXPECT_EQ(config->budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
-      EXPECT_EQ(config->layout.parameters.threshold, 1 << config->lattice.halvings);
-      const auto largest = sessions::largest_delta_bytes(*config);
+      EXPECT_EQ(config->stream.budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
+      EXPECT_EQ(config->stream.layout.parameters.threshold, 1 << config->stream.lattice.halvings);
+      const auto largest = sessions::largest_delta_bytes(config->stream);
       ASSERT_TRUE(largest) << largest.error().message;
       EXPECT_GT(*largest, 0U);
     }
@@ -245,13 +245,13 @@ TEST(SessionPlan, ABudgetBindsTheCodecsThatServeWhoWaits) {
   ASSERT_TRUE(scene);
   sessions::SessionChoice choice;
   choice.bodies = 1000;
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->budget, kNoBudget);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, kNoBudget);
   choice.budget_bytes = 200;
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->budget, 200U);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, 200U);
   choice.codec = "limited";
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->budget, 200U);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, 200U);
   choice.codec = "entropy";
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->budget, kNoBudget);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, kNoBudget);
 }
 
 TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
@@ -265,12 +265,13 @@ TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
     choice.predictor = "contact";
     const auto config = sessions::plan_session(*scene, choice);
     ASSERT_TRUE(config) << config.error().message;
-    EXPECT_TRUE(sessions::largest_delta_bytes(*config));
-    const auto read = read_contact_constants(config->layout.predictor_constants);
+    EXPECT_TRUE(sessions::largest_delta_bytes(config->stream));
+    const auto read = read_contact_constants(config->stream.layout.predictor_constants);
     ASSERT_TRUE(read);
     EXPECT_EQ(read->substeps, static_cast<std::int32_t>(scene->world.substeps));
     EXPECT_EQ(read->planes.size(), scene->world.planes.size());
-    EXPECT_NEAR(read->types[0].radius * config->lattice.unit, scene->smallest_radius_m, config->lattice.unit);
+    EXPECT_NEAR(read->types[0].radius * config->stream.lattice.unit, scene->smallest_radius_m,
+                config->stream.lattice.unit);
     scene->world.types.clear();  // as of a recorded trajectory
     EXPECT_FALSE(sessions::plan_session(*scene, choice));
   }
@@ -284,8 +285,9 @@ TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
     choice.bodies = bodies;
     choice.codec = codec;
     const auto config = *sessions::plan_session(*scene, choice);
-    EXPECT_EQ(config.layout.predictor_constants.empty(), config.layout.predictor == "ballistic");
-    return config.layout.predictor;
+    EXPECT_EQ(config.stream.layout.predictor_constants.empty(),
+              config.stream.layout.predictor == "ballistic");
+    return config.stream.layout.predictor;
   };
   EXPECT_EQ(predictor("tracker", 50000), "field");
   EXPECT_EQ(predictor("tracker", 50001), "ballistic");
@@ -301,7 +303,7 @@ TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
   choice.bodies = 1000;
   const auto threshold_m = [&] {
     const auto config = *sessions::plan_session(*scene, choice);
-    return config.layout.parameters.threshold * config.lattice.unit;
+    return config.stream.layout.parameters.threshold * config.stream.lattice.unit;
   };
   EXPECT_NEAR(threshold_m(), scene->threshold_m, 1e-9);
   choice.threshold_scale = 2;

@@ -1,0 +1,57 @@
+#include "services/host/publication.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::host {
+
+transport::SessionMessage session_message(const HostConfig& config, const Stream& stream) {
+  const StreamConfig& of_stream = stream.config();
+  transport::SessionMessage session;
+  session.session = config.session;
+  session.epoch = config.epoch;
+  session.layout = of_stream.layout;
+  session.frame_rate_hz = config.frame_rate_hz;
+  session.lattice_unit = of_stream.lattice.unit;
+  session.window_ceiling = config.window_ceiling;
+  session.max_delta_bytes = static_cast<std::uint32_t>(stream.payload_bound());
+  session.max_snapshot_bytes = static_cast<std::uint32_t>(stream.snapshot_bound());
+  session.client_cost_ns = of_stream.client_cost_ns;
+  session.scene = config.scene;
+  session.scene_description = config.scene_description;
+  session.types = config.types;
+  session.layout_hash = transport::layout_hash(session);
+  return session;
+}
+
+void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, std::int64_t wall_ns) {
+  const std::size_t size = frame.payload.size();
+  const std::size_t parts = std::max<std::size_t>((size + kPartBytes - 1) / kPartBytes, 1);
+  for (std::size_t part = 0; part < parts; ++part) {
+    const auto bytes =
+        frame.payload.subspan(part * kPartBytes, std::min(kPartBytes, size - part * kPartBytes));
+    transport::DeltaMessage delta;
+    delta.epoch = epoch;
+    delta.frame = frame.frame;
+    delta.part = static_cast<std::uint32_t>(part);
+    delta.parts = static_cast<std::uint32_t>(parts);
+    delta.last_input = frame.last_input;
+    delta.server_time_ns = wall_ns;
+    delta.hash = frame.hash;
+    delta.payload.assign(bytes.begin(), bytes.end());
+    // There is room: the caller made sure of it, and its thread is the only producer.
+    static_cast<void>(outbox.push(std::move(delta)));
+  }
+}
+
+bool push_snapshot(Outbox& outbox, Epoch epoch, Stream& stream) {
+  if (!outbox.has_snapshot_room()) return false;
+  transport::SnapshotMessage message;
+  message.slot = static_cast<std::uint32_t>(stream.frame() % 4);
+  message.epoch = epoch;
+  message.frame = stream.frame();
+  stream.snapshot(message.bytes);
+  return outbox.push(std::move(message));
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,23 @@
+#pragma once
+// What leaves the host: the session, the parts of a delta, a snapshot.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "sdk/transport/messages.hpp"
+#include "services/host/host.hpp"
+#include "services/host/outbox.hpp"
+#include "services/host/stream.hpp"
+
+namespace tandem::host {
+
+/// What a client must know before it reads a byte of `stream`.
+[[nodiscard]] transport::SessionMessage session_message(const HostConfig& config, const Stream& stream);
+
+/// Queues a delta, cut into parts of kPartBytes. There must be room for a frame.
+void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, std::int64_t wall_ns);
+
+/// Queues a snapshot of the last frame. False, and nothing queued, without room.
+[[nodiscard]] bool push_snapshot(Outbox& outbox, Epoch epoch, Stream& stream);
+
+}  // namespace tandem::host

@@ -1,0 +1,48 @@
+#include "services/host/status.hpp"
+
+#include <algorithm>
+
+#include "services/host/mbit.hpp"
+
+namespace tandem::host {
+namespace {
+
+constexpr double kRawBytesPerBody = 24;
+
+}  // namespace
+
+void StatusDesk::publish(const HostTotals& totals, const Present& present, std::int64_t now_ns) {
+  next_ns_ = now_ns + kSecond;
+  const double elapsed_s = std::max(static_cast<double>(now_ns - second_ns_) * 1e-9, 1e-9);
+  const auto frames = static_cast<double>(totals.frames - second_.frames);
+  const double per_frame = frames > 0 ? 1 / frames : 0;
+  transport::ServerStatusMessage status;
+  status.session = session_;
+  status.epoch = epoch_;
+  status.frame = present.frame;
+  status.uptime_s = static_cast<double>(now_ns - started_ns_) * 1e-9;
+  status.frame_rate_hz = frames / elapsed_s;
+  status.mbit_per_s =
+      static_cast<double>(totals.payload_bytes - second_.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
+  status.raw_mbit_per_s = present.bodies * kRawBytesPerBody * 8 * status.frame_rate_hz / kBitsPerMbit;
+  status.frame_ms_p50 = durations_.quantile_ms(0.5);
+  status.frame_ms_p99 = durations_.quantile_ms(0.99);
+  status.corrected_per_frame = static_cast<double>(totals.corrected - second_.corrected) * per_frame;
+  status.bodies = present.bodies;
+  status.participants = present.participants;
+  status.observers = present.observers;
+  status.window = present.window;
+  status.payload_bytes = totals.payload_bytes;
+  status.stalls = totals.stalls;
+  status.suspended_ms = totals.suspended_ms;
+  status.refused_inputs = totals.refused_inputs;
+  status.refused_messages = totals.refused_messages;
+  status.snapshots = totals.snapshots;
+  status.queue_high_water = static_cast<std::uint32_t>(outbox_->high_water());
+  if (!outbox_->push(std::move(status))) return;
+  second_ = totals;
+  second_ns_ = now_ns;
+  durations_.clear();
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,43 @@
+#pragma once
+// Figures for any DDS monitor, once a second.
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "sdk/statistics/duration_histogram.hpp"
+#include "services/host/host.hpp"
+#include "services/host/outbox.hpp"
+
+namespace tandem::host {
+
+/// Turns counts since the start into rates of the last second. Not thread-safe.
+class StatusDesk {
+ public:
+  StatusDesk(std::string session, Epoch epoch, Outbox& outbox)
+      : session_(std::move(session)), epoch_(epoch), outbox_(&outbox) {}
+
+  void start(std::int64_t now_ns) { started_ns_ = second_ns_ = now_ns; }
+  void frame_took(double ms) { durations_.add_ms(ms); }
+
+  [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
+  /// What is so at the moment.
+  struct Present {
+    Frame frame = 0;
+    std::uint32_t bodies = 0, participants = 0, observers = 0, window = 0;
+  };
+  /// Best effort: without room in the outbox this second's figures are lost.
+  void publish(const HostTotals& totals, const Present& present, std::int64_t now_ns);
+
+ private:
+  std::string session_;
+  Epoch epoch_;
+  Outbox* outbox_;
+  std::int64_t started_ns_ = 0, next_ns_ = 0;
+  // Of the last status.
+  HostTotals second_;
+  std::int64_t second_ns_ = 0;
+  DurationHistogram durations_;  // since then
+};
+
+}  // namespace tandem::host

@@ -1,0 +1,135 @@
+#include "services/host/stream.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "sdk/core/lattice/assert.hpp"
+#include "services/host/mirror.hpp"
+
+namespace tandem::host {
+namespace {
+
+Result<void> check(const StreamConfig& config, const StreamStart& start) {
+  const auto refuse = [](std::string message) {
+    return fail(ErrorCode::kInvalidArgument, std::move(message));
+  };
+  if (config.quality) {
+    if (!valid_goal(*config.quality, config.layout.parameters))
+      return refuse("automatic quality: the threshold must lie between its smallest and its largest");
+    const std::size_t least = least_budget(*config.quality, start.frame_rate_hz);
+    if (config.budget < least) {
+      return refuse(fmt::format(
+          "a budget of {} bytes a frame is too tight for a target of {} Mbit/s, which needs at least {} bytes",
+          config.budget, config.quality->target_mbit_per_s, least));
+    }
+  }
+  const std::uint32_t capacity = config.layout.capacity;
+  bool whole = start.bodies.alive.size() == capacity && start.bodies.type.size() == capacity;
+  for (const auto& column : start.bodies.position) whole = whole && column.size() == capacity;
+  for (const auto& column : start.bodies.velocity) whole = whole && column.size() == capacity;
+  if (!whole) return refuse(fmt::format("body columns that are not of {} slots", capacity));
+  return {};
+}
+
+}  // namespace
+
+struct Stream::Impl {
+  Impl(StreamConfig configuration, const StreamStart& start, ServerTimeline server)
+      : config(std::move(configuration)),
+        mirror(config.lattice, config.layout.capacity, config.layout.type_count),
+        timeline(std::move(server)),
+        parameters(config.layout.parameters) {
+    mirror.start(start.bodies);
+    timeline.start(start.frame, mirror.target(), start.drive);
+    bodies = mirror.target().alive_count();
+    if (config.quality) {
+      const StepRule steps = step_rule(config.layout.codec, !config.layout.codec_tables.empty());
+      quality.emplace(*config.quality, steps, parameters, config.layout.capacity, start.frame_rate_hz);
+      if (steps != StepRule::kLeave) timeline.set_statistics(&quality->statistics());
+    }
+    if (config.gains) {
+      gains.emplace(*config.gains, config.layout.capacity, parameters);
+      timeline.set_evidence(&gains->evidence());
+    }
+  }
+
+  void choose_parameters(const FrameResult& result);
+  [[nodiscard]] std::int64_t now_ns() const { return clock == nullptr ? 0 : clock(); }
+
+  StreamConfig config;
+  Mirror mirror;
+  ServerTimeline timeline;
+  CodecParameters parameters;  // of the next frame
+  std::optional<QualityControl> quality;
+  std::optional<GainControl> gains;
+  std::uint32_t bodies = 0;
+  std::int64_t (*clock)() = nullptr;
+};
+
+Result<Stream> Stream::create(StreamConfig config, const StreamStart& start) {
+  if (auto good = check(config, start); !good) return tl::unexpected(good.error());
+  auto timeline = ServerTimeline::create(config.layout, start.epoch, config.local);
+  if (!timeline) return tl::unexpected(timeline.error());
+  return Stream(std::make_unique<Impl>(std::move(config), start, std::move(*timeline)));
+}
+
+Stream::Stream(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Stream::Stream(Stream&&) noexcept = default;
+Stream& Stream::operator=(Stream&&) noexcept = default;
+Stream::~Stream() = default;
+
+Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<const engine::Event> events) {
+  Impl& m = *impl_;
+  const std::int64_t began_ns = m.now_ns();
+  m.mirror.update(bodies, events);
+  const std::int64_t mirrored_ns = m.now_ns();
+  for (const LifecycleRecord& record : m.mirror.lifecycle()) {
+    if (record.kind == LifecycleKind::kSpawn) ++m.bodies;
+    if (record.kind == LifecycleKind::kDespawn) --m.bodies;
+  }
+  const FrameResult result{m.timeline.advance(m.mirror.target(), m.mirror.lifecycle(), m.config.budget),
+                           m.mirror.lifecycle(), mirrored_ns - began_ns};
+  m.choose_parameters(result);
+  return result;
+}
+
+void Stream::Impl::choose_parameters(const FrameResult& result) {
+  const bool coarser = quality && quality->after_frame(result.payload.size(), result.corrected, parameters);
+  const bool steered = gains && gains->after_frame(parameters);
+  if (coarser || steered) timeline.set_parameters(parameters);
+}
+
+Result<void> Stream::set_parameters(const CodecParameters& parameters) {
+  if (!valid_parameters(parameters)) return fail(ErrorCode::kInvalidArgument, "parameters out of range");
+  if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
+  impl_->parameters = parameters;
+  impl_->timeline.set_parameters(parameters);
+  return {};
+}
+
+void Stream::set_statistics(CodecStatistics* statistics) {
+  TANDEM_ASSERT(!impl_->quality);
+  impl_->timeline.set_statistics(statistics);
+}
+
+void Stream::set_clock(std::int64_t (*now_ns)()) {
+  impl_->clock = now_ns;
+  impl_->timeline.set_clock(now_ns);
+}
+
+Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timeline.schedule(input); }
+void Stream::snapshot(std::vector<std::byte>& out) { impl_->timeline.snapshot(out); }
+const CodecParameters& Stream::parameters() const { return impl_->parameters; }
+double Stream::threshold_m() const { return impl_->parameters.threshold * impl_->config.lattice.unit; }
+bool Stream::target_out_of_reach() const { return impl_->quality && impl_->quality->out_of_reach(); }
+const StreamConfig& Stream::config() const { return impl_->config; }
+Frame Stream::frame() const { return impl_->timeline.frame(); }
+const State& Stream::agreed() const { return impl_->timeline.state(); }
+std::uint64_t Stream::hash() const { return impl_->timeline.hash(); }
+std::uint64_t Stream::last_input() const { return impl_->timeline.last_input(); }
+std::uint32_t Stream::bodies() const { return impl_->bodies; }
+std::size_t Stream::payload_bound() const { return impl_->timeline.payload_bound(); }
+std::size_t Stream::snapshot_bound() const { return impl_->timeline.snapshot_bound(); }
+
+}  // namespace tandem::host
