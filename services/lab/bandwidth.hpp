@@ -26,7 +26,7 @@ struct BandwidthRow {
   std::uint64_t seed = 0;
   std::uint64_t frames = 0;
   double dt_s = 0;                         ///< a frame
-  double threshold = 0;                    ///< scene units
+  double threshold = 0;                    ///< scene units; at the end where it is automatic
   double lattice_unit = 0;                 ///< scene units; the error may reach threshold and one of these
   double mbit_per_s = 0;                   ///< payload only, at the nominal rate; 2^20 bits to the Mbit
   std::optional<double> ideal_mbit_per_s;  ///< code length of adaptive models, without rounding and headers

@@ -7,6 +7,11 @@
 #include <memory>
 
 namespace tandem::lab {
+namespace {
+
+CLI::Range positive() { return CLI::Range(std::numeric_limits<double>::min(), 1e6); }
+
+}  // namespace
 
 int report(const std::string& command, const Error& error) {
   fmt::print(stderr, "tandem {}: {}\n", command, error.message);
@@ -40,14 +45,18 @@ void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
       ->capture_default_str();
 }
 
+CLI::Option* add_threshold_scale(CLI::App& command, sessions::SessionChoice& choice) {
+  return command
+      .add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
+      ->check(positive());
+}
+
 void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice) {
-  const auto positive = CLI::Range(std::numeric_limits<double>::min(), 1e6);
-  CLI::Option* length = command.add_option("--threshold", choice.threshold_m,
-                                           "Error threshold, scene units (default: the scene's)");
-  length->check(positive);
-  command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
-      ->check(positive)
-      ->excludes(length);
+  CLI::Option* scale = add_threshold_scale(command, choice);
+  command
+      .add_option("--threshold", choice.threshold_m, "Error threshold, scene units (default: the scene's)")
+      ->check(positive())
+      ->excludes(scale);
 }
 
 void add_bench(CLI::App& app, Run& run) {

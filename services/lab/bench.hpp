@@ -30,5 +30,6 @@ int report(const std::string& command, const Error& error);
 void add_scene_option(CLI::App& command, std::vector<std::string>& scenes);
 void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies);
 void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice);
+CLI::Option* add_threshold_scale(CLI::App& command, sessions::SessionChoice& choice);
 
 }  // namespace tandem::lab

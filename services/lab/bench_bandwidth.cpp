@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <iterator>
 #include <memory>
 #include <mutex>
@@ -54,6 +55,7 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
     choice.predictor = codec == "tracker" ? options.choice.predictor : "ballistic";
     auto stream = sessions::plan_stream(scene, choice);
     if (!stream) return tl::unexpected(stream.error());
+    if (codec == "none") stream->quality.reset();  // has no threshold
     streams.push_back(std::move(*stream));
   }
   auto replay = Replay::create(*source.simulation, std::move(source.script), streams[0].lattice);
@@ -65,6 +67,8 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
   for (BandwidthRow& row : *rows) {
     row.scene = scene.name;
     row.threshold = threshold;
+    if (choice.automatic && !row.predictor.empty())
+      row.threshold = row.parameters.threshold * row.lattice_unit;
   }
   return rows;
 }
@@ -212,6 +216,39 @@ int run_bandwidth(const BandwidthOptions& options) {
 
 }  // namespace
 
+namespace {
+
+/// As tandemd has them.
+void add_quality_options(CLI::App& command, sessions::SessionChoice& choice) {
+  CLI::Option* scale = add_threshold_scale(command, choice);
+  command
+      .add_option_function<std::string>(
+          "--threshold",
+          [&choice](const std::string& text) {
+            choice.automatic = text == "auto";
+            if (choice.automatic) return;
+            double length = 0;
+            const char* const end = text.data() + text.size();
+            const auto [rest, failure] = std::from_chars(text.data(), end, length);
+            if (failure != std::errc{} || rest != end || !(length > 0 && length <= 1e6))
+              throw CLI::ValidationError("--threshold", "a positive length, or auto");
+            choice.threshold_m = length;
+          },
+          "Error threshold, scene units, or auto: chosen at run time (default: the scene's)")
+      ->type_name("FLOAT|auto")
+      ->excludes(scale);
+  command
+      .add_option("--target-bandwidth", choice.target_mbit_per_s,
+                  "Mbit/s of payload that --threshold auto keeps to (default: none, only ranges follow)")
+      ->check(CLI::Range(0.001, 1e6));
+  command
+      .add_option("--max-error", choice.max_error_m,
+                  "Largest threshold of --threshold auto, scene units (default: four times the scene's)")
+      ->check(CLI::Range(1e-9, 1e9));
+}
+
+}  // namespace
+
 void add_bandwidth(CLI::App& bench, Run& run) {
   CLI::App* command = bench.add_subcommand(
       "bandwidth", "Codecs side by side over the same trajectory; a decoder checks every frame's hash.");
@@ -234,7 +271,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
-  add_threshold_options(*command, options->choice);
+  add_quality_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
@@ -264,6 +301,10 @@ void add_bandwidth(CLI::App& bench, Run& run) {
   command->callback([options, &run] {
     if (options->scenes.empty() && options->trajectory.empty())
       throw CLI::RequiredError("--scene or --trajectory");
+    const sessions::SessionChoice& choice = options->choice;
+    if (!choice.automatic && choice.target_mbit_per_s > 0)
+      throw CLI::RequiresError("--target-bandwidth", "--threshold auto");
+    if (!choice.automatic && choice.max_error_m) throw CLI::RequiresError("--max-error", "--threshold auto");
     run = [options] { return run_bandwidth(*options); };
   });
 }

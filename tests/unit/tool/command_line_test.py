@@ -51,6 +51,8 @@ class CommandLine(unittest.TestCase):
         for codec in ("entropy", "tracker"):
             self.assert_usage("--predictor", "bench", "bandwidth", "--scene", "cube", "--codec", codec, "--predictor", "foo")
         self.assert_usage("--budget", "bench", "bandwidth", "--scene", "cube", "--codec", "tracker", "--budget", "63")
+        for wrong in (("--threshold", "fine"), ("--threshold", "0"), ("--max-error", "1"), ("--target-bandwidth", "1")):
+            self.assert_usage("--threshold", "bench", "bandwidth", "--scene", "cube", *wrong)
         for flag in ("--bodies", "--users", "--seed"):
             self.assert_usage(flag, "bench", "bandwidth", "--trajectory", "x.npy", flag, "5")
         self.assert_usage("zip", "bench", "bandwidth", "--scene", "half_pipe", "--codec", "zip")
@@ -82,6 +84,13 @@ class CommandLine(unittest.TestCase):
         for row in rows:
             self.assertEqual(row["frames"], 5)
             self.assertLessEqual(row["rms_error"], row["max_error"])
+
+    def test_bandwidth_chooses_the_threshold_at_run_time_as_a_host_does(self):
+        bench = ("bench", "bandwidth", "--scene", "half_pipe", "--bodies", "500", "--frames", "150", "--codec", "entropy")
+        fixed = json.loads(run(*bench, "--json").stdout)["rows"][0]
+        coarse = json.loads(run(*bench, "--threshold", "auto", "--target-bandwidth", "0.01", "--json").stdout)["rows"][0]
+        self.assertGreater(coarse["threshold"], fixed["threshold"])
+        self.assertLess(coarse["mbit_per_s"], fixed["mbit_per_s"])
 
     def test_another_number_of_users_is_not_the_papers_scene(self):
         done = run("bench", "bandwidth", "--scene", "half_pipe", "--bodies", "50", "--frames", "2", "--users", "4", "--json")
