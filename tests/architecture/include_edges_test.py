@@ -40,6 +40,20 @@ class IncludeEdges(unittest.TestCase):
     def test_the_codec_may_not_include_the_predictor(self):
         self.assert_one("sdk/core/codec/a.cpp", '"sdk/core/predict/predictor.hpp"', "may not include")
 
+    def test_the_layout_stands_on_the_lattice_alone(self):
+        codec = ("sdk/core/codec/codec.hpp", '#include "sdk/core/layout/layout.hpp"\n')
+        layout = ("sdk/core/layout/layout.hpp", '#include "sdk/core/lattice/state.hpp"\n')
+        self.assertEqual(self.found(codec, layout), [])
+        found = self.found(codec, layout, ("sdk/core/layout/a.cpp", '#include "sdk/core/codec/codec.hpp"\n'))
+        self.assertEqual(len(found), 1, found)
+        self.assertIn("may not include", found[0])
+
+    def test_the_host_sees_no_scene_and_no_engine(self):
+        for header in ("services/scenes/scene.hpp", "services/engine/particles/world.hpp"):
+            found = self.found((header, ""), ("services/host/a.cpp", f'#include "{header}"\n'))
+            self.assertEqual(len(found), 1, found)
+            self.assertIn("may not include", found[0])
+
     def test_the_core_may_not_include_the_transport(self):
         self.assert_one("sdk/core/timeline/a.hpp", '"sdk/transport/port.hpp"', "may not include")
 
