@@ -27,9 +27,9 @@ bool valid_goal(const QualityGoal& goal, const CodecParameters& parameters) {
          parameters.threshold <= goal.largest_threshold && goal.largest_threshold <= kPositionLimit;
 }
 
-StepRule step_rule(std::string_view codec, bool has_tables) {
-  if (codec == "tracker") return StepRule::kLeave;
-  return has_tables ? StepRule::kFollowAbove : StepRule::kFollow;
+StepRule step_rule(const CodecTraits& traits) {
+  if (traits.reads_gains) return StepRule::kLeave;
+  return traits.takes_tables ? StepRule::kFollowAbove : StepRule::kFollow;
 }
 
 std::size_t least_budget(const QualityGoal& goal, double frame_rate_hz) {

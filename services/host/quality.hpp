@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/paper/training.hpp"
@@ -26,8 +25,7 @@ enum class StepRule : std::uint8_t {
   kFollow,       ///< up and down
   kFollowAbove,  ///< down to those of the start at most: its code tables were trained for them
 };
-/// For a codec with or without code tables.
-[[nodiscard]] StepRule step_rule(std::string_view codec, bool has_tables);
+[[nodiscard]] StepRule step_rule(const CodecTraits& traits);
 
 /// True when the limits are in order and permit `parameters`.
 [[nodiscard]] bool valid_goal(const QualityGoal& goal, const CodecParameters& parameters);

@@ -44,7 +44,7 @@ struct Stream::Impl {
     timeline.start(start.frame, mirror.target(), start.drive);
     bodies = mirror.target().alive_count();
     if (config.quality) {
-      const StepRule steps = step_rule(config.layout.codec, !config.layout.codec_tables.empty());
+      const StepRule steps = step_rule(*codec_traits(config.layout.codec));
       quality.emplace(*config.quality, steps, parameters, config.layout.capacity, start.frame_rate_hz);
       if (steps != StepRule::kLeave) timeline.set_statistics(&quality->statistics());
     }

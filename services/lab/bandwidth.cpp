@@ -153,6 +153,7 @@ BandwidthRow row_of(Lane& lane, double frames) {
   const host::StreamConfig& stream = lane.stream.config();
   BandwidthRow row;
   row.codec = stream.layout.codec;
+  row.traits = *codec_traits(stream.layout.codec);
   row.predictor = stream.layout.predictor;
   row.parameters = lane.stream.parameters();
   row.mbit_per_s = mbit_per_s(lane.bytes, stream.lattice.dt_s);

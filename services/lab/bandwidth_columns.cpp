@@ -23,7 +23,7 @@ enum class Rows : std::uint8_t {
   kAll,
   kMeasured,  // not those of peers that are not in this build
   kOurs,      // not those of peers
-  kTracker,   // ours with gains
+  kSteered,   // ours with gains
 };
 using enum Rows;
 
@@ -37,8 +37,8 @@ bool is_among(const Row& row, Rows rows) {
       return row.missing.empty();
     case kOurs:
       return !row.predictor.empty();
-    case kTracker:
-      return row.codec == "tracker";
+    case kSteered:
+      return row.traits.reads_gains;
   }
   return false;
 }
@@ -78,9 +78,9 @@ constexpr Column kColumns[] = {
     {"bodies", field<&Row::bodies>, kAll, kAll, kAll, "bodies", 7},
     {"codec", field<&Row::codec>, kAll, kAll, kAll, "codec", -10},
     {"predictor", field<&Row::predictor>, kAll, kAll, kOurs, "predictor", -9},
-    {"decay", decay, kOurs, kTracker},
-    {"velocity_gain", velocity_gain, kOurs, kTracker},
-    {"acceleration_gain", acceleration_gain, kOurs, kTracker},
+    {"decay", decay, kOurs, kSteered},
+    {"velocity_gain", velocity_gain, kOurs, kSteered},
+    {"acceleration_gain", acceleration_gain, kOurs, kSteered},
     {"threads", field<&Row::threads>, kAll},
     {"seed", field<&Row::seed>, kAll, kAll},
     {"frames", field<&Row::frames>, kAll, kAll},

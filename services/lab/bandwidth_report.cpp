@@ -57,7 +57,7 @@ std::string series_csv(Rows rows) {
 
 /// `none` is left out as in the paper, since it is constant and far above the others; peers have their table.
 bool drawn(const BandwidthRow& row) {
-  return row.missing.empty() && !row.predictor.empty() && row.codec != "none";
+  return row.missing.empty() && !row.predictor.empty() && row.traits.reads_threshold;
 }
 
 /// Holds its data, so that a figure can be drawn again with other settings.

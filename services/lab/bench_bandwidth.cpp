@@ -51,8 +51,9 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
   std::vector<host::StreamConfig> streams;
   for (const std::string& codec : options.codecs) {
     choice.codec = codec;
-    // The paper's codecs are what tracker is compared with: always as the paper has them.
-    choice.predictor = codec == "tracker" ? options.choice.predictor : "ballistic";
+    const auto traits = codec_traits(codec);
+    if (!traits) return tl::unexpected(traits.error());
+    choice.predictor = traits->is_baseline ? "ballistic" : options.choice.predictor;
     auto stream = sessions::plan_stream(scene, choice);
     if (!stream) return tl::unexpected(stream.error());
     if (codec == "none") stream->quality.reset();  // has no threshold
@@ -119,8 +120,12 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
 /// The tiers that compute contacts need to know what the bodies are and where the walls stand.
 Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const BandwidthOptions& options) {
   const std::string& predictor = options.choice.predictor;
-  const bool asked = (predictor == "field" || predictor == "contact") &&
-                     std::ranges::find(options.codecs, "tracker") != options.codecs.end();
+  const auto is_ours = [](const std::string& codec) {
+    const auto traits = codec_traits(codec);
+    return traits && !traits->is_baseline;
+  };
+  const bool asked =
+      (predictor == "field" || predictor == "contact") && std::ranges::any_of(options.codecs, is_ours);
   if (!asked || !trajectory.info().scene.empty()) return {};
   return fail(ErrorCode::kInvalidArgument,
               fmt::format("{}: no \"scene\"; --predictor {} needs one for radius, materials and walls (see "

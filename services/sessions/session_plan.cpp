@@ -20,9 +20,8 @@ constexpr double kCoarsest = 4;
 // Beyond, even a fast client would spend most of a frame on its predicted step.
 constexpr std::uint32_t kMostBodiesOfField = 50'000;
 
-std::vector<std::byte> codec_tables(const std::string& codec, const scenes::TrainedTable& table) {
+std::vector<std::byte> codec_tables(const scenes::TrainedTable& table) {
   std::vector<std::byte> bytes;
-  if (codec != "entropy" && codec != "limited") return bytes;
   for (const auto* lengths : {&table.position_code_lengths, &table.velocity_code_lengths}) {
     for (const std::uint8_t length : *lengths) bytes.push_back(std::byte{length});
   }
@@ -38,10 +37,10 @@ bool alike(const std::vector<engine::ParticleType>& types) {
 
 // Sets the predictor and its constants.
 Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice,
-                              host::StreamConfig& stream) {
+                              const CodecTraits& traits, host::StreamConfig& stream) {
   const bool automatic = choice.predictor == "auto";
   const bool field_pays =
-      choice.codec == "tracker" && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
+      !traits.is_baseline && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
   stream.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
   if (stream.layout.predictor != "field" && stream.layout.predictor != "contact") return {};
   auto constants = contact_constants(scene, stream.lattice, stream.layout.predictor);
@@ -57,7 +56,6 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
 
 // Decay and gains of the first frame, and what the later ones aim at.
 Result<void> choose_gains(host::StreamConfig& stream) {
-  if (stream.layout.codec != "tracker") return {};
   // What the constants make of the predictor, which may be another than the name says.
   const auto predictor = make_predictor(stream.layout.predictor, 1, stream.layout.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
@@ -70,6 +68,8 @@ Result<void> choose_gains(host::StreamConfig& stream) {
 }  // namespace
 
 Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice) {
+  const auto traits = codec_traits(choice.codec);
+  if (!traits) return tl::unexpected(traits.error());
   const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   const double threshold_m =
       choice.automatic ? std::min(stated_m, choice.max_error_m.value_or(stated_m)) : stated_m;
@@ -96,11 +96,13 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   stream.layout.type_count = static_cast<TypeId>(scene.types.size());
   stream.layout.parameters = *parameters;
   stream.layout.codec = choice.codec;
-  stream.layout.codec_tables = codec_tables(choice.codec, table);
-  if (choice.codec == "limited") stream.budget = choice.budget_bytes.value_or(kPaperBudgetBytes);
-  if (choice.codec == "tracker") stream.budget = choice.budget_bytes.value_or(kNoBudget);
-  if (auto chosen = choose_predictor(scene, choice, stream); !chosen) return tl::unexpected(chosen.error());
-  if (auto gained = choose_gains(stream); !gained) return tl::unexpected(gained.error());
+  if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table);
+  if (traits->takes_budget) stream.budget = choice.budget_bytes.value_or(traits->usual_budget);
+  if (auto chosen = choose_predictor(scene, choice, *traits, stream); !chosen)
+    return tl::unexpected(chosen.error());
+  if (traits->reads_gains) {
+    if (auto gained = choose_gains(stream); !gained) return tl::unexpected(gained.error());
+  }
   stream.local.run_blocks = host::blocks_on_threads(choice.threads);
   return stream;
 }

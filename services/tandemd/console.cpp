@@ -20,7 +20,7 @@ std::string gains_text(const CodecParameters& parameters) {
 std::string coding_text(const host::StreamConfig& stream) {
   std::string text = fmt::format("codec {}, predictor {}", stream.layout.codec, stream.layout.predictor);
   const auto metres = [&](std::int32_t units) { return units * stream.lattice.unit; };
-  if (stream.layout.codec != "none")
+  if (codec_traits(stream.layout.codec)->reads_threshold)
     text += fmt::format(", threshold {:.4g} m", metres(stream.layout.parameters.threshold));
   if (stream.quality) {
     text += fmt::format(" (automatic, up to {:.4g} m)", metres(stream.quality->largest_threshold));

@@ -15,7 +15,7 @@ void require(bool holds) {
 }
 
 void try_snapshot(std::span<const std::byte> input) {
-  static const std::unique_ptr<Codec> codec = std::move(*make_codec("quantized", kCapacity, {}));
+  static const std::unique_ptr<Codec> codec = synthetic::codec_of("quantized", kCapacity);
   static const std::unique_ptr<Predictor> predictor = std::move(*make_predictor("ballistic", kCapacity, {}));
   // The hash is the caller's to check, so the reader alone must keep every rule.
   State state(kCapacity);

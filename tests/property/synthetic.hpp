@@ -113,12 +113,19 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
 
 /// The tables that make_codec() wants for a name.
 inline std::vector<std::byte> tables_for(std::string_view codec) {
-  return codec == "entropy" || codec == "limited" ? default_code_tables() : std::vector<std::byte>{};
+  return codec_traits(codec)->takes_tables ? default_code_tables() : std::vector<std::byte>{};
+}
+
+inline std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capacity,
+                                       const RunBlocks& run_blocks = {}) {
+  const auto tables = tables_for(name);
+  return std::move(
+      *make_codec({.name = name, .capacity = capacity, .tables = tables, .run_blocks = run_blocks}));
 }
 
 inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
-                             const CodecParameters& parameters) {
-  return {std::move(*make_codec(codec, capacity, tables_for(codec))), capacity, parameters, kTypes};
+                             const CodecParameters& parameters, const RunBlocks& run_blocks = {}) {
+  return {codec_of(codec, capacity, run_blocks), capacity, parameters, kTypes};
 }
 
 /// What every state must hold, whatever bytes it came from; null or what is broken.

@@ -1,5 +1,6 @@
 #include "sdk/core/codec/codec.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string>
 
@@ -10,8 +11,29 @@
 namespace tandem {
 namespace {
 
-constexpr std::array<std::string_view, 6> kNames{"none",    "selective", "quantized",
-                                                 "entropy", "limited",   "tracker"};
+struct KnownCodec {
+  std::string_view name;
+  CodecTraits traits;
+};
+constexpr std::array<KnownCodec, 6> kKnown{
+    {{"none", {.is_baseline = true}},
+     {"selective", {.is_baseline = true, .reads_threshold = true}},
+     {"quantized", {.is_baseline = true, .reads_threshold = true, .reads_steps = true}},
+     {"entropy", {.is_baseline = true, .reads_threshold = true, .reads_steps = true, .takes_tables = true}},
+     {"limited",
+      {.is_baseline = true,
+       .reads_threshold = true,
+       .reads_steps = true,
+       .takes_tables = true,
+       .takes_budget = true,
+       .usual_budget = kPaperBudgetBytes}},
+     {"tracker", {.reads_threshold = true, .reads_gains = true, .takes_budget = true}}}};
+constexpr auto kNames = [] {
+  std::array<std::string_view, kKnown.size()> names{};
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = kKnown[i].name;
+  return names;
+}();
+
 Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
   CodeLengths lengths{};
   for (std::size_t s = 0; s < kSymbols; ++s) lengths[s] = std::to_integer<std::uint8_t>(bytes[s]);
@@ -31,40 +53,47 @@ void GainEvidence::add(const GainEvidence& more) {
   driven += more.driven;
 }
 
-Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
-                                          std::span<const std::byte> tables) {
+Result<CodecTraits> codec_traits(std::string_view name) {
+  const auto* const known = std::find_if(kKnown.begin(), kKnown.end(),
+                                         [name](const KnownCodec& each) { return each.name == name; });
+  if (known != kKnown.end()) return known->traits;
+  std::string names;
+  for (const std::string_view each : kNames) names += (names.empty() ? "" : ", ") + std::string(each);
+  return fail(ErrorCode::kUnsupported, "unknown codec '" + std::string(name) + "' (known: " + names + ")");
+}
+
+Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup) {
+  const std::string_view name = setup.name;
+  const std::uint32_t capacity = setup.capacity;
   if (capacity == 0 || capacity > kMaxCapacity)
     return fail(ErrorCode::kInvalidArgument, "capacity out of range");
-  if (name == "entropy" || name == "limited") {
-    if (tables.size() != 2 * kSymbols) {
-      return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' needs 512 code lengths, got " +
-                                             std::to_string(tables.size()) +
-                                             " (default_code_tables() has some)");
-    }
-    const auto position = read_lengths(tables.first(kSymbols));
-    if (!position) return tl::unexpected<Error>(position.error());
-    const auto velocity = read_lengths(tables.last(kSymbols));
-    if (!velocity) return tl::unexpected<Error>(velocity.error());
-    using Coding = ResidualCoding<HuffmanResiduals>;
-    return std::make_unique<BlockCodec<Coding>>(name, capacity,
-                                                Coding(capacity, HuffmanResiduals(*position, *velocity)));
-  }
-  if (std::find(kNames.begin(), kNames.end(), name) == kNames.end()) {
-    std::string known;
-    for (const std::string_view each : kNames) known += (known.empty() ? "" : ", ") + std::string(each);
-    return fail(ErrorCode::kUnsupported, "unknown codec '" + std::string(name) + "' (known: " + known + ")");
-  }
-  if (!tables.empty())
+  const auto traits = codec_traits(name);
+  if (!traits) return tl::unexpected<Error>(traits.error());
+  if (!traits->takes_tables && !setup.tables.empty())
     return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' takes no tables");
+  if (name == "tracker") return std::make_unique<Tracker>(setup);
   if (name == "none")
     return std::make_unique<BlockCodec<AbsoluteCoding<true>>>(name, capacity, AbsoluteCoding<true>(capacity));
   if (name == "selective") {
     return std::make_unique<BlockCodec<AbsoluteCoding<false>>>(name, capacity,
                                                                AbsoluteCoding<false>(capacity));
   }
-  if (name == "tracker") return std::make_unique<Tracker>(capacity);
-  using Coding = ResidualCoding<PlainResiduals>;
-  return std::make_unique<BlockCodec<Coding>>(name, capacity, Coding(capacity, PlainResiduals{}));
+  if (name == "quantized") {
+    using Coding = ResidualCoding<PlainResiduals>;
+    return std::make_unique<BlockCodec<Coding>>(name, capacity, Coding(capacity, PlainResiduals{}));
+  }
+  if (setup.tables.size() != 2 * kSymbols) {
+    return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' needs 512 code lengths, got " +
+                                           std::to_string(setup.tables.size()) +
+                                           " (default_code_tables() has some)");
+  }
+  const auto position = read_lengths(setup.tables.first(kSymbols));
+  if (!position) return tl::unexpected<Error>(position.error());
+  const auto velocity = read_lengths(setup.tables.last(kSymbols));
+  if (!velocity) return tl::unexpected<Error>(velocity.error());
+  using Coding = ResidualCoding<HuffmanResiduals>;
+  return std::make_unique<BlockCodec<Coding>>(name, capacity,
+                                              Coding(capacity, HuffmanResiduals(*position, *velocity)));
 }
 
 }  // namespace tandem

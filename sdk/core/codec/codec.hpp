@@ -35,7 +35,8 @@ struct GainEvidence {
   void add(const GainEvidence& more);
 };
 
-/// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done.
+/// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done. Changes no
+/// byte.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
 /// The corrections part of a delta: one implementation a codec name (paper, sections 3.3.1 and 3.3.2).
@@ -49,12 +50,6 @@ class Codec {
   [[nodiscard]] virtual std::string_view name() const = 0;
   /// Most bytes encode() can write for this session's capacity.
   [[nodiscard]] virtual std::size_t bound() const = 0;
-
-  /// Predictor::name() of the session, before anything else. For codecs whose gains depend on it.
-  virtual void predicted_by(std::string_view /*predictor*/) {}
-
-  /// How to code blocks side by side; one after the other without it. For codecs that can. Changes no byte.
-  virtual void run_blocks_on(const RunBlocks& /*run*/) {}
 
   /// Adds every encoded frame to `account`, which stays until this is called again; null: to none. For codecs
   /// with adaptive contexts; others do nothing.
@@ -107,16 +102,36 @@ class Codec {
   }
 };
 
-/// Makes the codec a session names. `tables` travel in the session: 512 code lengths for `entropy` and
-/// `limited` (training.hpp makes them, trained or default), nothing for the others. Errors: kUnsupported for
-/// an unknown name, kMalformed for tables that do not fit it.
-[[nodiscard]] Result<std::unique_ptr<Codec>> make_codec(std::string_view name, std::uint32_t capacity,
-                                                        std::span<const std::byte> tables);
+/// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
+inline constexpr std::size_t kPaperBudgetBytes = 6553;
+
+/// What a codec is like, for those who choose, configure or compare codecs.
+struct CodecTraits {
+  bool is_baseline = false;      ///< of the paper: compared as the paper has it, with its predicted step
+  bool reads_threshold = false;  ///< the others send every body
+  bool reads_steps = false;      ///< quantisation steps
+  bool reads_gains = false;      ///< and the decay that goes with them
+  bool takes_tables = false;     ///< 512 code lengths (training.hpp makes them, trained or default)
+  bool takes_budget = false;     ///< is meant to have one; any codec obeys it
+  std::size_t usual_budget = kNoBudget;  ///< bytes a frame
+};
+/// Errors: kUnsupported for a name that make_codec() does not know.
+[[nodiscard]] Result<CodecTraits> codec_traits(std::string_view name);
+
+/// All that a codec needs to know. Views are read by make_codec() alone.
+struct CodecSetup {
+  std::string_view name;
+  std::uint32_t capacity = 0;                ///< 1 .. kMaxCapacity
+  std::span<const std::byte> tables = {};    ///< as the session has them; empty without takes_tables
+  std::string_view predictor = "ballistic";  ///< Predictor::name() of the session; gains depend on it
+  RunBlocks run_blocks = {};  ///< how to code blocks side by side, where a codec can; empty: one by one
+};
+
+/// Makes the codec a session names. Errors: kUnsupported for an unknown name, kMalformed for tables that do
+/// not fit it, kInvalidArgument for the capacity.
+[[nodiscard]] Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup);
 
 /// The names make_codec() knows: those of the paper's table 5.1 in its order, then ours.
 [[nodiscard]] std::span<const std::string_view> codec_names();
-
-/// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
-inline constexpr std::size_t kPaperBudgetBytes = 6553;
 
 }  // namespace tandem

@@ -139,11 +139,9 @@ void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   State state(kMany);
   for (Slot slot = 0; slot < kMany; ++slot)
     state.spawn(slot, 0, 0, {{random.even(1 << 22), random.even(1 << 22), random.even(1 << 22)}, {}});
-  DeltaCodec server = synthetic::make_delta("tracker", kMany, kParameters);
-  DeltaCodec client = synthetic::make_delta("tracker", kMany, kParameters);
   const RunBlocks run = host::blocks_on_threads(threads);
-  server.codec().run_blocks_on(run);
-  client.codec().run_blocks_on(run);
+  DeltaCodec server = synthetic::make_delta("tracker", kMany, kParameters, run);
+  DeltaCodec client = synthetic::make_delta("tracker", kMany, kParameters, run);
   std::vector<std::byte> out(server.bound());
   State held = state;
   State target = state;

@@ -7,7 +7,7 @@
 namespace tandem {
 namespace {
 
-using synthetic::tables_for;
+using synthetic::codec_of;
 
 constexpr CodecParameters kParameters{100, 10, 20};
 
@@ -32,10 +32,6 @@ State bodies_at_rest(std::uint32_t count) {
   return state;
 }
 
-std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capacity) {
-  return std::move(*make_codec(name, capacity, tables_for(name)));
-}
-
 TEST(MakeCodec, KnowsTheNamesOfThePaperInItsOrderAndOurs) {
   const auto names = codec_names();
   EXPECT_EQ(
@@ -45,14 +41,29 @@ TEST(MakeCodec, KnowsTheNamesOfThePaperInItsOrderAndOurs) {
 }
 
 TEST(MakeCodec, RefusesUnknownNamesWrongTablesAndCapacities) {
-  EXPECT_EQ(make_codec("zip", 10, {}).error().code, ErrorCode::kUnsupported);
-  EXPECT_EQ(make_codec("entropy", 10, {}).error().code, ErrorCode::kMalformed);
-  EXPECT_EQ(make_codec("selective", 10, default_code_tables()).error().code, ErrorCode::kMalformed);
-  EXPECT_EQ(make_codec("none", 0, {}).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(make_codec("none", kMaxCapacity + 1, {}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(make_codec({.name = "zip", .capacity = 10}).error().code, ErrorCode::kUnsupported);
+  EXPECT_EQ(make_codec({.name = "entropy", .capacity = 10}).error().code, ErrorCode::kMalformed);
+  EXPECT_EQ(make_codec({.name = "none", .capacity = 0}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(make_codec({.name = "none", .capacity = kMaxCapacity + 1}).error().code,
+            ErrorCode::kInvalidArgument);
   auto tables = default_code_tables();
+  const auto code = [&tables](std::string_view name) {
+    return make_codec({.name = name, .capacity = 10, .tables = tables}).error().code;
+  };
+  EXPECT_EQ(code("selective"), ErrorCode::kMalformed);
   tables[300] = std::byte{0};
-  EXPECT_EQ(make_codec("limited", 10, tables).error().code, ErrorCode::kMalformed);
+  EXPECT_EQ(code("limited"), ErrorCode::kMalformed);
+}
+
+TEST(CodecTraits, SayWhatACodecTakesAndReads) {
+  EXPECT_EQ(codec_traits("zip").error().code, ErrorCode::kUnsupported);
+  EXPECT_FALSE(codec_traits("none")->reads_threshold);
+  EXPECT_FALSE(codec_traits("selective")->reads_steps);
+  EXPECT_TRUE(codec_traits("entropy")->reads_steps && codec_traits("entropy")->takes_tables);
+  EXPECT_EQ(codec_traits("limited")->usual_budget, kPaperBudgetBytes);
+  EXPECT_TRUE(codec_traits("tracker")->takes_budget && codec_traits("tracker")->reads_gains);
+  for (const std::string_view name : codec_names())
+    EXPECT_EQ(codec_traits(name)->is_baseline, name != "tracker") << name;
 }
 
 TEST(Codec, WhatIsWithinTheThresholdCostsNothing) {

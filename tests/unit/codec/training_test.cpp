@@ -40,10 +40,13 @@ TEST(Training, OnlyBodiesBeyondTheThresholdCount) {
 }
 
 TEST(Training, TablesFitTheCodecThatReadsThem) {
-  EXPECT_TRUE(make_codec("entropy", 10, default_code_tables()));
+  const auto fit = [](std::string_view name, const std::vector<std::byte>& tables) {
+    return make_codec({.name = name, .capacity = 10, .tables = tables}).has_value();
+  };
+  EXPECT_TRUE(fit("entropy", default_code_tables()));
   CodecStatistics statistics;
   statistics.position_counts[0] = 1000000;
-  EXPECT_TRUE(make_codec("limited", 10, trained_tables(statistics)));
+  EXPECT_TRUE(fit("limited", trained_tables(statistics)));
 }
 
 }  // namespace

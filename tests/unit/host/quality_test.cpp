@@ -73,11 +73,11 @@ TEST(Quality, StepsOfACodecThatDoesNotReadThemStay) {
   control.statistics().bodies = 1;
   control.statistics().largest_position = 127000;
   EXPECT_EQ(run(control, 1, 500, kStart), kStart);
-  EXPECT_EQ(step_rule("tracker", false), StepRule::kLeave);
+  EXPECT_EQ(step_rule(*codec_traits("tracker")), StepRule::kLeave);
 }
 
 TEST(Quality, StepsThatCodeTablesWereTrainedForAreTheSmallestAndScaleWithTheThreshold) {
-  QualityControl control = control_of({1, 10, 2000}, step_rule("entropy", true));
+  QualityControl control = control_of({1, 10, 2000}, step_rule(*codec_traits("entropy")));
   CodecParameters parameters = kStart;
   for (int frame = 0; frame < 300; ++frame) {
     control.statistics().bodies = 1;

@@ -10,7 +10,7 @@ namespace {
 using namespace synthetic;
 
 std::unique_ptr<Codec> codec_for(std::uint32_t capacity) {
-  return std::move(*make_codec("selective", capacity, {}));
+  return std::move(*make_codec({.name = "selective", .capacity = capacity}));
 }
 
 std::vector<std::byte> write(const Snapshot& snapshot, const State& state) {

@@ -74,10 +74,8 @@ TEST(Tracker, BlocksCodedSideBySideGiveTheSameBytes) {
     for (std::uint32_t i = count; i-- > 0;) threads.emplace_back(job, i);
   };
   DeltaCodec alone = synthetic::make_delta("tracker", kCapacity, kParameters);
-  DeltaCodec together = synthetic::make_delta("tracker", kCapacity, kParameters);
-  DeltaCodec client = synthetic::make_delta("tracker", kCapacity, kParameters);
-  together.codec().run_blocks_on(in_reverse_on_threads);
-  client.codec().run_blocks_on(in_reverse_on_threads);
+  DeltaCodec together = synthetic::make_delta("tracker", kCapacity, kParameters, in_reverse_on_threads);
+  DeltaCodec client = synthetic::make_delta("tracker", kCapacity, kParameters, in_reverse_on_threads);
   Bytes out(alone.bound());
   Bytes same(alone.bound());
   State agreed = synthetic::random_state(random, kCapacity);

@@ -16,16 +16,18 @@ constexpr std::size_t kTrackerBlockHeaderBytes = 2;
 
 }  // namespace
 
-Tracker::Tracker(std::uint32_t capacity)
-    : capacity_(capacity),
-      bodies_(kColumns * std::size_t{capacity}),
-      history_(capacity),
-      flags_(capacity),
-      contexts_(capacity),
-      corrected_(capacity),
-      steps_(capacity),
-      work_(block_count(capacity)) {
-  renewed_.reserve(capacity);
+Tracker::Tracker(const CodecSetup& setup)
+    : capacity_(setup.capacity),
+      bodies_(kColumns * std::size_t{capacity_}),
+      history_(capacity_),
+      run_(setup.run_blocks),
+      flags_(capacity_),
+      contexts_(capacity_),
+      corrected_(capacity_),
+      steps_(capacity_),
+      work_(block_count(capacity_)),
+      gains_(setup.predictor) {
+  renewed_.reserve(capacity_);
 }
 Tracker::~Tracker() = default;
 

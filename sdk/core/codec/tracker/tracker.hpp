@@ -17,21 +17,18 @@ namespace tandem {
 
 class TrackerSearch;
 
-/// See Codec. Blocks are coded side by side where run_blocks_on() says how. Corrects every body that is off
+/// See Codec. Blocks are coded side by side where the setup says how. Corrects every body that is off
 /// by more than the threshold, and a few that soon would be. Where a budget binds, bodies go by error^2 *
 /// (frames they have waited + 1)^2, so that none waits for ever; ties by slot.
 class Tracker final : public Codec {
  public:
-  /// `capacity` in 1 .. kMaxCapacity.
-  explicit Tracker(std::uint32_t capacity);
+  explicit Tracker(const CodecSetup& setup);
   ~Tracker() override;
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 
   [[nodiscard]] std::string_view name() const override { return "tracker"; }
   [[nodiscard]] std::size_t bound() const override;
-  void predicted_by(std::string_view predictor) override { gains_ = TrackerGains(predictor); }
-  void run_blocks_on(const RunBlocks& run) override { run_ = run; }
   void account_to(CodeAccount* account) override { account_ = account; }
   void evidence_to(GainEvidence* evidence) override { evidence_ = evidence; }
   void renew(const State& predicted, std::span<const Slot> slots) override;
@@ -120,7 +117,7 @@ class Tracker final : public Codec {
   std::size_t count_ = 0;   // corrected_, once it is whole
   std::uint32_t next_block_ = 0;
   std::int32_t threshold_ = 1;
-  TrackerGains gains_{"ballistic"};
+  TrackerGains gains_;
   std::unique_ptr<TrackerSearch> search_;  // encoder only, made by the first encode()
 };
 
