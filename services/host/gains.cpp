@@ -32,7 +32,10 @@ double exp_of(double x) {
   return (even + odd) / (even - odd);
 }
 
-double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(count); }
+double mean(std::int64_t cosines, std::uint64_t count) {
+  return static_cast<double>(cosines) /
+         (static_cast<double>(GainEvidence::kCosineOne) * static_cast<double>(count));
+}
 
 bool differs(double wanted, double held, double band) { return std::abs(wanted - held) > band * held; }
 

@@ -29,8 +29,8 @@ class GainControl {
   /// `parameters`: those in force at the start.
   GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters);
 
-  /// Where the timeline adds evidence: ServerTimeline::set_evidence().
-  [[nodiscard]] GainEvidence& evidence() { return evidence_; }
+  /// What an encoder's observer is told.
+  void observe(const GainEvidence& evidence) { evidence_.add(evidence); }
   /// After each frame; true when it changed decay and gains.
   bool after_frame(CodecParameters& parameters);
 

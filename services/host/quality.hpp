@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "sdk/core/codec/codec.hpp"
-#include "sdk/core/codec/paper/training.hpp"
+#include "services/host/residual_statistics.hpp"
 
 namespace tandem::host {
 
@@ -40,8 +40,10 @@ class QualityControl {
   QualityControl(const QualityGoal& goal, StepRule steps, const CodecParameters& start, std::uint32_t bodies,
                  double frame_rate_hz);
 
-  /// Where the timeline counts residuals: ServerTimeline::set_statistics(). Not read with StepRule::kLeave.
-  [[nodiscard]] CodecStatistics& statistics() { return statistics_; }
+  /// What an encoder's observer is told.
+  void observe(const State& predicted, const State& target, const CodecParameters& parameters) {
+    if (steps_ != StepRule::kLeave) statistics_.frame(predicted, target, parameters);
+  }
   /// After each frame; true when it changed threshold or steps. The goal must be valid for `parameters`,
   /// which are those of the next frame.
   bool after_frame(std::size_t payload_bytes, std::uint32_t corrected, CodecParameters& parameters);
@@ -66,7 +68,7 @@ class QualityControl {
   std::uint64_t corrected_ = 0;
   int pressed_ = 0;  // decisions above the target at the largest threshold, less the others
   bool out_of_reach_ = false;
-  CodecStatistics statistics_;
+  ResidualStatistics statistics_;
 };
 
 }  // namespace tandem::host

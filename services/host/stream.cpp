@@ -34,7 +34,7 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
 
 }  // namespace
 
-struct Stream::Impl {
+struct Stream::Impl final : EncodeObserver {
   Impl(StreamConfig configuration, const StreamStart& start, ServerTimeline server)
       : config(std::move(configuration)),
         mirror(config.lattice, config.layout.capacity, config.layout.type_count),
@@ -44,14 +44,24 @@ struct Stream::Impl {
     timeline.start(start.frame, mirror.target(), start.drive);
     bodies = mirror.target().alive_count();
     if (config.quality) {
-      const StepRule steps = step_rule(*codec_traits(config.layout.codec));
-      quality.emplace(*config.quality, steps, parameters, config.layout.capacity, start.frame_rate_hz);
-      if (steps != StepRule::kLeave) timeline.set_statistics(&quality->statistics());
+      quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters,
+                      config.layout.capacity, start.frame_rate_hz);
     }
-    if (config.gains) {
-      gains.emplace(*config.gains, config.layout.capacity, parameters);
-      timeline.set_evidence(&gains->evidence());
-    }
+    if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
+  }
+
+  // What the encoder tells goes to whom it concerns.
+  void frame(const State& predicted, const State& target, const CodecParameters& in_force) override {
+    if (quality) quality->observe(predicted, target, in_force);
+    if (other != nullptr) other->frame(predicted, target, in_force);
+  }
+  void decided(std::span<const std::uint16_t> p1,
+               std::span<const std::array<std::uint32_t, 2>> seen) override {
+    if (other != nullptr) other->decided(p1, seen);
+  }
+  void steered(const GainEvidence& evidence) override {
+    if (gains) gains->observe(evidence);
+    if (other != nullptr) other->steered(evidence);
   }
 
   void choose_parameters(const FrameResult& result);
@@ -63,6 +73,7 @@ struct Stream::Impl {
   CodecParameters parameters;  // of the next frame
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
+  EncodeObserver* other = nullptr;  // of the frame at hand
   std::uint32_t bodies = 0;
   std::int64_t (*clock)() = nullptr;
 };
@@ -79,7 +90,8 @@ Stream::Stream(Stream&&) noexcept = default;
 Stream& Stream::operator=(Stream&&) noexcept = default;
 Stream::~Stream() = default;
 
-Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<const engine::Event> events) {
+Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
+                                    EncodeObserver* observer) {
   Impl& m = *impl_;
   const std::int64_t began_ns = m.now_ns();
   m.mirror.update(bodies, events);
@@ -88,8 +100,11 @@ Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<cons
     if (record.kind == LifecycleKind::kSpawn) ++m.bodies;
     if (record.kind == LifecycleKind::kDespawn) --m.bodies;
   }
-  const FrameResult result{m.timeline.advance(m.mirror.target(), m.mirror.lifecycle(), m.config.budget),
-                           m.mirror.lifecycle(), mirrored_ns - began_ns};
+  m.other = observer;
+  EncodeObserver* const listener = m.quality || m.gains ? &m : observer;
+  const FrameResult result{
+      m.timeline.advance(m.mirror.target(), m.mirror.lifecycle(), m.config.budget, listener),
+      m.mirror.lifecycle(), mirrored_ns - began_ns};
   m.choose_parameters(result);
   return result;
 }
@@ -106,11 +121,6 @@ Result<void> Stream::set_parameters(const CodecParameters& parameters) {
   impl_->parameters = parameters;
   impl_->timeline.set_parameters(parameters);
   return {};
-}
-
-void Stream::set_statistics(CodecStatistics* statistics) {
-  TANDEM_ASSERT(!impl_->quality);
-  impl_->timeline.set_statistics(statistics);
 }
 
 void Stream::set_clock(std::int64_t (*now_ns)()) {

@@ -58,9 +58,11 @@ class Stream {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
     std::int64_t mirror_ns = 0;                  ///< putting the bodies on the lattice; 0 without a clock
   };
-  /// The next frame, from the bodies after a step and what happened to their slots in it. Allocates nothing
+  /// The next frame, from the bodies after a step and what happened to their slots in it; tells
+  /// `observer`, if any. Allocates nothing
   /// after the first few frames.
-  FrameResult produce(const engine::Bodies& bodies, std::span<const engine::Event> events);
+  FrameResult produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
+                      EncodeObserver* observer = nullptr);
 
   /// One cut right after frame(), for joiners. Replaces the content of `out`.
   void snapshot(std::vector<std::byte>& out);
@@ -73,9 +75,6 @@ class Stream {
   /// Automatic quality is above its target although the threshold is the largest permitted.
   [[nodiscard]] bool target_out_of_reach() const;
 
-  /// For training: every frame adds what it corrects. Null ends it. Not beside automatic quality, which
-  /// counts for itself.
-  void set_statistics(CodecStatistics* statistics);
   /// For measurement only: a monotonic clock in nanoseconds.
   void set_clock(std::int64_t (*now_ns)());
 

@@ -75,14 +75,52 @@ class Snaps {
   std::uint64_t count_ = 0;
 };
 
+/// The books of adaptive codecs: what their decisions took, and what they would have taken at best.
+class CodeAccount final : public EncodeObserver {
+ public:
+  void decided(std::span<const std::uint16_t> p1,
+               std::span<const std::array<std::uint32_t, 2>> seen) override {
+    decisions_.resize(seen.size());
+    for (std::size_t context = 0; context < seen.size(); ++context) {
+      const auto [zeros, ones] = seen[context];
+      if (zeros + ones == 0) continue;
+      const double p = p1[context] / 65536.0;
+      ideal_bits_ -= zeros * std::log2(1 - p) + ones * std::log2(p);
+      decisions_[context][0] += zeros;
+      decisions_[context][1] += ones;
+    }
+  }
+  void fill(BandwidthRow& row, double duration_s) const {
+    if (decisions_.empty()) return;
+    row.ideal_mbit_per_s = ideal_bits_ / (duration_s * kBitsPerMbit);
+    row.bound_mbit_per_s = least_bits() / (duration_s * kBitsPerMbit);
+  }
+
+ private:
+  /// Of all decisions at the best fixed probability of each context.
+  [[nodiscard]] double least_bits() const {
+    double bits = 0;
+    for (const auto& [zeros, ones] : decisions_) {
+      const auto all = static_cast<double>(zeros + ones);
+      for (const std::uint64_t some : {zeros, ones}) {
+        if (some != 0) bits += static_cast<double>(some) * std::log2(all / static_cast<double>(some));
+      }
+    }
+    return bits;
+  }
+
+  double ideal_bits_ = 0;
+  std::vector<std::array<std::uint64_t, 2>> decisions_;
+};
+
 /// A stream with a client of its own, and what they were seen to do.
 struct Lane {
-  Lane(std::unique_ptr<CodeAccount> books, host::Stream server_side, ClientTimeline client_side)
-      : account(std::move(books)), stream(std::move(server_side)), client(std::move(client_side)) {}
+  Lane(host::Stream server_side, ClientTimeline client_side)
+      : stream(std::move(server_side)), client(std::move(client_side)) {}
 
-  std::unique_ptr<CodeAccount> account;  // the stream adds to it
   host::Stream stream;
   ClientTimeline client;
+  CodeAccount account;
   std::vector<std::uint32_t> bytes;
   std::uint64_t corrected = 0;
   Errors errors;
@@ -93,8 +131,6 @@ struct Lane {
 Result<Lane> make_lane(host::StreamConfig config, const Replay& replay) {
   auto client = ClientTimeline::create(config.layout, {.run_blocks = config.local.run_blocks});
   if (!client) return tl::unexpected(client.error());
-  auto account = std::make_unique<CodeAccount>();
-  config.local.account = account.get();
   const engine::Simulation& simulation = replay.simulation();
   auto stream = host::Stream::create(std::move(config), {.bodies = simulation.bodies(),
                                                          .drive = replay.start_drive(),
@@ -106,7 +142,7 @@ Result<Lane> make_lane(host::StreamConfig config, const Replay& replay) {
   std::vector<std::byte> snapshot;
   stream->snapshot(snapshot);
   if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
-  return Lane(std::move(account), std::move(*stream), std::move(*client));
+  return Lane(std::move(*stream), std::move(*client));
 }
 
 /// One frame of one stream: the server's half, then the client's.
@@ -116,7 +152,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
     if (!scheduled) return scheduled;
   }
   const engine::Simulation& simulation = replay.simulation();
-  const host::Stream::FrameResult frame = lane.stream.produce(simulation.bodies(), simulation.events());
+  const host::Stream::FrameResult frame =
+      lane.stream.produce(simulation.bodies(), simulation.events(), &lane.account);
   lane.predict.add(frame.predict_ns);
   lane.encode.add(frame.mirror_ns + frame.encode_ns);
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
@@ -136,18 +173,6 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   return {};
 }
 
-/// Bits of all decisions at the best fixed probability of each context.
-double conditional_entropy(const CodeAccount& account) {
-  double bits = 0;
-  for (const auto& [zeros, ones] : account.decisions) {
-    const auto all = static_cast<double>(zeros + ones);
-    for (const std::uint64_t some : {zeros, ones}) {
-      if (some != 0) bits += static_cast<double>(some) * std::log2(all / static_cast<double>(some));
-    }
-  }
-  return bits;
-}
-
 /// What a lane measured over `frames` frames.
 BandwidthRow row_of(Lane& lane, double frames) {
   const host::StreamConfig& stream = lane.stream.config();
@@ -158,11 +183,7 @@ BandwidthRow row_of(Lane& lane, double frames) {
   row.parameters = lane.stream.parameters();
   row.mbit_per_s = mbit_per_s(lane.bytes, stream.lattice.dt_s);
   row.bytes = std::move(lane.bytes);
-  if (!lane.account->decisions.empty()) {
-    const double per_s = frames * stream.lattice.dt_s * kBitsPerMbit;
-    row.ideal_mbit_per_s = lane.account->ideal_bits / per_s;
-    row.bound_mbit_per_s = conditional_entropy(*lane.account) / per_s;
-  }
+  lane.account.fill(row, frames * stream.lattice.dt_s);
   lane.errors.fill(row);
   lane.snaps.fill(row, stream.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;

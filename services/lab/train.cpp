@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "sdk/core/codec/paper/training.hpp"
+#include "services/host/residual_statistics.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -11,8 +11,9 @@ namespace {
 constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
 
 /// What a stream corrected in one pass over the source.
-Result<CodecStatistics> observe(const host::StreamConfig& config, const std::function<Result<Source>()>& make,
-                                std::uint64_t frames, const std::function<void(Frame)>& progress) {
+Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
+                                         const std::function<Result<Source>()>& make, std::uint64_t frames,
+                                         const std::function<void(Frame)>& progress) {
   auto source = make();
   if (!source) return tl::unexpected(source.error());
   const engine::Simulation& simulation = *source->simulation;
@@ -20,14 +21,13 @@ Result<CodecStatistics> observe(const host::StreamConfig& config, const std::fun
   if (!replay) return tl::unexpected(replay.error());
   auto stream = host::Stream::create(config, {.bodies = simulation.bodies(), .drive = replay->start_drive()});
   if (!stream) return tl::unexpected(stream.error());
-  CodecStatistics observed;
-  stream->set_statistics(&observed);
+  host::ResidualStatistics observed;
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
     for (const ScheduledDrive& input : replay->scheduled()) {
       if (auto scheduled = stream->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
     }
-    stream->produce(simulation.bodies(), simulation.events());
+    stream->produce(simulation.bodies(), simulation.events(), &observed);
     progress(frame);
   }
   return observed;
@@ -68,7 +68,7 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
   if (!second) return tl::unexpected(second.error());
   const auto counts = observe(*second, make, frames, [&](Frame frame) { progress(frames + frame); });
   if (!counts) return tl::unexpected(counts.error());
-  const std::vector<std::byte> tables = trained_tables(*counts);
+  const std::vector<std::byte> tables = host::trained_tables(*counts);
   table.position_code_lengths = lengths(tables, 0);
   table.velocity_code_lengths = lengths(tables, kSymbols);
   return table;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/paper/code_tables.hpp"
 #include "sdk/core/codec/tracker/filter.hpp"
 #include "services/host/block_threads.hpp"
 #include "services/sessions/contact_plan.hpp"

@@ -48,7 +48,7 @@ void try_payload(std::span<const std::byte> input) {
   target.delta.restore_parameters(kParameters);
   target.state = target.before;
   const auto held = target.remembered(target.held);
-  if (target.delta.decode(target.state, input.subspan(1))) {
+  if (synthetic::receive(target.delta, target.state, input.subspan(1))) {
     require(synthetic::broken_invariant(target.state) == nullptr);
     // What the delta did not touch is as it was.
     std::vector<bool> touched(kCapacity);

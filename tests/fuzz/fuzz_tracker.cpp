@@ -48,9 +48,9 @@ class Stream {
     }
   }
   void payload(std::span<const std::byte> bytes) {
-    if (!side_.delta.decode(side_.state, bytes)) return;
+    if (!synthetic::receive(side_.delta, side_.state, bytes)) return;
     require(synthetic::broken_invariant(side_.state) == nullptr);
-    require(twin_.delta.decode(twin_.state, bytes).has_value());
+    require(synthetic::receive(twin_.delta, twin_.state, bytes).has_value());
   }
   void edit(std::span<const std::byte> edits) {
     side_.save(edited_);

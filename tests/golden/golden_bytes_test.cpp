@@ -67,7 +67,7 @@ void expect_bytes(std::string_view codec, std::string_view hex, const State& fro
   out.resize(server.encode(agreed, to, lifecycle, budget, out).size_bytes);
   EXPECT_EQ(to_text(out), to_text(from_text(hex)));
   State held = from;
-  const auto decoded = client.decode(held, from_text(hex));
+  const auto decoded = synthetic::receive(client, held, from_text(hex));
   ASSERT_TRUE(decoded) << decoded.error().message;
   EXPECT_EQ(held, agreed);
 }
@@ -133,8 +133,9 @@ TEST(GoldenBytes, ThatNoEncoderOfOursWritesAreDecodedToo) {
   DeltaCodec client = synthetic::make_delta("quantized", 20, kParameters);
   State state = predicted();
   const auto decoded =
-      client.decode(state, from_text("0700 03000000 aabbcc"
-                                     "0380 15000000 0000 00 0200 0300 0700 800000 000000 000000 000001"));
+      synthetic::receive(client, state,
+                         from_text("0700 03000000 aabbcc"
+                                   "0380 15000000 0000 00 0200 0300 0700 800000 000000 000000 000001"));
   ASSERT_TRUE(decoded) << decoded.error().message;
   State expected = predicted();
   expected.p(0)[3] -= 1280;

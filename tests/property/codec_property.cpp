@@ -42,7 +42,7 @@ RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
     const auto encoded = server.encode(agreed, target, lifecycle, budget, out);
     RC_ASSERT(encoded.size_bytes <= server.bound());
     RC_ASSERT(encoded.correction_bytes <= budget);
-    const auto decoded = client.decode(held, std::span(out).first(encoded.size_bytes));
+    const auto decoded = synthetic::receive(client, held, std::span(out).first(encoded.size_bytes));
     RC_ASSERT(decoded.has_value());
     RC_ASSERT(held == agreed);
     RC_ASSERT(synthetic::broken_invariant(held) == nullptr);

@@ -57,8 +57,8 @@ TEST(HostileDelta, AMutatedPayloadIsRefusedOrAppliedAlikeByEverybody) {
         State second = sample.before;
         one.restore_parameters(kParameters);
         two.restore_parameters(kParameters);
-        const auto decoded = one.decode(first, exact);
-        ASSERT_EQ(two.decode(second, exact).has_value(), decoded.has_value());
+        const auto decoded = synthetic::receive(one, first, exact);
+        ASSERT_EQ(synthetic::receive(two, second, exact).has_value(), decoded.has_value());
         ASSERT_EQ(first, second);
         ASSERT_EQ(one.parameters(), two.parameters());
         if (!decoded) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
-#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/paper/code_tables.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem::synthetic {
@@ -126,6 +126,11 @@ inline std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capa
 inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
                              const CodecParameters& parameters, const RunBlocks& run_blocks = {}) {
   return {codec_of(codec, capacity, run_blocks), capacity, parameters, kTypes};
+}
+
+/// A client's part: decodes `payload` against `state`, then applies it.
+inline Result<void> receive(DeltaCodec& client, State& state, std::span<const std::byte> payload) {
+  return client.decode(state, payload).map([&](const Delta& delta) { client.apply(delta, state); });
 }
 
 /// What every state must hold, whatever bytes it came from; null or what is broken.

@@ -91,12 +91,12 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
       }
     }
     const auto payload = std::span(out).first(encoded.size_bytes);
-    RC_ASSERT(client.decode(held, payload).has_value());
+    RC_ASSERT(synthetic::receive(client, held, payload).has_value());
     RC_ASSERT(held == agreed);
     RC_ASSERT(synthetic::broken_invariant(held) == nullptr);
     RC_ASSERT(saved(client) == saved(server));
     if (frame < joins_at) continue;
-    RC_ASSERT(late.decode(joined, payload).has_value());
+    RC_ASSERT(synthetic::receive(late, joined, payload).has_value());
     RC_ASSERT(joined == agreed);
     RC_ASSERT(saved(late) == saved(server));
   }

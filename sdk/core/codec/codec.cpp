@@ -46,13 +46,6 @@ Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
 
 std::span<const std::string_view> codec_names() { return kNames; }
 
-void GainEvidence::add(const GainEvidence& more) {
-  agreement += more.agreement;
-  repeated += more.repeated;
-  forwardness += more.forwardness;
-  driven += more.driven;
-}
-
 Result<CodecTraits> codec_traits(std::string_view name) {
   const auto* const known = std::find_if(kKnown.begin(), kKnown.end(),
                                          [name](const KnownCodec& each) { return each.name == name; });

@@ -1,15 +1,14 @@
 #pragma once
 // The codec interface: what turns the difference between a predicted and a target state into bytes.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
 #include <string_view>
-#include <vector>
 
+#include "sdk/core/codec/observer.hpp"
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/layout/parameters.hpp"
@@ -20,30 +19,35 @@ namespace tandem {
 /// Budget that never binds.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
 
-/// Adaptive codecs' own books: what their decisions took, and what they would have taken at best.
-struct CodeAccount {
-  double ideal_bits = 0;  ///< sum of -log2 of the probability that each decision had
-  std::vector<std::array<std::uint64_t, 2>> decisions;  ///< zeros and ones by context
-};
-
-/// What corrections say of a filter's gains: sums of cosines. Positive: more of it is wanted.
-struct GainEvidence {
-  double agreement = 0;        ///< of corrections with the one before: of v
-  std::uint64_t repeated = 0;  ///< corrections in it
-  double forwardness = 0;      ///< of corrections with c: of what is kept of c
-  std::uint64_t driven = 0;    ///< corrections in it
-  void add(const GainEvidence& more);
-};
-
 /// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done. Changes no
 /// byte.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
+/// A frame before its corrections, as a codec sees it.
+struct CodecFrame {
+  /// An encoder's has the delta's lifecycle records applied; a decoder's does not, so that bodies of
+  /// `renewed` must not be read from it.
+  const State& predicted;
+  std::span<const std::uint8_t> alive;  ///< the column after the records
+  std::span<const Slot> renewed;        ///< spawned, despawned or teleported by them; ascending, each once
+  const CodecParameters& parameters;
+};
+
+/// The body of one corrections section.
+using Section = std::span<const std::byte>;
+
+/// Which bodies a delta corrects; by how much stands in the codec until its next encode() or decode(), and so
+/// do the spans.
+struct Corrections {
+  std::span<const Slot> slots;    ///< each once, ascending
+  std::span<const Slot> renewed;  ///< as in the frame
+  CodecParameters parameters;     ///< as in the frame
+};
+
 /// The corrections part of a delta: one implementation a codec name (paper, sections 3.3.1 and 3.3.2).
 ///
-/// encode() and parse()+apply() leave the same state on both sides. Both see the state after the delta's
-/// lifecycle records. Only the first encode() allocates (a decoder needs no encoder's memory). Not
-/// thread-safe.
+/// The server encodes and applies, a client decodes and applies; both end with the same state. Only the first
+/// encode() allocates (a decoder needs no encoder's memory), and the message of a refusal. Not thread-safe.
 class Codec {
  public:
   virtual ~Codec() = default;
@@ -51,42 +55,20 @@ class Codec {
   /// Most bytes encode() can write for this session's capacity.
   [[nodiscard]] virtual std::size_t bound() const = 0;
 
-  /// Adds every encoded frame to `account`, which stays until this is called again; null: to none. For codecs
-  /// with adaptive contexts; others do nothing.
-  virtual void account_to(CodeAccount* /*account*/) {}
+  /// Writes sections that move the predicted state towards `target`, which has the same alive slots; changes
+  /// no state yet. Never writes more than `budget` bytes, section headers included, nor beyond the end of
+  /// `out`; where that binds, the largest errors go first, ties by slot, up to the first body that does not
+  /// fit (`tracker`: see tracker.hpp). `observer` may be null.
+  virtual Corrections encode(const CodecFrame& frame, const State& target, std::size_t budget,
+                             ByteWriter& out, EncodeObserver* observer) = 0;
 
-  /// Adds every encoded frame to `evidence`, which stays until this is called again; null: to none. For
-  /// codecs with gains; others do nothing.
-  virtual void evidence_to(GainEvidence* /*evidence*/) {}
+  /// Validates all corrections sections of a delta, in their order; changes no state yet. Errors: kMalformed
+  /// with the reason.
+  virtual Result<Corrections> decode(const CodecFrame& frame, std::span<const Section> sections) = 0;
 
-  /// The frame to come: `predicted` stays valid until the end of encode() or apply(); `slots` (ascending,
-  /// each once) are those that lifecycle records spawned, despawned or teleported in it. Comes before
-  /// encode() and before the first parse(); a decoder's `predicted` does not have the records applied yet, so
-  /// that bodies of `slots` must not be read from it. Changes no state. For codecs that remember bodies.
-  virtual void renew(const State& /*predicted*/, std::span<const Slot> /*slots*/) {}
-
-  /// Writes correction sections that move `state` (predicted) towards `target`, and moves it.
-  /// `target` has the same alive slots. Never writes more than `budget` bytes, section headers included, nor
-  /// beyond the end of `out`; where that binds, the largest errors go first, ties by slot, up to the first
-  /// body that does not fit (`tracker`: see tracker.hpp). Any codec obeys a budget; by name, only `limited`
-  /// is meant to have one. Returns the number of corrected bodies.
-  virtual std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
-                               std::size_t budget, ByteWriter& out) = 0;
-
-  /// Forgets what parse() collected. Call before the first section of a delta.
-  virtual void begin() = 0;
-  /// Validates the body of one corrections section against `alive` (the alive column after lifecycle) and
-  /// collects its corrections; changes no state. Blocks ascend. `section` must stay until apply(). Errors:
-  /// kMalformed with the reason.
-  virtual Result<void> parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
-                             const CodecParameters& parameters) = 0;
-  /// After the last section, if all parsed: refuses what can be seen only now. Changes no state. Errors:
-  /// kMalformed with the reason.
-  virtual Result<void> parse_end() { return {}; }
-  /// Applies all collected corrections. Only after every section of the delta parsed, and parse_end().
-  virtual void apply(State& state) = 0;
-  /// Slots corrected by the last encode() or apply(), each once, ascending.
-  [[nodiscard]] virtual std::span<const Slot> corrected() const = 0;
+  /// Does what the last encode() or decode() returned to the frame's state, lifecycle records applied. Once a
+  /// frame, also where nothing is corrected: codecs that learn learn here.
+  virtual void apply(const Corrections& corrections, State& state) = 0;
 
   /// The codec's own per-body bytes, part of the state hash and of snapshots. Empty for the paper's codecs.
   [[nodiscard]] virtual std::span<const std::byte> body_state() const { return {}; }
@@ -111,7 +93,7 @@ struct CodecTraits {
   bool reads_threshold = false;  ///< the others send every body
   bool reads_steps = false;      ///< quantisation steps
   bool reads_gains = false;      ///< and the decay that goes with them
-  bool takes_tables = false;     ///< 512 code lengths (training.hpp makes them, trained or default)
+  bool takes_tables = false;     ///< 512 code lengths (code_tables.hpp)
   bool takes_budget = false;     ///< is meant to have one; any codec obeys it
   std::size_t usual_budget = kNoBudget;  ///< bytes a frame
 };

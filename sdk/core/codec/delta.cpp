@@ -4,7 +4,6 @@
 #include <string>
 
 #include "sdk/core/codec/lifecycle.hpp"
-#include "sdk/core/codec/paper/training.hpp"
 #include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
@@ -51,38 +50,38 @@ struct DeltaCodec::Impl {
   TypeId type_count = 0;
   CodecParameters parameters;  // in force
   CodecParameters next;        // server: from the next encode() on
-  CodecStatistics* statistics = nullptr;
+  // Of the delta at hand.
   std::vector<LifecycleRecord> lifecycle;
   std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
-  std::vector<Slot> merged;         // touched slots; used only where lifecycle adds to the corrected ones
+  std::vector<Slot> renewed;        // slots of lifecycle records that brought or ended a body
+  std::vector<Section> sections;
+  // Of the last one that was applied.
+  std::span<const LifecycleRecord> applied;
+  std::vector<Slot> merged;  // touched slots; used only where lifecycle adds to the corrected ones
   std::span<const Slot> touched;
-  std::vector<Slot> renewed;  // slots of lifecycle records that brought or ended a body
 
-  // Where a section belongs among the others: lifecycle, parameters, corrections.
   struct Parsed {
-    int stage = 0;
+    int stage = 0;  // where a section belongs among the others: lifecycle, parameters, corrections
     CodecParameters parameters;
     std::span<const std::uint8_t> alive;
-    bool renewed = false;  // the codec knows of the frame
   };
-  Result<void> parse(std::span<const std::byte> payload, const State& state, Parsed& parsed);
-  Result<void> parse_section(std::uint16_t type, std::span<const std::byte> body, const State& state,
+  Result<void> parse(std::span<const std::byte> payload, const State& predicted, Parsed& parsed);
+  Result<void> parse_section(std::uint16_t type, std::span<const std::byte> body, const State& predicted,
                              Parsed& parsed);
-  void renew(const State& state);
-  void merge_touched();
+  void list_renewed();
+  void remember(const Delta& delta);
 };
 
-void DeltaCodec::Impl::renew(const State& state) {
+void DeltaCodec::Impl::list_renewed() {
   renewed.clear();
   for (const LifecycleRecord& record : lifecycle) {
     if (record.kind == LifecycleKind::kTypeChange) continue;
     if (renewed.empty() || renewed.back() != record.slot) renewed.push_back(record.slot);
   }
-  codec->renew(state, renewed);
 }
 
 Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const std::byte> body,
-                                             const State& state, Parsed& parsed) {
+                                             const State& predicted, Parsed& parsed) {
   const auto enter = [&parsed](int stage) {
     // Corrections may repeat (one section a block), the others may not.
     if (stage < parsed.stage || (stage == parsed.stage && stage != 3)) return false;
@@ -93,7 +92,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const
     case SectionType::kLifecycle: {
       if (!enter(1)) break;
       if (auto read = read_lifecycle(body, lifecycle); !read) return read;
-      std::copy(state.alive().begin(), state.alive().end(), alive.begin());
+      std::copy(predicted.alive().begin(), predicted.alive().end(), alive.begin());
       if (const char* reason = check_lifecycle(lifecycle, alive, type_count)) {
         return fail(ErrorCode::kMalformed, reason);
       }
@@ -109,9 +108,10 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const
     }
     case SectionType::kCorrections:
       if (!enter(3)) break;
-      if (!parsed.renewed) renew(state);
-      parsed.renewed = true;
-      return codec->parse(body, parsed.alive, parsed.parameters);
+      if (sections.size() == block_count(capacity))
+        return fail(ErrorCode::kMalformed, "more corrections sections than blocks");
+      sections.push_back(body);
+      return {};
     default:
       if ((type & kCriticalSection) == 0) return {};
       return fail(ErrorCode::kUnsupported,
@@ -120,12 +120,13 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const
   return fail(ErrorCode::kMalformed, "sections out of order or repeated");
 }
 
-void DeltaCodec::Impl::merge_touched() {
-  touched = codec->corrected();
-  if (lifecycle.empty()) return;
+void DeltaCodec::Impl::remember(const Delta& delta) {
+  applied = delta.lifecycle;
+  touched = delta.corrections.slots;
+  if (applied.empty()) return;
   merged.clear();
   auto corrected = touched.begin();
-  for (const LifecycleRecord& record : lifecycle) {
+  for (const LifecycleRecord& record : applied) {
     if (!merged.empty() && merged.back() == record.slot) continue;
     while (corrected != touched.end() && *corrected < record.slot) merged.push_back(*corrected++);
     if (corrected != touched.end() && *corrected == record.slot) ++corrected;
@@ -148,6 +149,7 @@ DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
   impl_->alive.resize(capacity);
   impl_->merged.reserve(capacity);
   impl_->renewed.reserve(capacity);
+  impl_->sections.reserve(block_count(capacity));
 }
 DeltaCodec::DeltaCodec(DeltaCodec&&) noexcept = default;
 DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
@@ -160,7 +162,7 @@ std::size_t DeltaCodec::bound() const {
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
                                        std::span<const LifecycleRecord> lifecycle, std::size_t budget,
-                                       std::span<std::byte> out) {
+                                       std::span<std::byte> out, EncodeObserver* observer) {
   TANDEM_ASSERT(out.size() >= bound());
   TANDEM_ASSERT(state.capacity() == impl_->capacity && target.capacity() == impl_->capacity);
   ByteWriter writer(out);
@@ -182,16 +184,19 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
     put_parameters(impl_->parameters, writer);
   }
   TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
-  if (impl_->statistics != nullptr) impl_->statistics->observe(state, target, impl_->parameters);
+  if (observer != nullptr) observer->frame(state, target, impl_->parameters);
   Encoded encoded;
   const std::size_t before = writer.size();
-  impl_->renew(state);
   const std::size_t left = budget - std::min(budget, before);
-  encoded.corrected = impl_->codec->encode(state, target, impl_->parameters, left, writer);
+  impl_->list_renewed();
+  const Corrections corrections = impl_->codec->encode(
+      {state, state.alive(), impl_->renewed, impl_->parameters}, target, left, writer, observer);
+  TANDEM_ASSERT(!writer.overflow());
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
-  TANDEM_ASSERT(!writer.overflow());
-  impl_->merge_touched();
+  encoded.corrected = static_cast<std::uint32_t>(corrections.slots.size());
+  impl_->codec->apply(corrections, state);
+  impl_->remember({impl_->lifecycle, impl_->parameters, corrections});
   return encoded;
 }
 
@@ -200,44 +205,48 @@ void DeltaCodec::set_parameters(const CodecParameters& parameters) {
   impl_->next = parameters;
 }
 const CodecParameters& DeltaCodec::parameters() const { return impl_->parameters; }
-void DeltaCodec::set_statistics(CodecStatistics* statistics) { impl_->statistics = statistics; }
 void DeltaCodec::restore_parameters(const CodecParameters& parameters) {
   set_parameters(parameters);
   impl_->parameters = parameters;
 }
 
-Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const State& state, Parsed& parsed) {
+Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const State& predicted,
+                                     Parsed& parsed) {
   ByteReader in(payload);
   while (in.remaining() > 0) {
     const auto type = in.get<std::uint16_t>();
     const auto size_bytes = in.get<std::uint32_t>();
     const std::span<const std::byte> body = in.get_bytes(size_bytes);
     if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated section");
-    if (auto section = parse_section(type, body, state, parsed); !section) return section;
+    if (auto section = parse_section(type, body, predicted, parsed); !section) return section;
   }
-  if (!parsed.renewed) renew(state);
-  return codec->parse_end();
-}
-
-Result<void> DeltaCodec::decode(State& state, std::span<const std::byte> payload) {
-  TANDEM_ASSERT(state.capacity() == impl_->capacity);
-  impl_->lifecycle.clear();
-  impl_->codec->begin();
-  impl_->touched = {};
-  Impl::Parsed parsed{0, impl_->parameters, state.alive(), false};
-  if (auto result = impl_->parse(payload, state, parsed); !result) {
-    impl_->lifecycle.clear();
-    return result;
-  }
-  impl_->parameters = impl_->next = parsed.parameters;
-  apply_lifecycle(impl_->lifecycle, state);
-  impl_->codec->apply(state);
-  impl_->merge_touched();
   return {};
 }
 
+Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::byte> payload) {
+  TANDEM_ASSERT(predicted.capacity() == impl_->capacity);
+  impl_->lifecycle.clear();
+  impl_->sections.clear();
+  impl_->remember({});
+  Impl::Parsed parsed{0, impl_->parameters, predicted.alive()};
+  if (auto result = impl_->parse(payload, predicted, parsed); !result)
+    return tl::unexpected<Error>(result.error());
+  impl_->list_renewed();
+  const auto corrections =
+      impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters}, impl_->sections);
+  if (!corrections) return tl::unexpected<Error>(corrections.error());
+  return Delta{impl_->lifecycle, parsed.parameters, *corrections};
+}
+
+void DeltaCodec::apply(const Delta& delta, State& state) {
+  impl_->parameters = impl_->next = delta.parameters;
+  apply_lifecycle(delta.lifecycle, state);
+  impl_->codec->apply(delta.corrections, state);
+  impl_->remember(delta);
+}
+
 std::span<const Slot> DeltaCodec::touched() const { return impl_->touched; }
-std::span<const LifecycleRecord> DeltaCodec::lifecycle() const { return impl_->lifecycle; }
+std::span<const LifecycleRecord> DeltaCodec::lifecycle() const { return impl_->applied; }
 Codec& DeltaCodec::codec() { return *impl_->codec; }
 const Codec& DeltaCodec::codec() const { return *impl_->codec; }
 

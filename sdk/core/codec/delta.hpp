@@ -39,7 +39,12 @@ void put_parameters(const CodecParameters& parameters, ByteWriter& out);
 /// Checks nothing.
 [[nodiscard]] CodecParameters get_parameters(ByteReader& in);
 
-struct CodecStatistics;
+/// What a payload says. Spans stay valid until the next encode() or decode() of the codec that read it.
+struct Delta {
+  std::span<const LifecycleRecord> lifecycle;
+  CodecParameters parameters;  ///< in force from this delta on
+  Corrections corrections;
+};
 
 /// Encodes and decodes whole payloads around a codec. One per side and session. Not thread-safe. encode() and
 /// decode() allocate only on the first call, for more lifecycle records than ever before, and for the message
@@ -67,22 +72,22 @@ class DeltaCodec {
   /// holds at least bound() bytes. `target` is the full simulation on the lattice. No more than `budget`
   /// bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
-                 std::size_t budget, std::span<std::byte> out);
+                 std::size_t budget, std::span<std::byte> out, EncodeObserver* observer = nullptr);
 
   /// Server side: parameters from the next encode() on; sent in that delta.
   void set_parameters(const CodecParameters& parameters);
   [[nodiscard]] const CodecParameters& parameters() const;
-  /// Server side, for training: every encode() adds what it sees after the lifecycle records. Null ends it.
-  void set_statistics(CodecStatistics* statistics);
   /// Client side, from a snapshot: parameters in force, nothing is sent.
   void restore_parameters(const CodecParameters& parameters);
 
-  /// Client side: validates all of `payload`, then applies it. On error the state is untouched.
+  /// Client side: validates all of `payload`, the delta of the frame that is `predicted`; changes nothing.
   /// Errors: kMalformed, kUnsupported (unknown critical section).
-  [[nodiscard]] Result<void> decode(State& state, std::span<const std::byte> payload);
+  [[nodiscard]] Result<Delta> decode(const State& predicted, std::span<const std::byte> payload);
+  /// Client side: does what the last decode() returned to the state that it saw.
+  void apply(const Delta& delta, State& state);
 
-  /// Of the last encode() or decode(): slots that records or corrections named, each once, ascending; the
-  /// records.
+  /// Of the last encode() or apply(), none since a decode(): slots that records or corrections named, each
+  /// once, ascending; the records.
   [[nodiscard]] std::span<const Slot> touched() const;
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;
   [[nodiscard]] Codec& codec();

@@ -135,12 +135,15 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   Stopwatch watch(m.clock);
   const bool ahead = m.now > m.applied;
   if (!ahead) m.simulate(frame);
-  if (auto decoded = m.parts.delta.decode(m.at(frame).state, payload); !decoded) return decoded;
+  State& state = m.at(frame).state;
+  const auto delta = m.parts.delta.decode(state, payload);
+  if (!delta) return tl::unexpected<Error>(delta.error());
+  m.parts.delta.apply(*delta, state);
   m.applied = frame;
   m.now = std::max(m.now, frame);
   m.inputs.forget(frame);
   m.timings.decode_ns = watch.lap_ns();
-  m.hash = m.hasher.hash(m.at(frame).state, m.parts.delta.codec().body_state());
+  m.hash = m.hasher.hash(state, m.parts.delta.codec().body_state());
   m.resimulate();
   m.timings.apply_ns = watch.lap_ns();
   if (m.hash != hash) {

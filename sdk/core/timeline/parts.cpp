@@ -13,7 +13,6 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
                            .predictor = predictor->name(),
                            .run_blocks = local.run_blocks});
   if (!codec) return tl::unexpected<Error>(codec.error());
-  (*codec)->account_to(local.account);
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count)};
 }

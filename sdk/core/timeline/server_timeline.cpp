@@ -67,7 +67,7 @@ Result<void> ServerTimeline::schedule(const ScheduledDrive& input) {
 
 ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
                                                     std::span<const LifecycleRecord> lifecycle,
-                                                    std::size_t budget) {
+                                                    std::size_t budget, EncodeObserver* observer) {
   Impl& m = *impl_;
   FrameResult result;
   Stopwatch watch(m.clock);
@@ -77,7 +77,8 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   m.inputs.forget(m.frame);
   m.parts.predictor->step(m.state, m.state, m.drive);
   result.predict_ns = watch.lap_ns();
-  const DeltaCodec::Encoded encoded = m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload);
+  const DeltaCodec::Encoded encoded =
+      m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer);
   result.encode_ns = watch.lap_ns();
   m.hash = m.hasher.hash(m.state, m.parts.delta.codec().body_state());
   result.hash_ns = watch.lap_ns();
@@ -94,14 +95,6 @@ void ServerTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns
 void ServerTimeline::set_parameters(const CodecParameters& parameters) {
   impl_->parts.delta.set_parameters(parameters);
 }
-void ServerTimeline::set_statistics(CodecStatistics* statistics) {
-  impl_->parts.delta.set_statistics(statistics);
-}
-
-void ServerTimeline::set_evidence(GainEvidence* evidence) {
-  impl_->parts.delta.codec().evidence_to(evidence);
-}
-
 Frame ServerTimeline::frame() const { return impl_->frame; }
 const State& ServerTimeline::state() const { return impl_->state; }
 const Drive& ServerTimeline::drive() const { return impl_->drive; }

@@ -17,8 +17,7 @@ namespace tandem {
 
 /// What one side decides for itself, beside the layout: the other never learns of it, and no byte changes.
 struct LocalOptions {
-  RunBlocks run_blocks;            ///< how this side codes blocks side by side; see Codec
-  CodeAccount* account = nullptr;  ///< books of this side's codec; see Codec
+  RunBlocks run_blocks;  ///< how this side codes blocks side by side; see Codec
 };
 
 /// An input that changes the predicted step. `number` counts 1, 2, ... within an epoch.
@@ -62,18 +61,14 @@ class ServerTimeline {
     /// Encoding applies as it goes. Filled only when a clock was given: set_clock().
     std::int64_t predict_ns = 0, encode_ns = 0, hash_ns = 0;
   };
-  /// Predicts the next frame, encodes towards `target` and applies. Allocates nothing after the first few
-  /// frames.
+  /// Predicts the next frame, encodes towards `target` and applies; tells `observer`, if any. Allocates
+  /// nothing after the first few frames.
   FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
-                      std::size_t budget = kNoBudget);
+                      std::size_t budget = kNoBudget, EncodeObserver* observer = nullptr);
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
   /// In force from the next advance() on; travels in that delta.
   void set_parameters(const CodecParameters& parameters);
-  /// For training: every advance() adds what it corrects (training.hpp). Null ends it.
-  void set_statistics(CodecStatistics* statistics);
-  /// Every advance() adds what its corrections say of the gains. Null ends it.
-  void set_evidence(GainEvidence* evidence);
 
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] const State& state() const;

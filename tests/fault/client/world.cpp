@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/paper/code_tables.hpp"
 #include "sdk/core/codec/tracker/filter.hpp"
 #include "services/host/outbox.hpp"
 

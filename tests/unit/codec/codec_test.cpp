@@ -19,10 +19,12 @@ struct Encoded {
 Encoded encode(Codec& codec, State& state, const State& target, std::size_t budget = kNoBudget) {
   Encoded encoded{std::vector<std::byte>(codec.bound()), {}};
   ByteWriter out(encoded.bytes);
-  codec.encode(state, target, kParameters, budget, out);
+  const CodecFrame frame{state, state.alive(), {}, kParameters};
+  const Corrections corrections = codec.encode(frame, target, budget, out, nullptr);
   EXPECT_FALSE(out.overflow());
   encoded.bytes.resize(out.size());
-  encoded.corrected.assign(codec.corrected().begin(), codec.corrected().end());
+  encoded.corrected.assign(corrections.slots.begin(), corrections.slots.end());
+  codec.apply(corrections, state);
   return encoded;
 }
 
@@ -137,7 +139,9 @@ TEST(Codec, AResidualThatRoundsToNothingIsNotSent) {
   const auto codec = codec_of("quantized", 1);
   std::vector<std::byte> memory(codec->bound());
   ByteWriter out(memory);
-  EXPECT_EQ(codec->encode(state, target, {100, 300, 300}, kNoBudget, out), 0U);
+  const CodecParameters parameters{100, 300, 300};
+  const CodecFrame frame{state, state.alive(), {}, parameters};
+  EXPECT_TRUE(codec->encode(frame, target, kNoBudget, out, nullptr).slots.empty());
   EXPECT_EQ(out.size(), 0U);
 }
 
@@ -189,9 +193,9 @@ TEST(Codec, AValueBeyondTheLatticeIsRefused) {
   out.put(std::uint8_t{2});
   out.put(kPositionLimit + 1);
   for (int i = 0; i < 5; ++i) out.put(std::int32_t{0});
-  const std::vector<std::uint8_t> alive{1};
-  codec->begin();
-  EXPECT_FALSE(codec->parse(memory, alive, kParameters));
+  const State state = bodies_at_rest(1);
+  const Section section(memory);
+  EXPECT_FALSE(codec->decode({state, state.alive(), {}, kParameters}, std::span(&section, 1)));
 }
 
 TEST(Codec, ThePaperCodecsKeepNoCoderState) {

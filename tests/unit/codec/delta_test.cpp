@@ -75,7 +75,7 @@ class Payload {
 Result<State> decode(const Bytes& payload, std::string_view codec = "quantized") {
   DeltaCodec delta = make_delta(codec, 4, kParameters);
   State state = three_of_four();
-  const auto decoded = delta.decode(state, payload);
+  const auto decoded = synthetic::receive(delta, state, payload);
   if (decoded) return state;
   EXPECT_EQ(state, three_of_four());
   EXPECT_EQ(delta.parameters(), kParameters);
@@ -165,7 +165,7 @@ TEST(DeltaCodec, ParametersTravelWithTheDeltaThatUsesThemFirst) {
   const CodecParameters changed{50, 1, 1};
   server.set_parameters(changed);
   auto encoded = server.encode(agreed, target, {}, kNoBudget, out);
-  ASSERT_TRUE(client.decode(held, std::span(out).first(encoded.size_bytes)));
+  ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));
   EXPECT_EQ(held, agreed);
   EXPECT_EQ(held.p(0)[0], 127);
   EXPECT_EQ(client.parameters(), changed);
@@ -257,20 +257,52 @@ TEST(DeltaCodec, TouchedNamesEachSlotOfRecordsAndCorrectionsOnce) {
   EXPECT_EQ(state, target);
 }
 
-TEST(DeltaCodec, StatisticsSeeWhatIsCorrected) {
+TEST(DeltaCodec, AnObserverSeesTheFrameAfterItsRecordsAndBeforeItsCorrections) {
+  struct Observer final : EncodeObserver {
+    void frame(const State& predicted, const State& target, const CodecParameters& parameters) override {
+      EXPECT_EQ(parameters, kParameters);
+      before = predicted;
+      after = target;
+    }
+    State before, after;
+  };
   DeltaCodec server = make_delta("selective", 4, kParameters);
   Bytes out(server.bound());
   State state = three_of_four();
   State target = state;
   target.p(0)[0] = 5000;
-  CodecStatistics statistics;
-  server.set_statistics(&statistics);
-  server.encode(state, target, {}, kNoBudget, out);
-  server.set_statistics(nullptr);
-  server.encode(state, three_of_four(), {}, kNoBudget, out);
-  EXPECT_EQ(statistics.frames, 1U);
-  EXPECT_EQ(statistics.bodies, 1U);
-  EXPECT_EQ(statistics.largest_position, 5000U);
+  target.despawn(1);
+  State despawned = state;
+  despawned.despawn(1);
+  Observer observer;
+  server.encode(state, target, std::vector<LifecycleRecord>{{LifecycleKind::kDespawn, 1, 0, 0, {}}},
+                kNoBudget, out, &observer);
+  EXPECT_EQ(observer.before, despawned);
+  EXPECT_EQ(observer.after, target);
+}
+
+TEST(DeltaCodec, DecodingChangesNothing) {
+  for (const std::string_view name : codec_names()) {
+    SCOPED_TRACE(name);
+    DeltaCodec server = make_delta(name, 4, kParameters);
+    DeltaCodec client = make_delta(name, 4, kParameters);
+    Bytes out(server.bound());
+    State state = three_of_four();
+    const State predicted = state;
+    State target = state;
+    target.p(0)[0] = 5000;
+    server.set_parameters({99, 16, 64});
+    const auto payload = std::span(out).first(server.encode(state, target, {}, kNoBudget, out).size_bytes);
+    State held = predicted;
+    ASSERT_TRUE(client.decode(held, payload));
+    EXPECT_EQ(held, predicted);
+    EXPECT_EQ(client.parameters(), kParameters);
+    const auto again = client.decode(held, payload);
+    ASSERT_TRUE(again);
+    client.apply(*again, held);
+    EXPECT_EQ(held, state);
+    EXPECT_EQ(client.parameters().threshold, 99);
+  }
 }
 
 }  // namespace

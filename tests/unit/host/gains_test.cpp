@@ -15,15 +15,19 @@ namespace {
 constexpr std::uint32_t kBodies = 1000;
 constexpr CodecParameters kStart{.threshold = 1000, .decay = 3000, .velocity_gain = 26214};
 
+/// The sum of as many cosines.
+std::int64_t cosines(double each, std::uint64_t count) {
+  return std::llround(each * static_cast<double>(GainEvidence::kCosineOne) * static_cast<double>(count));
+}
+
 /// Decisions on corrections that all have these cosines; the parameters in force at the end.
 CodecParameters decide(double agreement, double forwardness, int decisions, std::uint64_t corrections = 600) {
   GainControl control({}, kBodies, kStart);
   CodecParameters parameters = kStart;
   for (int frame = 0; frame < 15 * decisions; ++frame) {
-    GainEvidence& seen = control.evidence();
-    seen.repeated = seen.driven = corrections;
-    seen.agreement = agreement * static_cast<double>(corrections);
-    seen.forwardness = forwardness * static_cast<double>(corrections);
+    if (frame % 15 == 0)
+      control.observe(
+          {cosines(agreement, corrections), corrections, cosines(forwardness, corrections), corrections});
     control.after_frame(parameters);
   }
   return parameters;
@@ -62,8 +66,7 @@ TEST(Gains, AreDecidedEveryFifteenFrames) {
   GainControl control({}, kBodies, kStart);
   CodecParameters parameters = kStart;
   for (int frame = 1; frame <= 15; ++frame) {
-    control.evidence().driven += 100;
-    control.evidence().forwardness -= 50;
+    control.observe({.forwardness = cosines(-0.5, 100), .driven = 100});
     EXPECT_EQ(control.after_frame(parameters), frame == 15);
   }
 }

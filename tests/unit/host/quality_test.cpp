@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/paper/code_tables.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "tests/unit/host/fakes.hpp"
@@ -17,6 +17,15 @@ constexpr CodecParameters kStart{.threshold = 1000, .position_step = 100, .veloc
 
 QualityControl control_of(const QualityGoal& goal, StepRule steps = StepRule::kFollow) {
   return {goal, steps, kStart, 1000, 30};
+}
+
+/// Tells `control` of one body that is corrected by so much.
+void correct(QualityControl& control, std::int32_t position, std::int32_t velocity) {
+  State predicted(1);
+  predicted.spawn(0, 0, 0, {});
+  State target = predicted;
+  target.set_body(0, {{position, 0, 0}, {velocity, 0, 0}});
+  control.observe(predicted, target, {.threshold = 1});
 }
 
 /// `seconds` of frames of `bytes` each; the parameters in force at the end.
@@ -56,9 +65,7 @@ TEST(Quality, NeverLeavesItsLimits) {
 
 TEST(Quality, WithoutATargetTheThresholdStaysAndRangesFollowWhatIsCorrected) {
   QualityControl control = control_of({.smallest_threshold = 1000, .largest_threshold = 1000});
-  control.statistics().bodies = 1;
-  control.statistics().largest_position = 127000;
-  control.statistics().largest_velocity = 1270;
+  correct(control, 127000, 1270);
   CodecParameters grown = kStart;
   while (!control.after_frame(500, 10, grown)) continue;
   EXPECT_EQ(grown.threshold, 1000);
@@ -70,8 +77,7 @@ TEST(Quality, WithoutATargetTheThresholdStaysAndRangesFollowWhatIsCorrected) {
 TEST(Quality, StepsOfACodecThatDoesNotReadThemStay) {
   QualityControl control =
       control_of({.smallest_threshold = 1000, .largest_threshold = 1000}, StepRule::kLeave);
-  control.statistics().bodies = 1;
-  control.statistics().largest_position = 127000;
+  correct(control, 127000, 0);
   EXPECT_EQ(run(control, 1, 500, kStart), kStart);
   EXPECT_EQ(step_rule(*codec_traits("tracker")), StepRule::kLeave);
 }
@@ -80,8 +86,7 @@ TEST(Quality, StepsThatCodeTablesWereTrainedForAreTheSmallestAndScaleWithTheThre
   QualityControl control = control_of({1, 10, 2000}, step_rule(*codec_traits("entropy")));
   CodecParameters parameters = kStart;
   for (int frame = 0; frame < 300; ++frame) {
-    control.statistics().bodies = 1;
-    control.statistics().largest_position = 127;
+    correct(control, 127, 0);
     control.after_frame(100 * kMbitBytes, 10, parameters);
   }
   EXPECT_EQ(parameters, (CodecParameters{.threshold = 2000, .position_step = 200, .velocity_step = 200}));

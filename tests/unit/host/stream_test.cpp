@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "sdk/core/codec/paper/training.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
@@ -68,12 +67,11 @@ TEST(Stream, CountsWhatItCorrectsForTraining) {
   const HostConfig config = test_config();
   FakeSimulation simulation(4);
   Stream stream = Stream::create(config.stream, start_of(simulation, config)).value();
-  CodecStatistics statistics;
-  stream.set_statistics(&statistics);
+  ResidualStatistics statistics;
   std::uint64_t corrected = 0;
   for (int frame = 0; frame < 20; ++frame) {
     for (float& y : simulation.position[1]) y += 0.1F * static_cast<float>(frame);
-    corrected += stream.produce(simulation.bodies(), {}).corrected;
+    corrected += stream.produce(simulation.bodies(), {}, &statistics).corrected;
   }
   EXPECT_GT(corrected, 0U);
   EXPECT_EQ(statistics.bodies, corrected);

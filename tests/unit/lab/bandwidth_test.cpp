@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/paper/code_tables.hpp"
 #include "services/lab/bandwidth_columns.hpp"
 #include "services/lab/paper_numbers.hpp"
 #include "services/lab/peers.hpp"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sdk/core/codec/paper/training.hpp"
+#include "sdk/core/codec/paper/code_tables.hpp"
 #include "tests/unit/lab/bouncing.hpp"
 
 namespace tandem::lab {

@@ -26,7 +26,7 @@ TEST(TrackerBudget, IsNeverExceededByAByteAndSpentOnTheLargestErrors) {
     const auto encoded = server.encode(agreed, target, {}, budget, out);
     ASSERT_LE(encoded.correction_bytes, budget);
     State held = start;
-    ASSERT_TRUE(client.decode(held, std::span(out).first(encoded.size_bytes)));
+    ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));
     ASSERT_EQ(held, agreed);
     // Beyond 2^24 lattice units errors count alike.
     const auto error_of = [&](Slot slot) {
@@ -76,7 +76,7 @@ TEST(TrackerBudget, FewBytesAreEnoughToMoveManyBodiesOn) {
     const bool free = frame < 10;
     const auto encoded = server.encode(agreed, target, {}, free ? kNoBudget : 64, out);
     ASSERT_TRUE(free || encoded.size_bytes <= 64);
-    ASSERT_TRUE(client.decode(held, std::span(out).first(encoded.size_bytes)));
+    ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));
     ASSERT_EQ(held, agreed);
     moved += frame >= 40 && encoded.corrected > 0 ? 1 : 0;
   }

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sdk/core/codec/tracker/search.hpp"
+#include "sdk/core/codec/tracker/steps.hpp"
 
 namespace tandem {
 namespace {
@@ -79,7 +79,7 @@ TEST(TrackerFilter, SmallStepsAreShorterTheMoreAxesMove) {
   EXPECT_EQ(steppings.unit_for({2, 1, 0}), 949);
 }
 
-TEST(TrackerSearch, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
+TEST(TrackerSteps, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
   TrackerCosts costs;
   costs.learn(TrackerModels());
   for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11}) {

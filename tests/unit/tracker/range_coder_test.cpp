@@ -152,7 +152,7 @@ struct Coded {
 template <class Code>
 Coded coded(std::size_t room, const TrackerModels& models, const Code& code) {
   Coded result{Bytes(room), {}};
-  TrackerEncoder coder{RangeEncoder(result.bytes), &models, &result.counts};
+  DecisionEncoder coder{RangeEncoder(result.bytes), &models, &result.counts};
   code(coder);
   result.bytes.resize(coder.range.finish());
   EXPECT_FALSE(coder.range.overflow());
@@ -170,11 +170,11 @@ TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
     if (steps != TrackerSteps{}) all.push_back(steps);
   }
   const TrackerModels models;
-  const Coded out = coded(all.size() * (kMostStepsBits / 8 + 1), models, [&all](TrackerEncoder& coder) {
+  const Coded out = coded(all.size() * (kMostStepsBits / 8 + 1), models, [&all](DecisionEncoder& coder) {
     for (TrackerSteps steps : all) code_steps(coder, {}, steps);
   });
   TrackerCounts counts{};
-  TrackerDecoder decoder{RangeDecoder(out.bytes), &models, &counts};
+  DecisionDecoder decoder{RangeDecoder(out.bytes), &models, &counts};
   for (const TrackerSteps& expected : all) {
     TrackerSteps steps{};
     ASSERT_TRUE(code_steps(decoder, {}, steps));
@@ -238,7 +238,7 @@ TEST(TrackerModels, SectionsStayWithinOnePercentOfTheIdealLengthOfTheirModels) {
       IdealCoder ideal{&models};
       code_block(ideal, kSeed + frame, corrected_one_in);
       ideal_bits += ideal.bits;
-      const Coded out = coded(100'000, models, [&](TrackerEncoder& coder) {
+      const Coded out = coded(100'000, models, [&](DecisionEncoder& coder) {
         code_block(coder, kSeed + frame, corrected_one_in);
       });
       real_bits += 8.0 * static_cast<double>(out.bytes.size());

@@ -89,7 +89,7 @@ TEST(Tracker, BlocksCodedSideBySideGiveTheSameBytes) {
     ASSERT_EQ(together.encode(also, target, lifecycle, budget, same).size_bytes, encoded.size_bytes);
     const auto payload = std::span(out).first(encoded.size_bytes);
     ASSERT_TRUE(std::ranges::equal(payload, std::span(same).first(encoded.size_bytes)));
-    ASSERT_TRUE(client.decode(held, payload));
+    ASSERT_TRUE(synthetic::receive(client, held, payload));
     ASSERT_EQ(held, agreed);
     ASSERT_EQ(also, agreed);
     ASSERT_TRUE(std::ranges::equal(client.touched(), alone.touched()));
@@ -152,17 +152,17 @@ TEST(Tracker, ARefusedDeltaLeavesCoderAndBodiesUntouched) {
       DeltaCodec probe = synthetic::make_delta("tracker", 60, kParameters);
       ASSERT_TRUE(probe.codec().load(before, held.alive()));
       State state = held;
-      if (probe.decode(state, mutated)) {
+      if (synthetic::receive(probe, state, mutated)) {
         ASSERT_EQ(synthetic::broken_invariant(state), nullptr);
         continue;
       }
       ++refused;
       ASSERT_EQ(state, held);
-      ASSERT_FALSE(client.decode(held, mutated));
+      ASSERT_FALSE(synthetic::receive(client, held, mutated));
       ASSERT_EQ(coder_state(client), before);
       ASSERT_EQ(held, held_before);
     }
-    ASSERT_TRUE(client.decode(held, payload));
+    ASSERT_TRUE(synthetic::receive(client, held, payload));
     ASSERT_EQ(held, agreed);
     ASSERT_EQ(coder_state(client), coder_state(server));
   }
@@ -213,11 +213,11 @@ TEST(Tracker, AThresholdThatChangesActsInItsOwnDelta) {
   State target = agreed;
   target.p(0)[0] = 150;
   EXPECT_EQ(server.encode(agreed, target, {}, kNoBudget, out).corrected, 0U);
-  ASSERT_TRUE(client.decode(held, {}));
+  ASSERT_TRUE(synthetic::receive(client, held, {}));
   server.set_parameters({100, 1, 1});
   const auto encoded = server.encode(agreed, target, {}, kNoBudget, out);
   EXPECT_EQ(encoded.corrected, 1U);
-  ASSERT_TRUE(client.decode(held, std::span(out).first(encoded.size_bytes)));
+  ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));
   EXPECT_EQ(held, agreed);
   EXPECT_NEAR(held.p(0)[0], 150, 100);
 }
@@ -244,7 +244,7 @@ TEST(Tracker, CorrectionsBeyondTheCapacityRepeatedOrEmptyAreRefused) {
   const auto refused = [&](std::initializer_list<int> bytes) {
     Bytes payload;
     for (const int byte : bytes) payload.push_back(static_cast<std::byte>(byte));
-    return !client.decode(state, payload);
+    return !synthetic::receive(client, state, payload);
   };
   EXPECT_TRUE(refused({3, 0x80, 0, 0, 0, 0}));                     // no block
   EXPECT_TRUE(refused({3, 0x80, 2, 0, 0, 0, 1, 0}));               // block 1 of 1

@@ -22,20 +22,17 @@ class AbsoluteCoding {
     candidate.bits = 8 * kBodyBytes;
     return true;
   }
-  static void write(const State&, const State& target, std::span<const Candidate> chosen, std::byte* to) {
+  void begin() { sections_.clear(); }
+  void write(const State& target, std::span<const Candidate> chosen, std::size_t first,
+             std::span<std::byte> to) {
+    ByteWriter out(to);
     for (const Candidate& candidate : chosen) {
       const BodyState body = clamped(target.body(candidate.slot));
-      ByteWriter out({to, kBodyBytes});
       for (const std::int32_t value : body.p) out.put(value);
       for (const std::int32_t value : body.v) out.put(value);
-      to += kBodyBytes;
     }
+    sections_.push_back({to, first});
   }
-  static void correct(State& state, const State& target, const CodecParameters&, const Candidate& candidate) {
-    state.set_body(candidate.slot, target.body(candidate.slot));
-  }
-
-  void begin() { sections_.clear(); }
   Result<void> parse(std::span<const std::byte> values, std::span<const Slot> slots, std::size_t first) {
     if (values.size() != slots.size() * kBodyBytes)
       return fail(ErrorCode::kMalformed, "corrections of wrong length");

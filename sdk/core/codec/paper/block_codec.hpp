@@ -28,9 +28,11 @@ struct Candidate {
 ///   kEveryBody                                      whether bodies within the threshold are sent too
 ///   unsigned most_bits()                            a body can cost
 ///   bool measure(state, target, parameters, Candidate&)   fills bits and residual; false: nothing to send
-///   void write(state, target, candidates, to)       values of one section, padded to bytes
-///   void correct(state, target, parameters, candidate)    what the decoder will do
-///   begin(), parse(bytes, slots, first) -> Result<void>, apply(state, slots, parameters)
+///   begin()                                         forgets the delta before
+///   void write(target, candidates, first, to)       values of one section, padded to bytes; remembers them
+///   Result<void> parse(bytes, slots, first)         reads them; remembers them
+///   void apply(state, slots, parameters)            does what is remembered
+/// `first`: how many bodies of the delta come before those of the section.
 template <class Coding>
 class BlockCodec final : public Codec {
  public:
@@ -48,53 +50,37 @@ class BlockCodec final : public Codec {
     return bytes;
   }
 
-  std::uint32_t encode(State& state, const State& target, const CodecParameters& parameters,
-                       std::size_t budget, ByteWriter& out) override {
-    scan(state, target, parameters);
+  Corrections encode(const CodecFrame& frame, const State& target, std::size_t budget, ByteWriter& out,
+                     EncodeObserver* /*observer*/) override {
+    scan(frame.predicted, target, frame.parameters);
     budget = std::min(budget, out.rest().size());
     if (total_bytes() > budget) keep_largest(budget);
+    coding_.begin();
     std::size_t at = 0;
     for (std::uint32_t b = 0; b < plans_.size(); ++b) {
       const std::span<const Candidate> chosen = std::span(candidates_).subspan(at, plans_[b].chosen);
-      if (!chosen.empty()) write_section(b, state, target, chosen, std::span(corrected_).subspan(at), out);
+      if (!chosen.empty()) write_section(b, target, chosen, at, out);
       at += chosen.size();
     }
-    for (const Candidate& candidate : candidates_) coding_.correct(state, target, parameters, candidate);
-    count_ = candidates_.size();
-    return static_cast<std::uint32_t>(count_);
+    return {std::span(corrected_).first(at), frame.renewed, frame.parameters};
   }
 
-  void begin() override {
-    count_ = 0;
-    next_block_ = 0;
+  Result<Corrections> decode(const CodecFrame& frame, std::span<const Section> sections) override {
+    TANDEM_ASSERT(frame.alive.size() == capacity_);
     coding_.begin();
+    std::size_t count = 0;
+    std::uint32_t next_block = 0;
+    for (const Section& section : sections) {
+      auto parsed = parse(section, frame.alive, next_block, count);
+      if (!parsed) return tl::unexpected<Error>(parsed.error());
+      count += *parsed;
+    }
+    return Corrections{std::span(corrected_).first(count), frame.renewed, frame.parameters};
   }
 
-  Result<void> parse(std::span<const std::byte> section, std::span<const std::uint8_t> alive,
-                     const CodecParameters& parameters) override {
-    TANDEM_ASSERT(alive.size() == capacity_);
-    parameters_ = parameters;
-    ByteReader in(section);
-    const std::uint32_t index = in.get<std::uint16_t>();
-    const auto form = static_cast<SelectionForm>(in.get<std::uint8_t>());
-    if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
-    if (index >= block_count(capacity_))
-      return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
-    if (index < next_block_) return fail(ErrorCode::kMalformed, "blocks do not ascend");
-    next_block_ = index + 1;
-    const auto chosen =
-        parse_selection(form, block_at(index, capacity_), alive, in, std::span(corrected_).subspan(count_));
-    if (!chosen) return tl::unexpected<Error>(chosen.error());
-    const std::span<const Slot> slots = std::span<const Slot>(corrected_).subspan(count_, *chosen);
-    auto values = coding_.parse(in.get_bytes(in.remaining()), slots, count_);
-    if (!values) return values;
-    count_ += *chosen;
-    return {};
-  }
-
-  void apply(State& state) override { coding_.apply(state, corrected(), parameters_); }
-  [[nodiscard]] std::span<const Slot> corrected() const override {
-    return std::span(corrected_).first(count_);
+  void apply(const Corrections& corrections, State& state) override {
+    TANDEM_ASSERT(corrections.slots.data() == corrected_.data());
+    coding_.apply(state, corrections.slots, corrections.parameters);
   }
 
  private:
@@ -119,6 +105,26 @@ class BlockCodec final : public Codec {
     std::size_t bytes = 0;
     for (std::uint32_t b = 0; b < plans_.size(); ++b) bytes += plan_bytes(b);
     return bytes;
+  }
+
+  // Bodies of one section, the first of which is the `first`-th of the delta.
+  Result<std::uint32_t> parse(const Section& section, std::span<const std::uint8_t> alive,
+                              std::uint32_t& next_block, std::size_t first) {
+    ByteReader in(section);
+    const std::uint32_t index = in.get<std::uint16_t>();
+    const auto form = static_cast<SelectionForm>(in.get<std::uint8_t>());
+    if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
+    if (index >= block_count(capacity_))
+      return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
+    if (index < next_block) return fail(ErrorCode::kMalformed, "blocks do not ascend");
+    next_block = index + 1;
+    const auto chosen =
+        parse_selection(form, block_at(index, capacity_), alive, in, std::span(corrected_).subspan(first));
+    if (!chosen) return chosen;
+    const std::span<const Slot> slots = std::span<const Slot>(corrected_).subspan(first, *chosen);
+    auto values = coding_.parse(in.get_bytes(in.remaining()), slots, first);
+    if (!values) return tl::unexpected<Error>(values.error());
+    return chosen;
   }
 
   // Collects everything worth sending, ascending by slot, and what each block would cost.
@@ -183,28 +189,28 @@ class BlockCodec final : public Codec {
               [](const Candidate& a, const Candidate& b) { return a.slot < b.slot; });
   }
 
-  void write_section(std::uint32_t index, const State& state, const State& target,
-                     std::span<const Candidate> chosen, std::span<Slot> slots, ByteWriter& out) {
+  // `chosen` are the `first`-th corrected body and those that follow.
+  void write_section(std::uint32_t index, const State& target, std::span<const Candidate> chosen,
+                     std::size_t first, ByteWriter& out) {
     const Block block = block_at(index, capacity_);
     const auto count = static_cast<std::uint32_t>(chosen.size());
+    const std::span<Slot> slots = std::span(corrected_).subspan(first, count);
     for (std::uint32_t i = 0; i < count; ++i) slots[i] = chosen[i].slot;
     const SelectionForm form = smallest_form(block.slots, count, plans_[index].alive);
     out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
     out.put(static_cast<std::uint32_t>(plan_bytes(index) - kSectionHeaderBytes));
     out.put(static_cast<std::uint16_t>(index));
     out.put(static_cast<std::uint8_t>(form));
-    write_selection(form, block, slots.first(count), out);
-    coding_.write(state, target, chosen, out.rest().data());
-    out.advance(static_cast<std::size_t>((plans_[index].bits + 7) / 8));
+    write_selection(form, block, slots, out);
+    const auto size_bytes = static_cast<std::size_t>((plans_[index].bits + 7) / 8);
+    coding_.write(target, chosen, first, out.rest().first(size_bytes));
+    out.advance(size_bytes);
   }
 
   std::string name_;
   std::uint32_t capacity_;
   Coding coding_;
-  CodecParameters parameters_;
-  std::vector<Slot> corrected_;  // the first count_ are of the last delta
-  std::size_t count_ = 0;
-  std::uint32_t next_block_ = 0;
+  std::vector<Slot> corrected_;
   // Encoder only, taken by the first encode().
   std::vector<Candidate> candidates_;
   std::vector<Plan> plans_;

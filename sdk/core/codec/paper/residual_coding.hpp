@@ -57,15 +57,11 @@ class ResidualCoding {
     // With steps wider than the threshold all six may round to nothing: sending that would change nothing.
     return candidate.residual != Residual{};
   }
-  void write(const State&, const State&, std::span<const Candidate> chosen, std::byte* to) const {
-    bits_.write(chosen, to);
-  }
-  static void correct(State& state, const State&, const CodecParameters& parameters,
-                      const Candidate& candidate) {
-    apply_residual(state, candidate.slot, candidate.residual, parameters);
-  }
-
   static void begin() {}
+  void write(const State&, std::span<const Candidate> chosen, std::size_t first, std::span<std::byte> to) {
+    bits_.write(chosen, to.data());
+    for (std::size_t i = 0; i < chosen.size(); ++i) residuals_[first + i] = chosen[i].residual;
+  }
   Result<void> parse(std::span<const std::byte> values, std::span<const Slot> slots, std::size_t first) {
     return bits_.read(values, std::span(residuals_).subspan(first, slots.size()));
   }

@@ -1,7 +1,6 @@
 #include "sdk/core/codec/tracker/models.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "sdk/core/lattice/vector_clones.hpp"
 
@@ -114,15 +113,6 @@ void TrackerModels::learn(const TrackerCounts& counts) {
         sum >> 32U == 0 ? static_cast<std::uint32_t>(sum) / (before + seen) : sum / (before + seen);
     p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));
     weight[i] = static_cast<std::uint8_t>(std::min(before - 1 + seen, 255U));
-  }
-}
-
-void TrackerModels::account(const TrackerCounts& counts, CodeAccount& account) const {
-  account.decisions.resize(TrackerModelIndex::kDead);
-  for (std::size_t i = 0; i < TrackerModelIndex::kDead; ++i) {
-    const double p = p1[i] / 65536.0;
-    account.ideal_bits -= counts[i][0] * std::log2(1 - p) + counts[i][1] * std::log2(p);
-    for (std::size_t bit = 0; bit < 2; ++bit) account.decisions[i][bit] += counts[i][bit];
   }
 }
 

@@ -44,8 +44,6 @@ struct TrackerModels {
   /// p1 becomes the mean of what it was, counted weight + 1 times, and of the decisions; the weight grows by
   /// their number, up to 255.
   void learn(const TrackerCounts& counts);
-  /// Before learn().
-  void account(const TrackerCounts& counts, CodeAccount& account) const;
 
   std::array<std::uint16_t, TrackerModelIndex::kAll> p1{};
   std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
@@ -59,7 +57,7 @@ struct TrackerContext {
   std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
 };
 
-/// Buckets of frame counts 0 .. 255; see tracker_models.cpp.
+/// Buckets of frame counts 0 .. 255; see models.cpp.
 extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 
 namespace tracker_detail {
@@ -137,7 +135,7 @@ class TrackerContexts {
 }
 
 /// Decisions into bytes; counts them.
-struct TrackerEncoder {
+struct DecisionEncoder {
   bool code(bool bit, std::uint32_t model) {
     range.put(bit, models->p1[model]);
     ++(*counts)[model][bit ? 1 : 0];
@@ -151,7 +149,7 @@ struct TrackerEncoder {
 };
 
 /// Bytes into decisions; counts them. The first argument is what an encoder would code.
-struct TrackerDecoder {
+struct DecisionDecoder {
   bool code(bool /*bit*/, std::uint32_t model) {
     const bool bit = range.get(models->p1[model]);
     ++(*counts)[model][bit ? 1 : 0];

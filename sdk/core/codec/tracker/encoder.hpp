@@ -1,35 +1,36 @@
 #pragma once
-// The tracker's encoder: which bodies to correct and by which of the points inside the error ball. Nothing
-// here is on the wire.
+// The tracker's encoder: which bodies to correct. By how much is in steps.hpp. Nothing here is on the wire.
 
 #include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "sdk/core/codec/tracker/tracker.hpp"
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/codec/tracker/frame.hpp"
+#include "sdk/core/codec/tracker/steps.hpp"
 
 namespace tandem {
 
 /// What the encoder keeps to, as to a budget. Bodies that all jump at once take about a third of it.
 inline constexpr std::size_t kMostTrackerBytesPerBody = 24;
 inline constexpr std::size_t kTrackerSlackBytes = 64;
+inline constexpr std::size_t kTrackerBlockHeaderBytes = 2;  ///< u16 block
+/// Most bytes of sections for a capacity.
+[[nodiscard]] constexpr std::size_t tracker_bound(std::uint32_t capacity) {
+  return block_count(capacity) * (kSectionHeaderBytes + kTrackerBlockHeaderBytes + kTrackerSlackBytes) +
+         kMostTrackerBytesPerBody * capacity;
+}
 
-/// What decisions would cost, in 1/256 bits: of each model a zero and a one.
-struct TrackerCosts {
-  void learn(const TrackerModels& models);
-  std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
-};
-
-struct ErrorWorth;
-
-class TrackerSearch {
+/// Keeps, beside scratch memory, how long each body has waited for its correction.
+class TrackerEncoder {
  public:
-  explicit TrackerSearch(std::uint32_t capacity);
+  explicit TrackerEncoder(std::uint32_t capacity);
 
-  /// Writes at most `budget` bytes of sections; leaves bodies, steps and counts in `tracker` as parse_end()
-  /// would.
-  void encode(Tracker& tracker, const State& target, std::size_t budget, ByteWriter& out);
+  /// Writes at most `budget` bytes of sections, fills in frame.delta and returns the corrected slots,
+  /// ascending; changes nothing else.
+  std::span<const Slot> encode(const TrackerFrame& frame, const State& target, std::size_t budget,
+                               ByteWriter& out);
 
  private:
   /// A body that may be corrected, and how.
@@ -63,35 +64,35 @@ class TrackerSearch {
   static constexpr std::int32_t kNoCost = INT32_MIN;
 
   /// Candidates of a block without their steps.
-  void gather(Tracker& tracker, const State& target, const Block& block);
+  void gather(const TrackerFrame& frame, const State& target, const Block& block);
   /// Steps of a block's candidates that have none yet. Models are the same for a whole delta, so the choice
   /// does not depend on what else is sent.
-  void choose(const Tracker& tracker, const State& target, const Block& block);
-  void choose(const Tracker& tracker, const State& target, const ErrorWorth& worth, Candidate& candidate);
+  void choose(const TrackerFrame& frame, const State& target, const Block& block);
+  void choose(const TrackerFrame& frame, const State& target, const ErrorWorth& worth, Candidate& candidate);
 
   /// Sends as many of the most urgent bodies as fit. True: all of them, and the early ones.
-  bool write_most_urgent(Tracker& tracker, const State& target, std::size_t budget);
+  bool write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget);
   /// Fills order_ with the bodies that must go, and the costs of parts_.
-  void rank(Tracker& tracker);
+  void rank(const TrackerFrame& frame);
   struct Cut {
     std::uint32_t count;
     std::int64_t cost;
   };
   /// How many of the most urgent bodies, `first` .. `last` but at least one, seem to cost at most `most`.
   /// order_ then starts with them, the least urgent of them last; with `first` and `last` it does so already.
-  Cut cut(const Tracker& tracker, const State& target, std::uint32_t first, std::uint32_t last,
+  Cut cut(const TrackerFrame& frame, const State& target, std::uint32_t first, std::uint32_t last,
           std::int64_t most);
   /// What order_[first, last) adds to a cut.
-  std::int64_t add(const Tracker& tracker, const State& target, std::uint32_t first, std::uint32_t last);
+  std::int64_t add(const TrackerFrame& frame, const State& target, std::uint32_t first, std::uint32_t last);
   std::int64_t remove(std::uint32_t first, std::uint32_t last);
-  [[nodiscard]] std::int32_t cost(const Tracker& tracker, const Candidate& candidate) const;
+  [[nodiscard]] std::int32_t cost(const TrackerFrame& frame, const Candidate& candidate) const;
 
   /// Code streams of all blocks with the first `count` of order_. Returns the bytes of their sections.
-  std::size_t write_first(Tracker& tracker, std::uint32_t count);
+  std::size_t write_first(const TrackerFrame& frame, std::uint32_t count);
   /// Likewise, with all candidates if `all`, else with those that are marked as sent.
-  std::size_t write(Tracker& tracker, bool all);
-  void write_block(Tracker& tracker, const Block& block, bool all);
-  void remember_waiting(const Tracker& tracker);
+  std::size_t write(const TrackerFrame& frame, bool all);
+  void write_block(const TrackerFrame& frame, const Block& block, bool all);
+  void remember_waiting(const TrackerFrame& frame);
 
   std::vector<Candidate> candidates_;  // of each block from its first slot on, ascending
   std::vector<Part> parts_;            // by block
@@ -102,21 +103,5 @@ class TrackerSearch {
   bool some_wait_ = false;
   TrackerCosts costs_;
 };
-
-/// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.
-struct ErrorWorth {
-  explicit ErrorWorth(std::int32_t e);
-  std::int64_t threshold;
-  std::uint64_t limit;  ///< threshold squared
-  unsigned shift;       ///< limit >> shift has at most 24 bits
-  std::uint64_t worth;  ///< (error^2 >> shift) * worth >> 24: in 1/256 bits
-};
-
-/// Steps that correct `to` - `from` (lattice units) at least cost: of the eight points around it that leave
-/// an error of at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none
-/// does; `steps` is then the nearest.
-bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
-                  const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
-                  TrackerSteps& steps);
 
 }  // namespace tandem

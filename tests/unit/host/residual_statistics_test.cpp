@@ -1,12 +1,12 @@
-#include "sdk/core/codec/paper/training.hpp"
+#include "services/host/residual_statistics.hpp"
 
 #include <gtest/gtest.h>
 
-namespace tandem {
+namespace tandem::host {
 namespace {
 
-TEST(Training, RangesAreATenthAboveTheLargestResidual) {
-  CodecStatistics statistics;
+TEST(ResidualStatistics, RangesAreATenthAboveTheLargestResidual) {
+  ResidualStatistics statistics;
   statistics.largest_position = 127000;
   statistics.largest_velocity = 1270;
   const CodecParameters parameters = trained_parameters(statistics, 50);
@@ -15,13 +15,13 @@ TEST(Training, RangesAreATenthAboveTheLargestResidual) {
   EXPECT_EQ(parameters.velocity_step, 11);
 }
 
-TEST(Training, WithoutAResidualTheStepsAreOne) {
-  const CodecParameters parameters = trained_parameters({}, 50);
+TEST(ResidualStatistics, WithoutAResidualTheStepsAreOne) {
+  const CodecParameters parameters = trained_parameters(ResidualStatistics(), 50);
   EXPECT_EQ(parameters.position_step, 1);
   EXPECT_EQ(parameters.velocity_step, 1);
 }
 
-TEST(Training, OnlyBodiesBeyondTheThresholdCount) {
+TEST(ResidualStatistics, OnlyBodiesBeyondTheThresholdCount) {
   State predicted(3);
   for (Slot slot = 0; slot < 3; ++slot) predicted.spawn(slot, 0, 0, {});
   State target = predicted;
@@ -29,8 +29,8 @@ TEST(Training, OnlyBodiesBeyondTheThresholdCount) {
   target.v(0)[0] = 9999;
   target.p(1)[2] = -101;
   target.v(2)[2] = 40;
-  CodecStatistics statistics;
-  statistics.observe(predicted, target, {100, 10, 20});
+  ResidualStatistics statistics;
+  statistics.frame(predicted, target, {100, 10, 20});
   EXPECT_EQ(statistics.bodies, 1U);
   EXPECT_EQ(statistics.largest_position, 101U);
   EXPECT_EQ(statistics.largest_velocity, 40U);
@@ -39,15 +39,5 @@ TEST(Training, OnlyBodiesBeyondTheThresholdCount) {
   EXPECT_EQ(statistics.velocity_counts[2], 1U);
 }
 
-TEST(Training, TablesFitTheCodecThatReadsThem) {
-  const auto fit = [](std::string_view name, const std::vector<std::byte>& tables) {
-    return make_codec({.name = name, .capacity = 10, .tables = tables}).has_value();
-  };
-  EXPECT_TRUE(fit("entropy", default_code_tables()));
-  CodecStatistics statistics;
-  statistics.position_counts[0] = 1000000;
-  EXPECT_TRUE(fit("limited", trained_tables(statistics)));
-}
-
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::host

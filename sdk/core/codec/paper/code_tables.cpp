@@ -1,0 +1,21 @@
+#include "sdk/core/codec/paper/code_tables.hpp"
+
+namespace tandem {
+
+std::vector<std::byte> code_tables(const SymbolCounts& position, const SymbolCounts& velocity) {
+  std::vector<std::byte> tables;
+  for (const SymbolCounts* counts : {&position, &velocity}) {
+    for (const std::uint8_t length : build_code_lengths(*counts))
+      tables.push_back(static_cast<std::byte>(length));
+  }
+  return tables;
+}
+
+std::vector<std::byte> default_code_tables() {
+  SymbolCounts typical{};
+  for (std::int64_t q = -128; q < 128; ++q)
+    typical[static_cast<std::uint8_t>(q)] = static_cast<std::uint64_t>((1 << 20) / (4 + q * q));
+  return code_tables(typical, typical);
+}
+
+}  // namespace tandem

@@ -1,0 +1,299 @@
+#include "sdk/core/codec/tracker/encoder.hpp"
+
+#include <algorithm>
+
+#include "sdk/core/codec/errors.hpp"
+
+namespace tandem {
+namespace {
+
+// A body within the threshold but beyond this share of it (1/256) goes early if the model half expects it
+// anyway. 0.85: at 0.8 bits grow by 1.4 % and the RMS error falls by a tenth, at 1 nobody goes early
+// (RESEARCH.md).
+constexpr std::int64_t kEarlyShare = 218;
+constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + kTrackerBlockHeaderBytes;
+// Under a budget: this share of it may stay unused (1/64), and this often what is sent is written; if
+// estimates mislead, the last times with half as many bodies.
+constexpr std::size_t kSpareShare = 64;
+constexpr std::uint32_t kMostWrites = 8, kMostEstimates = 4;
+constexpr std::size_t kTooLarge = SIZE_MAX;
+// In 1/256 bits: a byte, and a first guess of what a body costs with its share of the flags.
+constexpr std::int64_t kByte = std::int64_t{8} << 8U;
+constexpr std::int64_t kGuessedCost = std::int64_t{16} << 8U;
+
+Vec3i position(const State& state, Slot slot) {
+  return {state.p(0)[slot], state.p(1)[slot], state.p(2)[slot]};
+}
+
+}  // namespace
+
+TrackerEncoder::TrackerEncoder(std::uint32_t capacity)
+    : candidates_(capacity),
+      parts_(block_count(capacity)),
+      waiting_(capacity),
+      marks_(std::size_t{block_count(capacity)} * kBlockSlots) {
+  std::size_t bytes = 0;
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    parts_[b].first_byte = bytes;
+    bytes += kMostTrackerBytesPerBody * block_at(b, capacity).slots + kTrackerSlackBytes;
+  }
+  bytes_.resize(bytes);
+  order_.reserve(capacity);
+}
+
+std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const State& target,
+                                             std::size_t budget, ByteWriter& out) {
+  budget = std::min({budget, tracker_bound(frame.memory.capacity()), out.rest().size()});
+  costs_.learn(frame.memory.models());
+  // Where bodies wait, the budget was too small a frame ago and probably still is.
+  const bool is_enough = !some_wait_ || budget >= tracker_bound(frame.memory.capacity());
+  frame.for_each_block([&](const Block& block) {
+    gather(frame, target, block);
+    if (is_enough) choose(frame, target, block);
+  });
+  const bool all_fit =
+      (is_enough && write(frame, true) <= budget) || write_most_urgent(frame, target, budget);
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    if (frame.delta.blocks[b].corrected == 0) continue;
+    out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
+    out.put(static_cast<std::uint32_t>(parts_[b].coded_bytes + kTrackerBlockHeaderBytes));
+    out.put(static_cast<std::uint16_t>(b));
+    out.put_bytes(std::span(bytes_).subspan(parts_[b].first_byte, parts_[b].coded_bytes));
+  }
+  if (!all_fit || some_wait_) remember_waiting(frame);
+  return frame.join();
+}
+
+void TrackerEncoder::gather(const TrackerFrame& frame, const State& target, const Block& block) {
+  const State& predicted = frame.at.predicted;
+  const ErrorWorth worth(frame.at.parameters.threshold);
+  const auto early = static_cast<std::int32_t>((frame.at.parameters.threshold * kEarlyShare) >> 8);
+  Candidate* const first = candidates_.data() + block.first;
+  Slot* const slots = frame.delta.slots.data() + block.first;
+  std::uint32_t count = 0;
+  const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
+                                                   kBlockSlots);
+  for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
+    const bool must = error > worth.limit;
+    if (!must && frame.memory.models().p1[frame.flag_of(slot)] <= frame.memory.gains().early()) return;
+    slots[count] = slot;
+    first[count++] = {error, slot, kNoCost, Candidate::Steps::kOpen, must, false, {}};
+  });
+  frame.list_contexts(block, std::span(slots, count));
+  parts_[block.index].candidates = count;
+}
+
+void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, const ErrorWorth& worth,
+                            Candidate& candidate) {
+  const Slot slot = candidate.slot;
+  const bool inside = choose_steps(position(frame.at.predicted, slot), position(target, slot),
+                                   TrackerSteppings(frame.at.parameters.threshold), worth, costs_,
+                                   frame.scratch.contexts.of(slot), candidate.steps);
+  const bool is_of_use = inside || (candidate.must && candidate.steps != TrackerSteps{});
+  candidate.state = is_of_use ? Candidate::Steps::kFound : Candidate::Steps::kUseless;
+}
+
+void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, const Block& block) {
+  const ErrorWorth worth(frame.at.parameters.threshold);
+  Candidate* const first = candidates_.data() + block.first;
+  for (std::uint32_t i = 0; i < parts_[block.index].candidates; ++i) {
+    if (first[i].state == Candidate::Steps::kOpen) choose(frame, target, worth, first[i]);
+  }
+}
+
+bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget) {
+  rank(frame);
+  const auto all = static_cast<std::uint32_t>(order_.size());
+  bool may_all_fit = some_wait_;  // else they were tried
+  const auto try_all = [&] {
+    may_all_fit = false;
+    frame.for_each_block([&](const Block& block) { choose(frame, target, block); });
+    return write(frame, true) <= budget;
+  };
+  if (all == 0 && may_all_fit && try_all()) return true;
+  std::uint32_t fits = 0;
+  std::uint32_t too_many = all + 1;
+  std::uint32_t written = too_many;
+  std::int64_t beyond = kByte;  // what is written over what was estimated
+  for (std::uint32_t i = 0; i < kMostWrites && too_many - fits > 1; ++i) {
+    std::uint32_t last = too_many - 1;
+    if (i >= kMostEstimates) {
+      last = fits + (too_many - fits) / 2;
+      std::nth_element(order_.begin() + fits, order_.begin() + last, order_.begin() + too_many - 1);
+    }
+    const Cut cut = this->cut(frame, target, fits, last, static_cast<std::int64_t>(budget) * kByte - beyond);
+    if (cut.count == fits) break;
+    if (cut.count == all && may_all_fit && try_all()) return true;
+    written = cut.count;
+    const std::size_t size_bytes = write_first(frame, written);
+    (size_bytes <= budget ? fits : too_many) = written;
+    if (size_bytes <= budget && budget - size_bytes <= budget / kSpareShare) break;
+    if (size_bytes != kTooLarge)
+      beyond = static_cast<std::int64_t>(size_bytes) * kByte - cut.cost + kByte / 2;
+  }
+  if (written != fits) write_first(frame, fits);
+  return false;
+}
+
+void TrackerEncoder::rank(const TrackerFrame& frame) {
+  frame.for_each_block([&](const Block& block) {
+    TrackerDelta::Part& coded = frame.delta.blocks[block.index];
+    frame.list_flags(block);
+    // Finer than costs_, because there are so many of them.
+    std::uint64_t zeros = 0;
+    for (std::uint32_t model = 0; model < TrackerModelIndex::kZero; ++model) {
+      if (coded.counts[model][0] == 0) continue;
+      const std::uint32_t p0 = 65536U - frame.memory.models().p1[model];
+      zeros += std::uint64_t{coded.counts[model][0]} * ((16U << 16U) - log2_of(p0, 16));
+    }
+    Part& part = parts_[block.index];
+    part.cost = static_cast<std::int64_t>(zeros >> 8U) + static_cast<std::int64_t>(kHeaderBytes) * kByte;
+    part.sent = 0;
+  });
+  order_.clear();
+  constexpr std::uint64_t kMostError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    const std::uint32_t first = b * kBlockSlots;
+    for (std::uint32_t i = first; i < first + parts_[b].candidates; ++i) {
+      const Candidate& candidate = candidates_[i];
+      const std::uint64_t frames = waiting_[candidate.slot] + 1U;
+      if (candidate.must) order_.push_back({std::min(candidate.error, kMostError) * frames * frames, i});
+    }
+  }
+}
+
+std::int32_t TrackerEncoder::cost(const TrackerFrame& frame, const Candidate& candidate) const {
+  const auto& flag = costs_.of[frame.flag_of(candidate.slot)];
+  CostCoder coder{&costs_};
+  TrackerSteps steps = candidate.steps;
+  code_steps(coder, frame.scratch.contexts.of(candidate.slot), steps);
+  return static_cast<std::int32_t>(coder.cost) + flag[1] - flag[0];
+}
+
+std::int64_t TrackerEncoder::add(const TrackerFrame& frame, const State& target, std::uint32_t first,
+                                 std::uint32_t last) {
+  const ErrorWorth worth(frame.at.parameters.threshold);
+  std::int64_t sum = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    const std::uint32_t index = order_[i].index;
+    Candidate& candidate = candidates_[index];
+    if (candidate.state == Candidate::Steps::kOpen) choose(frame, target, worth, candidate);
+    if (candidate.state == Candidate::Steps::kUseless) continue;
+    if (candidate.cost == kNoCost) candidate.cost = cost(frame, candidate);
+    Part& part = parts_[index / kBlockSlots];
+    sum += candidate.cost + (part.sent++ == 0 ? part.cost : 0);
+  }
+  return sum;
+}
+
+std::int64_t TrackerEncoder::remove(std::uint32_t first, std::uint32_t last) {
+  std::int64_t sum = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    const std::uint32_t index = order_[i].index;
+    const Candidate& candidate = candidates_[index];
+    if (candidate.state == Candidate::Steps::kUseless) continue;
+    Part& part = parts_[index / kBlockSlots];
+    sum += candidate.cost + (--part.sent == 0 ? part.cost : 0);
+  }
+  return sum;
+}
+
+TrackerEncoder::Cut TrackerEncoder::cut(const TrackerFrame& frame, const State& target, std::uint32_t first,
+                                        std::uint32_t last, std::int64_t most) {
+  for (Part& part : parts_) part.sent = 0;
+  std::int64_t sum = add(frame, target, 0, first);
+  bool is_limited = false;
+  const auto guess = static_cast<std::uint32_t>(std::max<std::int64_t>(most / kGuessedCost, 16));
+  while (first < last) {
+    const std::uint32_t more = is_limited ? (last - first + 1) / 2 : std::max(first, guess);
+    const std::uint32_t tried = first + std::min(more, last - first);
+    std::nth_element(order_.begin() + first, order_.begin() + tried - 1, order_.begin() + last);
+    const std::int64_t added = add(frame, target, first, tried);
+    if (sum + added <= most || tried == 1) {
+      sum += added;
+      first = tried;
+    } else {
+      remove(first, tried);
+      last = tried - 1;
+      is_limited = true;
+    }
+  }
+  return {first, sum};
+}
+
+std::size_t TrackerEncoder::write_first(const TrackerFrame& frame, std::uint32_t count) {
+  for (std::uint32_t i = 0; i < order_.size(); ++i) candidates_[order_[i].index].is_sent = i < count;
+  return write(frame, false);
+}
+
+std::size_t TrackerEncoder::write(const TrackerFrame& frame, bool all) {
+  frame.for_each_block([&](const Block& block) { write_block(frame, block, all); });
+  std::size_t size_bytes = 0;
+  bool fits = true;
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    fits = fits && parts_[b].fits;
+    if (frame.delta.blocks[b].corrected != 0) size_bytes += kHeaderBytes + parts_[b].coded_bytes;
+  }
+  return fits ? size_bytes : kTooLarge;
+}
+
+void TrackerEncoder::write_block(const TrackerFrame& frame, const Block& block, bool all) {
+  TrackerDelta::Part& coded = frame.delta.blocks[block.index];
+  Part& part = parts_[block.index];
+  Slot* const corrected = frame.delta.slots.data() + block.first;
+  TrackerSteps* const steps = frame.delta.steps.data() + block.first;
+  std::uint32_t count = 0;
+  for (std::uint32_t i = block.first; i < block.first + part.candidates; ++i) {
+    const Candidate& candidate = candidates_[i];
+    if (candidate.state != Candidate::Steps::kFound || !(all || candidate.is_sent)) continue;
+    corrected[count] = candidate.slot;
+    steps[count++] = candidate.steps;
+  }
+  coded.corrected = count;
+  part.coded_bytes = 0;
+  part.fits = true;
+  if (count == 0) return;
+  const std::size_t room = kMostTrackerBytesPerBody * block.slots + kTrackerSlackBytes;
+  RangeEncoder flags{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
+  frame.list_flags(block);
+  // Corrected bodies get a mark beside their models, so that no branch asks which they are.
+  constexpr std::uint16_t kMark = 0x8000;
+  static_assert(TrackerModelIndex::kAll <= kMark);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    coded.count_one(frame.scratch.flags[corrected[i]]);
+    frame.scratch.flags[corrected[i]] |= kMark;
+  }
+  const std::uint16_t* const models = frame.scratch.flags.data();
+  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
+    const std::uint32_t model = models[slot];
+    flags.put(model >= kMark, frame.memory.models().p1[model % kMark]);
+  }
+  DecisionEncoder coder{flags, &frame.memory.models(), &coded.counts};
+  for (std::uint32_t i = 0; i < count; ++i)
+    code_steps(coder, frame.scratch.contexts.of(corrected[i]), steps[i]);
+  part.coded_bytes = coder.range.finish();
+  part.fits = !coder.range.overflow();
+}
+
+void TrackerEncoder::remember_waiting(const TrackerFrame& frame) {
+  some_wait_ = false;
+  for (std::uint32_t b = 0; b < parts_.size(); ++b) {
+    const Block block = block_at(b, static_cast<std::uint32_t>(waiting_.size()));
+    const Slot* sent = frame.delta.slots.data() + block.first;
+    const Slot* const sent_end = sent + frame.delta.blocks[b].corrected;
+    const Candidate* candidate = candidates_.data() + block.first;
+    const Candidate* const end = candidate + parts_[b].candidates;
+    for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
+      const bool is_candidate = candidate != end && candidate->slot == slot;
+      const bool is_sent = sent != sent_end && *sent == slot;
+      const bool waits =
+          is_candidate && candidate->must && candidate->state != Candidate::Steps::kUseless && !is_sent;
+      waiting_[slot] = waits ? static_cast<std::uint8_t>(std::min(waiting_[slot] + 1, 255)) : std::uint8_t{0};
+      some_wait_ = some_wait_ || waits;
+      candidate += is_candidate ? 1 : 0;
+      sent += is_sent ? 1 : 0;
+    }
+  }
+}
+
+}  // namespace tandem

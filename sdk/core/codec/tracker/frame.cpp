@@ -1,0 +1,58 @@
+#include "sdk/core/codec/tracker/frame.hpp"
+
+#include <utility>
+
+namespace tandem {
+namespace {
+
+/// The renewed slots of a block.
+std::span<const Slot> within(std::span<const Slot> renewed, const Block& block) {
+  const auto first = std::lower_bound(renewed.begin(), renewed.end(), block.first);
+  return {first, std::lower_bound(first, renewed.end(), block.first + block.slots)};
+}
+
+}  // namespace
+
+void TrackerFrame::list_flags(const Block& block) const {
+  std::uint16_t* const flags = scratch.flags.data();
+  TrackerCounts& counts = delta.blocks[block.index].counts;
+  list_flag_models(memory.column(0) + block.first, memory.histories() + block.first,
+                   at.alive.data() + block.first, std::span(scratch.flags).subspan(block.first, block.slots));
+  // By turns in the places of zeros and ones, because neighbours often have the same model and an addition
+  // would wait for the one before.
+  counts = {};
+  const Slot end = block.first + block.slots;
+  for (Slot slot = block.first; slot < end; ++slot) ++counts[flags[slot]][slot & 1U];
+  for (auto& [zeros, ones] : counts) zeros += std::exchange(ones, 0);
+  for (const Slot slot : within(at.renewed, block)) {
+    if (at.alive[slot] == 0) continue;
+    --counts[flags[slot]][0];
+    flags[slot] = static_cast<std::uint16_t>(flag_model(0, 0));
+    ++counts[flags[slot]][0];
+  }
+}
+
+void TrackerFrame::list_contexts(const Block& block, std::span<const Slot> slots) const {
+  std::array<const std::uint8_t*, TrackerMemory::kColumns> columns{};
+  for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = memory.column(i);
+  TrackerContexts& contexts = scratch.contexts;
+  const std::int32_t threshold = at.parameters.threshold;
+  // One takes as long as some twenty side by side.
+  if (slots.size() < block.slots / 20) {
+    for (const Slot slot : slots) contexts.fill({block.index, slot, 1}, at.predicted, columns, threshold);
+  } else {
+    contexts.fill(block, at.predicted, columns, threshold);
+  }
+  for (const Slot slot : within(at.renewed, block)) contexts.renew(slot);
+}
+
+std::span<const Slot> TrackerFrame::join() const {
+  // A delta without corrections teaches that they are rare. Else a budget that not even one body fits,
+  // because its flags seem likely, would never be met.
+  const bool is_empty = std::all_of(delta.blocks.begin(), delta.blocks.end(),
+                                    [](const TrackerDelta::Part& part) { return part.corrected == 0; });
+  if (is_empty) for_each_block([this](const Block& block) { list_flags(block); });
+  return delta.join(memory.capacity(), is_empty);
+}
+
+}  // namespace tandem

@@ -1,0 +1,54 @@
+#pragma once
+// A frame of the tracker while its delta is coded: what encoder and decoder have in common. Both read the
+// memory, list the model of every decision, and fill in a TrackerDelta.
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/codec.hpp"
+#include "sdk/core/codec/selection.hpp"
+#include "sdk/core/codec/tracker/memory.hpp"
+#include "sdk/core/codec/tracker/models.hpp"
+
+namespace tandem {
+
+/// Scratch memory: the models of the decisions at hand, slot by slot.
+struct TrackerScratch {
+  explicit TrackerScratch(std::uint32_t capacity) : flags(capacity), contexts(capacity) {}
+  std::vector<std::uint16_t> flags;  ///< model of each slot's flag "is this body corrected"
+  TrackerContexts contexts;
+};
+
+/// Blocks are coded side by side; each touches its own part of scratch memory and delta alone.
+struct TrackerFrame {
+  const TrackerMemory& memory;  ///< as the delta before left it
+  const CodecFrame& at;
+  TrackerScratch& scratch;
+  TrackerDelta& delta;  ///< to be filled
+  const RunBlocks& run_blocks;
+
+  [[nodiscard]] bool is_renewed(Slot slot) const {
+    return !at.renewed.empty() && std::binary_search(at.renewed.begin(), at.renewed.end(), slot);
+  }
+  /// The model of one slot's flag, without scratch memory.
+  [[nodiscard]] std::uint32_t flag_of(Slot slot) const {
+    return is_renewed(slot) ? flag_model(0, 0) : memory.flag_of(slot);
+  }
+  /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots have a
+  /// model that is never a one and takes no bits, so that loops need not ask.
+  void list_flags(const Block& block) const;
+  /// Fills the contexts of a block, at least those of `slots`.
+  void list_contexts(const Block& block, std::span<const Slot> slots) const;
+  /// Once every block is coded: completes the delta. Returns the corrected slots, ascending.
+  std::span<const Slot> join() const;
+
+  /// Calls job(block) for all blocks, perhaps on several threads.
+  template <class Job>
+  void for_each_block(const Job& job) const {
+    for_each_tracker_block(memory.capacity(), run_blocks, job);
+  }
+};
+
+}  // namespace tandem

@@ -1,0 +1,129 @@
+#include "sdk/core/codec/tracker/memory.hpp"
+
+#include <algorithm>
+
+namespace tandem {
+namespace {
+
+constexpr std::size_t kModelBytes = 3;
+
+}  // namespace
+
+std::span<const Slot> TrackerDelta::join(std::uint32_t capacity, bool of_all_blocks) {
+  TrackerCounts* sum = nullptr;
+  std::uint32_t count = 0;
+  for (std::uint32_t b = 0; b < blocks.size(); ++b) {
+    Part& part = blocks[b];
+    part.first = count;
+    if (part.corrected == 0 && !of_all_blocks) continue;
+    if (const Slot from = block_at(b, capacity).first; from != count) {
+      std::copy_n(slots.begin() + from, part.corrected, slots.begin() + count);
+      std::copy_n(steps.begin() + from, part.corrected, steps.begin() + count);
+    }
+    count += part.corrected;
+    if (sum == nullptr) {
+      sum = &part.counts;
+      continue;
+    }
+    for (std::size_t model = 0; model < sum->size(); ++model) {
+      for (std::size_t bit = 0; bit < 2; ++bit) (*sum)[model][bit] += part.counts[model][bit];
+    }
+  }
+  seen = sum;
+  return std::span<const Slot>(slots).first(count);
+}
+
+TrackerMemory::TrackerMemory(std::uint32_t capacity, std::string_view predictor)
+    : capacity_(capacity),
+      columns_(kColumns * std::size_t{capacity}),
+      history_(capacity),
+      gains_(predictor) {}
+
+void TrackerMemory::set_body(Slot slot, const TrackerBody& body) {
+  std::byte* at = columns_.data() + slot;
+  *at = static_cast<std::byte>(body.age);
+  *(at += capacity_) = static_cast<std::byte>(body.interval);
+  for (const std::int8_t step : body.steps) *(at += capacity_) = static_cast<std::byte>(step);
+  history_[slot] = flag_history(body);
+}
+
+void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections,
+                          const RunBlocks& run_blocks, State& state) {
+  gains_.set(corrections.parameters.velocity_gain, corrections.parameters.acceleration_gain);
+  for (const Slot slot : corrections.renewed) set_body(slot, {});
+  for_each_tracker_block(capacity_, run_blocks,
+                         [&](const Block& block) { apply(delta, corrections, block, state); });
+  if (delta.seen != nullptr) models_.learn(*delta.seen);
+}
+
+void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block,
+                          State& state) {
+  const std::int32_t threshold = corrections.parameters.threshold;
+  const TrackerSteppings steppings(threshold);
+  // Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
+  constexpr std::byte kYoungest{0xFF};
+  std::byte* const age = columns_.data();
+  const TrackerDelta::Part& part = delta.blocks[block.index];
+  for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
+    const Slot slot = delta.slots[i];
+    TrackerBody body = this->body(slot);
+    correct_body(state, slot, delta.steps[i], steppings, threshold, gains_, body);
+    set_body(slot, body);
+    age[slot] = kYoungest;
+  }
+  const Slot end = block.first + block.slots;
+  const std::span<const Slot> renewed = corrections.renewed;
+  auto at = std::lower_bound(renewed.begin(), renewed.end(), block.first);
+  for (; at != renewed.end() && *at < end; ++at) age[*at] = kYoungest;
+  // 255 wraps to 0; what was 254 stays there.
+  const std::uint8_t* const alive = state.alive().data();
+  for (Slot slot = block.first; slot < end; ++slot) {
+    const auto was = std::to_integer<std::uint8_t>(age[slot]);
+    const auto older = static_cast<std::uint8_t>(was + (was != kMostAge - 1 ? 1 : 0));
+    age[slot] = static_cast<std::byte>(alive[slot] != 0 ? older : 0);
+  }
+}
+
+// Snapshot: columns of all slots, then per model: weight, and where that is not zero the probability.
+void TrackerMemory::save(ByteWriter& out) const {
+  out.put_bytes(columns_);
+  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+    out.put(models_.weight[i]);
+    if (models_.weight[i] != 0) out.put(models_.p1[i]);
+  }
+}
+
+std::size_t TrackerMemory::save_bound() const {
+  return columns_.size() + TrackerModelIndex::kCount * kModelBytes;
+}
+
+Result<void> TrackerMemory::load(std::span<const std::byte> bytes, std::span<const std::uint8_t> alive) {
+  ByteReader in(bytes);
+  const std::span<const std::byte> columns = in.get_bytes(columns_.size());
+  if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated coder state");
+  if (std::any_of(columns.begin(), columns.begin() + capacity_,
+                  [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMostAge; })) {
+    return fail(ErrorCode::kMalformed, "coder state with an impossible age");
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const bool impossible =
+        i >= 2 * std::size_t{capacity_} && columns[i] == std::byte{0x80};  // steps of -128
+    if (impossible || (columns[i] != std::byte{0} && alive[i % capacity_] == 0))
+      return fail(ErrorCode::kMalformed, "coder state of a slot that cannot have it");
+  }
+  bool good = true;
+  TrackerModels models;
+  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+    models.weight[i] = in.get<std::uint8_t>();
+    if (models.weight[i] == 0) continue;
+    models.p1[i] = in.get<std::uint16_t>();
+    good &= models.p1[i] >= TrackerModels::kLeast && models.p1[i] <= TrackerModels::kMost;
+  }
+  if (!good || !in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length or content");
+  std::copy(columns.begin(), columns.end(), columns_.begin());
+  for (Slot slot = 0; slot < capacity_; ++slot) history_[slot] = flag_history(body(slot));
+  models_ = models;
+  return {};
+}
+
+}  // namespace tandem

@@ -1,0 +1,104 @@
+#pragma once
+// What the tracker remembers from frame to frame: the same on both sides, bit by bit. It reads a delta before
+// it is applied and changes by TrackerMemory::apply() alone.
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "sdk/core/codec/codec.hpp"
+#include "sdk/core/codec/selection.hpp"
+#include "sdk/core/codec/tracker/models.hpp"
+
+namespace tandem {
+
+/// What a delta says, and what was seen in saying it. Its memory is made once and used for every frame.
+struct TrackerDelta {
+  explicit TrackerDelta(std::uint32_t capacity)
+      : slots(capacity), steps(capacity), blocks(block_count(capacity)) {}
+
+  /// Of a block, which is coded beside others: its corrected slots, ascending, and their steps stand from the
+  /// block's first slot on until join(), then from `first` on.
+  struct Part {
+    std::uint32_t corrected = 0;
+    std::uint32_t first = 0;
+    TrackerCounts counts{};
+    /// A decision that was counted as a zero is a one.
+    void count_one(std::uint32_t model) {
+      --counts[model][0];
+      ++counts[model][1];
+    }
+  };
+  /// Makes one list of all blocks and one sum of the decisions of those with corrections, or with
+  /// `of_all_blocks` of every one. Returns the corrected slots.
+  std::span<const Slot> join(std::uint32_t capacity, bool of_all_blocks);
+
+  std::vector<Slot> slots;
+  std::vector<TrackerSteps> steps;  ///< of slots
+  std::vector<Part> blocks;
+  const TrackerCounts* seen = nullptr;  ///< all decisions of the delta; one of the blocks' after join()
+};
+
+/// Calls job(block) for all blocks of `capacity` slots, perhaps on several threads.
+template <class Job>
+void for_each_tracker_block(std::uint32_t capacity, const RunBlocks& run_blocks, const Job& job) {
+  const std::uint32_t blocks = block_count(capacity);
+  const auto run = [&](std::uint32_t b) { job(block_at(b, capacity)); };
+  if (run_blocks && blocks > 1) {
+    run_blocks(blocks, run);
+  } else {
+    for (std::uint32_t b = 0; b < blocks; ++b) run(b);
+  }
+}
+
+class TrackerMemory {
+ public:
+  static constexpr std::size_t kColumns = 5;  ///< age, interval, steps x, y, z
+
+  /// `predictor`: Predictor::name().
+  TrackerMemory(std::uint32_t capacity, std::string_view predictor);
+
+  [[nodiscard]] std::uint32_t capacity() const { return capacity_; }
+  /// All columns, one after another: part of the state hash.
+  [[nodiscard]] std::span<const std::byte> columns() const { return columns_; }
+  [[nodiscard]] const std::uint8_t* column(std::size_t i) const {
+    return reinterpret_cast<const std::uint8_t*>(columns_.data()) + i * capacity_;
+  }
+  [[nodiscard]] TrackerBody body(Slot slot) const;
+  [[nodiscard]] const std::uint8_t* histories() const { return history_.data(); }
+  [[nodiscard]] std::uint32_t flag_of(Slot slot) const { return flag_model(column(0)[slot], history_[slot]); }
+  [[nodiscard]] const TrackerModels& models() const { return models_; }
+  [[nodiscard]] const TrackerGains& gains() const { return gains_; }
+
+  /// Takes in a delta: forgets the renewed bodies, corrects the others in `state`, lets the models learn and
+  /// every body age by a frame. `state` has the delta's lifecycle records applied.
+  void apply(const TrackerDelta& delta, const Corrections& corrections, const RunBlocks& run_blocks,
+             State& state);
+
+  /// As Codec has them.
+  void save(ByteWriter& out) const;
+  [[nodiscard]] std::size_t save_bound() const;
+  [[nodiscard]] Result<void> load(std::span<const std::byte> bytes, std::span<const std::uint8_t> alive);
+
+ private:
+  void set_body(Slot slot, const TrackerBody& body);
+  void apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block, State& state);
+
+  std::uint32_t capacity_;
+  std::vector<std::byte> columns_;
+  std::vector<std::uint8_t> history_;  // flag_history() of each body, which follows from the columns
+  TrackerModels models_;
+  TrackerGains gains_;  // follow from the parameters in force
+};
+
+inline TrackerBody TrackerMemory::body(Slot slot) const {
+  const std::byte* at = columns_.data() + slot;
+  TrackerBody body;
+  body.age = std::to_integer<std::uint8_t>(*at);
+  body.interval = std::to_integer<std::uint8_t>(*(at += capacity_));
+  for (std::int8_t& step : body.steps) step = static_cast<std::int8_t>(*(at += capacity_));
+  return body;
+}
+
+}  // namespace tandem

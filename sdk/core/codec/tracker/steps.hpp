@@ -1,0 +1,65 @@
+#pragma once
+// The tracker's encoder, one body at a time: by which of the points inside the error ball to correct it.
+// Nothing here is on the wire.
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "sdk/core/codec/tracker/models.hpp"
+
+namespace tandem {
+
+/// log2(x) in 1/2^fraction bits, rounded down; x > 0, fraction <= 16. Integers: the same everywhere.
+[[nodiscard]] constexpr std::uint32_t log2_of(std::uint32_t x, std::uint32_t fraction) {
+  // x = 2^whole * mantissa. Squaring the mantissa doubles its logarithm, so each squaring that reaches 2
+  // gives the next binary digit of the fraction (and halves the mantissa back to 1 .. 2).
+  const auto whole = static_cast<std::uint32_t>(std::bit_width(x)) - 1U;
+  std::uint64_t mantissa = (std::uint64_t{x} << 32U) >> whole;  // 1 .. 2 in 32.32
+  std::uint32_t log = whole << fraction;
+  for (std::uint32_t i = 1; i <= fraction; ++i) {
+    mantissa = (mantissa >> 2U) * (mantissa >> 2U) >> 28U;
+    if (mantissa >= std::uint64_t{2} << 32U) {
+      mantissa >>= 1U;
+      log |= 1U << (fraction - i);
+    }
+  }
+  return log;
+}
+
+/// What decisions would cost, in 1/256 bits: of each model a zero and a one. Coarse on purpose (12 bits of
+/// the probability, a cost of at most 12 bits): a choice between points that differ by less is worth nothing.
+struct TrackerCosts {
+  void learn(const TrackerModels& models);
+  std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
+};
+
+/// Adds up what decisions would cost: a coder for code_steps().
+struct CostCoder {
+  const TrackerCosts* costs;
+  std::uint32_t cost = 0;
+  bool code(bool bit, std::uint32_t model) {
+    cost += costs->of[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
+};
+
+/// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.
+struct ErrorWorth {
+  explicit ErrorWorth(std::int32_t e);
+  std::int64_t threshold;
+  std::uint64_t limit;  ///< threshold squared
+  unsigned shift;       ///< limit >> shift has at most 24 bits
+  std::uint64_t worth;  ///< (error^2 >> shift) * worth >> 24: in 1/256 bits
+};
+
+/// Steps that correct `to` - `from` (lattice units) at least cost: of the eight points around it that leave
+/// an error of at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none
+/// does; `steps` is then the nearest.
+bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
+                  const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
+                  TrackerSteps& steps);
+
+}  // namespace tandem

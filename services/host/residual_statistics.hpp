@@ -1,0 +1,38 @@
+#pragma once
+// What the paper's codecs learn from corrections: quantisation ranges and Huffman code lengths.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sdk/core/codec/observer.hpp"
+#include "sdk/core/codec/paper/huffman.hpp"
+
+namespace tandem::host {
+
+/// Residuals of the bodies beyond the threshold, summed over the frames observed. Two passes over the same
+/// inputs: the first with `selective` for the largest residuals, the second with `quantized` and the ranges
+/// found for the symbol counts.
+struct ResidualStatistics final : EncodeObserver {
+  void frame(const State& predicted, const State& target, const CodecParameters& parameters) override;
+
+  std::uint64_t frames = 0;
+  std::uint64_t bodies = 0;            ///< corrected, over all frames
+  std::uint32_t largest_position = 0;  ///< of one component, lattice units
+  std::uint32_t largest_velocity = 0;  ///< of one component, 1/64 unit per frame
+  SymbolCounts position_counts{};      ///< by residual byte (two's complement), with the parameters in force
+  SymbolCounts velocity_counts{};
+
+ private:
+  std::vector<std::uint8_t> marks_;
+};
+
+/// Steps whose 127-fold is 1.1 x the largest residual ("slightly exceed the maximum error of experimental
+/// runs").
+[[nodiscard]] CodecParameters trained_parameters(const ResidualStatistics& statistics,
+                                                 std::int32_t threshold);
+
+/// Code lengths from the symbol counts: 256 for positions, then 256 for velocities.
+[[nodiscard]] std::vector<std::byte> trained_tables(const ResidualStatistics& statistics);
+
+}  // namespace tandem::host
