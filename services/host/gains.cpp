@@ -45,13 +45,13 @@ GainGoal usual_gain_goal(std::string_view predictor) {
   return predictor == "field" ? kFieldGoal : GainGoal{};
 }
 
-GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters)
+GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const StreamParameters& parameters)
     : goal_(goal),
       enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
-      decay_(std::clamp<double>(parameters.decay, kLeastDecay, kMostDecay)),
-      gain_(std::clamp(parameters.velocity_gain / 32768.0, kLeastGain, kMostGain)) {}
+      decay_(std::clamp<double>(parameters.step.decay, kLeastDecay, kMostDecay)),
+      gain_(std::clamp(parameters.codec.velocity_gain / 32768.0, kLeastGain, kMostGain)) {}
 
-bool GainControl::after_frame(CodecParameters& parameters) {
+bool GainControl::after_frame(StreamParameters& parameters) {
   if (++frames_ < kFramesPerDecision) return false;
   const GainEvidence seen = evidence_;
   evidence_ = {};
@@ -72,12 +72,12 @@ bool GainControl::after_frame(CodecParameters& parameters) {
                         kMostDecay);
   }
   const double gain = 32768 * gain_;
-  if (!differs(decay_, parameters.decay, kDecayDeadBand) &&
-      !differs(gain, parameters.velocity_gain, kGainDeadBand))
+  if (!differs(decay_, parameters.step.decay, kDecayDeadBand) &&
+      !differs(gain, parameters.codec.velocity_gain, kGainDeadBand))
     return false;
-  parameters.decay = static_cast<std::uint16_t>(decay_);
-  parameters.velocity_gain = static_cast<std::uint16_t>(gain);
-  parameters.acceleration_gain =
+  parameters.step.decay = static_cast<std::uint16_t>(decay_);
+  parameters.codec.velocity_gain = static_cast<std::uint16_t>(gain);
+  parameters.codec.acceleration_gain =
       static_cast<std::uint16_t>(65536 * kMostAcceleration * std::min(1.0, kDecayOfMost / decay_));
   return true;
 }

@@ -27,12 +27,12 @@ struct GainGoal {
 class GainControl {
  public:
   /// `parameters`: those in force at the start.
-  GainControl(const GainGoal& goal, std::uint32_t bodies, const CodecParameters& parameters);
+  GainControl(const GainGoal& goal, std::uint32_t bodies, const StreamParameters& parameters);
 
   /// What an encoder's observer is told.
   void observe(const GainEvidence& evidence) { evidence_.add(evidence); }
   /// After each frame; true when it changed decay and gains.
-  bool after_frame(CodecParameters& parameters);
+  bool after_frame(StreamParameters& parameters);
 
  private:
   GainGoal goal_;

@@ -387,10 +387,10 @@ const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
 Result<Frame> Host::inject(const engine::Input& input) { return impl_->inputs.inject(input); }
-Result<void> Host::set_parameters(const CodecParameters& parameters) {
+Result<void> Host::set_parameters(const StreamParameters& parameters) {
   return impl_->stream.set_parameters(parameters);
 }
-const CodecParameters& Host::parameters() const { return impl_->stream.parameters(); }
+const StreamParameters& Host::parameters() const { return impl_->stream.parameters(); }
 double Host::threshold_m() const { return impl_->stream.threshold_m(); }
 const transport::SessionMessage& Host::session() const { return impl_->session; }
 Frame Host::frame() const { return impl_->stream.frame(); }

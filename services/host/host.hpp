@@ -107,9 +107,9 @@ class Host {
   Result<Frame> inject(const engine::Input& input);
 
   /// What the decoder reads (threshold, quantisation steps, gains): see Stream::set_parameters().
-  [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
-  [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
-  [[nodiscard]] double threshold_m() const;                 ///< of the next frame, scene units
+  [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
+  [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
+  [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units
 
   [[nodiscard]] const transport::SessionMessage& session() const;
   [[nodiscard]] Frame frame() const;                  ///< of the last delta

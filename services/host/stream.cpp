@@ -15,7 +15,7 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
   };
   if (config.quality) {
-    if (!valid_goal(*config.quality, config.layout.parameters))
+    if (!valid_goal(*config.quality, config.layout.parameters.codec))
       return refuse("automatic quality: the threshold must lie between its smallest and its largest");
     const std::size_t least = least_budget(*config.quality, start.frame_rate_hz);
     if (config.budget < least) {
@@ -44,7 +44,7 @@ struct Stream::Impl final : EncodeObserver {
     timeline.start(start.frame, mirror.target(), start.drive);
     bodies = mirror.target().alive_count();
     if (config.quality) {
-      quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters,
+      quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters.codec,
                       config.layout.capacity, start.frame_rate_hz);
     }
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
@@ -70,7 +70,7 @@ struct Stream::Impl final : EncodeObserver {
   StreamConfig config;
   Mirror mirror;
   ServerTimeline timeline;
-  CodecParameters parameters;  // of the next frame
+  StreamParameters parameters;  // of the next frame
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
   EncodeObserver* other = nullptr;  // of the frame at hand
@@ -110,13 +110,15 @@ Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<cons
 }
 
 void Stream::Impl::choose_parameters(const FrameResult& result) {
-  const bool coarser = quality && quality->after_frame(result.payload.size(), result.corrected, parameters);
+  const bool coarser =
+      quality && quality->after_frame(result.payload.size(), result.corrected, parameters.codec);
   const bool steered = gains && gains->after_frame(parameters);
   if (coarser || steered) timeline.set_parameters(parameters);
 }
 
-Result<void> Stream::set_parameters(const CodecParameters& parameters) {
-  if (!valid_parameters(parameters)) return fail(ErrorCode::kInvalidArgument, "parameters out of range");
+Result<void> Stream::set_parameters(const StreamParameters& parameters) {
+  if (!valid_parameters(parameters.codec))
+    return fail(ErrorCode::kInvalidArgument, "parameters out of range");
   if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
   impl_->parameters = parameters;
   impl_->timeline.set_parameters(parameters);
@@ -130,8 +132,8 @@ void Stream::set_clock(std::int64_t (*now_ns)()) {
 
 Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timeline.schedule(input); }
 void Stream::snapshot(std::vector<std::byte>& out) { impl_->timeline.snapshot(out); }
-const CodecParameters& Stream::parameters() const { return impl_->parameters; }
-double Stream::threshold_m() const { return impl_->parameters.threshold * impl_->config.lattice.unit; }
+const StreamParameters& Stream::parameters() const { return impl_->parameters; }
+double Stream::threshold_m() const { return impl_->parameters.codec.threshold * impl_->config.lattice.unit; }
 bool Stream::target_out_of_reach() const { return impl_->quality && impl_->quality->out_of_reach(); }
 const StreamConfig& Stream::config() const { return impl_->config; }
 Frame Stream::frame() const { return impl_->timeline.frame(); }

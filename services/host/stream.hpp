@@ -69,9 +69,9 @@ class Stream {
 
   /// In force from the next frame on; travels in that frame's delta. With gain goals, gains stay so until the
   /// next decision. Errors: kInvalidArgument (out of range, or automatic quality decides).
-  [[nodiscard]] Result<void> set_parameters(const CodecParameters& parameters);
-  [[nodiscard]] const CodecParameters& parameters() const;  ///< of the next frame
-  [[nodiscard]] double threshold_m() const;                 ///< of the next frame, scene units
+  [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
+  [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
+  [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units
   /// Automatic quality is above its target although the threshold is the largest permitted.
   [[nodiscard]] bool target_out_of_reach() const;
 

@@ -21,8 +21,8 @@ struct BandwidthRow {
   std::optional<int> number;  ///< of the paper's scene, 1..5
   std::uint32_t bodies = 0;
   std::string codec, predictor;
-  CodecTraits traits;          ///< none of a peer
-  CodecParameters parameters;  ///< at the end
+  CodecTraits traits;           ///< none of a peer
+  StreamParameters parameters;  ///< at the end
   std::uint32_t threads = 1;
   std::uint64_t seed = 0;
   std::uint64_t frames = 0;

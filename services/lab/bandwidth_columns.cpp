@@ -61,9 +61,9 @@ Json optional_field(const Row& row) {
   return json_of(row.*kField);
 }
 
-Json decay(const Row& row) { return row.parameters.decay / 65536.0; }
-Json velocity_gain(const Row& row) { return row.parameters.velocity_gain / 32768.0; }
-Json acceleration_gain(const Row& row) { return row.parameters.acceleration_gain / 65536.0; }
+Json decay(const Row& row) { return row.parameters.step.decay / 65536.0; }
+Json velocity_gain(const Row& row) { return row.parameters.codec.velocity_gain / 32768.0; }
+Json acceleration_gain(const Row& row) { return row.parameters.codec.acceleration_gain / 65536.0; }
 Json paper_mbit(const Row& row) {
   return row.number ? json_of(paper_mbit_per_s(*row.number, row.bodies, row.codec)) : Json(nullptr);
 }

@@ -56,7 +56,7 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
     choice.predictor = traits->is_baseline ? "ballistic" : options.choice.predictor;
     auto stream = sessions::plan_stream(scene, choice);
     if (!stream) return tl::unexpected(stream.error());
-    if (codec == "none") stream->quality.reset();  // has no threshold
+    if (!traits->reads_threshold) stream->quality.reset();
     streams.push_back(std::move(*stream));
   }
   auto replay = Replay::create(*source.simulation, std::move(source.script), streams[0].lattice);
@@ -69,7 +69,7 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
     row.scene = scene.name;
     row.threshold = threshold;
     if (choice.automatic && !row.predictor.empty())
-      row.threshold = row.parameters.threshold * row.lattice_unit;
+      row.threshold = row.parameters.codec.threshold * row.lattice_unit;
   }
   return rows;
 }

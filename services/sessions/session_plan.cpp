@@ -94,7 +94,7 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   stream.lattice = *lattice;
   stream.layout.capacity = choice.bodies;
   stream.layout.type_count = static_cast<TypeId>(scene.types.size());
-  stream.layout.parameters = *parameters;
+  stream.layout.parameters.codec = *parameters;
   stream.layout.codec = choice.codec;
   if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table);
   if (traits->takes_budget) stream.budget = choice.budget_bytes.value_or(traits->usual_budget);

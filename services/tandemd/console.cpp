@@ -11,17 +11,17 @@
 
 namespace tandem::daemon {
 
-std::string gains_text(const CodecParameters& parameters) {
-  if (parameters.decay == 0) return {};  // no tracker
-  return fmt::format("gains {:.2f} {:.3f} decay {:.1f} %", parameters.velocity_gain / 32768.0,
-                     parameters.acceleration_gain / 65536.0, parameters.decay / 655.36);
+std::string gains_text(const StreamParameters& parameters) {
+  if (parameters.step.decay == 0) return {};  // no tracker
+  return fmt::format("gains {:.2f} {:.3f} decay {:.1f} %", parameters.codec.velocity_gain / 32768.0,
+                     parameters.codec.acceleration_gain / 65536.0, parameters.step.decay / 655.36);
 }
 
 std::string coding_text(const host::StreamConfig& stream) {
   std::string text = fmt::format("codec {}, predictor {}", stream.layout.codec, stream.layout.predictor);
   const auto metres = [&](std::int32_t units) { return units * stream.lattice.unit; };
   if (codec_traits(stream.layout.codec)->reads_threshold)
-    text += fmt::format(", threshold {:.4g} m", metres(stream.layout.parameters.threshold));
+    text += fmt::format(", threshold {:.4g} m", metres(stream.layout.parameters.codec.threshold));
   if (stream.quality) {
     text += fmt::format(" (automatic, up to {:.4g} m)", metres(stream.quality->largest_threshold));
     if (stream.quality->target_mbit_per_s > 0)

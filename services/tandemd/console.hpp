@@ -9,7 +9,7 @@
 namespace tandem::daemon {
 
 /// Gains and decay of codec `tracker`; nothing for the others.
-[[nodiscard]] std::string gains_text(const CodecParameters& parameters);
+[[nodiscard]] std::string gains_text(const StreamParameters& parameters);
 
 /// How bodies are predicted and corrected from the first frame on: codec, predictor, threshold, and what
 /// binds them.

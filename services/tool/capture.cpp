@@ -63,7 +63,7 @@ void CaptureFile::write(std::uint32_t type) {
 
 void CaptureFile::add(const transport::SessionMessage& s) {
   const Layout& layout = s.layout;
-  const CodecParameters& first = layout.parameters;
+  const CodecParameters& first = layout.parameters.codec;
   Fields fields(body_);
   fields.put_text(s.session).put(s.epoch).put(s.protocol_version).put(s.layout_hash).put(layout.capacity);
   fields.put(s.frame_rate_hz).put(s.lattice_unit).put(layout.lead).put(s.window_ceiling);

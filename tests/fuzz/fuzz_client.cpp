@@ -117,10 +117,10 @@ class Run {
         session.layout.codec = codec_names()[program_.u8() % codec_names().size()];
         break;
       case 10:
-        session.layout.parameters.threshold = program_.i32();
+        session.layout.parameters.codec.threshold = program_.i32();
         break;
       case 11:
-        session.layout.parameters.position_step = program_.i32();
+        session.layout.parameters.codec.position_step = program_.i32();
         break;
       case 12:
         session.layout.predictor = program_.u8() % 2 == 0 ? "nonsense" : "";

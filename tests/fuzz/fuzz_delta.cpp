@@ -11,7 +11,7 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kCapacity = 24;
-constexpr CodecParameters kParameters{200, 16, 64};
+constexpr StreamParameters kParameters{{200, 16, 64}};
 
 void require(bool holds) {
   if (!holds) std::abort();

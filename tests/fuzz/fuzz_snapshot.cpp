@@ -22,9 +22,9 @@ void try_snapshot(std::span<const std::byte> input) {
   const auto snapshot = read_snapshot(input, synthetic::kTypes, state, *codec);
   if (!snapshot) return;
   require(synthetic::broken_invariant(state) == nullptr);
-  require(valid_parameters(snapshot->parameters));
+  require(valid_parameters(snapshot->parameters.codec));
   require(snapshot->pending.size() <= kMaxPendingInputs);
-  predictor->step(state, state, snapshot->drive);
+  predictor->step(state, state, {snapshot->drive, snapshot->parameters.step});
   require(synthetic::broken_invariant(state) == nullptr);
 
   // What was read can be written and read again.

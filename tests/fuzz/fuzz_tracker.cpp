@@ -14,7 +14,7 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kCapacity = 12;
-constexpr CodecParameters kParameters{200, 16, 64};
+constexpr StreamParameters kParameters{{200, 16, 64}};
 
 void require(bool holds) {
   if (!holds) std::abort();

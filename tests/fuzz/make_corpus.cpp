@@ -12,7 +12,7 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kCapacity = 24;  // as in the fuzz targets
-constexpr CodecParameters kParameters{200, 16, 64};
+constexpr StreamParameters kParameters{{200, 16, 64}};
 
 bool write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   std::filesystem::create_directories(path.parent_path());
@@ -32,7 +32,7 @@ bool write_deltas(const std::filesystem::path& folder) {
         std::vector<LifecycleRecord> lifecycle;
         if (lively) lifecycle = synthetic::random_lifecycle(random, state, target, 4);
         DeltaCodec delta = synthetic::make_delta(codec_names()[codec], kCapacity, kParameters);
-        if (lively) delta.set_parameters({100, 8, 32, 900, 30000, 5000});
+        if (lively) delta.set_parameters({{100, 8, 32, 30000, 5000}, {900}});
         std::vector<std::byte> bytes(1 + delta.bound());
         bytes[0] = static_cast<std::byte>(codec);
         const auto encoded = delta.encode(state, target, lifecycle, kNoBudget, std::span(bytes).subspan(1));
@@ -63,7 +63,7 @@ bool write_streams(const std::filesystem::path& folder) {
         for (std::int32_t& p : body.p) p = std::clamp(p + random.even(500), -kPositionLimit, kPositionLimit);
         target.set_body(slot, body);
       }
-      if (frame == 2) delta.set_parameters({100, 16, 64, 900, 30000, 5000});
+      if (frame == 2) delta.set_parameters({{100, 16, 64, 30000, 5000}, {900}});
       const auto size = delta.encode(state, target, {}, kNoBudget, payload).size_bytes;
       if (size >= 128) return false;
       stream.push_back(static_cast<std::byte>(size));

@@ -35,7 +35,7 @@ Bytes from_text(std::string_view text) {
   return bytes;
 }
 
-constexpr CodecParameters kParameters{100, 10, 20};
+constexpr StreamParameters kParameters{{100, 10, 20}};
 
 // Twenty slots, of which 4 and 19 are dead.
 State predicted() {
@@ -56,7 +56,7 @@ State target() {
 
 // Encodes with `codec`, expects the bytes, and decodes these bytes to the same state.
 void expect_bytes(std::string_view codec, std::string_view hex, const State& from, const State& to,
-                  std::span<const LifecycleRecord> lifecycle = {}, const CodecParameters* changed = nullptr,
+                  std::span<const LifecycleRecord> lifecycle = {}, const StreamParameters* changed = nullptr,
                   std::size_t budget = kNoBudget) {
   SCOPED_TRACE(codec);
   DeltaCodec server = synthetic::make_delta(codec, from.capacity(), kParameters);
@@ -117,7 +117,7 @@ TEST(GoldenBytes, OfLifecycleAndParameters) {
                                              {LifecycleKind::kSpawn, 4, 9, 2, {{1, 2, 3}, {4, 5, 6}}},
                                              {LifecycleKind::kTeleport, 5, 0, 0, {{-1, -2, -3}, {0, 0, 0}}},
                                              {LifecycleKind::kTypeChange, 6, 0, 1, {}}};
-  const CodecParameters changed{200, 5, 7};
+  const StreamParameters changed{{200, 5, 7}};
   expect_bytes("quantized",
                "0180 49000000"
                "02000000 00"
@@ -154,7 +154,7 @@ TEST(GoldenBytes, OfASnapshot) {
   State state(9);
   state.spawn(1, 5, 0, {{-1, 100, 7}, {64, 0, 0}});
   state.spawn(8, 6, 2, {{2, 100, 8}, {64, 0, 0}});
-  server.start(3, state, Drive{{0, -640, 0}, 10, 0});
+  server.start(3, state, Drive{{0, -640, 0}, 10});
   ASSERT_TRUE(server.schedule({1, 5, Drive{{1, 2, 3}, 4}}));
   Bytes bytes;
   server.snapshot(bytes);

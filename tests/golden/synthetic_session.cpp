@@ -38,7 +38,7 @@ bool run(std::string_view codec, std::string_view predictor, synthetic::Random& 
   layout.type_count = synthetic::kTypes;
   layout.codec = codec;
   layout.codec_tables = synthetic::tables_for(codec);
-  layout.parameters = {200, 16, 64, 100};
+  layout.parameters = {{200, 16, 64}, {100}};
   layout.predictor = predictor;
   if (predictor != kBallistic) layout.predictor_constants = contact_constants();
   auto server = ServerTimeline::create(layout, 1);
@@ -56,10 +56,10 @@ bool run(std::string_view codec, std::string_view predictor, synthetic::Random& 
     }
     if (random.one_in(30)) {
       const auto share = [&random] { return static_cast<std::uint16_t>(random.below(65536)); };
-      CodecParameters parameters = layout.parameters;
-      parameters.decay = share();
-      parameters.velocity_gain = share();
-      parameters.acceleration_gain = share();
+      StreamParameters parameters = layout.parameters;
+      parameters.step.decay = share();
+      parameters.codec.velocity_gain = share();
+      parameters.codec.acceleration_gain = share();
       server->set_parameters(parameters);
     }
     State target = synthetic::random_target(random, server->state(), 8);

@@ -20,16 +20,16 @@ struct Session {
   std::uint64_t seed = *rc::gen::arbitrary<std::uint64_t>();
 };
 
-CodecParameters random_parameters(Random& random) {
+StreamParameters random_parameters(Random& random) {
   const auto positive = [&random](std::int32_t most) { return 1 + std::abs(random.value(most - 1)); };
-  return {positive(1 << 20), positive(kMaxStep), positive(kMaxStep)};
+  return {{positive(1 << 20), positive(kMaxStep), positive(kMaxStep)}};
 }
 
 RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
   const Session session;
   Random random(session.seed);
-  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, {200, 16, 64});
-  DeltaCodec client = synthetic::make_delta(session.codec, session.capacity, {200, 16, 64});
+  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, {{200, 16, 64}});
+  DeltaCodec client = synthetic::make_delta(session.codec, session.capacity, {{200, 16, 64}});
   std::vector<std::byte> out(server.bound());
   State agreed = synthetic::random_state(random, session.capacity, session.dead_one_in);
   State held = agreed;
@@ -58,7 +58,7 @@ RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
 RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
   const Session session;
   Random random(session.seed);
-  const CodecParameters parameters = random_parameters(random);
+  const StreamParameters parameters = random_parameters(random);
   DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, parameters);
   std::vector<std::byte> out(server.bound());
   const State predicted = synthetic::random_state(random, session.capacity, session.dead_one_in);
@@ -66,8 +66,8 @@ RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
   State agreed = predicted;
   server.encode(agreed, target, {}, kNoBudget, out);
   const bool exact = session.codec == "none" || session.codec == "selective";
-  const auto limit =
-      static_cast<std::uint64_t>(parameters.threshold) * static_cast<std::uint64_t>(parameters.threshold);
+  const auto limit = static_cast<std::uint64_t>(parameters.codec.threshold) *
+                     static_cast<std::uint64_t>(parameters.codec.threshold);
   // What a residual of one axis may be after a correction.
   const auto settled = [](std::int32_t before, std::int32_t after, std::int32_t wanted, std::int32_t step) {
     const std::uint32_t error_before = magnitude(before, wanted);
@@ -93,10 +93,10 @@ RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
       continue;
     }
     for (std::size_t i = 0; i < 3; ++i) {
-      RC_ASSERT(
-          settled(predicted.p(i)[slot], agreed.p(i)[slot], target.p(i)[slot], parameters.position_step));
-      RC_ASSERT(
-          settled(predicted.v(i)[slot], agreed.v(i)[slot], target.v(i)[slot], parameters.velocity_step));
+      RC_ASSERT(settled(predicted.p(i)[slot], agreed.p(i)[slot], target.p(i)[slot],
+                        parameters.codec.position_step));
+      RC_ASSERT(settled(predicted.v(i)[slot], agreed.v(i)[slot], target.v(i)[slot],
+                        parameters.codec.velocity_step));
     }
   }
 }
@@ -105,7 +105,7 @@ RC_GTEST_PROP(AnyCodec, UnderABudgetNothingLeftOutIsWorseThanWhatWasSent, ()) {
   const Session session;
   RC_PRE(session.codec != "tracker");  // weighs waiting too, and learns from the first encode
   Random random(session.seed);
-  const CodecParameters parameters{200, 16, 64};
+  const StreamParameters parameters{{200, 16, 64}};
   const State predicted = synthetic::random_state(random, session.capacity, session.dead_one_in);
   const State target = synthetic::random_target(random, predicted, session.moved_one_in);
   DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, parameters);
@@ -136,9 +136,9 @@ RC_GTEST_PROP(AnyCodec, TheEncoderRepeatsItself, ()) {
   const State target = synthetic::random_target(random, predicted, session.moved_one_in);
   const std::size_t budget = random.below(10 * session.capacity);
   std::vector<std::byte> first;
-  DeltaCodec used = synthetic::make_delta(session.codec, session.capacity, {200, 16, 64});
+  DeltaCodec used = synthetic::make_delta(session.codec, session.capacity, {{200, 16, 64}});
   for (int round = 0; round < 3; ++round) {
-    DeltaCodec fresh = synthetic::make_delta(session.codec, session.capacity, {200, 16, 64});
+    DeltaCodec fresh = synthetic::make_delta(session.codec, session.capacity, {{200, 16, 64}});
     DeltaCodec& server = round == 0 || learns ? fresh : used;
     std::vector<std::byte> out(server.bound());
     State state = predicted;
@@ -152,7 +152,7 @@ RC_GTEST_PROP(AnyCodec, RepeatedCorrectionReachesTheTarget, ()) {
   const Session session;
   RC_PRE(!session.several_blocks);
   Random random(session.seed);
-  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, {1 << 21, 1 << 20, 1 << 20});
+  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, {{1 << 21, 1 << 20, 1 << 20}});
   std::vector<std::byte> out(server.bound());
   State agreed = synthetic::random_state(random, session.capacity, session.dead_one_in);
   const State target = synthetic::random_target(random, agreed, session.moved_one_in);

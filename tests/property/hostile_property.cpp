@@ -11,7 +11,7 @@ namespace {
 using synthetic::Random;
 using Bytes = std::vector<std::byte>;
 
-constexpr CodecParameters kParameters{200, 16, 64};
+constexpr StreamParameters kParameters{{200, 16, 64}};
 
 // Deltas of one codec over small states with lifecycle, parameters and corrections.
 struct Corpus {
@@ -29,7 +29,7 @@ std::vector<Corpus> deltas_of(std::string_view codec, std::uint32_t capacity, st
     const State before = state;
     State target = synthetic::random_target(random, state, 1 + random.below(6));
     const auto lifecycle = synthetic::random_lifecycle(random, state, target, 1 + random.below(12));
-    if (random.one_in(2)) server.set_parameters({100, 8, 32});
+    if (random.one_in(2)) server.set_parameters({{100, 8, 32}});
     out.resize(server.encode(state, target, lifecycle, kNoBudget, out).size_bytes);
     corpus.push_back({before, out});
   }

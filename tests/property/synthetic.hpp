@@ -124,7 +124,7 @@ inline std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capa
 }
 
 inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
-                             const CodecParameters& parameters, const RunBlocks& run_blocks = {}) {
+                             const StreamParameters& parameters, const RunBlocks& run_blocks = {}) {
   return {codec_of(codec, capacity, run_blocks), capacity, parameters, kTypes};
 }
 

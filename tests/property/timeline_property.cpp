@@ -21,9 +21,9 @@ class Chained final : public Predictor {
  public:
   explicit Chained(std::uint32_t capacity) : before_(capacity) {}
   [[nodiscard]] std::string_view name() const override { return "chained"; }
-  void step(const State& from, State& to, const Drive& drive) override {
+  void step(const State& from, State& to, const StepInput& input) override {
     before_ = from;
-    ballistic_.step(from, to, drive);
+    ballistic_.step(from, to, input);
     for (Slot slot = 0; slot + 1 < to.capacity(); ++slot) {
       if (to.alive()[slot] == 0 || to.alive()[slot + 1] == 0) continue;
       for (std::size_t i = 0; i < kPositionChannels; ++i) {
@@ -33,7 +33,7 @@ class Chained final : public Predictor {
       }
     }
   }
-  void step_slots(const State&, State&, const Drive&, std::span<const Slot>) override {
+  void step_slots(const State&, State&, const StepInput&, std::span<const Slot>) override {
     FAIL() << "bodies interact: all of them have to be simulated again";
   }
   [[nodiscard]] bool interacts() const override { return true; }
@@ -81,7 +81,7 @@ class Scenario {
     layout_.type_count = synthetic::kTypes;
     layout_.codec = codec_names()[random.below(codec_names().size())];
     layout_.codec_tables = synthetic::tables_for(layout_.codec);
-    layout_.parameters = {200, 16, 64, 300};
+    layout_.parameters = {{200, 16, 64}, {300}};
     layout_.lead = lead;
     server_.emplace(*ServerTimeline::create(layout_, 1, make(kind, layout_.capacity)));
     client_.emplace(*ClientTimeline::create(layout_, make(kind, layout_.capacity)));
@@ -111,9 +111,13 @@ class Scenario {
     State target = synthetic::random_target(random_, server_->state(), 1 + random_.below(8));
     const auto lifecycle =
         synthetic::random_lifecycle(random_, server_->state(), target, 1 + random_.below(30));
-    if (random_.one_in(10))
-      server_->set_parameters(
-          {static_cast<std::int32_t>(50 + random_.below(500)), 8, 32, share(), share(), share()});
+    if (random_.one_in(10)) {
+      StreamParameters parameters{{static_cast<std::int32_t>(50 + random_.below(500)), 8, 32}};
+      parameters.step.decay = share();
+      parameters.codec.velocity_gain = share();
+      parameters.codec.acceleration_gain = share();
+      server_->set_parameters(parameters);
+    }
     const auto frame =
         server_->advance(target, lifecycle, random_.one_in(2) ? kNoBudget : random_.below(400));
     deltas_.push_back(
@@ -156,8 +160,7 @@ class Scenario {
       for (const auto& [number, input] : all_inputs_) {
         if (input.frame == frame) drive = input.drive;
       }
-      drive.decay = client_->parameters().decay;
-      reference_->step(state, state, drive);
+      reference_->step(state, state, {drive, client_->parameters().step});
       RC_ASSERT(client_->state(frame) == state);
     }
   }

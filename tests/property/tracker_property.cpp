@@ -59,7 +59,7 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
   const auto joins_at = *rc::gen::inRange(1, 8);
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
   Random random(seed);
-  CodecParameters parameters{threshold, 1, 1};
+  StreamParameters parameters{{threshold, 1, 1}};
   DeltaCodec server = synthetic::make_delta("tracker", capacity, parameters);
   DeltaCodec client = synthetic::make_delta("tracker", capacity, parameters);
   DeltaCodec late = synthetic::make_delta("tracker", capacity, parameters);
@@ -76,8 +76,8 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
     const auto mood = static_cast<Mood>(moods[static_cast<std::size_t>(frame)]);
     const State target = target_of(random, agreed, mood, threshold, frame);
     if (random.one_in(3)) {
-      parameters.velocity_gain = static_cast<std::uint16_t>(random.below(65536));
-      parameters.acceleration_gain = static_cast<std::uint16_t>(random.below(65536));
+      parameters.codec.velocity_gain = static_cast<std::uint16_t>(random.below(65536));
+      parameters.codec.acceleration_gain = static_cast<std::uint16_t>(random.below(65536));
       server.set_parameters(parameters);
     }
     const std::size_t budget = random.one_in(3) ? random.below(4 * capacity + 20) : kNoBudget;

@@ -9,11 +9,11 @@
 namespace tandem {
 namespace {
 
-Result<CodecParameters> read_parameters(std::span<const std::byte> section) {
+Result<StreamParameters> read_parameters(std::span<const std::byte> section) {
   ByteReader in(section);
-  const CodecParameters parameters = get_parameters(in);
+  const StreamParameters parameters = get_parameters(in);
   if (!in.at_end()) return fail(ErrorCode::kMalformed, "parameters section of wrong length");
-  if (!valid_parameters(parameters)) return fail(ErrorCode::kMalformed, "parameters out of range");
+  if (!valid_parameters(parameters.codec)) return fail(ErrorCode::kMalformed, "parameters out of range");
   return parameters;
 }
 
@@ -24,23 +24,23 @@ void write_section_header(SectionType type, std::size_t size_bytes, ByteWriter& 
 
 }  // namespace
 
-void put_parameters(const CodecParameters& parameters, ByteWriter& out) {
-  out.put(parameters.threshold);
-  out.put(parameters.position_step);
-  out.put(parameters.velocity_step);
-  out.put(parameters.decay);
-  out.put(parameters.velocity_gain);
-  out.put(parameters.acceleration_gain);
+void put_parameters(const StreamParameters& parameters, ByteWriter& out) {
+  out.put(parameters.codec.threshold);
+  out.put(parameters.codec.position_step);
+  out.put(parameters.codec.velocity_step);
+  out.put(parameters.step.decay);
+  out.put(parameters.codec.velocity_gain);
+  out.put(parameters.codec.acceleration_gain);
 }
 
-CodecParameters get_parameters(ByteReader& in) {
-  CodecParameters parameters;
-  parameters.threshold = in.get<std::int32_t>();
-  parameters.position_step = in.get<std::int32_t>();
-  parameters.velocity_step = in.get<std::int32_t>();
-  parameters.decay = in.get<std::uint16_t>();
-  parameters.velocity_gain = in.get<std::uint16_t>();
-  parameters.acceleration_gain = in.get<std::uint16_t>();
+StreamParameters get_parameters(ByteReader& in) {
+  StreamParameters parameters;
+  parameters.codec.threshold = in.get<std::int32_t>();
+  parameters.codec.position_step = in.get<std::int32_t>();
+  parameters.codec.velocity_step = in.get<std::int32_t>();
+  parameters.step.decay = in.get<std::uint16_t>();
+  parameters.codec.velocity_gain = in.get<std::uint16_t>();
+  parameters.codec.acceleration_gain = in.get<std::uint16_t>();
   return parameters;
 }
 
@@ -48,8 +48,8 @@ struct DeltaCodec::Impl {
   std::unique_ptr<Codec> codec;
   std::uint32_t capacity = 0;
   TypeId type_count = 0;
-  CodecParameters parameters;  // in force
-  CodecParameters next;        // server: from the next encode() on
+  StreamParameters parameters;  // in force
+  StreamParameters next;        // server: from the next encode() on
   // Of the delta at hand.
   std::vector<LifecycleRecord> lifecycle;
   std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
@@ -62,7 +62,7 @@ struct DeltaCodec::Impl {
 
   struct Parsed {
     int stage = 0;  // where a section belongs among the others: lifecycle, parameters, corrections
-    CodecParameters parameters;
+    StreamParameters parameters;
     std::span<const std::uint8_t> alive;
   };
   Result<void> parse(std::span<const std::byte> payload, const State& predicted, Parsed& parsed);
@@ -137,9 +137,9 @@ void DeltaCodec::Impl::remember(const Delta& delta) {
 }
 
 DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
-                       const CodecParameters& parameters, TypeId type_count)
+                       const StreamParameters& parameters, TypeId type_count)
     : impl_(std::make_unique<Impl>()) {
-  TANDEM_ASSERT(valid_parameters(parameters));
+  TANDEM_ASSERT(valid_parameters(parameters.codec));
   impl_->codec = std::move(codec);
   impl_->capacity = capacity;
   impl_->type_count = type_count;
@@ -184,13 +184,13 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
     put_parameters(impl_->parameters, writer);
   }
   TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
-  if (observer != nullptr) observer->frame(state, target, impl_->parameters);
+  if (observer != nullptr) observer->frame(state, target, impl_->parameters.codec);
   Encoded encoded;
   const std::size_t before = writer.size();
   const std::size_t left = budget - std::min(budget, before);
   impl_->list_renewed();
   const Corrections corrections = impl_->codec->encode(
-      {state, state.alive(), impl_->renewed, impl_->parameters}, target, left, writer, observer);
+      {state, state.alive(), impl_->renewed, impl_->parameters.codec}, target, left, writer, observer);
   TANDEM_ASSERT(!writer.overflow());
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
@@ -200,12 +200,12 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   return encoded;
 }
 
-void DeltaCodec::set_parameters(const CodecParameters& parameters) {
-  TANDEM_ASSERT(valid_parameters(parameters));
+void DeltaCodec::set_parameters(const StreamParameters& parameters) {
+  TANDEM_ASSERT(valid_parameters(parameters.codec));
   impl_->next = parameters;
 }
-const CodecParameters& DeltaCodec::parameters() const { return impl_->parameters; }
-void DeltaCodec::restore_parameters(const CodecParameters& parameters) {
+const StreamParameters& DeltaCodec::parameters() const { return impl_->parameters; }
+void DeltaCodec::restore_parameters(const StreamParameters& parameters) {
   set_parameters(parameters);
   impl_->parameters = parameters;
 }
@@ -232,8 +232,8 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
   if (auto result = impl_->parse(payload, predicted, parsed); !result)
     return tl::unexpected<Error>(result.error());
   impl_->list_renewed();
-  const auto corrections =
-      impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters}, impl_->sections);
+  const auto corrections = impl_->codec->decode(
+      {predicted, parsed.alive, impl_->renewed, parsed.parameters.codec}, impl_->sections);
   if (!corrections) return tl::unexpected<Error>(corrections.error());
   return Delta{impl_->lifecycle, parsed.parameters, *corrections};
 }

@@ -33,16 +33,16 @@ enum class SectionType : std::uint16_t {
 /// u16 type, u32 length of the body, body.
 inline constexpr std::size_t kSectionHeaderBytes = 6;
 
-/// CodecParameters as they stand in a delta and in a snapshot.
+/// StreamParameters as they stand in a delta and in a snapshot.
 inline constexpr std::size_t kParametersBytes = 18;
-void put_parameters(const CodecParameters& parameters, ByteWriter& out);
+void put_parameters(const StreamParameters& parameters, ByteWriter& out);
 /// Checks nothing.
-[[nodiscard]] CodecParameters get_parameters(ByteReader& in);
+[[nodiscard]] StreamParameters get_parameters(ByteReader& in);
 
 /// What a payload says. Spans stay valid until the next encode() or decode() of the codec that read it.
 struct Delta {
   std::span<const LifecycleRecord> lifecycle;
-  CodecParameters parameters;  ///< in force from this delta on
+  StreamParameters parameters;  ///< in force from this delta on
   Corrections corrections;
 };
 
@@ -52,7 +52,7 @@ struct Delta {
 class DeltaCodec {
  public:
   /// `codec` must be made for `capacity`.
-  DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity, const CodecParameters& parameters,
+  DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity, const StreamParameters& parameters,
              TypeId type_count);
   DeltaCodec(DeltaCodec&&) noexcept;
   DeltaCodec& operator=(DeltaCodec&&) noexcept;
@@ -75,10 +75,10 @@ class DeltaCodec {
                  std::size_t budget, std::span<std::byte> out, EncodeObserver* observer = nullptr);
 
   /// Server side: parameters from the next encode() on; sent in that delta.
-  void set_parameters(const CodecParameters& parameters);
-  [[nodiscard]] const CodecParameters& parameters() const;
+  void set_parameters(const StreamParameters& parameters);
+  [[nodiscard]] const StreamParameters& parameters() const;
   /// Client side, from a snapshot: parameters in force, nothing is sent.
-  void restore_parameters(const CodecParameters& parameters);
+  void restore_parameters(const StreamParameters& parameters);
 
   /// Client side: validates all of `payload`, the delta of the frame that is `predicted`; changes nothing.
   /// Errors: kMalformed, kUnsupported (unknown critical section).

@@ -11,7 +11,7 @@ Result<void> check_layout(const Layout& layout) {
                   std::to_string(kMaxCapacity));
   }
   if (layout.type_count == 0) return refuse("a session has at least one type");
-  if (!valid_parameters(layout.parameters)) return refuse("codec parameters out of range");
+  if (!valid_parameters(layout.parameters.codec)) return refuse("codec parameters out of range");
   if (layout.lead > kMaxLead)
     return refuse("lead " + std::to_string(layout.lead) + " is above " + std::to_string(kMaxLead));
   return {};
@@ -20,7 +20,7 @@ Result<void> check_layout(const Layout& layout) {
 std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
                           std::uint64_t lattice_unit_bits) {
   // A text, so that a client in any language can build the same bytes.
-  const CodecParameters& first = layout.parameters;
+  const CodecParameters& first = layout.parameters.codec;
   std::string text = "tandem-layout " + std::to_string(protocol_version);
   text += "\ncapacity " + std::to_string(layout.capacity);
   text += "\nlattice_unit " + to_hex(lattice_unit_bits);

@@ -25,7 +25,7 @@ struct Layout {
   std::vector<std::byte> codec_tables;  ///< see make_codec()
   /// Of the first frame. A session announces threshold and steps alone; a snapshot holds all that are in
   /// force.
-  CodecParameters parameters;
+  StreamParameters parameters;
   std::string predictor = "ballistic";
   std::vector<std::int32_t> predictor_constants;  ///< see make_predictor()
   friend bool operator==(const Layout&, const Layout&) = default;

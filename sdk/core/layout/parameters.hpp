@@ -1,5 +1,6 @@
 #pragma once
-// What a codec's decoder reads besides its bytes.
+// What may change between frames: each delta that changes something says so. Two types, for two readers who
+// start to read at different frames.
 
 #include <cstdint>
 
@@ -7,17 +8,30 @@
 
 namespace tandem {
 
-/// What a decoder reads besides its bytes. May change between frames; a change travels in the delta itself.
+/// What the decoder reads besides its bytes: a change in delta f is in force from delta f on.
 struct CodecParameters {
   std::int32_t threshold = 0;      ///< lattice units; bodies further off than this are corrected. 1 .. 2^30
   std::int32_t position_step = 1;  ///< lattice units per quantisation step (range / 127). 1 .. 2^24
   std::int32_t velocity_step = 1;  ///< 1/64 unit per frame per quantisation step (range / 127). 1 .. 2^24
   // For codecs that steer a filter (`tracker`); nothing to the others. Any value is valid.
-  std::uint16_t decay = 0;  ///< E of the predicted steps after this delta: share of c lost, in 1/65536
   std::uint16_t velocity_gain = 26214;     ///< beta, in 1/32768: share of a correction that is an error of v
   std::uint16_t acceleration_gain = 9830;  ///< gamma, in 1/65536: share of that that is an error of c
   friend bool operator==(const CodecParameters&, const CodecParameters&) = default;
 };
+/// What the predicted step reads besides state and drive: a change in delta f is in force from the step that
+/// produces f + 1 on, since the one that produced f came before the delta. Any value is valid.
+struct StepParameters {
+  std::uint16_t decay = 0;  ///< E: share of c lost per frame, in 1/65536
+  friend bool operator==(const StepParameters&, const StepParameters&) = default;
+};
+
+/// All that a delta may change of its stream.
+struct StreamParameters {
+  CodecParameters codec = {};
+  StepParameters step = {};
+  friend bool operator==(const StreamParameters&, const StreamParameters&) = default;
+};
+
 /// 127 steps of this size span the lattice from end to end.
 inline constexpr std::int32_t kMaxStep = 1 << 24;
 

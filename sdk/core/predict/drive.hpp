@@ -1,20 +1,25 @@
 #pragma once
-// What the predicted step reads besides the state. Gravity and damping change by scheduled input only.
+// What the predicted step reads besides the state.
 
 #include <cstdint>
 
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/layout/parameters.hpp"
 
 namespace tandem {
 
-/// Integers of the predicted step, converted once by the server from scene units.
+/// The forces on all bodies, converted once by the server from scene units. Changes by scheduled input only.
 struct Drive {
   Vec3i gravity{};            ///< 1/64 lattice unit per frame^2, |g| <= 2^28
   std::uint16_t damping = 0;  ///< D: share of v lost per frame, in 1/65536
-  /// E: share of c lost per frame, in 1/65536. A timeline fills it in from the codec's parameters; scheduled
-  /// inputs do not have it.
-  std::uint16_t decay = 0;
   friend bool operator==(const Drive&, const Drive&) = default;
+};
+
+/// Of one step.
+struct StepInput {
+  Drive drive;                ///< of the frame that the step produces
+  StepParameters parameters;  ///< of the delta before
+  friend bool operator==(const StepInput&, const StepInput&) = default;
 };
 
 }  // namespace tandem

@@ -21,11 +21,12 @@ class Predictor {
 
   /// Writes into `to` the state that follows `from`. Both have the same capacity; they may be the same
   /// object. Allocates nothing. Dead slots stay all zero.
-  virtual void step(const State& from, State& to, const Drive& drive) = 0;
+  virtual void step(const State& from, State& to, const StepInput& input) = 0;
 
   /// The same for the listed slots only; other slots of `to` keep what they hold. Called only where
   /// `interacts()` is false, after a delta touched a few bodies of an earlier frame.
-  virtual void step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) = 0;
+  virtual void step_slots(const State& from, State& to, const StepInput& input,
+                          std::span<const Slot> slots) = 0;
 
   /// True where a body's next state depends on other bodies, so that a late correction re-simulates all of
   /// them.

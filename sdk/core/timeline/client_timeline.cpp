@@ -12,16 +12,16 @@
 namespace tandem {
 
 struct ClientTimeline::Impl {
-  // A frame in the ring: its state and the drive of the step that produced it.
+  // A frame in the ring, and what the step that produced it read.
   struct Held {
     State state;
-    Drive drive;
+    StepInput input;
   };
 
   Impl(TimelineParts made, const Layout& layout)
       : parts(std::move(made)), type_count(layout.type_count), max_lead(layout.lead) {
     // With lead 0 the next frame still needs a place while its delta is being checked.
-    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(layout.capacity), Drive{}});
+    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(layout.capacity), {}});
   }
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }
@@ -29,24 +29,24 @@ struct ClientTimeline::Impl {
   void simulate(Frame frame) {
     const Held& before = at(frame - 1);
     Held& next = at(frame);
-    next.drive = inputs.drive_for(frame, before.drive);
-    next.drive.decay = parts.delta.parameters().decay;
-    parts.predictor->step(before.state, next.state, next.drive);
+    next.input = {inputs.drive_for(frame, before.input.drive), parts.delta.parameters().step};
+    parts.predictor->step(before.state, next.state, next.input);
   }
 
-  // After a delta changed the touched slots of the frame just applied, and perhaps the decay from there on.
+  // After a delta changed the touched slots of the frame just applied, and perhaps what the steps from there
+  // on read.
   void resimulate() {
     const std::span<const Slot> touched = parts.delta.touched();
-    const std::uint16_t decay = parts.delta.parameters().decay;
+    const StepParameters& parameters = parts.delta.parameters().step;
     for (Frame frame = applied + 1; frame <= now; ++frame) {
       Held& next = at(frame);
-      const bool faded_otherwise = next.drive.decay != decay;
-      next.drive.decay = decay;
-      if (touched.empty() && !faded_otherwise) continue;
-      if (faded_otherwise || parts.predictor->interacts()) {
-        parts.predictor->step(at(frame - 1).state, next.state, next.drive);
+      const bool stepped_otherwise = next.input.parameters != parameters;
+      next.input.parameters = parameters;
+      if (touched.empty() && !stepped_otherwise) continue;
+      if (stepped_otherwise || parts.predictor->interacts()) {
+        parts.predictor->step(at(frame - 1).state, next.state, next.input);
       } else {
-        parts.predictor->step_slots(at(frame - 1).state, next.state, next.drive, touched);
+        parts.predictor->step_slots(at(frame - 1).state, next.state, next.input, touched);
       }
     }
   }
@@ -96,7 +96,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
   }
   std::swap(m.ring[0], m.at(read->frame));
-  m.at(read->frame).drive = read->drive;
+  m.at(read->frame).input.drive = read->drive;
   m.parts.delta.restore_parameters(read->parameters);
   m.inputs.reset(read->last_input, read->pending);
   m.applied = m.now = read->frame;
@@ -167,10 +167,10 @@ const State& ClientTimeline::state(Frame frame) const {
   return impl_->at(frame).state;
 }
 std::uint64_t ClientTimeline::hash() const { return impl_->hash; }
-const Drive& ClientTimeline::drive() const { return impl_->at(impl_->applied).drive; }
+const Drive& ClientTimeline::drive() const { return impl_->at(impl_->applied).input.drive; }
 std::span<const Slot> ClientTimeline::touched() const { return impl_->parts.delta.touched(); }
 std::span<const LifecycleRecord> ClientTimeline::lifecycle() const { return impl_->parts.delta.lifecycle(); }
-const CodecParameters& ClientTimeline::parameters() const { return impl_->parts.delta.parameters(); }
+const StreamParameters& ClientTimeline::parameters() const { return impl_->parts.delta.parameters(); }
 ClientTimeline::Timings ClientTimeline::timings() const { return impl_->timings; }
 void ClientTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns; }
 

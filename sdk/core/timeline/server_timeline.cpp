@@ -73,9 +73,8 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   Stopwatch watch(m.clock);
   ++m.frame;
   m.drive = m.inputs.drive_for(m.frame, m.drive);
-  m.drive.decay = m.parts.delta.parameters().decay;
   m.inputs.forget(m.frame);
-  m.parts.predictor->step(m.state, m.state, m.drive);
+  m.parts.predictor->step(m.state, m.state, {m.drive, m.parts.delta.parameters().step});
   result.predict_ns = watch.lap_ns();
   const DeltaCodec::Encoded encoded =
       m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer);
@@ -92,12 +91,13 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
 }
 
 void ServerTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns; }
-void ServerTimeline::set_parameters(const CodecParameters& parameters) {
+void ServerTimeline::set_parameters(const StreamParameters& parameters) {
   impl_->parts.delta.set_parameters(parameters);
 }
 Frame ServerTimeline::frame() const { return impl_->frame; }
 const State& ServerTimeline::state() const { return impl_->state; }
 const Drive& ServerTimeline::drive() const { return impl_->drive; }
+const StreamParameters& ServerTimeline::parameters() const { return impl_->parts.delta.parameters(); }
 std::uint64_t ServerTimeline::hash() const { return impl_->hash; }
 std::uint64_t ServerTimeline::last_input() const { return impl_->inputs.held_to(); }
 std::size_t ServerTimeline::payload_bound() const { return impl_->parts.delta.bound(); }

@@ -196,7 +196,8 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   const auto capacity = in.get<std::uint32_t>();
   const auto count = in.get<std::uint32_t>();
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated snapshot");
-  if (snapshot.frame > kMostFrame || !valid_drive(snapshot.drive) || !valid_parameters(snapshot.parameters)) {
+  if (snapshot.frame > kMostFrame || !valid_drive(snapshot.drive) ||
+      !valid_parameters(snapshot.parameters.codec)) {
     return fail(ErrorCode::kMalformed, "snapshot with a frame, drive or parameters out of range");
   }
   if (capacity != state.capacity()) return fail(ErrorCode::kMalformed, "snapshot of another capacity");

@@ -16,7 +16,7 @@ struct Snapshot {
   Frame frame = 0;
   std::uint64_t last_input = 0;
   Drive drive;
-  CodecParameters parameters;
+  StreamParameters parameters;
   std::uint64_t hash = 0;
   std::vector<ScheduledDrive> pending;  ///< ascending by number, all <= last_input, frames beyond `frame`
 };

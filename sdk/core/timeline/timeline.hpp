@@ -68,12 +68,13 @@ class ServerTimeline {
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
   /// In force from the next advance() on; travels in that delta.
-  void set_parameters(const CodecParameters& parameters);
+  void set_parameters(const StreamParameters& parameters);
 
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] const State& state() const;
-  [[nodiscard]] const Drive& drive() const;  ///< in force at frame()
-  [[nodiscard]] std::uint64_t hash() const;  ///< of state()
+  [[nodiscard]] const Drive& drive() const;                  ///< in force at frame()
+  [[nodiscard]] const StreamParameters& parameters() const;  ///< in force at frame()
+  [[nodiscard]] std::uint64_t hash() const;                  ///< of state()
   [[nodiscard]] std::uint64_t last_input() const;
   [[nodiscard]] std::size_t payload_bound() const;
   /// One cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content of `out`.
@@ -129,7 +130,7 @@ class ClientTimeline {
   [[nodiscard]] const Drive& drive() const;                          ///< in force at applied()
   [[nodiscard]] std::span<const Slot> touched() const;               ///< by the last apply()
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< of the last apply()
-  [[nodiscard]] const CodecParameters& parameters() const;           ///< in force at applied()
+  [[nodiscard]] const StreamParameters& parameters() const;          ///< in force at applied()
 
   /// Of the last apply(): decoding and correcting the frame; checking its hash and re-simulating. Zero
   /// without a clock.

@@ -46,9 +46,9 @@ dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
   wire.window_ceiling = message.window_ceiling;
   wire.max_delta_bytes = message.max_delta_bytes;
   wire.max_snapshot_bytes = message.max_snapshot_bytes;
-  wire.threshold = message.layout.parameters.threshold;
-  wire.position_step = message.layout.parameters.position_step;
-  wire.velocity_step = message.layout.parameters.velocity_step;
+  wire.threshold = message.layout.parameters.codec.threshold;
+  wire.position_step = message.layout.parameters.codec.position_step;
+  wire.velocity_step = message.layout.parameters.codec.velocity_step;
   wire.client_cost_ns = message.client_cost_ns;
   wire.session = lend(message.session);
   wire.codec = lend(message.layout.codec);
@@ -73,9 +73,9 @@ SessionMessage to_message(const tandem_TandemSession& wire) {
   message.window_ceiling = wire.window_ceiling;
   message.max_delta_bytes = wire.max_delta_bytes;
   message.max_snapshot_bytes = wire.max_snapshot_bytes;
-  message.layout.parameters.threshold = wire.threshold;
-  message.layout.parameters.position_step = wire.position_step;
-  message.layout.parameters.velocity_step = wire.velocity_step;
+  message.layout.parameters.codec.threshold = wire.threshold;
+  message.layout.parameters.codec.position_step = wire.position_step;
+  message.layout.parameters.codec.velocity_step = wire.velocity_step;
   message.client_cost_ns = wire.client_cost_ns;
   message.session = to_string(wire.session);
   message.layout.codec = to_string(wire.codec);

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t kBodies = 10000;
 constexpr std::int32_t kRadius = 20000, kWall = 500000;
 constexpr std::uint64_t kSeed = 42;
-const Drive kFalling{{0, -3000, 0}, 200, 0};
+const StepInput kFalling{{{0, -3000, 0}, 200}, {}};
 
 std::unique_ptr<Predictor> room(std::string_view tier, std::int32_t substeps) {
   constexpr std::int32_t kOne = ContactConstants::kOne;

@@ -53,7 +53,7 @@ Recording record(std::string_view codec, ServerTimes& times) {
   r.layout.type_count = synthetic::kTypes;
   r.layout.codec = codec;
   r.layout.codec_tables = synthetic::tables_for(codec);
-  r.layout.parameters = {4096, 256, 1024};
+  r.layout.parameters = {{4096, 256, 1024}};
   r.layout.predictor = "ballistic";
   synthetic::Random random(kSeed);
   State state(kBodies);
@@ -63,12 +63,12 @@ Recording record(std::string_view codec, ServerTimes& times) {
   for (Slot slot = 0; slot < kBodies; ++slot) state.spawn(slot, 0, 0, {vector(1 << 22), vector(1 << 19)});
   auto server = *ServerTimeline::create(r.layout, 1);
   server.set_clock(now_ns);
-  server.start(0, state, Drive{{0, -2000, 0}, 300, 0});
+  server.start(0, state, Drive{{0, -2000, 0}, 300});
   server.snapshot(r.snapshot);
   Ballistic predictor;
   State target(kBodies);
   for (std::size_t i = 0; i < kFrames; ++i) {
-    predictor.step(server.state(), target, server.drive());
+    predictor.step(server.state(), target, {server.drive(), server.parameters().step});
     for (Slot slot = 0; slot < kBodies; ++slot) {
       if (!random.one_in(10)) continue;
       BodyState body = target.body(slot);
@@ -134,7 +134,7 @@ void client_frame(benchmark::State& bench, std::string_view codec) {
 // Blocks side by side: wall time of encode() and decode() at 65,536 bodies in four blocks.
 void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   constexpr std::uint32_t kMany = 4 * kBlockSlots;
-  constexpr CodecParameters kParameters{4096, 256, 1024};
+  constexpr StreamParameters kParameters{{4096, 256, 1024}};
   synthetic::Random random(kSeed);
   State state(kMany);
   for (Slot slot = 0; slot < kMany; ++slot)

@@ -116,7 +116,7 @@ void World::start_server() {
   if (config.stream.layout.codec == "entropy" || config.stream.layout.codec == "limited")
     config.stream.layout.codec_tables = default_code_tables();
   config.stream.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
-  config.stream.layout.parameters = must(host::codec_parameters(config.stream.lattice, 0.01, 0.1, 2));
+  config.stream.layout.parameters.codec = must(host::codec_parameters(config.stream.lattice, 0.01, 0.1, 2));
   if (config.stream.layout.codec == "tracker") {
     config.stream.layout.parameters =
         with_first_gains(config.stream.layout.parameters, config.stream.layout.predictor);
@@ -197,12 +197,11 @@ void World::incident(bool restart) {
     network_.set_frozen(server_port_->self(), false);
     server_frozen_ = false;
   } else if (what == 5) {  // quality is changed at run time
-    CodecParameters parameters = host_->parameters();
-    parameters.threshold = std::max(1, static_cast<int>(parameters.threshold * dice_.uniform(0.5, 2)));
-    parameters.position_step =
-        std::max(1, static_cast<int>(parameters.position_step * dice_.uniform(0.5, 2)));
-    parameters.velocity_step =
-        std::max(1, static_cast<int>(parameters.velocity_step * dice_.uniform(0.5, 2)));
+    StreamParameters parameters = host_->parameters();
+    CodecParameters& codec = parameters.codec;
+    codec.threshold = std::max(1, static_cast<int>(codec.threshold * dice_.uniform(0.5, 2)));
+    codec.position_step = std::max(1, static_cast<int>(codec.position_step * dice_.uniform(0.5, 2)));
+    codec.velocity_step = std::max(1, static_cast<int>(codec.velocity_step * dice_.uniform(0.5, 2)));
     if (!host_->set_parameters(parameters)) throw std::logic_error("parameters refused");
   } else if (!clients_[at]->frozen) {
     for (std::uint64_t burst = 1 + dice_.below(4); burst > 0; --burst) {

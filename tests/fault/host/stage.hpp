@@ -78,7 +78,7 @@ class Stage {
     config.stream.layout.capacity = 16;
     config.stream.layout.codec = "selective";
     config.stream.lattice = must(choose_lattice(0.01, 3, server->simulation.dt_s()));
-    config.stream.layout.parameters = must(codec_parameters(config.stream.lattice, 0.01, 0, 0));
+    config.stream.layout.parameters.codec = must(codec_parameters(config.stream.lattice, 0.01, 0, 0));
     server->host = must(Host::create(std::move(config), server->simulation, *server->port));
     servers.push_back(std::move(server));
     return *servers.back();

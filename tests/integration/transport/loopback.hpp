@@ -48,9 +48,9 @@ inline SessionMessage a_session(const std::string& name, Epoch epoch) {
   session.max_delta_bytes = 1U << 20U;
   session.max_snapshot_bytes = 1U << 20U;
   session.layout.codec = "entropy";
-  session.layout.parameters.threshold = 100;
-  session.layout.parameters.position_step = 7;
-  session.layout.parameters.velocity_step = 9;
+  session.layout.parameters.codec.threshold = 100;
+  session.layout.parameters.codec.position_step = 7;
+  session.layout.parameters.codec.velocity_step = 9;
   session.layout.predictor = "ballistic";
   session.client_cost_ns = 12;
   session.scene = "half_pipe";

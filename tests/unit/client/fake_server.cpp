@@ -13,9 +13,9 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
   s.layout.lead = lead;
   s.max_delta_bytes = s.max_snapshot_bytes = 100'000 + 64 * capacity;
   s.layout.codec = "quantized";
-  s.layout.parameters.threshold = 50;
-  s.layout.parameters.position_step = 40;
-  s.layout.parameters.velocity_step = 40;
+  s.layout.parameters.codec.threshold = 50;
+  s.layout.parameters.codec.position_step = 40;
+  s.layout.parameters.codec.velocity_step = 40;
   s.layout.predictor = "ballistic";
   s.scene = "test";
   s.types = {{"ball", 0.1F, 0xFFFFFFFF}};
@@ -33,7 +33,7 @@ FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead)
     const auto place = static_cast<std::int32_t>(slot * 1000);
     target_.spawn(slot, 0, 0, {{place, 100'000, -place}, {64, 0, 128}});
   }
-  timeline_.start(0, target_, {{0, -20, 0}, 300, 0});
+  timeline_.start(0, target_, {{0, -20, 0}, 300});
   hashes[0] = timeline_.hash();
 }
 

@@ -85,7 +85,7 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& s) { s.max_delta_bytes = 0xFFFFFFFF; }));
   EXPECT_TRUE(refused([](auto& s) { s.max_snapshot_bytes = 0xFFFFFFFF; }));
   EXPECT_TRUE(refused([](auto& s) { s.types.clear(); }));
-  EXPECT_TRUE(refused([](auto& s) { s.layout.parameters.threshold = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.layout.parameters.codec.threshold = 0; }));
   EXPECT_TRUE(refused([](auto& s) { s.epoch = 0; }));
 }
 

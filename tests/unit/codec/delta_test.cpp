@@ -10,7 +10,7 @@ namespace {
 using synthetic::make_delta;
 using Bytes = std::vector<std::byte>;
 
-constexpr CodecParameters kParameters{100, 10, 20};
+constexpr StreamParameters kParameters{{100, 10, 20}};
 
 // Slots 0, 1, 2 alive, 3 dead.
 State three_of_four() {
@@ -28,7 +28,7 @@ class Payload {
     for (const std::int64_t value : u32_values) put(static_cast<std::uint32_t>(value));
     return *this;
   }
-  Payload& parameters(const CodecParameters& values, std::size_t size_bytes = kParametersBytes) {
+  Payload& parameters(const StreamParameters& values, std::size_t size_bytes = kParametersBytes) {
     put(static_cast<std::uint16_t>(SectionType::kParameters));
     put(static_cast<std::uint32_t>(size_bytes));
     Bytes body(kParametersBytes);
@@ -162,7 +162,7 @@ TEST(DeltaCodec, ParametersTravelWithTheDeltaThatUsesThemFirst) {
   State held = agreed;
   State target = agreed;
   target.p(0)[0] = 1000;
-  const CodecParameters changed{50, 1, 1};
+  const StreamParameters changed{{50, 1, 1}};
   server.set_parameters(changed);
   auto encoded = server.encode(agreed, target, {}, kNoBudget, out);
   ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));
@@ -176,7 +176,7 @@ TEST(DeltaCodec, ParametersTravelWithTheDeltaThatUsesThemFirst) {
 }
 
 TEST(DeltaCodec, ParametersOutOfRangeAreRefused) {
-  const auto taken = [](const CodecParameters& parameters, std::size_t size_bytes = kParametersBytes) {
+  const auto taken = [](const StreamParameters& parameters, std::size_t size_bytes = kParametersBytes) {
     return decode(Payload().parameters(parameters, size_bytes).bytes()).has_value();
   };
   EXPECT_TRUE(taken({1, 1, 1}));
@@ -196,9 +196,9 @@ TEST(DeltaCodec, UnknownSectionsAreSkippedUnlessCritical) {
 }
 
 TEST(DeltaCodec, SectionsOutOfOrderOrRepeatedAreRefused) {
-  EXPECT_FALSE(decode(Payload().parameters({1, 1, 1}).parameters({1, 1, 1}).bytes()));
+  EXPECT_FALSE(decode(Payload().parameters({{1, 1, 1}}).parameters({{1, 1, 1}}).bytes()));
   EXPECT_FALSE(
-      decode(Payload().parameters({1, 1, 1}).record(LifecycleKind::kDespawn, 0).end_lifecycle().bytes()));
+      decode(Payload().parameters({{1, 1, 1}}).record(LifecycleKind::kDespawn, 0).end_lifecycle().bytes()));
 }
 
 TEST(DeltaCodec, ABlockMayComeOnlyOnce) {
@@ -224,7 +224,7 @@ TEST(DeltaCodec, EveryTruncationAndExtensionOfADeltaIsRefused) {
     for (Slot slot = 0; slot < 2; ++slot) target.p(0)[slot] = 1000;
     target.despawn(2);
     const std::vector<LifecycleRecord> lifecycle{{LifecycleKind::kDespawn, 2, 0, 0, {}}};
-    server.set_parameters({99, 9, 9});
+    server.set_parameters({{99, 9, 9}});
     const auto encoded = server.encode(state, target, lifecycle, kNoBudget, out);
     const std::vector<std::size_t> boundaries{0, 11, 11 + 24};  // between sections
     for (std::size_t size = 0; size < encoded.size_bytes; ++size) {
@@ -260,7 +260,7 @@ TEST(DeltaCodec, TouchedNamesEachSlotOfRecordsAndCorrectionsOnce) {
 TEST(DeltaCodec, AnObserverSeesTheFrameAfterItsRecordsAndBeforeItsCorrections) {
   struct Observer final : EncodeObserver {
     void frame(const State& predicted, const State& target, const CodecParameters& parameters) override {
-      EXPECT_EQ(parameters, kParameters);
+      EXPECT_EQ(parameters, kParameters.codec);
       before = predicted;
       after = target;
     }
@@ -291,7 +291,7 @@ TEST(DeltaCodec, DecodingChangesNothing) {
     const State predicted = state;
     State target = state;
     target.p(0)[0] = 5000;
-    server.set_parameters({99, 16, 64});
+    server.set_parameters({{99, 16, 64}});
     const auto payload = std::span(out).first(server.encode(state, target, {}, kNoBudget, out).size_bytes);
     State held = predicted;
     ASSERT_TRUE(client.decode(held, payload));
@@ -301,7 +301,7 @@ TEST(DeltaCodec, DecodingChangesNothing) {
     ASSERT_TRUE(again);
     client.apply(*again, held);
     EXPECT_EQ(held, state);
-    EXPECT_EQ(client.parameters().threshold, 99);
+    EXPECT_EQ(client.parameters().codec.threshold, 99);
   }
 }
 

@@ -51,6 +51,6 @@ inline State bodies_within(std::mt19937_64& random, std::uint32_t capacity, std:
   return state;
 }
 
-inline constexpr Drive kFalling{{0, -3000, 0}, 200, 800};
+inline constexpr StepInput kFalling{{{0, -3000, 0}, 200}, {800}};
 
 }  // namespace tandem

@@ -9,7 +9,7 @@ namespace tandem {
 namespace {
 
 // idl/PROTOCOL.md, "Predicted step", word by word in 64 bits.
-void reference_step(State& s, const Drive& drive) {
+void reference_step(State& s, const StepInput& input) {
   const auto share = [](std::int64_t x, std::int64_t k) { return (x * k + (1 << 15)) >> 16; };
   const auto clamp = [](std::int64_t x, std::int64_t limit) {
     return static_cast<std::int32_t>(std::clamp(x, -limit, limit));
@@ -19,9 +19,9 @@ void reference_step(State& s, const Drive& drive) {
     for (std::size_t i = 0; i < 3; ++i) {
       std::int64_t v = s.v(i)[slot];
       std::int64_t c = s.c(i)[slot];
-      v += drive.gravity[i] + c;
-      c -= share(c, drive.decay);
-      v -= share(v, drive.damping);
+      v += input.drive.gravity[i] + c;
+      c -= share(c, input.parameters.decay);
+      v -= share(v, input.drive.damping);
       s.v(i)[slot] = clamp(v, kVelocityLimit);
       s.c(i)[slot] = clamp(c, kVelocityLimit);
       s.p(i)[slot] =
@@ -50,9 +50,10 @@ State random_state(std::mt19937_64& random, std::uint32_t capacity) {
   return s;
 }
 
-Drive random_drive(std::mt19937_64& random) {
+StepInput random_input(std::mt19937_64& random) {
   const auto g = [&random] { return static_cast<std::int32_t>(random() % (1U << 29U)) - kVelocityLimit; };
-  return {{g(), g(), g()}, static_cast<std::uint16_t>(random()), static_cast<std::uint16_t>(random())};
+  const auto share = [&random] { return static_cast<std::uint16_t>(random()); };
+  return {{{g(), g(), g()}, share()}, {share()}};
 }
 
 TEST(Ballistic, EqualsThePublishedFormulaForAnyState) {
@@ -63,12 +64,12 @@ TEST(Ballistic, EqualsThePublishedFormulaForAnyState) {
   for (int round = 0; round < 50; ++round) {
     State state = random_state(random, 300);
     State expected = state;
-    const Drive drive = random_drive(random);
+    const StepInput input = random_input(random);
     State stepped(300);
-    predictor.step(state, stepped, drive);
-    reference_step(expected, drive);
+    predictor.step(state, stepped, input);
+    reference_step(expected, input);
     ASSERT_EQ(stepped, expected) << "round " << round;
-    predictor.step(state, state, drive);
+    predictor.step(state, state, input);
     ASSERT_EQ(state, expected) << "in place, round " << round;
   }
 }
@@ -77,13 +78,13 @@ TEST(Ballistic, SteppingSlotsEqualsSteppingAll) {
   std::mt19937_64 random(7);
   Ballistic predictor;
   const State from = random_state(random, 100);
-  const Drive drive = random_drive(random);
+  const StepInput input = random_input(random);
   State all(100);
-  predictor.step(from, all, drive);
+  predictor.step(from, all, input);
   State some = all;
   const std::vector<Slot> slots{0, 3, 4, 99};
   for (const Slot slot : slots) some.despawn(slot);
-  predictor.step_slots(from, some, drive, slots);
+  predictor.step_slots(from, some, input, slots);
   EXPECT_EQ(some, all);
 }
 
@@ -91,9 +92,9 @@ TEST(Ballistic, FreeFallFollowsTheParabola) {
   Ballistic predictor;
   State state(1);
   state.spawn(0, 0, 0, {});
-  Drive drive;
-  drive.gravity = {0, -640, 0};  // 10 units per frame^2
-  for (int frame = 0; frame < 20; ++frame) predictor.step(state, state, drive);
+  StepInput input;
+  input.drive.gravity = {0, -640, 0};  // 10 units per frame^2
+  for (int frame = 0; frame < 20; ++frame) predictor.step(state, state, input);
   EXPECT_EQ(state.p(1)[0], -10 * 20 * 21 / 2);  // semi-implicit Euler: g n(n+1)/2
   EXPECT_EQ(state.v(1)[0], -640 * 20);
 }

@@ -112,7 +112,7 @@ TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
   EXPECT_TRUE(refused([](HostConfig& c) { c.epoch = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.codec = "morse"; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.predictor = "oracle"; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.parameters.threshold = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.parameters.codec.threshold = 0; }));
 }
 
 TEST(HostCreate, RefusesASimulationWhoseColumnsAreTooShort) {
@@ -137,7 +137,7 @@ TEST(HostCreate, DescribesTheSessionCompletely) {
   EXPECT_EQ(session.epoch, config.epoch);
   EXPECT_EQ(session.layout.capacity, 4U);
   EXPECT_EQ(session.lattice_unit, config.stream.lattice.unit);
-  EXPECT_EQ(session.layout.parameters.threshold, 4096);
+  EXPECT_EQ(session.layout.parameters.codec.threshold, 4096);
   EXPECT_EQ(session.layout.lead, 1U);
   EXPECT_EQ(session.window_ceiling, 24U);
   EXPECT_EQ(session.layout.codec, "selective");

@@ -150,7 +150,7 @@ class FakePort final : public transport::ServerPort {
   config.stream.layout.capacity = 4;
   config.stream.layout.codec = "selective";
   config.stream.lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
-  config.stream.layout.parameters = *codec_parameters(config.stream.lattice, 1.0 / 64, 0, 0);
+  config.stream.layout.parameters.codec = *codec_parameters(config.stream.lattice, 1.0 / 64, 0, 0);
   config.claim_ns = 0;
   return config;
 }

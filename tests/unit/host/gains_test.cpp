@@ -13,7 +13,8 @@ namespace tandem::host {
 namespace {
 
 constexpr std::uint32_t kBodies = 1000;
-constexpr CodecParameters kStart{.threshold = 1000, .decay = 3000, .velocity_gain = 26214};
+constexpr StreamParameters kStart{.codec = {.threshold = 1000, .velocity_gain = 26214},
+                                  .step = {.decay = 3000}};
 
 /// The sum of as many cosines.
 std::int64_t cosines(double each, std::uint64_t count) {
@@ -21,9 +22,10 @@ std::int64_t cosines(double each, std::uint64_t count) {
 }
 
 /// Decisions on corrections that all have these cosines; the parameters in force at the end.
-CodecParameters decide(double agreement, double forwardness, int decisions, std::uint64_t corrections = 600) {
+StreamParameters decide(double agreement, double forwardness, int decisions,
+                        std::uint64_t corrections = 600) {
   GainControl control({}, kBodies, kStart);
-  CodecParameters parameters = kStart;
+  StreamParameters parameters = kStart;
   for (int frame = 0; frame < 15 * decisions; ++frame) {
     if (frame % 15 == 0)
       control.observe(
@@ -34,16 +36,16 @@ CodecParameters decide(double agreement, double forwardness, int decisions, std:
 }
 
 TEST(Gains, GrowWhereCorrectionsAgreeAndShrinkWhereTheyDoNot) {
-  EXPECT_GT(decide(0.6, 0.2, 20).velocity_gain, kStart.velocity_gain);
-  EXPECT_LT(decide(-0.1, 0.2, 20).velocity_gain, kStart.velocity_gain);
+  EXPECT_GT(decide(0.6, 0.2, 20).codec.velocity_gain, kStart.codec.velocity_gain);
+  EXPECT_LT(decide(-0.1, 0.2, 20).codec.velocity_gain, kStart.codec.velocity_gain);
 }
 
 TEST(Gains, TheLearnedAccelerationIsKeptWhileCorrectionsFollowIt) {
-  const CodecParameters kept = decide(0.25, 0.6, 5);
-  const CodecParameters dropped = decide(0.25, -0.3, 5);
-  EXPECT_LT(kept.decay, kStart.decay);
-  EXPECT_GT(dropped.decay, kStart.decay);
-  EXPECT_GT(kept.acceleration_gain, dropped.acceleration_gain);
+  const StreamParameters kept = decide(0.25, 0.6, 5);
+  const StreamParameters dropped = decide(0.25, -0.3, 5);
+  EXPECT_LT(kept.step.decay, kStart.step.decay);
+  EXPECT_GT(dropped.step.decay, kStart.step.decay);
+  EXPECT_GT(kept.codec.acceleration_gain, dropped.codec.acceleration_gain);
 }
 
 TEST(Gains, StayWhereCorrectionsAreAsWantedOrTooFew) {
@@ -53,18 +55,18 @@ TEST(Gains, StayWhereCorrectionsAreAsWantedOrTooFew) {
 }
 
 TEST(Gains, StayInTheirLimitsForEver) {
-  const CodecParameters most = decide(1, 1, 1000);
-  const CodecParameters least = decide(-1, -1, 1000);
+  const StreamParameters most = decide(1, 1, 1000);
+  const StreamParameters least = decide(-1, -1, 1000);
   const auto near_limit = [](double value, double limit) { return std::abs(value / limit - 1) < 0.31; };
-  EXPECT_PRED2(near_limit, most.velocity_gain / 32768.0, 1.8);
-  EXPECT_PRED2(near_limit, least.velocity_gain / 32768.0, 0.35);
-  EXPECT_PRED2(near_limit, most.decay, 15);
-  EXPECT_PRED2(near_limit, least.decay, 60000);
+  EXPECT_PRED2(near_limit, most.codec.velocity_gain / 32768.0, 1.8);
+  EXPECT_PRED2(near_limit, least.codec.velocity_gain / 32768.0, 0.35);
+  EXPECT_PRED2(near_limit, most.step.decay, 15);
+  EXPECT_PRED2(near_limit, least.step.decay, 60000);
 }
 
 TEST(Gains, AreDecidedEveryFifteenFrames) {
   GainControl control({}, kBodies, kStart);
-  CodecParameters parameters = kStart;
+  StreamParameters parameters = kStart;
   for (int frame = 1; frame <= 15; ++frame) {
     control.observe({.forwardness = cosines(-0.5, 100), .driven = 100});
     EXPECT_EQ(control.after_frame(parameters), frame == 15);
@@ -85,7 +87,7 @@ TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
   HostConfig config = test_config();
   config.stream.layout.codec = "tracker";
   config.stream.layout.codec_tables.clear();
-  config.stream.layout.parameters.decay = 13000;
+  config.stream.layout.parameters.step.decay = 13000;
   config.stream.gains = GainGoal{};
   Bench bench(config);
   bench.simulation.on_step = [&](std::uint64_t step) {  // to and fro: no force is worth remembering

@@ -215,9 +215,9 @@ class RuntimeQuality : public ::testing::Test {
 
 TEST_F(RuntimeQuality, ParametersSetByHandTravelInTheNextDeltaAndClientsFollow) {
   follow();
-  CodecParameters coarse = bench.host->parameters();
-  coarse.threshold *= 16;
-  coarse.velocity_step *= 2;
+  StreamParameters coarse = bench.host->parameters();
+  coarse.codec.threshold *= 16;
+  coarse.codec.velocity_step *= 2;
   ASSERT_TRUE(bench.host->set_parameters(coarse));
   EXPECT_EQ(client->parameters(), test_config().stream.layout.parameters);
   const Frame before = bench.host->frame();
@@ -230,8 +230,8 @@ TEST_F(RuntimeQuality, ParametersSetByHandTravelInTheNextDeltaAndClientsFollow) 
 }
 
 TEST_F(RuntimeQuality, ParametersOutOfRangeAreRefusedAndChangeNothing) {
-  CodecParameters bad = bench.host->parameters();
-  bad.position_step = 0;
+  StreamParameters bad = bench.host->parameters();
+  bad.codec.position_step = 0;
   EXPECT_FALSE(bench.host->set_parameters(bad));
   EXPECT_EQ(bench.host->parameters(), test_config().stream.layout.parameters);
 }
@@ -239,8 +239,8 @@ TEST_F(RuntimeQuality, ParametersOutOfRangeAreRefusedAndChangeNothing) {
 HostConfig automatic() {
   HostConfig config = test_config();
   config.stream.layout.codec = "quantized";
-  config.stream.quality = QualityGoal{0.005, config.stream.layout.parameters.threshold,
-                                      64 * config.stream.layout.parameters.threshold};
+  config.stream.quality = QualityGoal{0.005, config.stream.layout.parameters.codec.threshold,
+                                      64 * config.stream.layout.parameters.codec.threshold};
   return config;
 }
 
@@ -268,7 +268,8 @@ TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedEr
   auto plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan);
   ASSERT_TRUE(plan->stream.quality);
-  EXPECT_NEAR(plan->stream.layout.parameters.threshold * plan->stream.lattice.unit, scene->threshold_m, 1e-6);
+  EXPECT_NEAR(plan->stream.layout.parameters.codec.threshold * plan->stream.lattice.unit, scene->threshold_m,
+              1e-6);
   EXPECT_NEAR(plan->stream.quality->smallest_threshold * plan->stream.lattice.unit, scene->threshold_m / 4,
               1e-6);
   EXPECT_NEAR(plan->stream.quality->largest_threshold * plan->stream.lattice.unit, scene->threshold_m * 4,
@@ -276,10 +277,10 @@ TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedEr
   choice.max_error_m = scene->threshold_m / 2;
   plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan) << "a smaller error is where it starts";
-  EXPECT_TRUE(valid_goal(*plan->stream.quality, plan->stream.layout.parameters));
-  EXPECT_NEAR(plan->stream.layout.parameters.threshold * plan->stream.lattice.unit, scene->threshold_m / 2,
-              1e-6);
-  EXPECT_EQ(plan->stream.quality->largest_threshold, plan->stream.layout.parameters.threshold);
+  EXPECT_TRUE(valid_goal(*plan->stream.quality, plan->stream.layout.parameters.codec));
+  EXPECT_NEAR(plan->stream.layout.parameters.codec.threshold * plan->stream.lattice.unit,
+              scene->threshold_m / 2, 1e-6);
+  EXPECT_EQ(plan->stream.quality->largest_threshold, plan->stream.layout.parameters.codec.threshold);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ std::vector<host::StreamConfig> streams(const std::vector<std::string>& codecs) 
   host::StreamConfig stream;
   stream.layout.capacity = kBodies;
   stream.lattice = *host::choose_lattice(kThreshold, 100, Bouncing::kDt);
-  stream.layout.parameters = *host::codec_parameters(stream.lattice, kThreshold, 0, 0);
+  stream.layout.parameters.codec = *host::codec_parameters(stream.lattice, kThreshold, 0, 0);
   std::vector<host::StreamConfig> all;
   for (const std::string& codec : codecs) {
     stream.layout.codec = codec;

@@ -14,7 +14,7 @@ Result<MemoryUse> measure(std::uint32_t bodies) {
         HostedSimulation hosted;
         hosted.simulation = std::make_unique<Bouncing>(bodies);
         hosted.config.stream.lattice = *host::choose_lattice(0.05, 1000, Bouncing::kDt);
-        hosted.config.stream.layout.parameters =
+        hosted.config.stream.layout.parameters.codec =
             *host::codec_parameters(hosted.config.stream.lattice, 0.05, 0, 0);
         hosted.config.stream.layout.capacity = bodies;
         hosted.config.stream.layout.codec = "entropy";

@@ -232,7 +232,7 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       EXPECT_EQ(config->types.size(), scene->types.size());
       EXPECT_EQ(config->scene, name);
       EXPECT_EQ(config->stream.budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
-      EXPECT_EQ(config->stream.layout.parameters.threshold, 1 << config->stream.lattice.halvings);
+      EXPECT_EQ(config->stream.layout.parameters.codec.threshold, 1 << config->stream.lattice.halvings);
       const auto largest = sessions::largest_delta_bytes(config->stream);
       ASSERT_TRUE(largest) << largest.error().message;
       EXPECT_GT(*largest, 0U);
@@ -303,7 +303,7 @@ TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
   choice.bodies = 1000;
   const auto threshold_m = [&] {
     const auto config = *sessions::plan_session(*scene, choice);
-    return config.stream.layout.parameters.threshold * config.stream.lattice.unit;
+    return config.stream.layout.parameters.codec.threshold * config.stream.lattice.unit;
   };
   EXPECT_NEAR(threshold_m(), scene->threshold_m, 1e-9);
   choice.threshold_scale = 2;

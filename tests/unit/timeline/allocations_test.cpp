@@ -41,7 +41,7 @@ TEST(Allocations, NoneInAFrameOfServerOrClientAfterTheFirst) {
     const Layout layout = layout_for(codec, kCapacity);
     auto server = server_of(layout);
     auto client = client_of(layout);
-    server.start(0, random_state(random, kCapacity), Drive{{0, -640, 0}, 10, 0});
+    server.start(0, random_state(random, kCapacity), Drive{{0, -640, 0}, 10});
     ASSERT_TRUE(client.load(snapshot_of(server), kEpoch));
     std::uint64_t on_server = 0;
     std::uint64_t on_client = 0;
@@ -49,7 +49,7 @@ TEST(Allocations, NoneInAFrameOfServerOrClientAfterTheFirst) {
       State target = random_target(random, server.state(), 1 + random.below(20));
       const auto lifecycle = random_lifecycle(random, server.state(), target, 50);
       const std::size_t budget = random.one_in(2) ? kNoBudget : kPaperBudgetBytes;
-      const ScheduledDrive input{frame, frame + 1, Drive{{0, static_cast<std::int32_t>(frame), 0}, 10, 0}};
+      const ScheduledDrive input{frame, frame + 1, Drive{{0, static_cast<std::int32_t>(frame), 0}, 10}};
 
       std::uint64_t before = allocations;
       const bool scheduled = server.schedule(input).has_value();

@@ -13,7 +13,7 @@ struct Pair {
   explicit Pair(std::uint32_t max_lead = 1, std::string_view codec = "entropy")
       : server(server_of(layout_for(codec, 40, max_lead))),
         client(client_of(layout_for(codec, 40, max_lead))) {
-    server.start(10, random_state(random, 40), Drive{{0, -640, 0}, 10, 0});
+    server.start(10, random_state(random, 40), Drive{{0, -640, 0}, 10});
     EXPECT_TRUE(client.load(snapshot_of(server), kEpoch));
   }
   ServerTimeline::FrameResult frame() { return server.advance(random_target(random, server.state(), 4), {}); }
@@ -62,7 +62,7 @@ TEST(ClientTimeline, WhatItSimulatedAheadIsSimulatedAgainAfterADelta) {
   ASSERT_TRUE(apply(pair.client, pair.frame()));
   State expected = pair.server.state();
   for (Frame frame = 12; frame <= 13; ++frame) {
-    Ballistic().step(expected, expected, pair.server.drive());
+    Ballistic().step(expected, expected, {pair.server.drive(), {}});
     EXPECT_EQ(pair.client.state(frame), expected) << "frame " << frame;
   }
 }
@@ -79,7 +79,7 @@ TEST(ClientTimeline, ADeltaOutOfOrderIsRefused) {
 
 TEST(ClientTimeline, ADeltaWaitsForTheInputsItCounts) {
   Pair pair;
-  const ScheduledDrive input{1, 12, Drive{{0, 640, 0}, 0, 0}};
+  const ScheduledDrive input{1, 12, Drive{{0, 640, 0}, 0}};
   ASSERT_TRUE(pair.server.schedule(input));
   const auto first = pair.frame();
   EXPECT_FALSE(pair.client.holds_inputs(first.last_input));
@@ -94,10 +94,10 @@ TEST(ClientTimeline, AnInputForAFrameAlreadySimulatedChangesThatFrame) {
   Pair pair(2);
   pair.client.step(2);
   pair.client.step(2);
-  const ScheduledDrive input{1, 12, Drive{{0, 6400, 0}, 0, 0}};
+  const ScheduledDrive input{1, 12, Drive{{0, 6400, 0}, 0}};
   ASSERT_TRUE(pair.client.schedule(input));
   State expected = pair.client.state(11);
-  Ballistic().step(expected, expected, input.drive);
+  Ballistic().step(expected, expected, {input.drive, {}});
   EXPECT_EQ(pair.client.state(12), expected);
 }
 
@@ -128,7 +128,7 @@ TEST(ClientTimeline, AWrongHashIsReportedAndASnapshotHealsIt) {
 
 TEST(ClientTimeline, ASnapshotBringsTheInputsStillToAct) {
   Pair pair;
-  const ScheduledDrive input{1, 13, Drive{{0, 640, 0}, 0, 0}};
+  const ScheduledDrive input{1, 13, Drive{{0, 640, 0}, 0}};
   ASSERT_TRUE(pair.server.schedule(input));
   pair.frame();
   ASSERT_TRUE(pair.client.load(snapshot_of(pair.server), kEpoch));
@@ -141,10 +141,10 @@ TEST(ClientTimeline, ASnapshotBringsTheInputsStillToAct) {
 
 TEST(ClientTimeline, ASnapshotBringsTheParametersInForce) {
   Pair pair;
-  pair.server.set_parameters({77, 3, 5});
+  pair.server.set_parameters({{77, 3, 5}});
   pair.frame();
   ASSERT_TRUE(pair.client.load(snapshot_of(pair.server), kEpoch));
-  EXPECT_EQ(pair.client.parameters(), (CodecParameters{77, 3, 5}));
+  EXPECT_EQ(pair.client.parameters(), (StreamParameters{{77, 3, 5}}));
   EXPECT_TRUE(apply(pair.client, pair.frame()));
 }
 

@@ -46,14 +46,14 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
   auto server = synthetic::server_of(layout);
   auto client = synthetic::client_of(layout);
   State target = heap(random);
-  server.start(0, target, {{0, -300, 0}, 200, 800});
+  server.start(0, target, {{0, -300, 0}, 200});
   ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
   const auto predictor = *make_predictor(name, kCapacity, layout.predictor_constants);
   std::uint32_t corrected = 0;
   for (int frame = 0; frame < 100; ++frame) {
     while (client.step(lead)) {
     }
-    predictor->step(target, target, {{0, -300, 0}, 200, 0});
+    predictor->step(target, target, {{{0, -300, 0}, 200}, {}});
     const Slot pushed = static_cast<Slot>(random() % kCapacity);
     target.p(0)[pushed] += 700;
     const auto result = server.advance(target, {}, kNoBudget);
@@ -62,7 +62,7 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
     ASSERT_EQ(client.state(client.applied()), server.state());
     State ahead = server.state();
     for (Frame f = client.applied() + 1; f <= client.now(); ++f) {
-      predictor->step(ahead, ahead, server.drive());
+      predictor->step(ahead, ahead, {server.drive(), server.parameters().step});
       ASSERT_EQ(client.state(f), ahead) << "frame " << f << " ahead";
     }
   }

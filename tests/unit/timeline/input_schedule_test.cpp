@@ -6,7 +6,7 @@ namespace tandem {
 namespace {
 
 ScheduledDrive input(std::uint64_t number, Frame frame, std::int32_t gravity = 0) {
-  return {number, frame, Drive{{gravity, 0, 0}, 0, 0}};
+  return {number, frame, Drive{{gravity, 0, 0}, 0}};
 }
 
 TEST(InputSchedule, NumbersCountAsHeldOnlyWithoutAGap) {
@@ -35,7 +35,7 @@ TEST(InputSchedule, OfSeveralInputsForAFrameTheLastIssuedWins) {
     ASSERT_TRUE(inputs.add(input(number, 20, static_cast<std::int32_t>(number)), 10));
   }
   EXPECT_EQ(inputs.drive_for(20, {}).gravity[0], 3);
-  EXPECT_EQ(inputs.drive_for(21, Drive{{7, 0, 0}, 0, 0}).gravity[0], 7);
+  EXPECT_EQ(inputs.drive_for(21, Drive{{7, 0, 0}, 0}).gravity[0], 7);
 }
 
 TEST(InputSchedule, AFrameThatIsOverIsRefused) {

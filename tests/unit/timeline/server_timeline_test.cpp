@@ -21,7 +21,7 @@ TEST(ServerTimeline, RefusesConfigurationsThatMakeNoSession) {
   EXPECT_EQ(code(layout_for("none", kMaxCapacity + 1)), ErrorCode::kInvalidArgument);
   EXPECT_EQ(code(layout_for("none", 10, kMaxLead + 1)), ErrorCode::kInvalidArgument);
   layout = layout_for("none", 10);
-  layout.parameters.threshold = 0;
+  layout.parameters.codec.threshold = 0;
   EXPECT_EQ(code(layout), ErrorCode::kInvalidArgument);
   layout = layout_for("none", 10);
   layout.type_count = 0;
@@ -31,11 +31,11 @@ TEST(ServerTimeline, RefusesConfigurationsThatMakeNoSession) {
 TEST(ServerTimeline, AFrameThatTheTargetPredictsCostsNothing) {
   Random random(1);
   const State start = random_state(random, 50);
-  const Drive drive{{0, -640, 0}, 10, 0};
+  const Drive drive{{0, -640, 0}, 10};
   auto server = server_of(layout_for("entropy", 50));
   server.start(7, start, drive);
   State target(50);
-  Ballistic().step(start, target, drive);
+  Ballistic().step(start, target, {drive, {}});
   const auto frame = server.advance(target, {});
   EXPECT_EQ(frame.frame, 8U);
   EXPECT_EQ(frame.last_input, 0U);
@@ -49,7 +49,7 @@ TEST(ServerTimeline, AScheduledDriveActsInTheStepThatProducesItsFrame) {
   State state(1);
   state.spawn(0, 0, 0, {});
   server.start(0, state, Drive{});
-  ASSERT_TRUE(server.schedule({1, 2, Drive{{640, 0, 0}, 0, 0}}));
+  ASSERT_TRUE(server.schedule({1, 2, Drive{{640, 0, 0}, 0}}));
   EXPECT_EQ(server.advance(state, {}).last_input, 1U);
   EXPECT_EQ(server.drive().gravity[0], 0);
   server.advance(state, {});
@@ -64,8 +64,7 @@ TEST(ServerTimeline, InputsAreNumberedWithoutGapsAndLieInTheFuture) {
   server.start(5, State(1), Drive{});
   EXPECT_EQ(server.schedule({2, 9, {}}).error().code, ErrorCode::kOutOfOrder);
   EXPECT_EQ(server.schedule({1, 5, {}}).error().code, ErrorCode::kOutOfOrder);
-  EXPECT_EQ(server.schedule({1, 6, Drive{{INT32_MIN, 0, 0}, 0, 0}}).error().code,
-            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(server.schedule({1, 6, Drive{{INT32_MIN, 0, 0}, 0}}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_TRUE(server.schedule({1, 6, {}}));
   EXPECT_EQ(server.schedule({1, 7, {}}).error().code, ErrorCode::kOutOfOrder);
 }
@@ -95,7 +94,7 @@ TEST(ServerTimeline, NoPayloadOrSnapshotExceedsItsBound) {
       lifecycle.push_back({LifecycleKind::kDespawn, slot, 0, 0, {}});
       lifecycle.push_back({LifecycleKind::kSpawn, slot, 0, 0, random_body(random)});
     }
-    server.set_parameters({1, 1, 1});
+    server.set_parameters({{1, 1, 1}});
     EXPECT_LE(server.advance(target, lifecycle).payload.size(), server.payload_bound());
     EXPECT_LE(snapshot_of(server).size(), server.snapshot_bound());
   }

@@ -14,7 +14,7 @@ inline Layout layout_for(std::string_view codec, std::uint32_t capacity, std::ui
   layout.type_count = kTypes;
   layout.codec = codec;
   layout.codec_tables = tables_for(codec);
-  layout.parameters = {200, 16, 64};
+  layout.parameters = {{200, 16, 64}};
   layout.predictor = "ballistic";
   layout.lead = lead;
   return layout;

@@ -91,7 +91,7 @@ TEST(Snapshot, ValuesThatNoStateMayHoldAreRefused) {
   EXPECT_TRUE(refused(example(), broken));
 
   Snapshot snapshot = example();
-  snapshot.parameters.position_step = 0;
+  snapshot.parameters.codec.position_step = 0;
   EXPECT_TRUE(refused(snapshot, state));
   snapshot = example();
   snapshot.drive.gravity[0] = INT32_MAX;

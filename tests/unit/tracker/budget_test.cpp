@@ -10,7 +10,7 @@ namespace {
 using synthetic::Random;
 using Bytes = std::vector<std::byte>;
 
-constexpr CodecParameters kParameters{200, 1, 1};
+constexpr StreamParameters kParameters{{200, 1, 1}};
 
 TEST(TrackerBudget, IsNeverExceededByAByteAndSpentOnTheLargestErrors) {
   constexpr std::uint64_t kSeed = 21;
@@ -91,8 +91,8 @@ TEST(TrackerBudget, CountsTheParametersToo) {
   for (std::int32_t frame = 1; frame <= 20; ++frame) {
     State target = agreed;
     for (Slot slot = 0; slot < 300; ++slot) target.p(0)[slot] = agreed.p(0)[slot] + 2000;
-    CodecParameters parameters = kParameters;
-    parameters.threshold += frame;
+    StreamParameters parameters = kParameters;
+    parameters.codec.threshold += frame;
     server.set_parameters(parameters);
     EXPECT_LE(server.encode(agreed, target, {}, 64, out).size_bytes, 64U);
   }

@@ -16,7 +16,7 @@ namespace {
 using synthetic::Random;
 using Bytes = std::vector<std::byte>;
 
-constexpr CodecParameters kParameters{200, 1, 1};
+constexpr StreamParameters kParameters{{200, 1, 1}};
 
 Bytes coder_state(const DeltaCodec& delta) {
   Bytes out(delta.codec().save_bound());
@@ -33,7 +33,7 @@ Layout layout_of(std::uint32_t capacity) {
   layout.type_count = synthetic::kTypes;
   layout.codec = "tracker";
   layout.parameters = with_first_gains(kParameters, "ballistic");
-  layout.parameters.decay = 800;  // nothing chooses it here: what suits bodies at rest
+  layout.parameters.step.decay = 800;  // nothing chooses it here: what suits bodies at rest
   layout.predictor = "ballistic";
   return layout;
 }
@@ -214,7 +214,7 @@ TEST(Tracker, AThresholdThatChangesActsInItsOwnDelta) {
   target.p(0)[0] = 150;
   EXPECT_EQ(server.encode(agreed, target, {}, kNoBudget, out).corrected, 0U);
   ASSERT_TRUE(synthetic::receive(client, held, {}));
-  server.set_parameters({100, 1, 1});
+  server.set_parameters({{100, 1, 1}});
   const auto encoded = server.encode(agreed, target, {}, kNoBudget, out);
   EXPECT_EQ(encoded.corrected, 1U);
   ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));

@@ -114,9 +114,9 @@ TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
   EXPECT_TRUE(differs([](auto& s) { s.layout.lead = 0; }));
   EXPECT_TRUE(differs([](auto& s) { s.layout.codec = "none"; }));
   EXPECT_TRUE(differs([](auto& s) { s.layout.codec_tables = Bytes(1); }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.threshold = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.position_step = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.velocity_step = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.codec.threshold = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.codec.position_step = 7; }));
+  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.codec.velocity_step = 7; }));
   EXPECT_TRUE(differs([](auto& s) { s.layout.predictor = "field"; }));
   EXPECT_TRUE(differs([](auto& s) { s.layout.predictor_constants = {1}; }));
   EXPECT_TRUE(differs([](auto& s) { s.layout.type_count = 2; }));
@@ -129,7 +129,7 @@ TEST(LayoutHash, OfAFixedSessionIsAFixedNumber) {
   session.layout.capacity = 10000;
   session.lattice_unit = 0.0009765625;
   session.layout.codec = "entropy";
-  session.layout.parameters.threshold = 100;
+  session.layout.parameters.codec.threshold = 100;
   session.layout.predictor = "ballistic";
   session.layout.type_count = 2;
   EXPECT_EQ(layout_hash(session), 0xf2d62373ce44cb3cULL)

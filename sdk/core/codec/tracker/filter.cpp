@@ -98,11 +98,11 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
   }
 }
 
-CodecParameters with_first_gains(CodecParameters parameters, std::string_view predictor) {
+StreamParameters with_first_gains(StreamParameters parameters, std::string_view predictor) {
   const TrackerKind& kind = kind_of(predictor);
-  parameters.decay = kind.first_decay;
-  parameters.velocity_gain = kind.first_beta;
-  parameters.acceleration_gain = kind.first_gamma;
+  parameters.step.decay = kind.first_decay;
+  parameters.codec.velocity_gain = kind.first_beta;
+  parameters.codec.acceleration_gain = kind.first_gamma;
   return parameters;
 }
 

@@ -51,7 +51,7 @@ class TrackerGains {
 };
 
 /// `parameters` with decay and gains to start from; they suit most scenes. `predictor`: Predictor::name().
-[[nodiscard]] CodecParameters with_first_gains(CodecParameters parameters, std::string_view predictor);
+[[nodiscard]] StreamParameters with_first_gains(StreamParameters parameters, std::string_view predictor);
 
 /// Steps to lattice units for one threshold e.
 class TrackerSteppings {

@@ -45,9 +45,9 @@ TANDEM_VECTOR_CLONES void step_channel(const std::int32_t* __restrict p, const s
                                        const std::int32_t* __restrict c, std::int32_t* __restrict p_to,
                                        std::int32_t* __restrict v_to, std::int32_t* __restrict c_to,
                                        const std::uint8_t* __restrict alive, std::size_t count,
-                                       std::int32_t gravity, const Drive& drive) {
-  const std::uint32_t damping = drive.damping;
-  const std::uint32_t decay = drive.decay;
+                                       std::int32_t gravity, const StepInput& input) {
+  const std::uint32_t damping = input.drive.damping;
+  const std::uint32_t decay = input.parameters.decay;
   for (std::size_t s = 0; s < count; ++s) {
     const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
     p_to[s] = m.p;
@@ -59,9 +59,9 @@ TANDEM_VECTOR_CLONES void step_channel(const std::int32_t* __restrict p, const s
 TANDEM_VECTOR_CLONES void step_channel_in_place(std::int32_t* __restrict p, std::int32_t* __restrict v,
                                                 std::int32_t* __restrict c,
                                                 const std::uint8_t* __restrict alive, std::size_t count,
-                                                std::int32_t gravity, const Drive& drive) {
-  const std::uint32_t damping = drive.damping;
-  const std::uint32_t decay = drive.decay;
+                                                std::int32_t gravity, const StepInput& input) {
+  const std::uint32_t damping = input.drive.damping;
+  const std::uint32_t decay = input.parameters.decay;
   for (std::size_t s = 0; s < count; ++s) {
     const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
     p[s] = m.p;
@@ -70,32 +70,33 @@ TANDEM_VECTOR_CLONES void step_channel_in_place(std::int32_t* __restrict p, std:
   }
 }
 
-void step_all(const State& from, State& to, const Drive& drive) {
+void step_all(const State& from, State& to, const StepInput& input) {
   const std::size_t count = from.capacity();
   const std::uint8_t* alive = from.alive().data();
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    const std::int32_t gravity = drive.gravity[i];
+    const std::int32_t gravity = input.drive.gravity[i];
     if (&from == &to) {
-      step_channel_in_place(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, drive);
+      step_channel_in_place(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, input);
     } else {
       step_channel(from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
-                   to.c(i).data(), alive, count, gravity, drive);
+                   to.c(i).data(), alive, count, gravity, input);
     }
   }
 }
 
 }  // namespace
 
-void Ballistic::step(const State& from, State& to, const Drive& drive) {
+void Ballistic::step(const State& from, State& to, const StepInput& input) {
   if (&from != &to) {
     std::copy(from.alive().begin(), from.alive().end(), to.alive().begin());
     std::copy(from.generation().begin(), from.generation().end(), to.generation().begin());
     std::copy(from.type().begin(), from.type().end(), to.type().begin());
   }
-  step_all(from, to, drive);
+  step_all(from, to, input);
 }
 
-void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) {
+void Ballistic::step_slots(const State& from, State& to, const StepInput& input,
+                           std::span<const Slot> slots) {
   for (const Slot s : slots) {
     to.alive()[s] = from.alive()[s];
     to.generation()[s] = from.generation()[s];
@@ -109,8 +110,8 @@ void Ballistic::step_slots(const State& from, State& to, const Drive& drive, std
     std::int32_t* v_to = to.v(i).data();
     std::int32_t* c_to = to.c(i).data();
     for (const Slot s : slots) {
-      const std::int32_t gravity = gravity_of(from.alive()[s], drive.gravity[i]);
-      const Motion m = stepped({p[s], v[s], c[s]}, gravity, drive.damping, drive.decay);
+      const std::int32_t gravity = gravity_of(from.alive()[s], input.drive.gravity[i]);
+      const Motion m = stepped({p[s], v[s], c[s]}, gravity, input.drive.damping, input.parameters.decay);
       p_to[s] = m.p;
       v_to[s] = m.v;
       c_to[s] = m.c;

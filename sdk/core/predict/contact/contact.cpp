@@ -171,7 +171,7 @@ void Contact::add_pairs(bool first) {
   }
 }
 
-void Contact::write(const State& from, const Drive& drive, State& to) const {
+void Contact::write(const State& from, const StepInput& input, State& to) const {
   if (&from != &to) {
     const auto copy = [](const auto& column, const auto& column_to) {
       std::copy(column.begin(), column.end(), column_to.begin());
@@ -195,10 +195,11 @@ void Contact::write(const State& from, const Drive& drive, State& to) const {
       to.v(i)[s] = body.v[i];
     }
   }
-  for (std::size_t i = 0; accelerated_ && i < 3; ++i) decay(to.c(i).data(), to.c(i).size(), drive.decay);
+  for (std::size_t i = 0; accelerated_ && i < 3; ++i)
+    decay(to.c(i).data(), to.c(i).size(), input.parameters.decay);
 }
 
-void Contact::step(const State& from, State& to, const Drive& drive) {
+void Contact::step(const State& from, State& to, const StepInput& input) {
   sort(from);
   place_bodies(std::span(bodies_).first(count_),
                {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_);
@@ -206,18 +207,19 @@ void Contact::step(const State& from, State& to, const Drive& drive) {
     walls_.add_forces(std::span(bodies_).first(count_), forces_);
     add_pairs(i == 0);
     const bool first = i == 0;
-    const ContactMove move{shift_, one_mobility_, constants_.substeps, first ? drive.gravity : Vec3i{},
-                           first ? drive.damping : 0U};
+    const ContactMove move{shift_, one_mobility_, constants_.substeps, first ? input.drive.gravity : Vec3i{},
+                           first ? input.drive.damping : 0U};
     const bool pushed = first && accelerated_;
     move_bodies(move, std::span(bodies_).first(count_), forces_,
                 pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>(),
                 views_);
   }
-  write(from, drive, to);
+  write(from, input, to);
 }
 
-void Contact::step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> /*slots*/) {
-  step(from, to, drive);
+void Contact::step_slots(const State& from, State& to, const StepInput& input,
+                         std::span<const Slot> /*slots*/) {
+  step(from, to, input);
 }
 
 }  // namespace tandem

@@ -27,15 +27,15 @@ class Contact final : public Predictor {
   Contact(std::uint32_t capacity, ContactConstants constants, Tier tier);
 
   [[nodiscard]] std::string_view name() const override { return coarse_ ? "field" : "contact"; }
-  void step(const State& from, State& to, const Drive& drive) override;
+  void step(const State& from, State& to, const StepInput& input) override;
   /// Steps all bodies: each depends on the others.
-  void step_slots(const State& from, State& to, const Drive& drive, std::span<const Slot> slots) override;
+  void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
 
  private:
   void sort(const State& state);
   void add_pairs(bool first);
-  void write(const State& from, const Drive& drive, State& to) const;
+  void write(const State& from, const StepInput& input, State& to) const;
 
   bool coarse_;  // one step stands for several
   ContactConstants constants_;
