@@ -19,6 +19,9 @@ struct GainGoal {
 /// For a predictor: Predictor::name().
 [[nodiscard]] GainGoal usual_gain_goal(std::string_view predictor);
 
+/// Sets decay and gains of the first frame; they suit most scenes. `predictor`: Predictor::name().
+void set_first_gains(std::string_view predictor, StreamParameters& parameters);
+
 /// Looks at every frame and decides every fifteen. Deterministic; no clock. Not thread-safe.
 ///
 /// Where corrections agree with the one before more than the goal says, velocities learn more from them,

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
-#include "sdk/core/codec/tracker/filter.hpp"
 #include "services/host/block_threads.hpp"
 #include "services/sessions/contact_plan.hpp"
 
@@ -60,7 +59,7 @@ Result<void> choose_gains(host::StreamConfig& stream) {
   const auto predictor = make_predictor(stream.layout.predictor, 1, stream.layout.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
   const std::string_view kind = (*predictor)->name();
-  stream.layout.parameters = with_first_gains(stream.layout.parameters, kind);
+  host::set_first_gains(kind, stream.layout.parameters);
   stream.gains = host::usual_gain_goal(kind);
   return {};
 }

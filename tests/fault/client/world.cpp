@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
-#include "sdk/core/codec/tracker/filter.hpp"
 #include "services/host/outbox.hpp"
 
 namespace tandem::client {
@@ -118,8 +117,7 @@ void World::start_server() {
   config.stream.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
   config.stream.layout.parameters.codec = must(host::codec_parameters(config.stream.lattice, 0.01, 0.1, 2));
   if (config.stream.layout.codec == "tracker") {
-    config.stream.layout.parameters =
-        with_first_gains(config.stream.layout.parameters, config.stream.layout.predictor);
+    host::set_first_gains(config.stream.layout.predictor, config.stream.layout.parameters);
     config.stream.gains = host::GainGoal{};
   }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};

@@ -32,7 +32,7 @@ Layout layout_of(std::uint32_t capacity) {
   layout.capacity = capacity;
   layout.type_count = synthetic::kTypes;
   layout.codec = "tracker";
-  layout.parameters = with_first_gains(kParameters, "ballistic");
+  layout.parameters = kParameters;
   layout.parameters.step.decay = 800;  // nothing chooses it here: what suits bodies at rest
   layout.predictor = "ballistic";
   return layout;

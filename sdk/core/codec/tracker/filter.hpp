@@ -32,7 +32,7 @@ struct TrackerKind;
 /// k = min(age + 1, 255): 64 beta / k and 64 beta gamma / k^2, in 1/65536.
 class TrackerGains {
  public:
-  /// The usual ones of a predictor; those of `ballistic` for a name not known here.
+  /// For the errors that a predictor leaves; as for `ballistic` with a name not known here.
   explicit TrackerGains(std::string_view predictor);
   /// beta in 1/32768, gamma in 1/65536: as in CodecParameters.
   void set(std::uint16_t beta, std::uint16_t gamma);
@@ -49,9 +49,6 @@ class TrackerGains {
   std::array<std::int64_t, kMostAge + 1> velocity_{};
   std::array<std::int64_t, kMostAge + 1> acceleration_{};
 };
-
-/// `parameters` with decay and gains to start from; they suit most scenes. `predictor`: Predictor::name().
-[[nodiscard]] StreamParameters with_first_gains(StreamParameters parameters, std::string_view predictor);
 
 /// Steps to lattice units for one threshold e.
 class TrackerSteppings {
