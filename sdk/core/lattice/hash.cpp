@@ -36,6 +36,9 @@ StateHasher::StateHasher(StateHasher&&) noexcept = default;
 StateHasher& StateHasher::operator=(StateHasher&&) noexcept = default;
 StateHasher::~StateHasher() = default;
 
+// One stream over all columns, not a hash of hashes: XXH3 takes 64 bytes at a time whatever the columns'
+// ends, and columns of a capacity are of fixed length, so nothing has to stand between them. A change of
+// order or width breaks every client: idl/PROTOCOL.md, "State hash".
 std::uint64_t StateHasher::hash(const State& state, std::span<const std::byte> codec_state) {
   XXH3_state_t* const h = impl_->state;
   XXH3_64bits_reset(h);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "sdk/core/codec/tracker/steps.hpp"
 
 namespace tandem {
@@ -69,6 +71,27 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
       EXPECT_EQ(std::abs(state.c(i)[0]), kVelocityLimit);
     }
   }
+}
+
+TEST(TrackerFilter, EvidenceIsTheCosineOfCorrections) {
+  const auto near = [](std::int64_t sum, double cosine) {
+    return std::abs(static_cast<double>(sum) / GainEvidence::kCosineOne - cosine) < 1e-6;
+  };
+  const auto evidence_of = [](const std::array<std::int8_t, 3>& last, const TrackerSteps& steps,
+                              const Vec3i& c) {
+    GainEvidence evidence;
+    add_evidence({9, 5, last}, steps, c, evidence);
+    return evidence;
+  };
+  EXPECT_PRED2(near, evidence_of({3, 0, 0}, {5, 0, 0}, {}).agreement, 1.0);
+  EXPECT_PRED2(near, evidence_of({3, 0, 0}, {-5, 0, 0}, {}).agreement, -1.0);
+  EXPECT_PRED2(near, evidence_of({3, 0, 0}, {0, 5, 0}, {}).agreement, 0.0);
+  EXPECT_PRED2(near, evidence_of({3, 3, 0}, {127, 0, 0}, {}).agreement, std::sqrt(0.5));
+  EXPECT_PRED2(near, evidence_of({0, 0, 0}, {4, 4, 4}, {0, 0, -1}).forwardness, -std::sqrt(1.0 / 3));
+  const std::int32_t most = kVelocityLimit;
+  EXPECT_PRED2(near, evidence_of({0, 0, 0}, {127, 127, 127}, {most, most, most}).forwardness, 1.0);
+  EXPECT_EQ(evidence_of({0, 0, 0}, {1, 0, 0}, {}).repeated, 0U);
+  EXPECT_EQ(evidence_of({1, 0, 0}, {1, 0, 0}, {1, 0, 0}).driven, 1U);
 }
 
 TEST(TrackerFilter, SmallStepsAreShorterTheMoreAxesMove) {

@@ -7,6 +7,7 @@
 namespace tandem {
 namespace {
 
+// Of v and c by one step, in 1/64 units; twice the largest velocity there is.
 constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
 
 }  // namespace
@@ -124,6 +125,14 @@ void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3
   }
 }
 
+// One step along an axis is worth `one` lattice units, n of them n * one. It changes
+//   p by n one,   v by n G(k) one (1 + u/2),   c by n H(k) one (1 + u/2),
+// with v and c in 1/64 units, so that G = 64 beta / k and H = 64 beta gamma / k^2 (in 1/65536: TrackerGains).
+// u in -1 .. 1 is the product with the last correction in squares of the threshold: two in the same direction
+// mean that too little was believed, two in opposite ones that too much was.
+//
+// Ranges: one <= 2^30 and G, H <= 64, so that one G (1 + u/2) fits 64 bits in 2^-24; what one step may change
+// is cut at 2^29, so that n of them fit, n < 2^31.
 void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
                   std::int32_t threshold, const TrackerGains& gains, TrackerBody& body) {
   TrackerSteps now{};
@@ -142,6 +151,8 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
   };
   const std::int64_t v_of_one = growth_of_one(gains.velocity(k));
   const std::int64_t c_of_one = growth_of_one(gains.acceleration(k));
+  // 256 / 64: c may move a body by four thresholds in a frame. Beyond, it would be corrected every frame
+  // anyway.
   const std::int64_t most_c = std::min<std::int64_t>(kVelocityLimit, std::int64_t{256} * threshold);
   for (std::size_t i = 0; i < 3; ++i) {
     // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of

@@ -101,6 +101,11 @@ void TrackerContexts::fill(const Block& block, const State& predicted,
                block.slots, column(2 + axis) + first);
 }
 
+// The mean of a model's decisions, each counted once, with one that says what p1 was at the start:
+//   p1' = ((weight + 1) p1 + 65536 ones) / (weight + 1 + seen),  weight' = min(weight + seen, 255).
+// Up to 255 decisions it is their running mean. Beyond, the past is worth 256 decisions and fades: a delta of
+// n moves p1 by the share n / (256 + n) of the way to what it shows. With a larger limit models follow slower
+// when a scene calms down, with a smaller one they are noisy where decisions are rare; this one fits a byte.
 void TrackerModels::learn(const TrackerCounts& counts) {
   for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
     const std::uint32_t ones = counts[i][1];
@@ -108,7 +113,8 @@ void TrackerModels::learn(const TrackerCounts& counts) {
     if (seen == 0) continue;
     const std::uint32_t before = weight[i] + 1U;
     const std::uint64_t sum = std::uint64_t{before} * p1[i] + (std::uint64_t{ones} << 16U);
-    // Two divisions, because the short one takes a third of the time and nearly always does.
+    // At most 256 * 2^16 + 2^20 * 2^16 < 2^37. Two divisions, because the short one takes a third of the time
+    // and nearly always does.
     const std::uint64_t mean =
         sum >> 32U == 0 ? static_cast<std::uint32_t>(sum) / (before + seen) : sum / (before + seen);
     p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));

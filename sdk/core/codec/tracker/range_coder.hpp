@@ -1,6 +1,16 @@
 #pragma once
 // Binary range coder: one decision at a time, each with a 16-bit probability (G. N. N. Martin 1979; carries
 // are carried into bytes already written, as in LZMA). Integers only; bytes in idl/PROTOCOL.md.
+//
+// All decisions so far stand for an interval [low, low + range) of fractions below 1. A decision with
+// probability P / 2^16 of a 1 takes the first P / 2^16 of it for a 1 and the rest for a 0, so the interval
+// shrinks by the factor of what was decided and -log2 of it, the ideal length, is what the decision costs. In
+// the end any number within the interval says all decisions; the one with the fewest bytes is written.
+//
+// Only 32 bits of range are held. Once it is below 2^24 the leading byte of the number is settled, but for a
+// carry, and both are shifted by a byte. So range is at least 2^24 when a decision is made: rounding
+// (range * P) >> 16 takes less than 1/256 of a 1's share even at P = 1, which is 0.006 bits, and neither
+// share is ever empty for P in 1 .. 65535.
 
 #include <cstddef>
 #include <cstdint>
@@ -75,7 +85,8 @@ class RangeEncoder {
   std::byte* begin_;
   std::byte* at_;
   std::byte* end_;
-  std::uint64_t low_ = 0;  // from the top: a carry, held_ bytes that are not written yet, 32 bits
+  // From the top: a carry, held_ bytes that are not written yet, 32 bits. Written are three bytes at once.
+  std::uint64_t low_ = 0;
   std::uint32_t held_ = 0;
   std::uint32_t range_ = 0xFFFFFFFFU;
   bool overflow_ = false;

@@ -88,6 +88,14 @@ Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerC
   return result;
 }
 
+// Of each point: bits + kErrorWorth * (error / threshold)^2, in 1/256 bits.
+//
+// Bits: the axes are coded one after another, and an axis' contexts depend on how many before it moved; so
+// the costs of an axis are worked out once for each number of them (axis_costs) and picked by the point.
+// Error: a point that goes two steps or more along some axis uses the long unit, and errors of axes add up;
+// otherwise m axes move by one step of unit(m), and with r the distance on an axis
+//   error^2 = sum of r^2 + m unit^2 - 2 unit (sum of r over the axes that move).
+//
 // All eight are worked out, used or not: almost no branch that is hard to guess. Errors wrap where a point is
 // of no use.
 bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
