@@ -16,8 +16,6 @@ namespace {
 // Automatic quality moves between these multiples of the threshold it starts from.
 constexpr double kFinest = 0.25;
 constexpr double kCoarsest = 4;
-// Beyond, even a fast client would spend most of a frame on its predicted step.
-constexpr std::uint32_t kMostBodiesOfField = 50'000;
 
 std::vector<std::byte> codec_tables(const scenes::TrainedTable& table) {
   std::vector<std::byte> bytes;
@@ -39,7 +37,7 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
                               const CodecTraits& traits, host::StreamConfig& stream) {
   const bool automatic = choice.predictor == "auto";
   const bool field_pays =
-      !traits.is_baseline && choice.bodies <= kMostBodiesOfField && alike(scene.world.types);
+      !traits.is_baseline && choice.bodies <= kMostBodiesForField && alike(scene.world.types);
   stream.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
   if (stream.layout.predictor != "field" && stream.layout.predictor != "contact") return {};
   auto constants = contact_constants(scene, stream.lattice, stream.layout.predictor);

@@ -14,12 +14,15 @@ namespace tandem::sessions {
 
 /// Below, a frame has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
+/// Beyond, `field` would take even a fast client most of a frame.
+inline constexpr std::uint32_t kMostBodiesForField = 50'000;
 
 /// What an operator chooses on top of the scene.
 struct SessionChoice {
   std::uint32_t bodies = 0;
   std::string codec = "tracker";
-  /// auto: `field` for `tracker` with at most 50,000 bodies in a scene that has body types, else `ballistic`
+  /// auto: `field` for `tracker` with at most kMostBodiesForField bodies in a scene that has body types, else
+  /// `ballistic`
   std::string predictor = "auto";
   std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
   double threshold_scale = 1;

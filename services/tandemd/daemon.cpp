@@ -98,18 +98,7 @@ class Script {
 };
 
 Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& options) {
-  sessions::SessionChoice choice;
-  choice.bodies = options.bodies;
-  choice.codec = options.codec;
-  choice.predictor = options.predictor;
-  choice.threshold_m = options.threshold_m;
-  choice.threshold_scale = options.threshold_scale;
-  choice.automatic = options.automatic;
-  choice.target_mbit_per_s = options.target_mbit_per_s;
-  choice.max_error_m = options.max_error_m;
-  choice.budget_bytes = options.budget_bytes;
-  choice.threads = options.threads;
-  return sessions::plan_session(scene, choice).map([&](host::HostConfig config) {
+  return sessions::plan_session(scene, options.choice).map([&](host::HostConfig config) {
     config.session = options.session;
     config.epoch = static_cast<Epoch>(wall_ns() / host::kMillisecond);
     if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
@@ -200,7 +189,8 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   if (!scene) return report_error(scene.error(), 2);
   auto config = configure(*scene, options);
   if (!config) return report_error(config.error(), 2);
-  auto simulation = scenes::make_simulation(*scene, options.bodies, options.seed, options.threads);
+  auto simulation =
+      scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
   if (!simulation) return report_error(simulation.error(), 2);
   HashLog hashes;
   if (const auto opened = hashes.open(options.hash_log, config->epoch); !opened)
@@ -212,8 +202,8 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   const std::string coding = coding_text(config->stream);
   auto host = host::Host::create(std::move(*config), **simulation, **port);
   if (!host) return report_error(host.error(), 2);
-  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name, options.bodies,
-               coding, options.session, options.domain, (*host)->session().epoch);
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
+               options.choice.bodies, coding, options.session, options.domain, (*host)->session().epoch);
 
   host::Publisher publisher((*host)->outbox(), **port);
   Script script(*scene, options);
@@ -226,7 +216,7 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   const auto closed = hashes.close();
   if (!closed) spdlog::error(closed.error().message);
   if (ending == Ending::kRefused) return report_error(*(*host)->error(), 1);
-  if (options.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
+  if (options.choice.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
   if (const std::string gains = gains_text((*host)->parameters()); !gains.empty())
     spdlog::info("at the end: {}", gains);
   print_report((*host)->totals(), frame_rate_hz, options.json);

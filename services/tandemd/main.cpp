@@ -10,8 +10,8 @@
 #include <exception>
 #include <thread>
 
+#include "services/tandemd/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
-#include "services/tandemd/options.hpp"
 
 namespace {
 

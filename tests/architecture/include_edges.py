@@ -60,7 +60,7 @@ EDGES = {
 # Headers from outside the project, and the only folders that may include them.
 OWNERS = [
     (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
-    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/sessions", "services/tandemd", "services/lab", "tests/unit"]),
+    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/lab", "services/tandemd"]),

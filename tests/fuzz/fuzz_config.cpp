@@ -1,18 +1,19 @@
 // Any text as a server's configuration: refused naming the file, or options within their ranges.
 
 #include "sdk/core/lattice/state.hpp"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/config.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const tandem::fuzz::ScratchFolder folder;
-  const auto settings = tandem::daemon::load_config(folder.put("any.textproto", {data, size}));
-  if (!settings) {
-    if (settings.error().message.find("any.textproto") == std::string::npos) std::abort();
+  const auto config = tandem::daemon::load_config(folder.put("any.textproto", {data, size}));
+  if (!config) {
+    if (config.error().message.find("any.textproto") == std::string::npos) std::abort();
     return 0;
   }
-  const auto options = tandem::daemon::check_settings(*settings);
-  if (options && (options->bodies == 0 || options->bodies > tandem::kMaxCapacity || options->lead > 1))
+  const auto options = tandem::daemon::check_config(*config);
+  if (options &&
+      (options->choice.bodies == 0 || options->choice.bodies > tandem::kMaxCapacity || options->lead > 1))
     std::abort();
   return 0;
 }

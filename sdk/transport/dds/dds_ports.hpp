@@ -13,8 +13,11 @@
 
 namespace tandem::transport {
 
+/// Of DDS domains; the ports of a higher one would be out of range.
+inline constexpr std::uint32_t kMaxDomain = 230;
+
 struct DdsOptions {
-  std::uint32_t domain = 0;  ///< DDS domain, 0..230
+  std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
   std::string session = "default";
   ClientId client = 0;  ///< client ports: only for the name that DDS tools show
   /// Deltas a server keeps for slow readers and a client for a slow application; see delta_depth() in

@@ -1,30 +1,33 @@
-#include "services/tandemd/options.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "services/sessions/session_plan.hpp"
+#include "services/tandemd/command_line.hpp"
+#include "services/tandemd/config.hpp"
 
 namespace tandem::daemon {
 namespace {
 
-Settings least() {
-  Settings settings;
-  settings.scene = "cube";
-  settings.bodies = 100;
-  return settings;
+using Config = idl::ServerConfig;
+
+Config least() {
+  Config config;
+  config.set_scene("cube");
+  config.set_bodies(100);
+  return config;
 }
 
-std::string refusal(const std::function<void(Settings&)>& spoil) {
-  Settings settings = least();
-  spoil(settings);
-  const auto options = check_settings(settings);
+std::string refusal(const std::function<void(Config&)>& spoil) {
+  Config config = least();
+  spoil(config);
+  const auto options = check_config(config);
   return options ? "" : options.error().message;
 }
 
@@ -39,32 +42,32 @@ class ConfigFile : public ::testing::Test {
 };
 
 TEST(Options, DefaultsAreThoseOfTheManual) {
-  const auto options = check_settings(least());
+  const auto options = check_config(least());
   ASSERT_TRUE(options);
   EXPECT_EQ(options->session, "default");
-  EXPECT_EQ(options->codec, "tracker");
+  EXPECT_EQ(options->choice.codec, "tracker");
   EXPECT_EQ(options->lead, 1U);
   EXPECT_FALSE(options->window);
   EXPECT_FALSE(options->free_rate);
   EXPECT_EQ(options->stall_timeout_s, 0.5);
   EXPECT_FALSE(options->duration_s);
-  EXPECT_FALSE(options->budget_bytes);
+  EXPECT_FALSE(options->choice.budget_bytes);
 }
 
 TEST(Options, WordsAndNumbersAreBothUnderstood) {
-  Settings settings = least();
-  settings.window = "2";
-  settings.rate = "max";
-  settings.stall_timeout = "off";
-  const auto words = check_settings(settings);
+  Config config = least();
+  config.set_window("2");
+  config.set_rate("max");
+  config.set_stall_timeout("off");
+  const auto words = check_config(config);
   ASSERT_TRUE(words);
   EXPECT_EQ(words->window, 2U);
   EXPECT_TRUE(words->free_rate);
   EXPECT_FALSE(words->stall_timeout_s);
-  settings.window = "auto";
-  settings.rate = "59.94";
-  settings.stall_timeout = "1.5";
-  const auto numbers = check_settings(settings);
+  config.set_window("auto");
+  config.set_rate("59.94");
+  config.set_stall_timeout("1.5");
+  const auto numbers = check_config(config);
   ASSERT_TRUE(numbers);
   EXPECT_FALSE(numbers->window);
   EXPECT_EQ(numbers->rate_hz, 59.94);
@@ -72,54 +75,54 @@ TEST(Options, WordsAndNumbersAreBothUnderstood) {
 }
 
 TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
-  EXPECT_NE(refusal([](Settings& s) { s.scene.reset(); }).find("--scene"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.bodies.reset(); }).find("--bodies"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.bodies = 0; }).find("--bodies"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.bodies = kMaxCapacity + 1; }).find("--bodies"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.session = "a*"; }).find("--session"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.session = ""; }).find("--session"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.lead = 2; }).find("--lead"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.domain = 231; }).find("--domain"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.threads = 0; }).find("--threads"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.client_limit = 0; }).find("--client-limit"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.clear_scene(); }).find("--scene"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.clear_bodies(); }).find("--bodies"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_bodies(0); }).find("--bodies"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_bodies(kMaxCapacity + 1); }).find("--bodies"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_session("a*"); }).find("--session"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_session(""); }).find("--session"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_lead(2); }).find("--lead"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_domain(231); }).find("--domain"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_threads(0); }).find("--threads"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_client_limit(0); }).find("--client-limit"), std::string::npos);
   for (const char* bad : {"0", "25", "-1", "2x", "", "automatic"}) {
-    EXPECT_NE(refusal([bad](Settings& s) { s.window = bad; }).find("--window"), std::string::npos) << bad;
+    EXPECT_NE(refusal([bad](Config& s) { s.set_window(bad); }).find("--window"), std::string::npos) << bad;
   }
   for (const char* bad : {"0", "1001", "nan", "inf", "30Hz", ""}) {
-    EXPECT_NE(refusal([bad](Settings& s) { s.rate = bad; }).find("--rate"), std::string::npos) << bad;
+    EXPECT_NE(refusal([bad](Config& s) { s.set_rate(bad); }).find("--rate"), std::string::npos) << bad;
   }
   for (const char* bad : {"0", "11", "nan", "never", "-1"}) {
-    EXPECT_NE(refusal([bad](Settings& s) { s.stall_timeout = bad; }).find("--stall-timeout"),
+    EXPECT_NE(refusal([bad](Config& s) { s.set_stall_timeout(bad); }).find("--stall-timeout"),
               std::string::npos)
         << bad;
   }
   for (const double bad : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_NE(refusal([bad](Settings& s) { s.threshold = bad; }).find("--threshold"), std::string::npos)
+    EXPECT_NE(refusal([bad](Config& s) { s.set_threshold(bad); }).find("--threshold"), std::string::npos)
         << bad;
-    EXPECT_NE(refusal([bad](Settings& s) { s.threshold_scale = bad; }).find("--threshold-scale"),
+    EXPECT_NE(refusal([bad](Config& s) { s.set_threshold_scale(bad); }).find("--threshold-scale"),
               std::string::npos);
   }
-  EXPECT_NE(refusal([](Settings& s) { s.duration = -1; }).find("--duration"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.duration = std::nan(""); }).find("--duration"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) {
-              s.codec = "entropy";
-              s.budget_bytes = 1000;
+  EXPECT_NE(refusal([](Config& s) { s.set_duration(-1); }).find("--duration"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_duration(std::nan("")); }).find("--duration"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) {
+              s.set_codec("entropy");
+              s.set_budget_bytes(1000);
             }).find("--budget"),
             std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) { s.budget_bytes = 63; }).find("--budget"), std::string::npos);
-  EXPECT_NE(refusal([](Settings& s) {
-              s.threshold = 1;
-              s.threshold_scale = 1;
+  EXPECT_NE(refusal([](Config& s) { s.set_budget_bytes(63); }).find("--budget"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) {
+              s.set_threshold(1);
+              s.set_threshold_scale(1);
             }).find("--threshold-scale"),
             std::string::npos);
 }
 
 TEST(Options, OneWayToSetTheThresholdOnTheCommandLineDisplacesTheOtherInTheFile) {
-  Settings flags = least(), file;
-  file.threshold = 0.1;
-  flags.threshold_scale = 2;
-  EXPECT_TRUE(check_settings(overlay(flags, file)));
-  EXPECT_FALSE(overlay(flags, file).threshold);
+  Config flags = least(), file;
+  file.set_threshold(0.1);
+  flags.set_threshold_scale(2);
+  EXPECT_TRUE(check_config(merge(flags, file)));
+  EXPECT_FALSE(merge(flags, file).has_threshold());
 }
 
 TEST(Options, AutomaticQualityHasItsOwnFlags) {
@@ -129,11 +132,11 @@ TEST(Options, AutomaticQualityHasItsOwnFlags) {
   };
   const auto options = parse({"--threshold", "auto", "--target-bandwidth", "0.5", "--max-error", "0.2"});
   ASSERT_TRUE(options);
-  EXPECT_TRUE(options->automatic);
-  EXPECT_FALSE(options->threshold_m);
-  EXPECT_DOUBLE_EQ(options->target_mbit_per_s, 0.5);
-  EXPECT_DOUBLE_EQ(options->max_error_m.value_or(0), 0.2);
-  EXPECT_FALSE(parse({"--threshold", "0.1"})->automatic);
+  EXPECT_TRUE(options->choice.automatic);
+  EXPECT_FALSE(options->choice.threshold_m);
+  EXPECT_DOUBLE_EQ(options->choice.target_mbit_per_s, 0.5);
+  EXPECT_DOUBLE_EQ(options->choice.max_error_m.value_or(0), 0.2);
+  EXPECT_FALSE(parse({"--threshold", "0.1"})->choice.automatic);
   EXPECT_FALSE(parse({"--threshold", "much"}));
   EXPECT_FALSE(parse({"--target-bandwidth", "0.5"})) << "needs --threshold auto";
   EXPECT_FALSE(parse({"--threshold", "0.1", "--max-error", "0.2"}));
@@ -141,35 +144,35 @@ TEST(Options, AutomaticQualityHasItsOwnFlags) {
 }
 
 TEST(Options, AThresholdOnTheCommandLineDisplacesAutomaticQualityInTheFile) {
-  Settings flags = least(), file;
-  file.automatic = true;
-  flags.threshold = 0.1;
-  flags.automatic = false;  // as the command line sets it with a length
-  const auto options = check_settings(overlay(flags, file));
+  Config flags = least(), file;
+  file.set_threshold_auto(true);
+  flags.set_threshold(0.1);
+  flags.set_threshold_auto(false);  // as the command line sets it with a length
+  const auto options = check_config(merge(flags, file));
   ASSERT_TRUE(options);
-  EXPECT_FALSE(options->automatic);
+  EXPECT_FALSE(options->choice.automatic);
 }
 
 TEST(Options, WhatDependedOnADisplacedChoiceInTheFileGoesWithIt) {
-  Settings flags = least(), file;
-  file.automatic = true;
-  file.target_bandwidth = 1;
-  file.max_error = 0.5;
-  flags.threshold = 0.1;
-  flags.automatic = false;
-  EXPECT_TRUE(check_settings(overlay(flags, file)));
+  Config flags = least(), file;
+  file.set_threshold_auto(true);
+  file.set_target_bandwidth(1);
+  file.set_max_error(0.5);
+  flags.set_threshold(0.1);
+  flags.set_threshold_auto(false);
+  EXPECT_TRUE(check_config(merge(flags, file)));
   flags = least();
-  flags.codec = "none";
-  EXPECT_TRUE(check_settings(overlay(flags, file)));
-  flags.automatic = true;
-  EXPECT_FALSE(check_settings(overlay(flags, file))) << "none has no threshold to choose";
+  flags.set_codec("none");
+  EXPECT_TRUE(check_config(merge(flags, file)));
+  flags.set_threshold_auto(true);
+  EXPECT_FALSE(check_config(merge(flags, file))) << "none has no threshold to choose";
   file = {};
-  file.budget_bytes = 1000;
+  file.set_budget_bytes(1000);
   flags = least();
-  flags.codec = "entropy";
-  EXPECT_TRUE(check_settings(overlay(flags, file)));
-  flags.codec = "limited";
-  EXPECT_EQ(overlay(flags, file).budget_bytes, 1000U);
+  flags.set_codec("entropy");
+  EXPECT_TRUE(check_config(merge(flags, file)));
+  flags.set_codec("limited");
+  EXPECT_EQ(merge(flags, file).budget_bytes(), 1000U);
 }
 
 TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
@@ -180,7 +183,7 @@ TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
   const CommandLine command = parse_command_line(5, arguments);
   ASSERT_TRUE(command.options);
   EXPECT_EQ(command.options->scene, "cube");
-  EXPECT_EQ(command.options->bodies, 300U) << "the flag wins";
+  EXPECT_EQ(command.options->choice.bodies, 300U) << "the flag wins";
   EXPECT_EQ(command.options->session, "arena");
   EXPECT_EQ(command.options->window, 4U);
   EXPECT_TRUE(command.options->scripted);

@@ -1,0 +1,137 @@
+#include "services/tandemd/command_line.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <utility>
+
+#include "sdk/core/codec/codec.hpp"
+#include "services/tandemd/config.hpp"
+#include "services/tandemd/number.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+/// Flags that each set a field of the configuration.
+class Flags {
+ public:
+  Flags(CLI::App& app, idl::ServerConfig& config) : app_(&app), config_(&config) {}
+
+  template <class T>
+  void add(const char* flag, void (idl::ServerConfig::*set)(T), const std::string& help) {
+    app_->add_option_function<T>(
+        flag, [config = config_, set](T value) { (config->*set)(value); }, help);
+  }
+  void add(const char* flag, std::string* (idl::ServerConfig::*field)(), const std::string& help) {
+    app_->add_option_function<std::string>(
+        flag, [config = config_, field](const std::string& value) { *(config->*field)() = value; }, help);
+  }
+
+ private:
+  CLI::App* app_;
+  idl::ServerConfig* config_;
+};
+
+void set_threshold(idl::ServerConfig& config, const std::string& text) {
+  config.set_threshold_auto(text == "auto");
+  if (config.threshold_auto()) return;
+  const auto length = number<double>(text);
+  if (!length) throw CLI::ValidationError("--threshold", "a positive length, or auto");
+  config.set_threshold(*length);
+}
+
+void add_flags(CLI::App& app, idl::ServerConfig& config) {
+  using Config = idl::ServerConfig;
+  const Options defaults;
+  Flags flags(app, config);
+  flags.add("--scene", &Config::mutable_scene, "Scene by name or file");
+  flags.add("--bodies", &Config::set_bodies, "Number of bodies");
+  flags.add("--session", &Config::mutable_session,
+            fmt::format("Name that clients join by [{}]", defaults.session));
+  flags.add("--domain", &Config::set_domain, fmt::format("DDS domain [{}]", defaults.domain));
+  flags.add("--codec", &Config::mutable_codec,
+            fmt::format("{} [{}]", fmt::join(codec_names(), ", "), defaults.choice.codec));
+  flags.add(
+      "--predictor", &Config::mutable_predictor,
+      fmt::format("Predicted step of server and clients: ballistic, field, contact, or auto: field with "
+                  "codec tracker and at most {} bodies, else ballistic [{}]",
+                  sessions::kMostBodiesForField, defaults.choice.predictor));
+  app.add_option_function<std::string>(
+         "--threshold", [&config](const std::string& text) { set_threshold(config, text); },
+         "Position error above which a body is corrected, in metres, or auto: chosen at run time [the "
+         "scene's]")
+      ->type_name("METRES|auto");
+  flags.add("--target-bandwidth", &Config::set_target_bandwidth,
+            "Mbit/s of payload at the nominal rate that --threshold auto keeps to, from a quarter of the "
+            "threshold it starts from up to --max-error");
+  flags.add("--max-error", &Config::set_max_error,
+            "Largest threshold of --threshold auto, in metres; below the scene's it is also the first [four "
+            "times the scene's]");
+  flags.add("--threshold-scale", &Config::set_threshold_scale,
+            fmt::format("The scene's threshold times this [{}]", defaults.choice.threshold_scale));
+  flags.add("--budget", &Config::set_budget_bytes,
+            fmt::format("Bytes of corrections per frame with --codec limited [{}] or tracker [no limit]",
+                        kPaperBudgetBytes));
+  flags.add("--window", &Config::mutable_window,
+            "Frames the server may run ahead of its slowest participant, or auto [auto]");
+  flags.add("--lead", &Config::set_lead,
+            fmt::format("Frames a client may simulate beyond its last delta: 0 or 1 [{}]", defaults.lead));
+  flags.add("--rate", &Config::mutable_rate, "Frames per second, or max [the scene's]");
+  flags.add("--stall-timeout", &Config::mutable_stall_timeout,
+            fmt::format("Seconds a participant may hold up the others within 10 s, or off [{}]",
+                        *defaults.stall_timeout_s));
+  flags.add("--client-limit", &Config::set_client_limit,
+            fmt::format("Clients at once [{}]", defaults.client_limit));
+  flags.add("--wait-for", &Config::set_wait_for,
+            fmt::format("Participants that must play before frame 1 [{}]", defaults.wait_for));
+  flags.add("--duration", &Config::set_duration,
+            "Seconds from the first frame; as long again is waited for it [no end]");
+  flags.add("--threads", &Config::set_threads,
+            fmt::format("Threads of the full simulation [{}]", defaults.choice.threads));
+  flags.add("--seed", &Config::set_seed, fmt::format("Seed of start block and script [{}]", defaults.seed));
+  app.add_flag_callback(
+      "--scripted", [&config] { config.set_scripted(true); },
+      "The server itself sends what the scene's users would");
+  flags.add("--users", &Config::set_users, "Users of that script [as many as the scene says]");
+  flags.add("--hash-log", &Config::mutable_hash_log, "File to write `epoch,frame,hash` of every frame to");
+}
+
+}  // namespace
+
+CommandLine parse_command_line(int argc, const char* const* argv) {
+  CLI::App app{"Simulates a scene and streams it over DDS to clients, which hold bit-identical state.",
+               "tandemd"};
+  app.set_version_flag("--version", "tandemd " TANDEM_VERSION);
+  app.footer(
+      "Exit codes: 0 done, 1 failed (also: the session has a server already), 2 wrong usage. SIGINT and "
+      "SIGTERM end it cleanly.");
+  idl::ServerConfig config;
+  std::string path;
+  bool json = false;
+  add_flags(app, config);
+  app.add_option("--config", path, "Configuration file (protobuf text, idl/server.proto); flags win over it");
+  app.add_flag("--json", json, "Print one JSON object on stdout at the end");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return {.options = std::nullopt, .exit_code = app.exit(error) == 0 ? 0 : 2};
+  }
+  if (!path.empty()) {
+    auto file = load_config(path);
+    if (!file) {
+      fmt::print(stderr, "tandemd: {}\n", file.error().message);
+      return {.options = std::nullopt, .exit_code = 2};
+    }
+    config = merge(config, std::move(*file));
+  }
+  auto options = check_config(config);
+  if (!options) {
+    fmt::print(stderr, "tandemd: {}\nRun with --help for all flags.\n", options.error().message);
+    return {.options = std::nullopt, .exit_code = 2};
+  }
+  options->json = json;
+  return {.options = std::move(*options), .exit_code = 0};
+}
+
+}  // namespace tandem::daemon

@@ -1,0 +1,178 @@
+#include "services/tandemd/config.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/io/tokenizer.h>
+#include <google/protobuf/text_format.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "sdk/core/lattice/state.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/host/host.hpp"
+#include "services/tandemd/number.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using idl::ServerConfig;
+
+constexpr std::uint32_t kMostThreads = 256, kMostClients = 65536;
+
+// Keeps the first error as one line; protobuf counts lines and columns from 0.
+class FirstError final : public google::protobuf::io::ErrorCollector {
+ public:
+  explicit FirstError(std::string path) : path_(std::move(path)) {}
+  void AddError(int line, int column, const std::string& message) override {
+    if (text_.empty()) text_ = fmt::format("{}:{}:{}: {}", path_, line + 1, column + 1, message);
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  std::string path_;
+  std::string text_;
+};
+
+tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
+  return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
+}
+
+bool takes_budget(const std::string& codec) { return codec == "limited" || codec == "tracker"; }
+bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
+bool is_length(double metres) { return within(metres, 1e-9, 1e9); }
+
+/// Numbers that may be words.
+Result<void> check_words(const ServerConfig& config, Options& options) {
+  if (config.has_window() && config.window() != "auto") {
+    const std::uint32_t most = host::HostConfig().window_ceiling;
+    options.window = number<std::uint32_t>(config.window());
+    if (!options.window || *options.window < 1 || *options.window > most)
+      return refuse("window", fmt::format("1 to {} frames, or auto", most));
+  }
+  if (config.rate() == "max") {
+    options.free_rate = true;
+  } else if (config.has_rate()) {
+    options.rate_hz = number<double>(config.rate());
+    if (!options.rate_hz || !within(*options.rate_hz, 1, 1000)) return refuse("rate", "1 to 1000 Hz, or max");
+  }
+  if (config.stall_timeout() == "off") {
+    options.stall_timeout_s.reset();
+  } else if (config.has_stall_timeout()) {
+    options.stall_timeout_s = number<double>(config.stall_timeout());
+    if (!options.stall_timeout_s || !within(*options.stall_timeout_s, 0.01, 10))
+      return refuse("stall-timeout", "0.01 to 10 seconds, or off");
+  }
+  return {};
+}
+
+Result<void> check_numbers(const Options& options) {
+  const std::uint32_t bodies = options.choice.bodies;
+  if (bodies == 0 || bodies > kMaxCapacity)
+    return refuse("bodies", fmt::format("1 to {}, not {}", kMaxCapacity, bodies));
+  if (options.lead > 1) return refuse("lead", "0 or 1");
+  if (options.domain > transport::kMaxDomain)
+    return refuse("domain", fmt::format("0 to {}", transport::kMaxDomain));
+  if (options.client_limit < 1 || options.client_limit > kMostClients)
+    return refuse("client-limit", fmt::format("1 to {}", kMostClients));
+  if (options.choice.threads < 1 || options.choice.threads > kMostThreads)
+    return refuse("threads", fmt::format("1 to {}", kMostThreads));
+  if (options.duration_s && !within(*options.duration_s, 0, 1e9))
+    return refuse("duration", "seconds, not negative");
+  return {};
+}
+
+/// Threshold, automatic quality and budget: which of them go together.
+Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
+  if (choice.threshold_m && !is_length(*choice.threshold_m)) return refuse("threshold", "a positive length");
+  if (!within(choice.threshold_scale, 1e-6, 1e6)) return refuse("threshold-scale", "a positive factor");
+  if (choice.threshold_m && config.has_threshold_scale())
+    return refuse("threshold-scale", "not together with --threshold");
+  if (choice.automatic && choice.codec == "none")
+    return refuse("threshold", "auto chooses nothing with codec none, which has no threshold");
+  if (choice.automatic && choice.threshold_m) return refuse("threshold", "a length or auto, not both");
+  if (!choice.automatic && config.has_target_bandwidth())
+    return refuse("target-bandwidth", "needs --threshold auto");
+  if (!choice.automatic && choice.max_error_m) return refuse("max-error", "needs --threshold auto");
+  if (config.has_target_bandwidth() && !within(choice.target_mbit_per_s, 0.001, 1e6))
+    return refuse("target-bandwidth", "Mbit/s, at least 0.001");
+  if (choice.max_error_m && !is_length(*choice.max_error_m)) return refuse("max-error", "a positive length");
+  if (choice.budget_bytes && !takes_budget(choice.codec))
+    return refuse("budget", "only with --codec limited or tracker");
+  if (choice.budget_bytes && *choice.budget_bytes < sessions::kLeastBudgetBytes)
+    return refuse("budget", fmt::format("at least {} bytes", sessions::kLeastBudgetBytes));
+  return {};
+}
+
+sessions::SessionChoice choice_of(const ServerConfig& config) {
+  sessions::SessionChoice choice;
+  choice.bodies = config.bodies();
+  if (config.has_codec()) choice.codec = config.codec();
+  if (config.has_predictor()) choice.predictor = config.predictor();
+  if (config.has_threshold()) choice.threshold_m = config.threshold();
+  if (config.has_threshold_scale()) choice.threshold_scale = config.threshold_scale();
+  choice.automatic = config.threshold_auto();
+  choice.target_mbit_per_s = config.target_bandwidth();
+  if (config.has_max_error()) choice.max_error_m = config.max_error();
+  if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
+  if (config.has_threads()) choice.threads = config.threads();
+  return choice;
+}
+
+}  // namespace
+
+Result<ServerConfig> load_config(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened", path));
+  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (in.bad()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be read", path));
+  ServerConfig config;
+  FirstError errors(path);
+  google::protobuf::TextFormat::Parser parser;
+  parser.RecordErrorsTo(&errors);
+  if (!parser.ParseFromString(text, &config)) return fail(ErrorCode::kMalformed, errors.text());
+  return config;
+}
+
+ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
+  // What a flag excludes goes with it, where only the file says it: a length, a scale and auto exclude each
+  // other, quality follows auto, and auto and a budget need codecs that have them.
+  if (flags.has_threshold() || flags.has_threshold_auto() || flags.has_threshold_scale())
+    file.clear_threshold();
+  if (flags.has_threshold()) file.clear_threshold_scale();
+  if (flags.has_threshold() || flags.codec() == "none") file.clear_threshold_auto();
+  if (flags.has_codec() && !takes_budget(flags.codec())) file.clear_budget_bytes();
+  const bool automatic = flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto();
+  if (!automatic) {
+    file.clear_target_bandwidth();
+    file.clear_max_error();
+  }
+  file.MergeFrom(flags);
+  return file;
+}
+
+Result<Options> check_config(const ServerConfig& config) {
+  if (config.scene().empty()) return refuse("scene", "a scene's name or file is needed");
+  if (!config.has_bodies()) return refuse("bodies", "how many are needed");
+  Options options;
+  options.scene = config.scene();
+  options.choice = choice_of(config);
+  if (config.has_seed()) options.seed = config.seed();
+  options.scripted = config.scripted();
+  options.users = config.users();
+  if (config.has_session()) options.session = config.session();
+  options.domain = config.domain();
+  if (config.has_lead()) options.lead = config.lead();
+  if (config.has_client_limit()) options.client_limit = config.client_limit();
+  options.wait_for = config.wait_for();
+  if (config.has_duration() && config.duration() != 0) options.duration_s = config.duration();
+  options.hash_log = config.hash_log();
+  if (const auto named = transport::check_session_name(options.session); !named)
+    return refuse("session", named.error().message);
+  return check_words(config, options)
+      .and_then([&] { return check_numbers(options); })
+      .and_then([&] { return check_quality(config, options.choice); })
+      .map([&] { return options; });
+}
+
+}  // namespace tandem::daemon
