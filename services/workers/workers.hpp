@@ -46,8 +46,8 @@ class Workers {
   void (*call_)(const void*, std::uint32_t, std::uint32_t) = nullptr;
   std::uint32_t count_ = 0;
   std::uint32_t block_ = 1;
-  std::atomic<std::uint64_t> ticket_{
-      0};  // number of the run in the upper half, blocks nobody took in the lower
+  // Number of the run in the upper half, blocks that nobody took yet in the lower.
+  std::atomic<std::uint64_t> ticket_{0};
   std::atomic<std::uint32_t> undone_{0};  // blocks
   std::atomic<bool> stop_{false};
   std::vector<std::jthread> threads_;
