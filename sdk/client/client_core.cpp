@@ -6,17 +6,16 @@
 
 #include "sdk/client/reply_reason.hpp"
 #include "sdk/client/session_check.hpp"
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/units.hpp"
 
 namespace tandem::client {
 namespace {
 
-constexpr std::int64_t kMillisecondNs = 1'000'000;
 // An acknowledgement is repeated after this, so that the server hears from a client even when no frame comes.
-constexpr std::int64_t kAckRepeatNs = 250 * kMillisecondNs;
+constexpr std::int64_t kAckRepeatNs = 250 * kMillisecond;
 // Longest that poll() asks to sleep.
-constexpr std::int64_t kMaxSleepNs = 50 * kMillisecondNs;
-constexpr std::size_t kMaxInputValues = 16;
-constexpr std::size_t kMaxInputBytes = 1024;
+constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
 
 }  // namespace
 
@@ -56,7 +55,7 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
     }
   }
   // Never in the past and never a busy loop, whatever the estimates say.
-  return std::max(due, now.steady_ns + kMillisecondNs / 2);
+  return std::max(due, now.steady_ns + kMillisecond / 2);
 }
 
 void ClientCore::take_sessions(Now now) {
@@ -182,7 +181,7 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
   }
   if (phase() != ClientPhase::kPlaying)
     return fail(ErrorCode::kOutOfOrder, "input is possible while playing only");
-  if (values.size() > kMaxInputValues || bytes.size() > kMaxInputBytes) {
+  if (values.size() > transport::kMaxInputValues || bytes.size() > transport::kMaxInputBytes) {
     return fail(ErrorCode::kInvalidArgument, "an input holds at most 16 values and 1,024 bytes");
   }
   if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) {

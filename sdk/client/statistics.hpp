@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/units.hpp"
 #include "tandem/client.hpp"
 
 namespace tandem::client {
@@ -49,7 +50,7 @@ struct Statistics {
   /// Payload since the first applied frame; 2^20 bits to the Mbit.
   [[nodiscard]] double mbit_per_s() const {
     const auto span_ns = static_cast<double>(last_applied_ns - first_applied_ns);
-    return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / (1U << 20U) / (span_ns / 1e9) : 0;
+    return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / kBitsPerMbit / (span_ns / 1e9) : 0;
   }
 };
 

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "sdk/transport/units.hpp"
+
 namespace tandem::client {
 
 transport::ClientStatusMessage StatusReport::next(const Statistics& statistics, std::int64_t now_ns) {
@@ -11,7 +13,7 @@ transport::ClientStatusMessage StatusReport::next(const Statistics& statistics, 
   transport::ClientStatusMessage status;
   status.lag_ms = statistics.smoothed_latency_ns / 1e6;
   status.client_ms_p50 = statistics.frame_cost.quantile_ms(0.5);
-  status.mbit_per_s = first ? 0 : static_cast<double>(bytes) * 8 / (1U << 20U) / elapsed_s;
+  status.mbit_per_s = first ? 0 : static_cast<double>(bytes) * 8 / kBitsPerMbit / elapsed_s;
   status.frames_applied = statistics.frames_applied;
   status.resyncs = statistics.resyncs;
   status.hash_mismatches = statistics.hash_mismatches;

@@ -15,7 +15,8 @@ Result<void> check_session_name(const std::string& name) {
            c == '_' || c == '-';
   };
   if (name.empty() || name.size() > kMaxNameBytes) {
-    return fail(ErrorCode::kInvalidArgument, "a session name has 1 to 64 characters");
+    return fail(ErrorCode::kInvalidArgument,
+                "a session name has 1 to " + std::to_string(kMaxNameBytes) + " characters");
   }
   if (!std::all_of(name.begin(), name.end(), allowed)) {
     return fail(ErrorCode::kInvalidArgument,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/claim.hpp"
 #include "services/host/inputs.hpp"
 #include "services/host/joins.hpp"
@@ -48,6 +49,7 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
     return refuse(
         fmt::format("{} body types, {} described", config.stream.layout.type_count, config.types.size()));
   if (config.epoch == 0) return refuse("epoch must not be 0");
+  static_assert(engine::kMaxBodies == kMaxCapacity);
   const std::uint32_t capacity = simulation.capacity();
   if (capacity != config.stream.layout.capacity)
     return refuse(fmt::format("{} slots for a simulation of {}", config.stream.layout.capacity, capacity));

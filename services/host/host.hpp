@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/transport/port.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/simulation.hpp"
 #include "services/host/stream.hpp"
@@ -16,8 +17,6 @@
 
 namespace tandem::host {
 
-inline constexpr std::int64_t kMillisecond = 1'000'000;
-inline constexpr std::int64_t kSecond = 1'000'000'000;
 /// Most payload bytes of one delta sample.
 inline constexpr std::size_t kPartBytes = 60'000;
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/transport/limits.hpp"
+
 namespace tandem::host {
 namespace {
 
@@ -30,7 +32,8 @@ bool remembers(const InputAccount& account, std::uint64_t number) {
 }
 
 bool well_formed(const transport::InputMessage& input) {
-  return input.values.size() <= kMostInputValues && input.bytes.size() <= kMostInputBytes &&
+  return input.values.size() <= transport::kMaxInputValues &&
+         input.bytes.size() <= transport::kMaxInputBytes &&
          std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
 }
 

@@ -1,9 +1,8 @@
 #include "services/host/quality.hpp"
+#include "sdk/transport/units.hpp"
 
 #include <algorithm>
 #include <cmath>
-
-#include "services/host/mbit.hpp"
 
 namespace tandem::host {
 namespace {

@@ -12,6 +12,8 @@ namespace tandem::engine {
 
 using Vec3 = std::array<double, 3>;
 
+inline constexpr std::uint32_t kMaxBodies = 1U << 20U;  ///< of a simulation
+
 enum class InputKind : std::uint32_t {
   kGravity = 1,       ///< values: x, y, z in scene units / s^2; changes the predicted step too
   kPush = 2,          ///< values: centre x, y, z; radius; velocity change x, y, z

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "services/host/mbit.hpp"
+#include "sdk/transport/units.hpp"
 
 namespace tandem::host {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "sdk/statistics/duration_histogram.hpp"
-#include "services/host/mbit.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/lab/peers.hpp"
 
 namespace tandem::lab {

@@ -41,7 +41,7 @@ void add_scene_option(CLI::App& command, std::vector<std::string>& scenes) {
 void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
   command.add_option("--bodies", bodies, "Numbers of bodies, separated by commas")
       ->delimiter(',')
-      ->check(CLI::Range(1U, scenes::kMaxBodies))
+      ->check(CLI::Range(1U, engine::kMaxBodies))
       ->capture_default_str();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // The subcommands of `tandem bench` and what they share with `tandem export`.
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "services/lab/commands.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::lab {
 
@@ -25,6 +27,8 @@ int report(const std::string& command, const Error& error);
 [[nodiscard]] std::vector<std::string> paper_scenes();
 /// Loads the scenes of a --scene flag: names, files, or "all" for the paper's. Errors: those of load_scene().
 [[nodiscard]] Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names);
+
+inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
 
 /// Flags that several subcommands have.
 void add_scene_option(CLI::App& command, std::vector<std::string>& scenes);

@@ -263,7 +263,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
   add_bodies_option(*command, options->bodies);
   command->get_option("--scene")->required(false);
   command->add_option("--frames", options->frames, "Frames, from the start block on")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
+      ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
       ->capture_default_str();
   command->add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
       ->delimiter(',')
@@ -278,7 +278,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->capture_default_str();
   add_quality_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
-      ->check(CLI::Range(1, 64))
+      ->check(CLI::Range(1U, kMaxThreads))
       ->capture_default_str();
   command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
       ->check(CLI::Range(1U, scenes::kMaxUsers));

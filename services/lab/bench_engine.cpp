@@ -58,10 +58,10 @@ void add_engine(CLI::App& bench, Run& run) {
   const auto options = std::make_shared<EngineOptions>();
   command->add_option("--scene", options->scene, "Scene by name or file")->capture_default_str();
   command->add_option("--bodies", options->run.bodies, "Number of bodies")
-      ->check(CLI::Range(1U, scenes::kMaxBodies))
+      ->check(CLI::Range(1U, engine::kMaxBodies))
       ->capture_default_str();
   command->add_option("--threads", options->run.threads, "Of the engine")
-      ->check(CLI::Range(1, 64))
+      ->check(CLI::Range(1U, kMaxThreads))
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();

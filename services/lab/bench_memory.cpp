@@ -70,7 +70,7 @@ void add_memory(CLI::App& bench, Run& run) {
   const auto options = std::make_shared<MemoryOptions>();
   command->add_option("--scene", options->scene, "Scene by name or file")->capture_default_str();
   command->add_option("--bodies", options->bodies, "Number of bodies; twice as many are measured too")
-      ->check(CLI::Range(1U, scenes::kMaxBodies / 2))
+      ->check(CLI::Range(1U, engine::kMaxBodies / 2))
       ->capture_default_str();
   std::vector<std::string> names;
   for (const std::string_view name : codec_names()) names.emplace_back(name);

@@ -76,12 +76,12 @@ void add_train(CLI::App& bench, Run& run) {
   add_scene_option(*command, options->scenes);
   add_bodies_option(*command, options->bodies);
   command->add_option("--frames", options->frames, "Frames, from the start block on")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
+      ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the training run")->capture_default_str();
   add_threshold_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine")
-      ->check(CLI::Range(1, 64))
+      ->check(CLI::Range(1U, kMaxThreads))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON object: rows[scene, bodies, threshold, ranges, file]");
   command->callback([options, &run] { run = [options] { return run_train(*options); }; });

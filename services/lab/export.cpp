@@ -61,15 +61,15 @@ void add_export(CLI::App& app, Run& run) {
   options->run.frames = 1000;
   command->add_option("--scene", options->scene, "Scene by name or file")->required();
   command->add_option("--bodies", options->run.bodies, "Number of bodies")
-      ->check(CLI::Range(1U, scenes::kMaxBodies))
+      ->check(CLI::Range(1U, engine::kMaxBodies))
       ->capture_default_str();
   command->add_option("--frames", options->run.frames, "Frames after the start")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{10'000'000}))
+      ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
       ->capture_default_str();
   command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
       ->capture_default_str();
   command->add_option("--threads", options->run.threads, "Of the engine")
-      ->check(CLI::Range(1, 64))
+      ->check(CLI::Range(1U, kMaxThreads))
       ->capture_default_str();
   command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
       ->check(CLI::Range(1U, scenes::kMaxUsers));

@@ -21,7 +21,6 @@ constexpr std::size_t kHeaderBytes = 128;
 constexpr std::size_t kChannels = 6;
 // numpy writes 118; std::regex recurses for every character, so a long header would end the stack.
 constexpr std::size_t kMaxHeaderBytes = 4096;
-constexpr std::uint64_t kMaxBodies = 1U << 20U;
 // Rows are read and checked a frame at a time; a frame count beyond this is a broken header.
 constexpr std::uint64_t kMaxRows = 1U << 24U;
 // Of the numbers in the sidecar; beyond, somebody mistook something.
@@ -237,9 +236,9 @@ Result<void> RecordedTrajectory::open_npy(const std::string& path) {
   }
   rows_ = std::stoull(match[1]);
   const std::uint64_t bodies = std::stoull(match[2]);
-  if (rows_ < 2 || rows_ > kMaxRows || bodies == 0 || bodies > kMaxBodies) {
-    return malformed(
-        fmt::format("the shape is ({}), outside 2..{} rows and 1..{} bodies", shape, kMaxRows, kMaxBodies));
+  if (rows_ < 2 || rows_ > kMaxRows || bodies == 0 || bodies > engine::kMaxBodies) {
+    return malformed(fmt::format("the shape is ({}), outside 2..{} rows and 1..{} bodies", shape, kMaxRows,
+                                 engine::kMaxBodies));
   }
   bodies_ = static_cast<std::uint32_t>(bodies);
   const std::uint64_t expected = rows_ * bodies * kChannels * sizeof(float);

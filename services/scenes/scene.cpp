@@ -178,9 +178,10 @@ Result<Scene> load_scene(std::string_view name_or_path) {
 }
 
 Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
-  if (bodies == 0 || bodies > kMaxBodies) {
-    return fail(ErrorCode::kInvalidArgument, "number of bodies must be 1 to " + std::to_string(kMaxBodies) +
-                                                 ", not " + std::to_string(bodies));
+  if (bodies == 0 || bodies > engine::kMaxBodies) {
+    return fail(ErrorCode::kInvalidArgument, "number of bodies must be 1 to " +
+                                                 std::to_string(engine::kMaxBodies) + ", not " +
+                                                 std::to_string(bodies));
   }
   engine::World world = scene.world;
   world.capacity = bodies;

@@ -15,7 +15,6 @@
 
 namespace tandem::scenes {
 
-inline constexpr std::uint32_t kMaxBodies = 1U << 20U;
 inline constexpr std::uint32_t kMaxUsers = 64;
 
 struct BodyType {

@@ -28,7 +28,7 @@ void check_material(const Node& node, const idl::Material& material) {
 Names check_types(const Node& root, const idl::Scene& scene) {
   Names names;
   root.require(scene.types_size() >= 1 && scene.types_size() <= kMaxTypes, "types",
-               "needs 1 to 4096 entries");
+               "needs 1 to " + std::to_string(kMaxTypes) + " entries");
   for (int i = 0; i < scene.types_size(); ++i) {
     const idl::BodyType& type = scene.types(i);
     const Node node = root.child("types", i);
@@ -114,10 +114,11 @@ void check_script(const Node& root, const idl::Scene& scene) {
   if (!scene.has_script()) return;
   const Node node = root.child("script");
   const idl::Script& script = scene.script();
-  node.require(script.events_size() <= kMaxEvents, "events", "must be at most 100000");
+  node.require(script.events_size() <= kMaxEvents, "events", "must be at most " + std::to_string(kMaxEvents));
   for (int i = 0; i < script.events_size(); ++i) {
     check_event(node.child("events", i), script.events(i));
-    node.child("events", i).require(script.events(i).user() < kMaxUsers, "user", "must be below 64");
+    node.child("events", i)
+        .require(script.events(i).user() < kMaxUsers, "user", "must be below " + std::to_string(kMaxUsers));
   }
   for (int i = 0; i < script.tilting_size(); ++i) {
     const idl::Tilting& tilting = script.tilting(i);
@@ -175,7 +176,7 @@ bool read_colour(const std::string& text, std::uint32_t& rgba) {
 void check_scene(const Node& root, const idl::Scene& scene) {
   root.require_sane_numbers();
   root.require(scene.dt_s() >= 1e-6 && scene.dt_s() <= 1, "dt_s", "must be from 1e-6 to 1");
-  root.require(scene.substeps() <= 64, "substeps", "must be at most 64");
+  root.require(scene.substeps() <= 64, "substeps", "must be at most " + std::to_string(kMaxUsers));
   root.require(scene.damping_per_s() >= 0 && scene.damping_per_s() * scene.dt_s() < 1, "damping_per_s",
                "must be at least 0 and below 1 / dt_s");
   root.require(scene.threshold_radii() > 0 && scene.threshold_radii() <= 10, "threshold_radii",
@@ -184,7 +185,7 @@ void check_scene(const Node& root, const idl::Scene& scene) {
                    scene.bounds().low().y() < scene.bounds().high().y() &&
                    scene.bounds().low().z() < scene.bounds().high().z(),
                "bounds", "must have low below high along x, y and z");
-  root.require(scene.users() <= kMaxUsers, "users", "must be at most 64");
+  root.require(scene.users() <= kMaxUsers, "users", "must be at most " + std::to_string(kMaxUsers));
   root.require(scene.has_pair(), "pair", "is missing");
   if (scene.has_pair()) check_material(root.child("pair"), scene.pair());
   if (scene.has_wall()) check_material(root.child("wall"), scene.wall());

@@ -7,18 +7,19 @@
 #include <fstream>
 #include <iterator>
 
-#include "sdk/core/lattice/state.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
+#include "services/host/simulation.hpp"
 #include "services/tandemd/number.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::daemon {
 namespace {
 
 using idl::ServerConfig;
 
-constexpr std::uint32_t kMostThreads = 256, kMostClients = 65536;
+constexpr std::uint32_t kMostClients = 65536;
 
 // Keeps the first error as one line; protobuf counts lines and columns from 0.
 class FirstError final : public google::protobuf::io::ErrorCollector {
@@ -68,15 +69,15 @@ Result<void> check_words(const ServerConfig& config, Options& options) {
 
 Result<void> check_numbers(const Options& options) {
   const std::uint32_t bodies = options.choice.bodies;
-  if (bodies == 0 || bodies > kMaxCapacity)
-    return refuse("bodies", fmt::format("1 to {}, not {}", kMaxCapacity, bodies));
+  if (bodies == 0 || bodies > engine::kMaxBodies)
+    return refuse("bodies", fmt::format("1 to {}, not {}", engine::kMaxBodies, bodies));
   if (options.lead > 1) return refuse("lead", "0 or 1");
   if (options.domain > transport::kMaxDomain)
     return refuse("domain", fmt::format("0 to {}", transport::kMaxDomain));
   if (options.client_limit < 1 || options.client_limit > kMostClients)
     return refuse("client-limit", fmt::format("1 to {}", kMostClients));
-  if (options.choice.threads < 1 || options.choice.threads > kMostThreads)
-    return refuse("threads", fmt::format("1 to {}", kMostThreads));
+  if (options.choice.threads < 1 || options.choice.threads > kMaxThreads)
+    return refuse("threads", fmt::format("1 to {}", kMaxThreads));
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
     return refuse("duration", "seconds, not negative");
   return {};

@@ -1,4 +1,5 @@
 #include "services/tandemd/console.hpp"
+#include "sdk/transport/units.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -6,8 +7,6 @@
 
 #include <algorithm>
 #include <cstdio>
-
-#include "services/host/mbit.hpp"
 
 namespace tandem::daemon {
 
@@ -61,7 +60,7 @@ void Console::show(host::Host& host, std::int64_t now_ns) {
   line_shown_ = true;
   last_ = totals;
   last_ns_ = now_ns;
-  next_ns_ = now_ns + host::kSecond;
+  next_ns_ = now_ns + kSecond;
 }
 
 }  // namespace tandem::daemon

@@ -14,8 +14,8 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
-#include "services/host/mbit.hpp"
 #include "services/host/publisher.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
@@ -100,7 +100,7 @@ class Script {
 Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& options) {
   return sessions::plan_session(scene, options.choice).map([&](host::HostConfig config) {
     config.session = options.session;
-    config.epoch = static_cast<Epoch>(wall_ns() / host::kMillisecond);
+    config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
     if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
     config.free_rate = options.free_rate;
     config.stream.layout.lead = options.lead;

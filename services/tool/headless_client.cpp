@@ -11,13 +11,13 @@
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/scenes/script.hpp"
 
 namespace tandem::tool {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr std::int64_t kTellWaitingNs = 2 * kSecondNs;
+constexpr std::int64_t kTellWaitingNs = 2 * kSecond;
 // More than a second of deltas, even in parts: a busy machine may keep this process waiting.
 constexpr std::uint32_t kDeltaDepth = 512;
 
@@ -169,7 +169,7 @@ void HeadlessClient::tell_waiting(client::Now now) {
 }
 
 void HeadlessClient::tell_live(client::Now now) {
-  if (!options_.live || now.steady_ns - live_ns_ < kSecondNs) return;
+  if (!options_.live || now.steady_ns - live_ns_ < kSecond) return;
   const double span_s = static_cast<double>(now.steady_ns - live_ns_) / 1e9;
   const client::Statistics& figures = core_->statistics();
   const auto bytes = static_cast<double>(figures.payload_bytes - live_bytes_);
@@ -180,7 +180,7 @@ void HeadlessClient::tell_live(client::Now now) {
   line["phase"] = kPhases[static_cast<std::size_t>(core_->phase())];
   line["frame"] = last_frame_;
   line["frames_per_s"] = static_cast<double>(figures.frames_applied - live_frames_) / span_s;
-  line["mbit_per_s"] = bytes * 8 / (1U << 20U) / span_s;
+  line["mbit_per_s"] = bytes * 8 / kBitsPerMbit / span_s;
   line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
   line["resyncs"] = figures.resyncs;
   fmt::print(stderr, "{}\n", line.dump());

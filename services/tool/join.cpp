@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/headless_client.hpp"
@@ -78,7 +79,7 @@ void add_join(CLI::App& app, Run& run) {
   const auto options = std::make_shared<JoinOptions>();
   HeadlessOptions& client = options->client;
   command->add_option("--domain", client.domain, "DDS domain")
-      ->check(CLI::Range(0, 230))
+      ->check(CLI::Range(0U, transport::kMaxDomain))
       ->capture_default_str();
   command->add_option("--session", client.session, "Session name")
       ->check([](const std::string& name) {

@@ -10,15 +10,15 @@
 
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/top_view.hpp"
 
 namespace tandem::tool {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 // Status comes once a second; discovery takes up to as long.
-constexpr std::int64_t kOnceNs = 5 * kSecondNs / 2;
+constexpr std::int64_t kOnceNs = 5 * kSecond / 2;
 
 struct TopOptions {
   std::uint32_t domain = 0;
@@ -72,8 +72,8 @@ int run_top(const TopOptions& options) {
       show(view, options);
       return view.empty() ? 1 : 0;
     }
-    if (now_ns - shown_ns >= kSecondNs) {
-      shown_ns += kSecondNs;
+    if (now_ns - shown_ns >= kSecond) {
+      shown_ns += kSecond;
       if (!show(view, options)) return 0;
     }
   }
@@ -87,7 +87,7 @@ void add_top(CLI::App& app, Run& run) {
       app.add_subcommand("top", "Shows the sessions and clients of a domain, their bandwidth and lag.");
   const auto options = std::make_shared<TopOptions>();
   command->add_option("--domain", options->domain, "DDS domain")
-      ->check(CLI::Range(0, 230))
+      ->check(CLI::Range(0U, transport::kMaxDomain))
       ->capture_default_str();
   command->add_option("--session", options->session, "Only this session (default: all)");
   CLI::Option* once = command->add_flag("--once", options->once,

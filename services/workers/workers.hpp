@@ -9,6 +9,9 @@
 
 namespace tandem {
 
+/// Of a pool, its caller's among them; more would hardly find blocks.
+inline constexpr std::uint32_t kMaxThreads = 64;
+
 /// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
 /// because a static split waits for the thread whose core somebody else is using; nor is a thread waited for
 /// that wakes up late and finds nothing left. Jobs write to places of their own.

@@ -47,13 +47,13 @@ EDGES = {
     "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
     "services/tandemd": LAYOUT
     + CODEC
-    + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions"],
+    + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds", "services/scenes"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
-    + ["sdk/statistics", "services/host", "services/scenes", "services/sessions", "services/tool"],
+    + ["sdk/statistics", "services/host", "services/scenes", "services/sessions", "services/tool", "services/workers"],
     "tests": ["*"],
 }
 

@@ -1,5 +1,6 @@
 // tandem::Client: a ClientCore with a clock, a DDS port and, if wanted, a thread.
 #include "tandem/client.hpp"
+#include "sdk/core/timeline/timeline.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -16,8 +17,6 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint32_t kMaxDomain = 230;
-constexpr std::uint32_t kMaxWantedLead = 8;
 constexpr double kLongestWaitS = 1e6;
 // Deltas that wait while the application does not poll; more than a second's worth, even in parts.
 constexpr std::uint32_t kDeltaDepth = 512;
@@ -82,8 +81,10 @@ Client::~Client() = default;
 
 Result<Client> Client::connect(const ClientOptions& options) {
   if (auto ok = transport::check_session_name(options.session); !ok) return tl::unexpected<Error>(ok.error());
-  if (options.domain > kMaxDomain) return fail(ErrorCode::kInvalidArgument, "a DDS domain is 0 to 230");
-  if (options.lead > kMaxWantedLead) return fail(ErrorCode::kInvalidArgument, "a lead is 0 or 1");
+  if (options.domain > transport::kMaxDomain) {
+    return fail(ErrorCode::kInvalidArgument, "a DDS domain is 0 to " + std::to_string(transport::kMaxDomain));
+  }
+  if (options.lead > kMaxLead) return fail(ErrorCode::kInvalidArgument, "a lead is 0 or 1");
   auto core = core_options(options);
   transport::DdsOptions dds;
   dds.domain = options.domain;

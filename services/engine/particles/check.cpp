@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace tandem::engine {
 namespace {
@@ -29,10 +30,12 @@ bool sane(const Box& box) {
   return sane(box.centre);
 }
 
-// What is wrong, or nullptr.
-const char* fault(const World& world) {
+// What is wrong; empty: nothing.
+std::string fault(const World& world) {
   const std::size_t types = world.types.size();
-  if (world.capacity == 0 || world.capacity > kMaxBodies) return "the number of bodies must be 1 to 1048576";
+  if (world.capacity == 0 || world.capacity > kMaxBodies) {
+    return "the number of bodies must be 1 to " + std::to_string(kMaxBodies);
+  }
   if (!positive(world.dt_s) || world.dt_s > 1) return "dt must be above 0 and at most 1 s";
   if (world.substeps == 0 || world.substeps > 64) return "substeps must be 1 to 64";
   if (!sane(world.gravity)) return "gravity must be finite";
@@ -72,7 +75,7 @@ const char* fault(const World& world) {
     if (!ordered(region.low, region.high) || !sane(region.offset) || region.type >= types)
       return "a region needs a known type";
   }
-  return nullptr;
+  return {};
 }
 
 Classification refuse(std::string reason) {
@@ -90,7 +93,8 @@ bool within(std::span<const double> values, double limit) {
 }  // namespace
 
 Result<void> check(const World& world) {
-  if (const char* reason = fault(world)) return fail(ErrorCode::kInvalidArgument, reason);
+  if (std::string reason = fault(world); !reason.empty())
+    return fail(ErrorCode::kInvalidArgument, std::move(reason));
   return {};
 }
 

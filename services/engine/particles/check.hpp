@@ -7,8 +7,6 @@
 
 namespace tandem::engine {
 
-inline constexpr std::uint32_t kMaxBodies = 1U << 20U;
-
 /// False for a point with a coordinate that is not a number, too.
 [[nodiscard]] inline bool inside(const Vec3f& p, const Vec3f& low, const Vec3f& high) {
   return p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1] && p[2] >= low[2] &&

@@ -16,7 +16,6 @@
 namespace tandem::engine {
 namespace {
 
-constexpr std::uint32_t kMaxThreads = 64;
 constexpr std::uint32_t kIntegrationBlock =
     4096;                             // bodies; smaller blocks cost more to hand out than they even out
 constexpr float kCellSlack = 1.001F;  // rounding must not put touching bodies two cells apart
@@ -308,7 +307,7 @@ bool Particles::load(std::span<const std::byte> bytes) {
 
 Result<std::unique_ptr<Simulation>> make_particles(const World& world, std::uint32_t threads) {
   if (threads == 0 || threads > kMaxThreads)
-    return fail(ErrorCode::kInvalidArgument, "threads must be 1 to 64");
+    return fail(ErrorCode::kInvalidArgument, "threads must be 1 to " + std::to_string(kMaxThreads));
   return check(world).transform(
       [&] { return std::unique_ptr<Simulation>(std::make_unique<Particles>(world, threads)); });
 }

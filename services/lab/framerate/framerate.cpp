@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "services/host/mbit.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/lab/cells.hpp"
 #include "services/lab/framerate/child.hpp"
 #include "services/lab/framerate/enclave.hpp"

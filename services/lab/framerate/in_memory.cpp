@@ -7,7 +7,7 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "services/host/mbit.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/outbox.hpp"
 #include "services/lab/framerate/framerate.hpp"
 #include "services/lab/scene_source.hpp"

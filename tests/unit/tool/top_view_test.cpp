@@ -4,13 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "sdk/transport/units.hpp"
+
 namespace tandem::tool {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 transport::ServerStatusMessage server(const std::string& session) {
   transport::ServerStatusMessage status;
