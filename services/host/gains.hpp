@@ -25,8 +25,8 @@ void set_first_gains(std::string_view predictor, StreamParameters& parameters);
 /// Looks at every frame and decides every fifteen. Deterministic; no clock. Not thread-safe.
 ///
 /// Where corrections agree with the one before more than the goal says, velocities learn more from them,
-/// where less, less; where they agree with c, it is kept for longer. RESEARCH.md of the codec, "Gains at run
-/// time".
+/// where less, less; where they agree with c, it is kept for longer. RESEARCH.md
+/// has the measurements.
 class GainControl {
  public:
   /// `parameters`: those in force at the start.
