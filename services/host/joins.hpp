@@ -14,8 +14,8 @@ namespace tandem::host {
 class JoinDesk {
  public:
   static constexpr std::int64_t kCollectNs = 100'000'000;  ///< joiners of one snapshot
-  static constexpr std::int64_t kPatienceNs =
-      5'000'000'000;  ///< a joiner that does not ask again gets another
+  /// A joiner that does not ask again gets another after this.
+  static constexpr std::int64_t kPatienceNs = 5'000'000'000;
 
   /// True when the time has come to make one snapshot for all who are ready: they say `joining`, all three
   /// writers have matched their participant, and they were not served for this attempt within 5 s.

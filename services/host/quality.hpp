@@ -13,8 +13,8 @@ namespace tandem::host {
 
 /// What automatic quality may do.
 struct QualityGoal {
-  double target_mbit_per_s =
-      0;  ///< of payload at the nominal rate; 0: the threshold stays, only ranges follow
+  /// Of payload at the nominal rate; 0: the threshold stays, only ranges follow.
+  double target_mbit_per_s = 0;
   std::int32_t smallest_threshold = 1;  ///< lattice units; no finer than this, whatever there is room for
   std::int32_t largest_threshold = 1;   ///< the stated maximum error; no coarser, even above the target
 };

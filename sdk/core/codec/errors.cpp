@@ -21,8 +21,8 @@ void mark_suspects(const State& state, const State& target, const Block& block, 
     return static_cast<std::uint8_t>(shifted > 2 * near);
   };
   std::uint8_t* mark = marks.data();
-  const std::uint32_t slots =
-      block.slots;  // a store to a byte could change the block, for all a compiler knows
+  // A copy: a store to a byte could change the block, for all a compiler knows.
+  const std::uint32_t slots = block.slots;
   for (std::uint32_t s = 0; s < slots; ++s) {
     mark[s] = static_cast<std::uint8_t>(beyond(x1[s], x0[s]) | beyond(y1[s], y0[s]) | beyond(z1[s], z0[s]));
   }

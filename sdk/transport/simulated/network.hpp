@@ -16,8 +16,8 @@ struct LinkModel {
   std::int64_t delay_ns = 1'000'000;
   std::int64_t jitter_ns = 0;  ///< added uniformly; order within a topic and writer is kept nevertheless
   double loss = 0;             ///< chance that one transmission is lost, first or repeated
-  std::int64_t repair_ns =
-      20'000'000;            ///< a lost sample of a reliable topic is sent again after this, if still kept
+  /// A lost sample of a reliable topic is sent again after this, if it is still kept.
+  std::int64_t repair_ns = 20'000'000;
   double lost_for_good = 0;  ///< chance that a lost sample of a reliable topic is never repaired
   /// What all samples have to pass, also those of other paths that name the same one; what it drops is lost.
   /// Null: room for everything.
@@ -27,10 +27,10 @@ struct LinkModel {
 struct NetworkOptions {
   std::uint64_t seed = 1;
   LinkModel link;  ///< of all links without one of their own
-  std::int64_t match_min_ns =
-      1'000'000;  ///< a writer and a reader find each other after a time in this range,
-  std::int64_t match_max_ns = 20'000'000;  ///< drawn for every pair
-  std::int64_t lease_ns = 1'000'000'000;   ///< a frozen, killed or cut-off peer counts as dead after this
+  /// A writer and a reader find each other after a time in this range, drawn for every pair.
+  std::int64_t match_min_ns = 1'000'000, match_max_ns = 20'000'000;
+  /// A frozen, killed or cut-off peer counts as dead after this.
+  std::int64_t lease_ns = 1'000'000'000;
 };
 
 /// What happened to samples on the way, for tests that want to know whether they tested anything.

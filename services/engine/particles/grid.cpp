@@ -7,8 +7,8 @@ namespace {
 
 constexpr std::uint32_t kMinBits = 2;  // neighbours on both sides must be different cells
 constexpr std::uint32_t kMaxBits = 10;
-constexpr std::uint32_t kCellsPerBody =
-    4;  // more makes clearing the table cost more than the folded cells save
+// More makes clearing the table cost more than the folded cells save.
+constexpr std::uint32_t kCellsPerBody = 4;
 
 constexpr std::uint32_t kNoCell = UINT32_MAX;
 

@@ -16,8 +16,8 @@
 namespace tandem::engine {
 namespace {
 
-constexpr std::uint32_t kIntegrationBlock =
-    4096;                             // bodies; smaller blocks cost more to hand out than they even out
+// Bodies; smaller blocks cost more to hand out than they even out.
+constexpr std::uint32_t kIntegrationBlock = 4096;
 constexpr float kCellSlack = 1.001F;  // rounding must not put touching bodies two cells apart
 
 std::uint64_t splitmix64(std::uint64_t x) {

@@ -1,9 +1,8 @@
 // A process for the other side of the DDS tests. Prints lines that the test waits for.
 //   transport_peer client DOMAIN SESSION LAST_FRAME: joins, prints "ready", takes deltas up to LAST_FRAME,
-//   prints
-//     "done first=F last=L missing=M bytes=B".
+//     prints "done first=F last=L missing=M bytes=B".
 //   transport_peer server DOMAIN SESSION EPOCH: announces, prints "ready", sends its status until it is
-//   killed.
+//     killed.
 
 #include <chrono>
 #include <cstdio>

@@ -43,9 +43,9 @@ struct ContactGrid {
   const std::uint32_t* cell;   ///< by place
   // By place, each coordinate in 16 bits of 2^5 grid units; readable 8 further.
   const std::uint32_t* xy;  ///< x below, y above
-  const std::uint32_t*
-      later_xy;            ///< where the last sub-step finds it if nothing pushes it; none for one sub-step
-  const std::uint32_t* z;  ///< now below, later above
+  /// Where the last sub-step finds it if nothing pushes it; none for one sub-step.
+  const std::uint32_t* later_xy;
+  const std::uint32_t* z;      ///< now below, later above
   std::uint32_t near_squared;  ///< bodies nearer than this, now or later, are a pair
 };
 
