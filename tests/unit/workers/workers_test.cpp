@@ -116,6 +116,7 @@ TEST(Workers, AllThreadsTakePartAndEachWasPreparedFirst) {
 TEST(Workers, SeveralPoolsWorkAtTheSameTime) {
   std::vector<std::jthread> callers;
   std::array<std::vector<int>, 3> seen;
+  callers.reserve(seen.size());
   for (auto& mine : seen) {
     callers.emplace_back([&mine] {
       Workers workers(2);
