@@ -3,17 +3,18 @@
 #include <utility>
 
 #include "sdk/client/client_core.hpp"
+#include "sdk/transport/units.hpp"
 
 namespace tandem::client {
 
 namespace {
 
 // A scheduled input that a delta promised may be this late before the client joins again.
-constexpr std::int64_t kInputPatienceNs = 250'000'000;
+constexpr std::int64_t kInputPatienceNs = 250 * kMillisecond;
 
 // A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
-  constexpr std::int64_t kMostNs = 3'600'000'000'000;
+  constexpr std::int64_t kMostNs = 3600 * kSecond;
   return wall_ns - std::clamp(server_time_ns, wall_ns - kMostNs, wall_ns + kMostNs);
 }
 

@@ -39,7 +39,7 @@ struct EpochState {
   bool joining = true;
   bool played = false;             ///< has been playing in this epoch
   std::int64_t join_began_ns = 0;  ///< the session was learned, or something was lost
-  /// Since when the front delta waits for a scheduled input.
+  /// How long the front delta has waited for a scheduled input.
   std::optional<std::int64_t> input_missing_ns;
   std::int64_t frame_cost_ns = 0;                ///< simulation since the last applied delta
   std::optional<transport::ReplyMessage> reply;  ///< newest

@@ -18,8 +18,6 @@ class DurationHistogram {
     ++counts_[bucket_of(static_cast<std::uint64_t>(duration_ns < 0 ? 0 : duration_ns))];
     ++total_;
   }
-  /// At most 10^12 ms.
-  void add_ms(double duration_ms) { add(static_cast<std::int64_t>(duration_ms * 1e6)); }
 
   /// Milliseconds; `share` in [0, 1], 0.5 is the median; 0 while empty.
   [[nodiscard]] double quantile_ms(double share) const {

@@ -18,7 +18,7 @@ class StatusDesk {
       : session_(std::move(session)), epoch_(epoch), outbox_(&outbox) {}
 
   void start(std::int64_t now_ns) { started_ns_ = second_ns_ = now_ns; }
-  void frame_took(double ms) { durations_.add_ms(ms); }
+  void frame_took(std::int64_t duration_ns) { durations_.add(duration_ns); }
 
   [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
   /// What is so at the moment.

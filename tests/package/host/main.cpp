@@ -90,7 +90,7 @@ Result<std::uint64_t> serve(std::int64_t lasts_ns) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto frames = serve((argc > 1 ? std::atoi(argv[1]) : 10) * host::kSecond);
+  const auto frames = serve((argc > 1 ? std::atoi(argv[1]) : 10) * kSecond);
   if (!frames) return std::fprintf(stderr, "%s\n", frames.error().message.c_str()), 1;
   std::printf("%llu frames\n", static_cast<unsigned long long>(*frames));
   return *frames == 0 ? 1 : 0;
