@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "sdk/core/codec/codec.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
@@ -39,7 +40,11 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
   return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
 }
 
-bool takes_budget(const std::string& codec) { return codec == "limited" || codec == "tracker"; }
+/// An unknown codec, or none named, excludes nothing here; it is refused where the session is planned.
+CodecTraits traits_of(const std::string& codec) {
+  const auto traits = codec_traits(codec);
+  return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
+}
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 bool is_length(double metres) { return within(metres, 1e-9, 1e9); }
 
@@ -85,12 +90,15 @@ Result<void> check_numbers(const Options& options) {
 
 /// Threshold, automatic quality and budget: which of them go together.
 Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
+  const CodecTraits traits = traits_of(choice.codec);
   if (choice.threshold_m && !is_length(*choice.threshold_m)) return refuse("threshold", "a positive length");
   if (!within(choice.threshold_scale, 1e-6, 1e6)) return refuse("threshold-scale", "a positive factor");
   if (choice.threshold_m && config.has_threshold_scale())
     return refuse("threshold-scale", "not together with --threshold");
-  if (choice.automatic && choice.codec == "none")
-    return refuse("threshold", "auto chooses nothing with codec none, which has no threshold");
+  if (choice.automatic && !traits.reads_threshold) {
+    return refuse("threshold",
+                  fmt::format("auto chooses nothing with codec {}, which has no threshold", choice.codec));
+  }
   if (choice.automatic && choice.threshold_m) return refuse("threshold", "a length or auto, not both");
   if (!choice.automatic && config.has_target_bandwidth())
     return refuse("target-bandwidth", "needs --threshold auto");
@@ -98,7 +106,7 @@ Result<void> check_quality(const ServerConfig& config, const sessions::SessionCh
   if (config.has_target_bandwidth() && !within(choice.target_mbit_per_s, 0.001, 1e6))
     return refuse("target-bandwidth", "Mbit/s, at least 0.001");
   if (choice.max_error_m && !is_length(*choice.max_error_m)) return refuse("max-error", "a positive length");
-  if (choice.budget_bytes && !takes_budget(choice.codec))
+  if (choice.budget_bytes && !traits.takes_budget)
     return refuse("budget", "only with --codec limited or tracker");
   if (choice.budget_bytes && *choice.budget_bytes < sessions::kLeastBudgetBytes)
     return refuse("budget", fmt::format("at least {} bytes", sessions::kLeastBudgetBytes));
@@ -138,11 +146,12 @@ Result<ServerConfig> load_config(const std::string& path) {
 ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   // What a flag excludes goes with it, where only the file says it: a length, a scale and auto exclude each
   // other, quality follows auto, and auto and a budget need codecs that have them.
+  const CodecTraits traits = traits_of(flags.codec());
   if (flags.has_threshold() || flags.has_threshold_auto() || flags.has_threshold_scale())
     file.clear_threshold();
   if (flags.has_threshold()) file.clear_threshold_scale();
-  if (flags.has_threshold() || flags.codec() == "none") file.clear_threshold_auto();
-  if (flags.has_codec() && !takes_budget(flags.codec())) file.clear_budget_bytes();
+  if (flags.has_threshold() || !traits.reads_threshold) file.clear_threshold_auto();
+  if (!traits.takes_budget) file.clear_budget_bytes();
   const bool automatic = flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto();
   if (!automatic) {
     file.clear_target_bandwidth();
