@@ -79,15 +79,14 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   session_ = announcement.message;
   refusal_.clear();
   listener_.on_session(*session_);
-  auto config = check_session(*session_);
-  auto timeline = config ? ClientTimeline::create(*config) : tl::unexpected<Error>(config.error());
-  if (!timeline) {
+  auto playable = choose_stream(*session_);
+  if (!playable) {
     ++statistics_.refused_messages;
-    refusal_ = timeline.error().message;
+    refusal_ = playable.error().message;
     log(LogLevel::kError, refusal_);
     return;
   }
-  epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*timeline), options_.lead,
+  epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*playable), options_.lead,
                                         pictures_);
   epoch_->join_began_ns = now.steady_ns;
   epoch_->joiner.start(now.steady_ns);
@@ -97,7 +96,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
                                 std::to_string(epoch_->lead));
   }
   log(LogLevel::kInfo, "found session '" + session_->session + "', scene '" + session_->scene + "', " +
-                           std::to_string(session_->layout.capacity) + " slots, epoch " +
+                           std::to_string(session_->capacity) + " slots, epoch " +
                            std::to_string(session_->epoch));
 }
 
@@ -140,6 +139,7 @@ void ClientCore::send_ack(Now now) {
   transport::AckMessage ack;
   ack.client = options_.id;
   ack.epoch = epoch_->session.epoch;
+  ack.stream = epoch_->stream.id;
   ack.phase = epoch_->joining ? transport::Phase::kJoining : transport::Phase::kPlaying;
   if (!epoch_->joining) {
     ack.applied = epoch_->timeline.applied();
@@ -159,6 +159,7 @@ void ClientCore::send_status(Now now) {
   status.session = options_.session;
   if (epoch_) {
     status.epoch = epoch_->session.epoch;
+    status.stream = epoch_->stream.id;
     status.applied = epoch_->joining ? 0 : epoch_->timeline.applied();
     status.role =
         static_cast<std::uint32_t>(epoch_->reply ? epoch_->reply->role : transport::Role::kObserver);

@@ -86,7 +86,7 @@ void ClientCore::take_snapshots() {
   port_.take(inbox_.snapshots);
   for (auto& received : inbox_.snapshots) {
     if (!belongs(received)) continue;
-    if (received.message.bytes.size() > epoch_->session.max_snapshot_bytes) {
+    if (received.message.bytes.size() > epoch_->stream.max_snapshot_bytes) {
       ++statistics_.refused_messages;
       continue;
     }
@@ -97,14 +97,14 @@ void ClientCore::take_snapshots() {
 void ClientCore::join(Now now) {
   EpochState& e = *epoch_;
   if (!e.stream_open) {
-    if (auto opened = port_.open_stream(e.session); !opened) {
+    if (auto opened = port_.open_stream(e.session, e.stream); !opened) {
       log(LogLevel::kError, opened.error().message);
       return;
     }
     e.stream_open = true;
   }
   if (e.joiner.poll(now.steady_ns)) {
-    if (auto opened = port_.open_snapshots(e.session); !opened) log(LogLevel::kError, opened.error().message);
+    if (auto opened = port_.open_snapshots(); !opened) log(LogLevel::kError, opened.error().message);
     ack_due_ = true;
   }
   const CompleteDelta* first = e.assembly.front();

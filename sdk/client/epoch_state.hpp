@@ -9,6 +9,7 @@
 #include "sdk/client/picture_writer.hpp"
 #include "sdk/client/scheduled_inputs.hpp"
 #include "sdk/client/server_clock.hpp"
+#include "sdk/client/session_check.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/messages.hpp"
 
@@ -16,16 +17,18 @@ namespace tandem::client {
 
 struct EpochState {
   EpochState(transport::SessionMessage announced, const transport::ParticipantId& announced_by,
-             ClientTimeline made_timeline, std::uint32_t wanted_lead, PictureExchange& exchange)
+             Playable playable, std::uint32_t wanted_lead, PictureExchange& exchange)
       : session(std::move(announced)),
+        stream(session.streams[playable.stream]),
         server(announced_by),
-        timeline(std::move(made_timeline)),
-        lead(std::min(wanted_lead, session.layout.lead)),
-        assembly({.delta_bytes = session.max_delta_bytes}),
+        timeline(std::move(playable.timeline)),
+        lead(std::min(wanted_lead, session.lead)),
+        assembly({.delta_bytes = stream.max_delta_bytes}),
         pacer(session.frame_rate_hz),
         pictures(exchange, session) {}
 
   transport::SessionMessage session;
+  transport::StreamMessage stream;  ///< the one that is played
   transport::ParticipantId server;
   ClientTimeline timeline;
   std::uint32_t lead;  ///< in force: not above the session's

@@ -57,7 +57,7 @@ const DrawnFrame* PictureWriter::draw(const ClientTimeline& timeline, Frame fram
     copy(state.v(channel), drawn.v[channel]);
   }
   copy(state.alive(), drawn.alive);
-  copy(state.generation(), drawn.generation);
+  copy(state.reuse(), drawn.generation);
   copy(state.type(), drawn.type);
   copy(jumps_, drawn.jumps);
   return &drawn;

@@ -28,6 +28,8 @@ std::string describe(std::uint32_t reason) {
       return "the server speaks another protocol version";
     case transport::Reason::kFull:
       return "the server is full";
+    case transport::Reason::kNoStream:
+      return "the server does not play this stream any more";
   }
   return "refused for reason " + std::to_string(reason);
 }

@@ -1,6 +1,7 @@
 #include "sdk/client/session_check.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "sdk/transport/port.hpp"
 
@@ -15,42 +16,56 @@ constexpr double kMaxFrameRateHz = 10'000;
 constexpr std::uint64_t kMaxBytesPerSlot = 128;
 constexpr std::uint64_t kMaxFixedBytes = 1U << 20U;
 
-Result<void> check_values(const transport::SessionMessage& s) {
-  const auto bad = [](const std::string& what) {
-    return fail(ErrorCode::kMalformed, "session refused: " + what);
-  };
+tl::unexpected<Error> bad(const std::string& what) { return fail(ErrorCode::kMalformed, what); }
+
+Result<void> check_session(const transport::SessionMessage& s) {
+  if (s.protocol_version != transport::kProtocolVersion) {
+    return fail(ErrorCode::kUnsupported, "the server speaks protocol version " +
+                                             std::to_string(s.protocol_version) + ", this client " +
+                                             std::to_string(transport::kProtocolVersion));
+  }
   if (s.epoch == 0) return bad("epoch 0");
-  if (auto good = check_layout(s.layout); !good) return bad(good.error().message);
   if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))
     return bad("frame rate out of range");
   if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
-  if (s.layout.lead > kDefinedLead)
-    return bad("lead " + std::to_string(s.layout.lead) + ", at most 1 is defined");
-  if (s.types.size() != s.layout.type_count)
-    return bad("a list of " + std::to_string(s.types.size()) + " body types");
+  if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
   for (const auto& type : s.types) {
     if (!std::isfinite(type.radius) || type.radius < 0) return bad("radius of type " + type.name);
   }
+  return {};
+}
+
+Result<void> check_stream(const transport::SessionMessage& session, const transport::StreamMessage& s) {
+  if (auto good = check_layout(s.layout); !good) return good;
+  if (session.types.size() != s.layout.type_count)
+    return bad("a list of " + std::to_string(session.types.size()) + " body types");
   const std::uint64_t most = kMaxFixedBytes + kMaxBytesPerSlot * s.layout.capacity;
   if (s.max_delta_bytes > most) return bad("deltas of " + std::to_string(s.max_delta_bytes) + " bytes");
   if (s.max_snapshot_bytes > most)
     return bad("snapshots of " + std::to_string(s.max_snapshot_bytes) + " bytes");
+  if (transport::layout_hash(session, s) != s.layout_hash) {
+    return fail(ErrorCode::kMismatch, "its layout hash differs from what this client computes");
+  }
   return {};
 }
 
 }  // namespace
 
-Result<Layout> check_session(const transport::SessionMessage& session) {
-  if (session.protocol_version != transport::kProtocolVersion) {
-    return fail(ErrorCode::kUnsupported, "the server speaks protocol version " +
-                                             std::to_string(session.protocol_version) + ", this client " +
-                                             std::to_string(transport::kProtocolVersion));
+Result<Playable> choose_stream(const transport::SessionMessage& session) {
+  if (auto good = check_session(session); !good) {
+    return fail(good.error().code, "session refused: " + good.error().message);
   }
-  if (auto ok = check_values(session); !ok) return tl::unexpected<Error>(ok.error());
-  if (transport::layout_hash(session) != session.layout_hash) {
-    return fail(ErrorCode::kMismatch, "the session's layout hash differs from what this client computes");
+  Error refused{ErrorCode::kMalformed, "session refused: no stream can be played"};
+  for (std::size_t i = 0; i < session.streams.size(); ++i) {
+    const transport::StreamMessage& stream = session.streams[i];
+    const auto good = check_stream(session, stream);
+    auto timeline = good ? ClientTimeline::create(stream.layout) : tl::unexpected<Error>(good.error());
+    if (timeline) return Playable{i, std::move(*timeline)};
+    if (i == 0) refused.code = timeline.error().code;
+    refused.message +=
+        (i == 0 ? ": stream " : "; stream ") + std::to_string(stream.id.id) + ": " + timeline.error().message;
   }
-  return session.layout;
+  return tl::unexpected<Error>(std::move(refused));
 }
 
 }  // namespace tandem::client

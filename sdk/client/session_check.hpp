@@ -1,15 +1,24 @@
 #pragma once
-// Is an announced session one that this build can play?
+// Which stream of an announced session can this build play?
 
-#include "sdk/core/layout/layout.hpp"
+#include <cstddef>
+
+#include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::client {
 
-/// Checks version, layout hash and every declared size, and returns what a timeline is made from. An
-/// announcement is untrusted bytes: nothing is allocated from it before it passed here. Errors: kUnsupported
-/// (protocol version), kMismatch (layout hash), kMalformed (a value out of range).
-[[nodiscard]] Result<Layout> check_session(const transport::SessionMessage& session);
+struct Playable {
+  std::size_t stream = 0;  ///< index into SessionMessage::streams
+  ClientTimeline timeline;
+};
+
+/// Checks version and every declared value, and makes the timeline of the first listed stream whose layout
+/// hash and values are right and whose codec and predictor are known. An announcement is untrusted bytes:
+/// nothing is allocated from a value of it before that was checked. Errors: kUnsupported (protocol version),
+/// kMalformed (a session-wide value out of range); when no stream can be played, what the first one has
+/// (kMismatch, kMalformed, kUnsupported, kInvalidArgument), with every stream's reason in the message.
+[[nodiscard]] Result<Playable> choose_stream(const transport::SessionMessage& session);
 
 }  // namespace tandem::client

@@ -13,21 +13,55 @@ bool is_positive(double value) { return std::isfinite(value) && value > 0; }
 bool is_role(Role role) { return role == Role::kObserver || role == Role::kParticipant; }
 bool is_phase(Phase phase) { return phase == Phase::kJoining || phase == Phase::kPlaying; }
 
+bool is_finite(const std::vector<float>& values) {
+  return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+}
+
+bool fits_shape(const BodyType& type) {
+  const std::size_t count = type.shape_values.size();
+  switch (type.shape) {
+    case Shape::kNone:
+    case Shape::kSphere:
+      return count == 0;
+    case Shape::kBox:
+      return count == 3;
+    case Shape::kCapsule:
+    case Shape::kCylinder:
+      return count == 2;
+    case Shape::kHull:
+      return count >= 12 && count <= kMaxHullValues && count % 3 == 0;
+  }
+  return false;
+}
+
+bool within_limits(const BodyType& type) {
+  return is_name(type.name) && std::isfinite(type.radius) && fits_shape(type) && is_finite(type.shape_values);
+}
+
+bool within_limits(const StreamMessage& stream) {
+  const Layout& layout = stream.layout;
+  return stream.max_delta_bytes <= kMaxSampleBytes && stream.max_snapshot_bytes <= kMaxSampleBytes &&
+         is_name(layout.codec) && is_name(layout.predictor) && !layout.groups.empty() &&
+         layout.groups.size() <= kMaxGroups &&
+         std::all_of(layout.groups.begin(), layout.groups.end(), is_name) &&
+         layout.radii.size() <= kMaxTypes && layout.predictor_constants.size() <= kMaxPredictorConstants &&
+         layout.codec_tables.size() <= kMaxTableBytes;
+}
+
 }  // namespace
 
 bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
-  return check_session_name(message.session).has_value() && message.layout.capacity >= 1 &&
-         message.layout.capacity <= kMaxCapacity && is_positive(message.frame_rate_hz) &&
+  return check_session_name(message.session).has_value() && message.capacity >= 1 &&
+         message.capacity <= kMaxCapacity && is_positive(message.frame_rate_hz) &&
          is_positive(message.lattice_unit) && message.window_ceiling >= 1 &&
-         message.window_ceiling <= kMaxWindowCeiling && message.max_delta_bytes <= kMaxSampleBytes &&
-         message.max_snapshot_bytes <= kMaxSampleBytes && is_name(message.layout.codec) &&
-         is_name(message.layout.predictor) && is_name(message.scene) &&
-         message.scene_description.size() <= kMaxDescriptionBytes &&
-         message.layout.predictor_constants.size() <= kMaxPredictorConstants &&
+         message.window_ceiling <= kMaxWindowCeiling && is_name(message.scene) &&
+         message.scene_description.size() <= kMaxDescriptionBytes && !message.types.empty() &&
          message.types.size() <= kMaxTypes &&
          std::all_of(message.types.begin(), message.types.end(),
-                     [](const BodyType& type) { return is_name(type.name) && std::isfinite(type.radius); }) &&
-         message.layout.codec_tables.size() <= kMaxTableBytes;
+                     [](const BodyType& type) { return within_limits(type); }) &&
+         !message.streams.empty() && message.streams.size() <= kMaxStreams &&
+         std::all_of(message.streams.begin(), message.streams.end(),
+                     [](const StreamMessage& stream) { return within_limits(stream); });
 }
 
 bool within_limits(const DeltaMessage& message, const Limits& limits) {
@@ -40,7 +74,9 @@ bool within_limits(const ScheduledInputMessage& message, const Limits& /*limits*
 }
 
 bool within_limits(const SnapshotMessage& message, const Limits& limits) {
-  return message.slot == message.frame % kSnapshotSlots && message.bytes.size() <= limits.max_snapshot_bytes;
+  return message.parts >= 1 && message.parts <= kMaxParts && message.part < message.parts &&
+         message.total_bytes <= limits.max_snapshot_bytes && !message.bytes.empty() &&
+         message.bytes.size() <= message.total_bytes;
 }
 
 bool within_limits(const ReplyMessage& message, const Limits& /*limits*/) {
@@ -54,11 +90,13 @@ bool within_limits(const InputMessage& message, const Limits& /*limits*/) {
 }
 
 bool within_limits(const AckMessage& message, const Limits& /*limits*/) {
-  return message.client != 0 && is_role(message.role_wanted) && is_phase(message.phase);
+  return message.client != 0 && is_role(message.role_wanted) && is_phase(message.phase) &&
+         message.missing.size() % 2 == 0 && message.missing.size() <= 2 * kMaxMissingRuns;
 }
 
 bool within_limits(const ServerStatusMessage& message, const Limits& /*limits*/) {
-  return check_session_name(message.session).has_value();
+  return check_session_name(message.session).has_value() && is_name(message.codec) &&
+         is_name(message.predictor);
 }
 
 bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/) {

@@ -12,18 +12,20 @@ namespace tandem::transport {
 /// No sample is larger, whatever a session declares; transports refuse it on the wire where they can.
 inline constexpr std::uint32_t kMaxSampleBytes = 64U << 20U;
 inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
-inline constexpr std::uint32_t kMaxParts = 4096;  ///< of one delta
+inline constexpr std::uint32_t kMaxParts = 4096;  ///< of one delta or snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
-inline constexpr std::size_t kMaxTypes = 65536;   ///< body types of a session (type ids have 16 bits)
+inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
+inline constexpr std::size_t kMaxHullValues = 768;
+inline constexpr std::size_t kMaxStreams = 8, kMaxGroups = 8, kMaxParameters = 64;
 inline constexpr std::size_t kMaxPredictorConstants = 1U << 20U;
 inline constexpr std::size_t kMaxDescriptionBytes = 1U << 20U;
 inline constexpr std::size_t kMaxTableBytes = 4U << 20U;  ///< codec tables
 inline constexpr std::size_t kMaxScheduledValues = 64;
 inline constexpr std::size_t kMaxInputValues = 16;
 inline constexpr std::size_t kMaxInputBytes = 1024;
-inline constexpr std::uint32_t kSnapshotSlots = 4;  ///< snapshot key: frame modulo this
+inline constexpr std::size_t kMaxMissingRuns = 32;  ///< in an acknowledgement
 
-/// What the session declares; until one is known, the fixed maximum.
+/// What the stream declares; until one is known, the fixed maximum.
 struct Limits {
   std::uint32_t max_delta_bytes = kMaxSampleBytes;
   std::uint32_t max_snapshot_bytes = kMaxSampleBytes;

@@ -25,7 +25,8 @@ enum class Reason : std::uint32_t {
   kNotPlaying = 7,     ///< the client has not finished joining
   kForeignClient = 8,  ///< the client id belongs to another DDS participant
   kProtocolVersion = 9,
-  kFull = 10,  ///< the server's client limit is reached
+  kFull = 10,      ///< the server's client limit is reached
+  kNoStream = 11,  ///< the stream or generation named is not played here
 };
 
 // After Reason, or g++ 12 warns that its enumerator shadows this.
@@ -39,33 +40,57 @@ struct ParticipantId {
   auto operator<=>(const ParticipantId&) const = default;
 };
 
+/// What a body looks like. The meaning of BodyType::shape_values depends on it: idl/PROTOCOL.md, "Fields".
+enum class Shape : std::uint32_t {
+  kNone = 0,
+  kSphere = 1,    ///< no values: the radius
+  kBox = 2,       ///< half sizes x, y, z
+  kCapsule = 3,   ///< radius, half of the length between the centres of the caps, along y
+  kCylinder = 4,  ///< radius, half of the height, along y
+  kHull = 5,      ///< convex: points x, y, z, at least four
+};
+
 struct BodyType {
   std::string name;
   float radius = 0;               ///< scene units
   std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
+  Shape shape = Shape::kNone;
+  std::vector<float> shape_values = {};  ///< scene units, in the body's frame; for drawing only
   bool operator==(const BodyType&) const = default;
+};
+
+/// One way of telling the session's world. All streams share epoch, rate, lead, lattice, slots and inputs.
+struct StreamMessage {
+  StreamId id;
+  std::uint32_t client_cost_ns = 0;      ///< of a client's predicted step and hash, per body and frame
+  std::uint32_t max_delta_bytes = 0;     ///< of a whole payload
+  std::uint32_t max_snapshot_bytes = 0;  ///< of a whole snapshot
+  std::uint64_t layout_hash = 0;         ///< see layout_hash() in port.hpp
+  /// With the session's capacity, lead and number of types. Received parameters that are not all there, or
+  /// out of range, read as CodecParameters{}, which no layout may have.
+  Layout layout;
+  bool operator==(const StreamMessage&) const = default;
 };
 
 struct SessionMessage {
   std::string session;  ///< key; no wildcard characters, 1..64 bytes of [A-Za-z0-9._-]
   Epoch epoch = 0;      ///< ms of wall clock at the server's start
   std::uint32_t protocol_version = kProtocolVersion;
-  std::uint64_t layout_hash = 0;  ///< see layout_hash() in port.hpp
-  Layout layout;                  ///< lead 0 or 1; gains are not on the wire
+  std::uint32_t capacity = 0;  ///< slots
   double frame_rate_hz = 30;
   double lattice_unit = 0;  ///< scene units per lattice unit
+  std::uint32_t lead = 1;   ///< frames a client may simulate beyond its last delta, 0 or 1
   std::uint32_t window_ceiling = 24;
-  std::uint32_t max_delta_bytes = 0;  ///< of a whole payload
-  std::uint32_t max_snapshot_bytes = 0;
-  std::uint32_t client_cost_ns = 0;  ///< client cost class: ns per body and frame on one desktop core
-  std::string scene;                 ///< name
-  std::string scene_description;     ///< the geometry as protobuf text (idl/scene.proto), for drawing
-  std::vector<BodyType> types;       ///< layout.type_count of them
+  std::string scene;              ///< name
+  std::string scene_description;  ///< the geometry as protobuf text (idl/scene.proto), for drawing
+  std::vector<BodyType> types;
+  std::vector<StreamMessage> streams;  ///< at least one; a client plays the first that it can
   bool operator==(const SessionMessage&) const = default;
 };
 
 struct DeltaMessage {
   Epoch epoch = 0;
+  StreamId stream;
   Frame frame = 0;
   std::uint32_t part = 0, parts = 1;
   std::uint64_t last_input = 0;     ///< number of the last scheduled input issued before this delta
@@ -91,9 +116,11 @@ struct ScheduledInputMessage {
 };
 
 struct SnapshotMessage {
-  std::uint32_t slot = 0;  ///< key: frame mod 4
   Epoch epoch = 0;
+  StreamId stream;
   Frame frame = 0;
+  std::uint32_t part = 0, parts = 1;
+  std::uint32_t total_bytes = 0;  ///< of all parts together
   Bytes bytes;
   bool operator==(const SnapshotMessage&) const = default;
 };
@@ -143,26 +170,33 @@ struct AckMessage {
   ClientId client = 0;  ///< key
   Epoch epoch = 0;
   std::uint32_t protocol_version = kProtocolVersion;
+  StreamId stream;  ///< played or joined
   Phase phase = Phase::kJoining;
   Frame applied = 0;
   Frame simulated = 0;
   Role role_wanted = Role::kObserver;
-  std::int64_t clock_ns = 0;       ///< the client's steady clock
-  std::uint32_t join_attempt = 0;  ///< counts this client's requests for a snapshot; a new value asks again
+  std::uint32_t join_attempt = 0;    ///< counts this client's requests for a snapshot; a new value asks again
+  std::int64_t clock_ns = 0;         ///< the client's steady clock
+  Frame snapshot_frame = 0;          ///< while joining: of the snapshot that is coming in
+  std::uint32_t snapshot_parts = 0;  ///< of how many parts it is; 0: none has come yet
+  std::vector<std::uint32_t> missing;  ///< of these, not received: runs of first part and count, ascending
   bool operator==(const AckMessage&) const = default;
 };
 
 struct ServerStatusMessage {
-  std::string session;  ///< key
+  std::string session;       ///< key
+  std::uint32_t stream = 0;  ///< key
   Epoch epoch = 0;
   Frame frame = 0;
   double uptime_s = 0, frame_rate_hz = 0, mbit_per_s = 0, raw_mbit_per_s = 0, frame_ms_p50 = 0,
          frame_ms_p99 = 0;
   double corrected_per_frame = 0;
-  std::uint32_t bodies = 0, participants = 0, observers = 0, window = 0;
-  std::uint64_t payload_bytes = 0, stalls = 0, suspended_ms = 0, refused_inputs = 0, refused_messages = 0,
-                snapshots = 0;
-  std::uint32_t queue_high_water = 0;
+  double threshold = 0;  ///< in force, scene units
+  std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0, queue_high_water = 0;
+  /// Handed to the writers since the start, once each however many readers there are.
+  std::uint64_t delta_bytes = 0, reply_bytes = 0, input_bytes = 0, snapshot_bytes = 0;
+  std::uint64_t stalls = 0, suspended_ms = 0, refused_inputs = 0, refused_messages = 0, snapshots = 0;
+  std::string codec, predictor;
   bool operator==(const ServerStatusMessage&) const = default;
 };
 
@@ -171,10 +205,12 @@ struct ClientStatusMessage {
   std::string session;
   Epoch epoch = 0;
   Frame applied = 0;
+  StreamId stream;
   std::uint32_t role = 0, phase = 0;
+  std::uint32_t too_slow = 0;  ///< 1: the median frame takes more than half a period
+  std::uint32_t queue_high_water = 0;
   double lag_ms = 0, client_ms_p50 = 0, mbit_per_s = 0;
   std::uint64_t frames_applied = 0, resyncs = 0, hash_mismatches = 0, inputs_sent = 0, inputs_refused = 0;
-  std::uint32_t queue_high_water = 0;
   bool operator==(const ClientStatusMessage&) const = default;
 };
 

@@ -37,8 +37,6 @@ class ServerPort {
   virtual Result<void> write(const SnapshotMessage&) = 0;
   virtual Result<void> write(const ReplyMessage&) = 0;
   virtual Result<void> write(const ServerStatusMessage&) = 0;
-  /// Removes all published snapshots, so that late joiners are not handed an old one.
-  virtual Result<void> dispose_snapshots() = 0;
 
   virtual void take(std::vector<Received<InputMessage>>& out) = 0;
   virtual void take(std::vector<Received<AckMessage>>& out) = 0;
@@ -65,11 +63,11 @@ class ClientPort {
   /// False when the writer of the session's announcement is gone (server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;
 
-  /// Subscribes to deltas, scheduled inputs and replies, with limits from the session. Calling it again for
-  /// another epoch drops what was buffered.
-  virtual Result<void> open_stream(const SessionMessage& session) = 0;
-  /// Subscribes to snapshots; close when one was taken.
-  virtual Result<void> open_snapshots(const SessionMessage& session) = 0;
+  /// Subscribes to the deltas of `stream`, one of the session's, to scheduled inputs and to replies, with the
+  /// stream's limits. Calling it again for another epoch or stream drops what was buffered.
+  virtual Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream) = 0;
+  /// Subscribes to the snapshots of the stream that is open; close when one was taken. No effect while open.
+  virtual Result<void> open_snapshots() = 0;
   virtual void close_snapshots() = 0;
 
   virtual void take(std::vector<Received<DeltaMessage>>& out) = 0;
@@ -90,8 +88,8 @@ class ClientPort {
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
 [[nodiscard]] Result<void> check_session_name(const std::string& name);
 
-/// Over everything of the session that decides how bytes are read, stepped and scaled: its layout, protocol
-/// version and lattice unit. A client that computes another value refuses the session.
-[[nodiscard]] std::uint64_t layout_hash(const SessionMessage& session);
+/// Over everything that decides how the bytes of a stream are read, stepped and scaled: its layout and the
+/// session's protocol version and lattice unit. A client that computes another value refuses the stream.
+[[nodiscard]] std::uint64_t layout_hash(const SessionMessage& session, const StreamMessage& stream);
 
 }  // namespace tandem::transport

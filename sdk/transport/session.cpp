@@ -25,8 +25,8 @@ Result<void> check_session_name(const std::string& name) {
   return {};
 }
 
-std::uint64_t layout_hash(const SessionMessage& session) {
-  return tandem::layout_hash(session.layout, session.protocol_version,
+std::uint64_t layout_hash(const SessionMessage& session, const StreamMessage& stream) {
+  return tandem::layout_hash(stream.layout, session.protocol_version,
                              std::bit_cast<std::uint64_t>(session.lattice_unit));
 }
 

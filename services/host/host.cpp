@@ -310,11 +310,12 @@ void Host::Impl::produce_frame() {
 }
 
 void Host::Impl::serve_joiners() {
-  if (joins.due(roster.accounts(), *port, now_ns) && push_snapshot(outbox, config.epoch, stream)) {
-    joins.served(roster.accounts(), now_ns);
-    ++totals.snapshots;
-  }
-  if (joins.dispose_due(roster.accounts()) && outbox.push(DisposeSnapshots{})) joins.disposed();
+  if (!joins.due(roster.accounts(), *port, now_ns)) return;
+  const std::size_t size_bytes = push_snapshot(outbox, config.epoch, stream);
+  if (size_bytes == 0) return;
+  joins.served(roster.accounts(), now_ns);
+  ++totals.snapshots;
+  totals.snapshot_bytes += size_bytes;
 }
 
 HostTotals Host::Impl::totals_now() const {
@@ -334,9 +335,13 @@ void Host::Impl::publish_status() {
   status.publish(totals_now(),
                  {.frame = stream.frame(),
                   .bodies = stream.bodies(),
+                  .at_rest = stream.agreed().rest_count(),
                   .participants = roster.counted(),
                   .observers = roster.watching(),
-                  .window = roster.window()},
+                  .window = roster.window(),
+                  .threshold_m = stream.threshold_m(),
+                  .codec = config.stream.layout.codec,
+                  .predictor = config.stream.layout.predictor},
                  now_ns);
 }
 

@@ -60,7 +60,7 @@ struct FrameReport {
 
 /// Counts since the start.
 struct HostTotals {
-  std::uint64_t frames = 0, payload_bytes = 0, corrected = 0;
+  std::uint64_t frames = 0, payload_bytes = 0, snapshot_bytes = 0, corrected = 0;
   std::uint64_t stalls = 0;        ///< suspensions that a participant caused
   std::uint64_t suspended_ms = 0;  ///< waiting past due, for participants or for the queue
   std::uint64_t refused_inputs = 0, refused_messages = 0, snapshots = 0, demotions = 0, clients_seen = 0;

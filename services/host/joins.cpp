@@ -1,7 +1,5 @@
 #include "services/host/joins.hpp"
 
-#include <algorithm>
-
 namespace tandem::host {
 namespace {
 
@@ -36,11 +34,6 @@ void JoinDesk::served(std::map<transport::ClientId, Account>& accounts, std::int
     known->second.join = {.served = true, .served_attempt = known->second.attempt, .served_at_ns = now_ns};
   }
   collecting_since_ns_.reset();
-  published_ = true;
-}
-
-bool JoinDesk::dispose_due(const std::map<transport::ClientId, Account>& accounts) const {
-  return published_ && std::ranges::none_of(accounts, [](const auto& entry) { return joins(entry.second); });
 }
 
 std::optional<std::int64_t> JoinDesk::due_ns() const {

@@ -4,13 +4,14 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "sdk/transport/port.hpp"
 #include "services/host/roster.hpp"
 
 namespace tandem::host {
 
-/// Decides when a snapshot is made and when the published ones are removed.
+/// Decides when a snapshot is made.
 class JoinDesk {
  public:
   static constexpr std::int64_t kCollectNs = 100'000'000;  ///< joiners of one snapshot
@@ -23,16 +24,12 @@ class JoinDesk {
                          std::int64_t now_ns);
   /// One was queued for those who were ready at the last due().
   void served(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
-  /// True when snapshots are out and nobody joins any more.
-  [[nodiscard]] bool dispose_due(const std::map<transport::ClientId, Account>& accounts) const;
-  void disposed() { published_ = false; }
   /// When the joiners collected so far get theirs.
   [[nodiscard]] std::optional<std::int64_t> due_ns() const;
 
  private:
   std::optional<std::int64_t> collecting_since_ns_;
   std::vector<transport::ClientId> ready_;
-  bool published_ = false;
 };
 
 }  // namespace tandem::host

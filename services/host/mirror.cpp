@@ -57,7 +57,7 @@ void Mirror::start(const engine::Bodies& bodies) {
     expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
     expelled_count_ += expelled_[s];
     target_.alive()[s] = shown_[s];
-    target_.generation()[s] = 0;
+    target_.reuse()[s] = 0;
     target_.type()[s] = bodies.type[s];
     generations_[s] = shown_[s];
   }
@@ -96,7 +96,7 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
   const bool reused = was && shown && (marks & kSpawned) != 0;
   if (was && (!shown || reused)) {
     lifecycle_.push_back(
-        {.kind = LifecycleKind::kDespawn, .slot = slot, .generation = 0, .type = 0, .body = {}});
+        {.kind = LifecycleKind::kDespawn, .slot = slot, .reuse = 0, .type = 0, .body = {}});
   }
   if (shown && (!was || reused)) {
     spawn(slot, type);
@@ -105,24 +105,24 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
     // then.
     lifecycle_.push_back({.kind = LifecycleKind::kTeleport,
                           .slot = slot,
-                          .generation = 0,
+                          .reuse = 0,
                           .type = 0,
                           .body = target_.body(slot)});
   } else if (shown && target_.type()[slot] != type) {
     target_.type()[slot] = type;
     lifecycle_.push_back(
-        {.kind = LifecycleKind::kTypeChange, .slot = slot, .generation = 0, .type = type, .body = {}});
+        {.kind = LifecycleKind::kTypeChange, .slot = slot, .reuse = 0, .type = type, .body = {}});
   }
 }
 
 void Mirror::spawn(Slot slot, TypeId type) {
   const std::uint8_t generation = generations_[slot]++;
   target_.alive()[slot] = 1;
-  target_.generation()[slot] = generation;
+  target_.reuse()[slot] = generation;
   target_.type()[slot] = type;
   lifecycle_.push_back({.kind = LifecycleKind::kSpawn,
                         .slot = slot,
-                        .generation = generation,
+                        .reuse = generation,
                         .type = type,
                         .body = target_.body(slot)});
 }

@@ -79,15 +79,7 @@ std::size_t Outbox::high_water() const {
 }
 
 Result<void> publish(transport::ServerPort& port, const Outgoing& message) {
-  return std::visit(
-      [&port](const auto& m) -> Result<void> {
-        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, DisposeSnapshots>) {
-          return port.dispose_snapshots();
-        } else {
-          return port.write(m);
-        }
-      },
-      message);
+  return std::visit([&port](const auto& m) { return port.write(m); }, message);
 }
 
 Result<void> drain(Outbox& outbox, transport::ServerPort& port) {

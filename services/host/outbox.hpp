@@ -14,12 +14,9 @@
 
 namespace tandem::host {
 
-/// Asks the publisher to remove all snapshots.
-struct DisposeSnapshots {};
-
-using Outgoing = std::variant<transport::SessionMessage, transport::DeltaMessage,
-                              transport::ScheduledInputMessage, transport::SnapshotMessage,
-                              transport::ReplyMessage, transport::ServerStatusMessage, DisposeSnapshots>;
+using Outgoing =
+    std::variant<transport::SessionMessage, transport::DeltaMessage, transport::ScheduledInputMessage,
+                 transport::SnapshotMessage, transport::ReplyMessage, transport::ServerStatusMessage>;
 
 /// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
 /// for one producer and one consumer.

@@ -7,20 +7,25 @@ namespace tandem::host {
 
 transport::SessionMessage session_message(const HostConfig& config, const Stream& stream) {
   const StreamConfig& of_stream = stream.config();
+  const Layout& layout = of_stream.layout;
   transport::SessionMessage session;
   session.session = config.session;
   session.epoch = config.epoch;
-  session.layout = of_stream.layout;
+  session.capacity = layout.capacity;
   session.frame_rate_hz = config.frame_rate_hz;
   session.lattice_unit = of_stream.lattice.unit;
+  session.lead = layout.lead;
   session.window_ceiling = config.window_ceiling;
-  session.max_delta_bytes = static_cast<std::uint32_t>(stream.payload_bound());
-  session.max_snapshot_bytes = static_cast<std::uint32_t>(stream.snapshot_bound());
-  session.client_cost_ns = of_stream.client_cost_ns;
   session.scene = config.scene;
   session.scene_description = config.scene_description;
   session.types = config.types;
-  session.layout_hash = transport::layout_hash(session);
+  transport::StreamMessage announced;
+  announced.client_cost_ns = of_stream.client_cost_ns;
+  announced.max_delta_bytes = static_cast<std::uint32_t>(stream.payload_bound());
+  announced.max_snapshot_bytes = static_cast<std::uint32_t>(stream.snapshot_bound());
+  announced.layout = layout;
+  announced.layout_hash = transport::layout_hash(session, announced);
+  session.streams.push_back(std::move(announced));
   return session;
 }
 
@@ -44,14 +49,15 @@ void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, s
   }
 }
 
-bool push_snapshot(Outbox& outbox, Epoch epoch, Stream& stream) {
-  if (!outbox.has_snapshot_room()) return false;
+std::size_t push_snapshot(Outbox& outbox, Epoch epoch, Stream& stream) {
+  if (!outbox.has_snapshot_room()) return 0;
   transport::SnapshotMessage message;
-  message.slot = static_cast<std::uint32_t>(stream.frame() % 4);
   message.epoch = epoch;
   message.frame = stream.frame();
   stream.snapshot(message.bytes);
-  return outbox.push(std::move(message));
+  message.total_bytes = static_cast<std::uint32_t>(message.bytes.size());
+  const std::size_t size_bytes = message.bytes.size();
+  return outbox.push(std::move(message)) ? size_bytes : 0;
 }
 
 }  // namespace tandem::host

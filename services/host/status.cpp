@@ -28,11 +28,16 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   status.frame_ms_p50 = durations_.quantile_ms(0.5);
   status.frame_ms_p99 = durations_.quantile_ms(0.99);
   status.corrected_per_frame = static_cast<double>(totals.corrected - second_.corrected) * per_frame;
+  status.threshold = present.threshold_m;
+  status.codec = present.codec;
+  status.predictor = present.predictor;
   status.bodies = present.bodies;
+  status.at_rest = present.at_rest;
   status.participants = present.participants;
   status.observers = present.observers;
   status.window = present.window;
-  status.payload_bytes = totals.payload_bytes;
+  status.delta_bytes = totals.payload_bytes;
+  status.snapshot_bytes = totals.snapshot_bytes;
   status.stalls = totals.stalls;
   status.suspended_ms = totals.suspended_ms;
   status.refused_inputs = totals.refused_inputs;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "sdk/statistics/duration_histogram.hpp"
@@ -24,7 +25,9 @@ class StatusDesk {
   /// What is so at the moment.
   struct Present {
     Frame frame = 0;
-    std::uint32_t bodies = 0, participants = 0, observers = 0, window = 0;
+    std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0;
+    double threshold_m = 0;  ///< in force
+    std::string_view codec, predictor;
   };
   /// Best effort: without room in the outbox this second's figures are lost.
   void publish(const HostTotals& totals, const Present& present, std::int64_t now_ns);

@@ -113,8 +113,11 @@ Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionC
     config.scene_description = scene.text;
     config.types.clear();
     for (const scenes::BodyType& type : scene.types) {
-      config.types.push_back(
-          {.name = type.name, .radius = static_cast<float>(type.radius_m), .colour_rgba = type.colour_rgba});
+      config.types.push_back({.name = type.name,
+                              .radius = static_cast<float>(type.radius_m),
+                              .colour_rgba = type.colour_rgba,
+                              .shape = transport::Shape::kSphere,
+                              .shape_values = {}});
     }
     return config;
   });

@@ -62,14 +62,19 @@ void CaptureFile::write(std::uint32_t type) {
 }
 
 void CaptureFile::add(const transport::SessionMessage& s) {
-  const Layout& layout = s.layout;
+  const transport::StreamMessage& stream = s.streams.front();
+  const Layout& layout = stream.layout;
   const CodecParameters& first = layout.parameters.codec;
   Fields fields(body_);
-  fields.put_text(s.session).put(s.epoch).put(s.protocol_version).put(s.layout_hash).put(layout.capacity);
+  fields.put_text(s.session)
+      .put(s.epoch)
+      .put(s.protocol_version)
+      .put(stream.layout_hash)
+      .put(layout.capacity);
   fields.put(s.frame_rate_hz).put(s.lattice_unit).put(layout.lead).put(s.window_ceiling);
-  fields.put(s.max_delta_bytes).put(s.max_snapshot_bytes).put_text(layout.codec);
+  fields.put(stream.max_delta_bytes).put(stream.max_snapshot_bytes).put_text(layout.codec);
   fields.put(first.threshold).put(first.position_step).put(first.velocity_step).put_text(layout.predictor);
-  fields.put(s.client_cost_ns).put_text(s.scene).put_text(s.scene_description);
+  fields.put(stream.client_cost_ns).put_text(s.scene).put_text(s.scene_description);
   fields.put(static_cast<std::uint32_t>(layout.predictor_constants.size()));
   for (const std::int32_t value : layout.predictor_constants) fields.put(value);
   fields.put(static_cast<std::uint32_t>(s.types.size()));

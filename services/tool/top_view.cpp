@@ -39,12 +39,17 @@ Json json_of(const transport::ServerStatusMessage& s) {
           {"participants", s.participants},
           {"observers", s.observers},
           {"window", s.window},
-          {"payload_bytes", s.payload_bytes},
+          {"delta_bytes", s.delta_bytes},
           {"stalls", s.stalls},
           {"suspended_ms", s.suspended_ms},
           {"refused_inputs", s.refused_inputs},
           {"refused_messages", s.refused_messages},
           {"snapshots", s.snapshots},
+          {"snapshot_bytes", s.snapshot_bytes},
+          {"codec", s.codec},
+          {"predictor", s.predictor},
+          {"threshold", s.threshold},
+          {"at_rest", s.at_rest},
           {"queue_high_water", s.queue_high_water}};
 }
 
@@ -105,16 +110,17 @@ std::string TopView::to_json() const {
 
 std::string TopView::to_table() const {
   if (empty()) return "no session heard of on this domain\n";
-  std::string text =
-      fmt::format("{:<20} {:>9} {:>6} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}\n", "SESSION", "FRAME", "HZ",
-                  "BODIES", "MBIT/S (OF RAW)", "CORRECTED", "FRAME MS", "CLIENTS", "WINDOW", "STALLS");
+  std::string text = fmt::format("{:<20} {:>9} {:>6} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}  {}\n",
+                                 "SESSION", "FRAME", "HZ", "BODIES", "MBIT/S (OF RAW)", "CORRECTED",
+                                 "FRAME MS", "CLIENTS", "WINDOW", "STALLS", "CODEC, PREDICTOR, THRESHOLD");
   for (const auto& [name, heard] : sessions_) {
     const transport::ServerStatusMessage& s = heard.status;
-    text +=
-        fmt::format("{:<20} {:>9} {:>6.1f} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}\n",
-                    printable(s.session), s.frame, s.frame_rate_hz, s.bodies,
-                    fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
-                    s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls);
+    text += fmt::format(
+        "{:<20} {:>9} {:>6.1f} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {}, {}, {:.3g}\n",
+        printable(s.session), s.frame, s.frame_rate_hz, s.bodies,
+        fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
+        s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls,
+        printable(s.codec), printable(s.predictor), s.threshold);
   }
   text +=
       fmt::format("\n{:<16} {:<20} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}\n", "CLIENT", "SESSION",

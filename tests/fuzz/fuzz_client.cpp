@@ -85,7 +85,8 @@ class Run {
 
   transport::SessionMessage damaged_session() {
     auto session = honest_.server.session;
-    switch (program_.u8() % 16) {
+    auto& stream = session.streams[0];
+    switch (program_.u8() % 20) {
       case 0:
         session.epoch = program_.number();
         break;
@@ -93,10 +94,10 @@ class Run {
         session.protocol_version = static_cast<std::uint32_t>(program_.number());
         break;
       case 2:
-        session.layout_hash ^= program_.number();
+        stream.layout_hash ^= program_.number();
         break;
       case 3:
-        session.layout.capacity = static_cast<std::uint32_t>(program_.number() % 4096);
+        session.capacity = stream.layout.capacity = static_cast<std::uint32_t>(program_.number() % 4096);
         break;
       case 4:
         session.frame_rate_hz = program_.real();
@@ -105,37 +106,52 @@ class Run {
         session.lattice_unit = program_.real();
         break;
       case 6:
-        session.layout.lead = static_cast<std::uint32_t>(program_.number());
+        session.lead = stream.layout.lead = static_cast<std::uint32_t>(program_.number());
         break;
       case 7:
         session.window_ceiling = static_cast<std::uint32_t>(program_.number());
         break;
       case 8:
-        session.max_delta_bytes = static_cast<std::uint32_t>(program_.number());
+        stream.max_delta_bytes = static_cast<std::uint32_t>(program_.number());
         break;
       case 9:
-        session.layout.codec = codec_names()[program_.u8() % codec_names().size()];
+        stream.layout.codec = codec_names()[program_.u8() % codec_names().size()];
         break;
       case 10:
-        session.layout.parameters.codec.threshold = program_.i32();
+        stream.layout.parameters.codec.threshold = program_.i32();
         break;
       case 11:
-        session.layout.parameters.codec.position_step = program_.i32();
+        stream.layout.parameters.codec.position_step = program_.i32();
         break;
       case 12:
-        session.layout.predictor = program_.u8() % 2 == 0 ? "nonsense" : "";
+        stream.layout.predictor = program_.u8() % 2 == 0 ? "nonsense" : "";
         break;
       case 13:
-        session.layout.predictor_constants.assign(program_.u8(), program_.i32());
+        stream.layout.predictor_constants.assign(program_.u8(), program_.i32());
         break;
       case 14:
-        session.layout.codec_tables = program_.bytes(600);
+        stream.layout.codec_tables = program_.bytes(600);
+        break;
+      case 15:
+        stream.id.id = static_cast<std::uint32_t>(program_.number());
+        break;
+      case 16:
+        stream.layout.region_blocks = static_cast<std::uint32_t>(program_.number());
+        break;
+      case 17:
+        stream.layout.groups.emplace_back(program_.u8() % 2 == 0 ? "orientation" : kPositionGroup);
+        break;
+      case 18:
+        session.streams.insert(session.streams.begin(), stream);
+        session.streams[0].layout.predictor = "nonsense";
         break;
       default:
-        session.max_snapshot_bytes = static_cast<std::uint32_t>(program_.number());
+        stream.max_snapshot_bytes = static_cast<std::uint32_t>(program_.number());
         break;
     }
-    if (program_.u8() % 2 == 0) session.layout_hash = transport::layout_hash(session);
+    if (program_.u8() % 2 == 0) {
+      for (auto& any : session.streams) any.layout_hash = transport::layout_hash(session, any);
+    }
     return session;
   }
   transport::SnapshotMessage damaged_snapshot() {

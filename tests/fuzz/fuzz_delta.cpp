@@ -22,19 +22,10 @@ struct Target {
     synthetic::Random random(1);
     before = synthetic::random_state(random, kCapacity);
     state = before;
-    held.resize(delta.codec().save_bound());
-    coder.resize(held.size());
-  }
-  /// What the codec remembers between deltas.
-  std::span<const std::byte> remembered(std::vector<std::byte>& into) const {
-    ByteWriter out(into);
-    delta.codec().save(out);
-    return std::span(into).first(out.size());
   }
   DeltaCodec delta;
   State before;
   State state;
-  std::vector<std::byte> held, coder;
 };
 
 void try_payload(std::span<const std::byte> input) {
@@ -47,7 +38,7 @@ void try_payload(std::span<const std::byte> input) {
   Target& target = targets[std::to_integer<std::size_t>(input[0]) % targets.size()];
   target.delta.restore_parameters(kParameters);
   target.state = target.before;
-  const auto held = target.remembered(target.held);
+  const auto held = synthetic::coder_state(target.delta.codec());
   if (synthetic::receive(target.delta, target.state, input.subspan(1))) {
     require(synthetic::broken_invariant(target.state) == nullptr);
     // What the delta did not touch is as it was.
@@ -59,7 +50,7 @@ void try_payload(std::span<const std::byte> input) {
   } else {
     require(target.state == target.before);
     require(target.delta.parameters() == kParameters);
-    require(std::ranges::equal(target.remembered(target.coder), held));
+    require(synthetic::coder_state(target.delta.codec()) == held);
   }
 }
 

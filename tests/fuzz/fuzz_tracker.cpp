@@ -23,10 +23,7 @@ void require(bool holds) {
 struct Side {
   Side() : delta(synthetic::make_delta("tracker", kCapacity, kParameters)), state(kCapacity) {}
   void save(std::vector<std::byte>& bytes) const {
-    bytes.resize(delta.codec().save_bound());
-    ByteWriter out(bytes);
-    delta.codec().save(out);
-    bytes.resize(out.size());
+    bytes = synthetic::coder_state(delta.codec());
   }
   DeltaCodec delta;
   State state;
@@ -42,7 +39,7 @@ class Stream {
   }
   void restart() {
     for (Side* side : {&side_, &twin_}) {
-      require(side->delta.codec().load(fresh_, start_.alive()).has_value());
+      require(synthetic::load_coder_state(side->delta.codec(), fresh_, start_.alive()).has_value());
       side->delta.restore_parameters(kParameters);
       side->state = start_;
     }
@@ -59,8 +56,8 @@ class Stream {
       const std::size_t at = in.get<std::uint16_t>();
       edited_[at % edited_.size()] = static_cast<std::byte>(in.get<std::uint8_t>());
     }
-    if (side_.delta.codec().load(edited_, side_.state.alive()))
-      require(twin_.delta.codec().load(edited_, twin_.state.alive()).has_value());
+    if (synthetic::load_coder_state(side_.delta.codec(), edited_, side_.state.alive()))
+      require(synthetic::load_coder_state(twin_.delta.codec(), edited_, twin_.state.alive()).has_value());
   }
   void end() {
     side_.save(edited_);

@@ -77,13 +77,13 @@ TEST(GoldenBytes, OfNone) {
   two.spawn(1, 0, 0, {{1, -1, 256}, {64, 0, -2}});
   State moved = two;
   moved.set_body(1, {{2, -1, 256}, {64, 0, -2}});
-  expect_bytes("none", "0380 1b000000 0000 02 02000000 ffffffff 00010000 40000000 00000000 feffffff", two,
+  expect_bytes("none", "83 1a 00 02 02000000 ffffffff 00010000 40000000 00000000 feffffff", two,
                moved);
 }
 
 TEST(GoldenBytes, OfSelective) {
   expect_bytes("selective",
-               "0380 36000000 0000 01 880000"
+               "83 35 00 01 880000"
                "4e0c0000 00000000 2bf8ffff 40000000 e8ffffff 00000000"
                "581b0000 7effffff fbffffff 40000000 c0ffffff 00000000",
                predicted(), target());
@@ -91,20 +91,20 @@ TEST(GoldenBytes, OfSelective) {
 
 TEST(GoldenBytes, OfQuantized) {
   // -2000 is beyond 127 steps of 10.
-  expect_bytes("quantized", "0380 12000000 0000 01 880000 0f0081 000200 00f300 000000", predicted(),
+  expect_bytes("quantized", "83 11 00 01 880000 0f0081 000200 00f300 000000", predicted(),
                target());
 }
 
 TEST(GoldenBytes, OfEntropy) {
-  expect_bytes("entropy", "0380 0e000000 0000 01 880000 e51fee8603a80000", predicted(), target());
+  expect_bytes("entropy", "83 0d 00 01 880000 e51fee8603a80000", predicted(), target());
 }
 
 TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger error goes.
-  expect_bytes("limited", "0380 0b000000 0000 01 080000 e51fee8600", predicted(), target(), {}, nullptr, 18);
+  expect_bytes("limited", "83 0a 00 01 080000 e51fee8600", predicted(), target(), {}, nullptr, 14);
 }
 
 TEST(GoldenBytes, OfTracker) {  // Positions alone; v and c follow from them on both sides.
-  expect_bytes("tracker", "0380 07000000 0000 2f2643e622", predicted(), target());
+  expect_bytes("tracker", "83 06 00 2f2643e622", predicted(), target());
 }
 
 TEST(GoldenBytes, OfLifecycleAndParameters) {
@@ -119,12 +119,12 @@ TEST(GoldenBytes, OfLifecycleAndParameters) {
                                              {LifecycleKind::kTypeChange, 6, 0, 1, {}}};
   const StreamParameters changed{{200, 5, 7}};
   expect_bytes("quantized",
-               "0180 49000000"
-               "02000000 00"
-               "04000000 01 09 0200 01000000 02000000 03000000 04000000 05000000 06000000"
-               "05000000 02 ffffffff feffffff fdffffff 00000000 00000000 00000000"
-               "06000000 03 0100"
-               "0280 12000000 c8000000 05000000 07000000 0000 6666 6626",
+               "81 38"
+               "08"
+               "09 09 02 01000000 02000000 03000000 04000000 05000000 06000000"
+               "06 01 ffffffff feffffff fdffffff 00000000 00000000 00000000"
+               "07 01"
+               "82 07 01 9003 02 0a 03 0e",
                predicted(), to, records, &changed);
 }
 
@@ -134,8 +134,8 @@ TEST(GoldenBytes, ThatNoEncoderOfOursWritesAreDecodedToo) {
   State state = predicted();
   const auto decoded =
       synthetic::receive(client, state,
-                         from_text("0700 03000000 aabbcc"
-                                   "0380 15000000 0000 00 0200 0300 0700 800000 000000 000000 000001"));
+                         from_text("07 03 aabbcc"
+                                   "83 14 00 00 0200 0300 0700 800000 000000 000000 000001"));
   ASSERT_TRUE(decoded) << decoded.error().message;
   State expected = predicted();
   expected.p(0)[3] -= 1280;
@@ -159,21 +159,21 @@ TEST(GoldenBytes, OfASnapshot) {
   Bytes bytes;
   server.snapshot(bytes);
   const std::string_view golden =
-      "54445350 0100 0201000000000000 0300000000000000 0100000000000000"
+      "54445350 01 0201000000000000 00000000 00000000 0300000000000000 0100000000000000"
       "00000000 80fdffff 00000000 0a00"
-      "64000000 0a000000 14000000 0000 6666 6626"
-      "164114a8e0917823"
-      "09000000 02000000 0100"
-      "0100000000000000 0500000000000000 01000000 02000000 03000000 0400"
+      "933a3916bebd5cc5 09000000"
+      "82 11 01 c801 02 14 03 28 04 00 05 cc9903 06 cc9901"
+      "84 1e 0100000000000000 0500000000000000 01000000 02000000 03000000 0400"
+      "85 43 00 40e3ab95e48141ca"
       "0201"
-      "01 05000000 40"
-      "02 00000000 20"
+      "01 05 40"
+      "02 0000 20"
+      "00 00"
       "02 ffffffff 30"
       "00 64000000"
       "01 07000000 40"
       "00 40000000  00 00000000  00 00000000"
-      "00 00000000  00 00000000  00 00000000"
-      "00000000";
+      "00 00000000  00 00000000  00 00000000";
   EXPECT_EQ(to_text(bytes), to_text(from_text(golden)));
   auto client = *ClientTimeline::create(layout);
   const auto loaded = client.load(from_text(golden), 0x0102);

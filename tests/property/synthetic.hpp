@@ -85,7 +85,7 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
                            static_cast<TypeId>(random.below(kTypes)), random_body(random)};
     if (state.alive()[slot] == 0) {
       records.push_back(record);
-      target.spawn(slot, record.generation, record.type, record.body);
+      target.spawn(slot, record.reuse, record.type, record.body);
       continue;
     }
     switch (random.below(4)) {
@@ -96,7 +96,7 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
       case 1:
         records.push_back({LifecycleKind::kDespawn, slot, 0, 0, {}});
         records.push_back(record);
-        target.spawn(slot, record.generation, record.type, record.body);
+        target.spawn(slot, record.reuse, record.type, record.body);
         break;
       case 2:
         records.push_back({LifecycleKind::kTeleport, slot, 0, 0, record.body});
@@ -142,7 +142,7 @@ inline const char* broken_invariant(const State& state) {
     if (state.alive()[slot] > 1) return "alive is neither 0 nor 1";
     if (state.type()[slot] >= kTypes) return "type that the session does not list";
     const bool dead = state.alive()[slot] == 0;
-    if (dead && (state.generation()[slot] != 0 || state.type()[slot] != 0)) return "dead slot is not zero";
+    if (dead && (state.reuse()[slot] != 0 || state.type()[slot] != 0)) return "dead slot is not zero";
     for (std::size_t i = 0; i < kPositionChannels; ++i) {
       const std::int32_t p = state.p(i)[slot];
       const std::int32_t v = state.v(i)[slot];
@@ -186,6 +186,29 @@ inline void mutate(Random& random, std::vector<std::byte>& bytes) {
       }
     }
   }
+}
+
+/// What a codec remembers: its columns, then its models.
+inline std::vector<std::byte> coder_state(const Codec& codec) {
+  const std::span<const std::byte> columns = codec.columns();
+  std::vector<std::byte> bytes(columns.begin(), columns.end());
+  bytes.resize(columns.size() + codec.models_bound());
+  ByteWriter models{std::span(bytes).subspan(columns.size())};
+  codec.save_models(models);
+  bytes.resize(columns.size() + models.size());
+  return bytes;
+}
+
+/// Loads it into a codec, as a snapshot would that knows of `alive` slots only.
+inline Result<void> load_coder_state(Codec& codec, std::span<const std::byte> bytes,
+                                     std::span<const std::uint8_t> alive) {
+  const std::size_t columns = codec.columns().size();
+  if (bytes.size() < columns) return fail(ErrorCode::kMalformed, "too short");
+  for (std::size_t at = 0; at < columns; ++at) {
+    if (bytes[at] != std::byte{0} && alive[at % alive.size()] == 0)
+      return fail(ErrorCode::kMalformed, "coder state of a dead slot");
+  }
+  return codec.load(bytes.first(columns), bytes.subspan(columns));
 }
 
 }  // namespace tandem::synthetic

@@ -42,11 +42,7 @@ State target_of(Random& random, const State& state, Mood mood, std::int32_t thre
 }
 
 Bytes saved(const DeltaCodec& codec) {
-  Bytes bytes(codec.codec().save_bound());
-  ByteWriter out(bytes);
-  codec.codec().save(out);
-  bytes.resize(out.size());
-  return bytes;
+  return synthetic::coder_state(codec.codec());
 }
 
 // Also that a decoder which loads the coder state in mid-stream goes on like one that was there from the
@@ -69,7 +65,7 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
   State joined = agreed;
   for (int frame = 0; frame < static_cast<int>(moods.size()); ++frame) {
     if (frame == joins_at) {
-      RC_ASSERT(late.codec().load(saved(client), held.alive()).has_value());
+      RC_ASSERT(synthetic::load_coder_state(late.codec(), saved(client), held.alive()).has_value());
       late.restore_parameters(client.parameters());
       joined = held;
     }

@@ -3,13 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 #include <string_view>
 
 #include "sdk/core/codec/observer.hpp"
 #include "sdk/core/lattice/bytes.hpp"
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/layout/parameters.hpp"
 #include "tandem/result.hpp"
@@ -18,10 +18,6 @@ namespace tandem {
 
 /// Budget that never binds.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
-
-/// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done. Changes no
-/// byte.
-using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
 /// A frame before its corrections, as a codec sees it.
 struct CodecFrame {
@@ -70,16 +66,18 @@ class Codec {
   /// frame, also where nothing is corrected: codecs that learn learn here.
   virtual void apply(const Corrections& corrections, State& state) = 0;
 
-  /// The codec's own per-body bytes, part of the state hash and of snapshots. Empty for the paper's codecs.
-  [[nodiscard]] virtual std::span<const std::byte> body_state() const { return {}; }
-  /// Coder state that lives across frames, as it goes into a snapshot. Nothing for the paper's codecs.
-  virtual void save(ByteWriter& /*out*/) const {}
-  /// Most bytes save() writes.
-  [[nodiscard]] virtual std::size_t save_bound() const { return 0; }
-  /// Errors: kMalformed for what save() would not write beside these slots; then nothing changed.
-  [[nodiscard]] virtual Result<void> load(std::span<const std::byte> bytes,
-                                          std::span<const std::uint8_t> /*alive*/) {
-    if (!bytes.empty()) return fail(ErrorCode::kMalformed, "this codec keeps no coder state");
+  /// The codec's own columns, part of the state hash and of snapshots: one byte a slot, one column after
+  /// another; zero for dead slots. Empty for the paper's codecs.
+  [[nodiscard]] virtual std::span<const std::byte> columns() const { return {}; }
+  /// What else lives across frames, as it goes into a snapshot. Nothing for the paper's codecs.
+  virtual void save_models(ByteWriter& /*out*/) const {}
+  /// Most bytes save_models() writes.
+  [[nodiscard]] virtual std::size_t models_bound() const { return 0; }
+  /// `columns`: as many as columns() has, zero for dead slots. Errors: kMalformed for what this codec would
+  /// not have written; then nothing changed.
+  [[nodiscard]] virtual Result<void> load(std::span<const std::byte> /*columns*/,
+                                          std::span<const std::byte> models) {
+    if (!models.empty()) return fail(ErrorCode::kMalformed, "this codec keeps no models");
     return {};
   }
 };

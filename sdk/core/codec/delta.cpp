@@ -7,43 +7,6 @@
 #include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
-namespace {
-
-Result<StreamParameters> read_parameters(std::span<const std::byte> section) {
-  ByteReader in(section);
-  const StreamParameters parameters = get_parameters(in);
-  if (!in.at_end()) return fail(ErrorCode::kMalformed, "parameters section of wrong length");
-  if (!valid_parameters(parameters.codec)) return fail(ErrorCode::kMalformed, "parameters out of range");
-  return parameters;
-}
-
-void write_section_header(SectionType type, std::size_t size_bytes, ByteWriter& out) {
-  out.put(static_cast<std::uint16_t>(type));
-  out.put(static_cast<std::uint32_t>(size_bytes));
-}
-
-}  // namespace
-
-void put_parameters(const StreamParameters& parameters, ByteWriter& out) {
-  out.put(parameters.codec.threshold);
-  out.put(parameters.codec.position_step);
-  out.put(parameters.codec.velocity_step);
-  out.put(parameters.step.decay);
-  out.put(parameters.codec.velocity_gain);
-  out.put(parameters.codec.acceleration_gain);
-}
-
-StreamParameters get_parameters(ByteReader& in) {
-  StreamParameters parameters;
-  parameters.codec.threshold = in.get<std::int32_t>();
-  parameters.codec.position_step = in.get<std::int32_t>();
-  parameters.codec.velocity_step = in.get<std::int32_t>();
-  parameters.step.decay = in.get<std::uint16_t>();
-  parameters.codec.velocity_gain = in.get<std::uint16_t>();
-  parameters.codec.acceleration_gain = in.get<std::uint16_t>();
-  return parameters;
-}
-
 struct DeltaCodec::Impl {
   std::unique_ptr<Codec> codec;
   std::uint32_t capacity = 0;
@@ -66,7 +29,7 @@ struct DeltaCodec::Impl {
     std::span<const std::uint8_t> alive;
   };
   Result<void> parse(std::span<const std::byte> payload, const State& predicted, Parsed& parsed);
-  Result<void> parse_section(std::uint16_t type, std::span<const std::byte> body, const State& predicted,
+  Result<void> parse_section(std::uint8_t type, std::span<const std::byte> body, const State& predicted,
                              Parsed& parsed);
   void list_renewed();
   void remember(const Delta& delta);
@@ -80,7 +43,7 @@ void DeltaCodec::Impl::list_renewed() {
   }
 }
 
-Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const std::byte> body,
+Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const std::byte> body,
                                              const State& predicted, Parsed& parsed) {
   const auto enter = [&parsed](int stage) {
     // Corrections may repeat (one section a block), the others may not.
@@ -101,9 +64,9 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const
     }
     case SectionType::kParameters: {
       if (!enter(2)) break;
-      const auto read = read_parameters(body);
-      if (!read) return tl::unexpected<Error>(read.error());
-      parsed.parameters = *read;
+      const auto named = read_parameters(body, parsed.parameters);
+      if (!named) return tl::unexpected<Error>(named.error());
+      if (*named == 0) return fail(ErrorCode::kMalformed, "parameters section that names none");
       return {};
     }
     case SectionType::kCorrections:
@@ -113,9 +76,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint16_t type, std::span<const
       sections.push_back(body);
       return {};
     default:
-      if ((type & kCriticalSection) == 0) return {};
-      return fail(ErrorCode::kUnsupported,
-                  "unknown critical section " + std::to_string(type & ~kCriticalSection));
+      return skip_section(type);
   }
   return fail(ErrorCode::kMalformed, "sections out of order or repeated");
 }
@@ -156,8 +117,8 @@ DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
 DeltaCodec::~DeltaCodec() = default;
 
 std::size_t DeltaCodec::bound() const {
-  return kSectionHeaderBytes + impl_->capacity * kMostLifecycleBytesPerSlot + kSectionHeaderBytes +
-         kParametersBytes + impl_->codec->bound();
+  return 2 * kMostSectionHeaderBytes + impl_->capacity * kMostLifecycleBytesPerSlot + kMostParametersBytes +
+         impl_->codec->bound();
 }
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
@@ -172,16 +133,13 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
     std::copy(state.alive().begin(), state.alive().end(), impl_->alive.begin());
     TANDEM_ASSERT(check_lifecycle(lifecycle, impl_->alive, impl_->type_count) == nullptr);
 #endif
-    const std::size_t at = writer.size();
-    write_section_header(SectionType::kLifecycle, 0, writer);
-    write_lifecycle(lifecycle, writer);
-    writer.patch_u32(at + 2, static_cast<std::uint32_t>(writer.size() - at - kSectionHeaderBytes));
+    put_section(SectionType::kLifecycle, writer, [&](ByteWriter& body) { write_lifecycle(lifecycle, body); });
     apply_lifecycle(lifecycle, state);
   }
   if (impl_->next != impl_->parameters) {
+    put_section(SectionType::kParameters, writer,
+                [&](ByteWriter& body) { write_parameters(impl_->next, &impl_->parameters, body); });
     impl_->parameters = impl_->next;
-    write_section_header(SectionType::kParameters, kParametersBytes, writer);
-    put_parameters(impl_->parameters, writer);
   }
   TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
   if (observer != nullptr) observer->frame(state, target, impl_->parameters.codec);
@@ -214,11 +172,9 @@ Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const S
                                      Parsed& parsed) {
   ByteReader in(payload);
   while (in.remaining() > 0) {
-    const auto type = in.get<std::uint16_t>();
-    const auto size_bytes = in.get<std::uint32_t>();
-    const std::span<const std::byte> body = in.get_bytes(size_bytes);
-    if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated section");
-    if (auto section = parse_section(type, body, predicted, parsed); !section) return section;
+    const auto section = next_section(in);
+    if (!section) return tl::unexpected<Error>(section.error());
+    if (auto good = parse_section(section->type, section->body, predicted, parsed); !good) return good;
   }
   return {};
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/layout/sections.hpp"
 
 namespace tandem {
 
@@ -17,27 +18,10 @@ enum class LifecycleKind : std::uint8_t { kDespawn = 0, kSpawn = 1, kTeleport = 
 struct LifecycleRecord {
   LifecycleKind kind = LifecycleKind::kDespawn;
   Slot slot = 0;
-  std::uint8_t generation = 0;  ///< spawn only
-  TypeId type = 0;              ///< spawn and type change
-  BodyState body;               ///< spawn and teleport
+  std::uint8_t reuse = 0;  ///< spawn only
+  TypeId type = 0;         ///< spawn and type change
+  BodyState body;          ///< spawn and teleport
 };
-
-/// Section types. A reader that does not know a type refuses the delta if the critical bit is set, else skips
-/// it.
-inline constexpr std::uint16_t kCriticalSection = 0x8000;
-enum class SectionType : std::uint16_t {
-  kLifecycle = 1 | kCriticalSection,
-  kParameters = 2 | kCriticalSection,
-  kCorrections = 3 | kCriticalSection,
-};
-/// u16 type, u32 length of the body, body.
-inline constexpr std::size_t kSectionHeaderBytes = 6;
-
-/// StreamParameters as they stand in a delta and in a snapshot.
-inline constexpr std::size_t kParametersBytes = 18;
-void put_parameters(const StreamParameters& parameters, ByteWriter& out);
-/// Checks nothing.
-[[nodiscard]] StreamParameters get_parameters(ByteReader& in);
 
 /// What a payload says. Spans stay valid until the next encode() or decode() of the codec that read it.
 struct Delta {

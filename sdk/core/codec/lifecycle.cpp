@@ -8,6 +8,11 @@ bool within(const Vec3i& values, std::int32_t limit) {
                      [limit](std::int32_t x) { return -limit <= x && x <= limit; });
 }
 
+constexpr std::uint32_t kKinds = 4;
+constexpr std::size_t kMostHeadBytes = 4;
+constexpr std::size_t kMostTypeBytes = 3;
+constexpr std::uint8_t kPositionMask = 1;  // position is the first group listed, and the only one
+
 bool carries_body(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport;
 }
@@ -23,9 +28,9 @@ const char* check_lifecycle(std::span<const LifecycleRecord> records, std::span<
   for (const LifecycleRecord& record : records) {
     if (record.slot >= alive.size()) return "lifecycle record of a slot beyond the capacity";
     if (previous != nullptr && record.slot <= previous->slot) {
-      const bool reuse = record.slot == previous->slot && previous->kind == LifecycleKind::kDespawn &&
-                         record.kind == LifecycleKind::kSpawn;
-      if (!reuse) return "lifecycle records do not ascend";
+      const bool reused = record.slot == previous->slot && previous->kind == LifecycleKind::kDespawn &&
+                          record.kind == LifecycleKind::kSpawn;
+      if (!reused) return "lifecycle records do not ascend";
     }
     previous = &record;
     if (record.kind == LifecycleKind::kSpawn) {
@@ -45,11 +50,13 @@ const char* check_lifecycle(std::span<const LifecycleRecord> records, std::span<
 }
 
 void write_lifecycle(std::span<const LifecycleRecord> records, ByteWriter& out) {
+  Slot previous = 0;
   for (const LifecycleRecord& record : records) {
-    out.put(record.slot);
-    out.put(static_cast<std::uint8_t>(record.kind));
-    if (record.kind == LifecycleKind::kSpawn) out.put(record.generation);
-    if (carries_type(record.kind)) out.put(record.type);
+    out.put_leb128(std::uint64_t{record.slot - previous} * kKinds + static_cast<std::uint8_t>(record.kind));
+    previous = record.slot;
+    if (record.kind == LifecycleKind::kSpawn) out.put(record.reuse);
+    if (carries_type(record.kind)) out.put_leb128(record.type);
+    if (record.kind == LifecycleKind::kTeleport) out.put(kPositionMask);
     if (!carries_body(record.kind)) continue;
     for (const std::int32_t value : record.body.p) out.put(value);
     for (const std::int32_t value : record.body.v) out.put(value);
@@ -60,23 +67,32 @@ Result<void> read_lifecycle(std::span<const std::byte> section, std::vector<Life
   records.clear();
   if (section.empty()) return fail(ErrorCode::kMalformed, "lifecycle section without a record");
   ByteReader in(section);
+  std::uint64_t slot = 0;
   while (in.ok() && in.remaining() > 0) {
+    const std::uint64_t head = in.get_leb128(kMostHeadBytes);
+    slot += head / kKinds;
+    if (slot >= kMaxCapacity)
+      return fail(ErrorCode::kMalformed, "lifecycle record of a slot beyond the capacity");
     LifecycleRecord record;
-    record.slot = in.get<std::uint32_t>();
-    const auto kind = in.get<std::uint8_t>();
-    if (kind > static_cast<std::uint8_t>(LifecycleKind::kTypeChange)) {
-      return fail(ErrorCode::kMalformed, "unknown kind of lifecycle record");
+    record.slot = static_cast<Slot>(slot);
+    record.kind = static_cast<LifecycleKind>(head % kKinds);
+    if (record.kind == LifecycleKind::kSpawn) record.reuse = in.get<std::uint8_t>();
+    if (carries_type(record.kind)) {
+      const std::uint64_t type = in.get_leb128(kMostTypeBytes);
+      if (type > UINT16_MAX) return fail(ErrorCode::kMalformed, "type that the session does not list");
+      record.type = static_cast<TypeId>(type);
     }
-    record.kind = static_cast<LifecycleKind>(kind);
-    if (record.kind == LifecycleKind::kSpawn) record.generation = in.get<std::uint8_t>();
-    if (carries_type(record.kind)) record.type = in.get<TypeId>();
+    if (record.kind == LifecycleKind::kTeleport && in.get<std::uint8_t>() != kPositionMask && in.ok()) {
+      return fail(ErrorCode::kMalformed, "teleport of groups that the stream does not list");
+    }
     if (carries_body(record.kind)) {
       for (std::int32_t& value : record.body.p) value = in.get<std::int32_t>();
       for (std::int32_t& value : record.body.v) value = in.get<std::int32_t>();
     }
     records.push_back(record);
   }
-  if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated lifecycle record");
+  if (!in.ok())
+    return fail(ErrorCode::kMalformed, "lifecycle record that is truncated or not in shortest form");
   return {};
 }
 
@@ -87,7 +103,7 @@ void apply_lifecycle(std::span<const LifecycleRecord> records, State& state) {
         state.despawn(record.slot);
         break;
       case LifecycleKind::kSpawn:
-        state.spawn(record.slot, record.generation, record.type, record.body);
+        state.spawn(record.slot, record.reuse, record.type, record.body);
         break;
       case LifecycleKind::kTeleport:
         state.set_body(record.slot, record.body);

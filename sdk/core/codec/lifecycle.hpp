@@ -11,7 +11,7 @@
 namespace tandem {
 
 /// Despawn and spawn of one slot: the most that a slot can cost.
-inline constexpr std::size_t kMostLifecycleBytesPerSlot = 5 + 32;
+inline constexpr std::size_t kMostLifecycleBytesPerSlot = 4 + 4 + 1 + 3 + 24;
 
 /// Why `records` break the rules (order, alive and dead slots, ranges) on top of the `alive` column; null if
 /// they do not. Leaves in `alive` the column after the records.

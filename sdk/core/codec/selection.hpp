@@ -25,9 +25,6 @@ struct Block {
 };
 [[nodiscard]] Block block_at(std::uint32_t index, std::uint32_t capacity);
 
-/// u16 block, u8 form; selection and values follow.
-inline constexpr std::size_t kBlockHeaderBytes = 3;
-
 /// Form with the fewest bytes; `chosen` of the block's `alive` slots are selected.
 [[nodiscard]] SelectionForm smallest_form(std::uint32_t slots, std::uint32_t chosen, std::uint32_t alive);
 [[nodiscard]] std::size_t selection_bytes(SelectionForm form, std::uint32_t slots, std::uint32_t chosen);

@@ -10,6 +10,21 @@
 
 namespace tandem {
 
+/// Bytes that `value` takes as LEB128 of the shortest form.
+[[nodiscard]] constexpr std::size_t leb128_bytes(std::uint64_t value) {
+  std::size_t bytes = 1;
+  while ((value >>= 7U) != 0) ++bytes;
+  return bytes;
+}
+
+/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
+[[nodiscard]] constexpr std::uint32_t zigzag(std::int32_t value) {
+  return (static_cast<std::uint32_t>(value) << 1U) ^ static_cast<std::uint32_t>(value >> 31);
+}
+[[nodiscard]] constexpr std::int32_t from_zigzag(std::uint32_t value) {
+  return static_cast<std::int32_t>((value >> 1U) ^ (0U - (value & 1U)));
+}
+
 /// Appends to caller memory. Writing past the end sets `overflow()` and drops the bytes.
 class ByteWriter {
  public:
@@ -29,6 +44,22 @@ class ByteWriter {
     if (!reserve(bytes.size())) return;
     std::copy(bytes.begin(), bytes.end(), out_.begin() + static_cast<std::ptrdiff_t>(size_));
     size_ += bytes.size();
+  }
+  /// Seven bits a byte, lowest first; bit 7 set in all but the last.
+  void put_leb128(std::uint64_t value) {
+    for (; value >= 0x80U; value >>= 7U) put(static_cast<std::uint8_t>(value | 0x80U));
+    put(static_cast<std::uint8_t>(value));
+  }
+  /// Puts, as LEB128, the number of bytes written since size() was `at` before them.
+  void put_length_before(std::size_t at) {
+    const std::size_t length = size_ - at;
+    const std::size_t header = leb128_bytes(length);
+    if (!reserve(header)) return;
+    const auto begin = out_.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto end = out_.begin() + static_cast<std::ptrdiff_t>(size_);
+    std::copy_backward(begin, end, end + static_cast<std::ptrdiff_t>(header));
+    ByteWriter(out_.subspan(at, header)).put_leb128(length);
+    size_ += header;
   }
   /// Overwrites four bytes written before, as for a length known only afterwards.
   void patch_u32(std::size_t at, std::uint32_t value) {
@@ -67,6 +98,21 @@ class ByteReader {
     }
     at_ += sizeof(T);
     return static_cast<T>(static_cast<std::make_unsigned_t<T>>(bits));
+  }
+  /// LEB128 of the shortest form and at most `most_bytes` (at most 9); anything else reads as zero and clears
+  /// ok().
+  [[nodiscard]] std::uint64_t get_leb128(std::size_t most_bytes) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < most_bytes; ++i) {
+      const std::uint64_t byte = get<std::uint8_t>();
+      value |= (byte & 0x7FU) << (7U * i);
+      if (byte < 0x80U) {
+        if (ok_ && (byte != 0 || i == 0)) return value;
+        break;
+      }
+    }
+    ok_ = false;
+    return 0;
   }
   [[nodiscard]] std::span<const std::byte> get_bytes(std::size_t count) {
     if (!available(count)) return {};

@@ -1,6 +1,9 @@
 #include "sdk/core/lattice/hash.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <functional>
+#include <vector>
 
 #include "sdk/core/lattice/hash_avx2.hpp"
 
@@ -23,12 +26,43 @@ Update fastest_update() {
 }  // namespace
 
 struct StateHasher::Impl {
-  XXH3_state_t* state = XXH3_createState();
+  using Working = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
+  static constexpr std::size_t kLeaves = 2;  // of a block: what all groups share, and the position group
+
+  // The part of a column, or of several one after another, that belongs to a block.
+  void add(XXH3_state_t* h, const auto& column, Slot first, std::uint32_t slots) const {
+    const auto part = column.subspan(first, slots);
+    update(h, part.data(), part.size_bytes());
+  }
+  void add_all(XXH3_state_t* h, std::span<const std::byte> columns, const State& state, Slot first,
+               std::uint32_t slots) const {
+    for (std::size_t at = 0; at < columns.size(); at += state.capacity())
+      add(h, columns.subspan(at, state.capacity()), first, slots);
+  }
+
+  void hash_block(const State& state, const ExtraColumns& extra, std::uint32_t block) {
+    const Slot first = block * kBlockSlots;
+    const std::uint32_t slots = std::min(kBlockSlots, state.capacity() - first);
+    XXH3_state_t* const h = working[block].get();
+    XXH3_64bits_reset(h);
+    add(h, state.alive(), first, slots);
+    add(h, state.reuse(), first, slots);
+    add(h, state.type(), first, slots);
+    add(h, state.rest(), first, slots);
+    add_all(h, extra.codec, state, first, slots);
+    add_all(h, extra.predictor, state, first, slots);
+    leaves[block * kLeaves] = XXH3_64bits_digest(h);
+    XXH3_64bits_reset(h);
+    for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.p(i), first, slots);
+    for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.v(i), first, slots);
+    for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.c(i), first, slots);
+    leaves[block * kLeaves + 1] = XXH3_64bits_digest(h);
+  }
+
   Update update = fastest_update();
-  Impl() = default;
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-  ~Impl() { XXH3_freeState(state); }
+  std::vector<Working> working;  // by block
+  std::vector<std::uint64_t> leaves;
+  std::uint64_t region_hash = 0;
 };
 
 StateHasher::StateHasher() : impl_(std::make_unique<Impl>()) {}
@@ -36,24 +70,22 @@ StateHasher::StateHasher(StateHasher&&) noexcept = default;
 StateHasher& StateHasher::operator=(StateHasher&&) noexcept = default;
 StateHasher::~StateHasher() = default;
 
-// One stream over all columns, not a hash of hashes: XXH3 takes 64 bytes at a time whatever the columns'
-// ends, and columns of a capacity are of fixed length, so nothing has to stand between them. A change of
-// order or width breaks every client: idl/PROTOCOL.md, "State hash".
-std::uint64_t StateHasher::hash(const State& state, std::span<const std::byte> codec_state) {
-  XXH3_state_t* const h = impl_->state;
-  XXH3_64bits_reset(h);
-  const auto add = [h, update = impl_->update](const auto& column) {
-    update(h, column.data(), column.size_bytes());
-  };
-  add(state.alive());
-  add(state.generation());
-  add(state.type());
-  for (std::size_t i = 0; i < kPositionChannels; ++i) add(state.p(i));
-  for (std::size_t i = 0; i < kPositionChannels; ++i) add(state.v(i));
-  for (std::size_t i = 0; i < kPositionChannels; ++i) add(state.c(i));
-  if (!codec_state.empty()) add(codec_state);
-  return XXH3_64bits_digest(h);
+std::uint64_t StateHasher::hash(const State& state, const ExtraColumns& extra, const RunBlocks& run) {
+  Impl& m = *impl_;
+  const std::uint32_t blocks = block_count(state.capacity());
+  while (m.working.size() < blocks) m.working.emplace_back(XXH3_createState(), &XXH3_freeState);
+  m.leaves.resize(blocks * Impl::kLeaves);
+  if (blocks > 1 && run) {
+    const auto all = [&](std::uint32_t block) { m.hash_block(state, extra, block); };
+    run(blocks, std::ref(all));  // by reference: a copy would be allocated
+  } else {
+    for (std::uint32_t block = 0; block < blocks; ++block) m.hash_block(state, extra, block);
+  }
+  m.region_hash = hash_bytes(std::as_bytes(std::span(m.leaves)));
+  return hash_bytes(std::as_bytes(std::span(&m.region_hash, 1)));
 }
+
+std::uint64_t StateHasher::region_hash() const { return impl_->region_hash; }
 
 std::uint64_t hash_bytes(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 

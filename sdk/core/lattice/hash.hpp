@@ -6,12 +6,19 @@
 #include <span>
 #include <string>
 
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem {
 
-/// Hashes columns one after another, little-endian. Keeps its working memory, so hashing allocates nothing.
-/// Not thread-safe; one per thread.
+/// Columns beside the state's own: one byte a slot, one column after another. Part of hash and snapshot.
+struct ExtraColumns {
+  std::span<const std::byte> codec;
+  std::span<const std::byte> predictor;
+};
+
+/// Hashes block by block, so that blocks can be hashed side by side: idl/PROTOCOL.md, "State hash". Keeps its
+/// working memory, so only the first call for more blocks than ever before allocates. Not thread-safe.
 class StateHasher {
  public:
   StateHasher();
@@ -21,9 +28,11 @@ class StateHasher {
   StateHasher& operator=(const StateHasher&) = delete;
   ~StateHasher();
 
-  /// Columns in this order, each over all slots: alive (u8), generation (u8), type (u16), p x, y, z, v x, y,
-  /// z, c x, y, z (i32), then `codec_state`, the codec's per-body bytes (empty for the paper's codecs).
-  [[nodiscard]] std::uint64_t hash(const State& state, std::span<const std::byte> codec_state = {});
+  /// Of a state with one region. `run` changes no bit of the result.
+  [[nodiscard]] std::uint64_t hash(const State& state, const ExtraColumns& extra = {},
+                                   const RunBlocks& run = {});
+  /// Of that region, as the last hash() found it.
+  [[nodiscard]] std::uint64_t region_hash() const;
 
  private:
   struct Impl;

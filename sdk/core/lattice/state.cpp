@@ -4,7 +4,7 @@
 
 namespace tandem {
 
-State::State(std::uint32_t capacity) : alive_(capacity), generation_(capacity), type_(capacity) {
+State::State(std::uint32_t capacity) : alive_(capacity), reuse_(capacity), type_(capacity), rest_(capacity) {
   for (auto* columns : {&p_, &v_, &c_}) {
     for (auto& column : *columns) column.assign(capacity, 0);
   }
@@ -20,6 +20,7 @@ BodyState State::body(Slot slot) const {
 }
 
 void State::set_body(Slot slot, const BodyState& body) {
+  rest_[slot] = 0;
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     p_[i][slot] = std::clamp(body.p[i], -kPositionLimit, kPositionLimit);
     v_[i][slot] = std::clamp(body.v[i], -kVelocityLimit, kVelocityLimit);
@@ -27,9 +28,9 @@ void State::set_body(Slot slot, const BodyState& body) {
   }
 }
 
-void State::spawn(Slot slot, std::uint8_t generation, TypeId type, const BodyState& body) {
+void State::spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& body) {
   alive_[slot] = 1;
-  generation_[slot] = generation;
+  reuse_[slot] = reuse;
   type_[slot] = type;
   set_body(slot, body);
 }
@@ -37,12 +38,16 @@ void State::spawn(Slot slot, std::uint8_t generation, TypeId type, const BodySta
 void State::despawn(Slot slot) {
   set_body(slot, BodyState{});
   alive_[slot] = 0;
-  generation_[slot] = 0;
+  reuse_[slot] = 0;
   type_[slot] = 0;
 }
 
 std::uint32_t State::alive_count() const {
   return static_cast<std::uint32_t>(std::count(alive_.begin(), alive_.end(), std::uint8_t{1}));
+}
+
+std::uint32_t State::rest_count() const {
+  return static_cast<std::uint32_t>(std::count(rest_.begin(), rest_.end(), std::uint8_t{1}));
 }
 
 }  // namespace tandem

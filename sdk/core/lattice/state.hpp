@@ -36,8 +36,9 @@ struct BodyState {
 
 /// Structure of arrays over `capacity` slots. Invariant: every column of a dead slot is zero.
 ///
-/// Columns: alive (0 or 1), generation (counts reuse of the slot, wraps), type, and per position channel
-/// p (lattice units), v (1/64 unit per frame) and c (1/64 unit per frame^2).
+/// Columns: alive (0 or 1), reuse (counts the bodies a slot has held, wraps), type, rest (1: does not move
+/// until it is corrected or the drive changes), and per position channel p (lattice units), v (1/64 unit per
+/// frame) and c (1/64 unit per frame^2).
 /// Copying between equal capacities does not allocate. Not thread-safe; distinct objects are independent.
 class State {
  public:
@@ -49,10 +50,12 @@ class State {
 
   std::span<std::uint8_t> alive() { return alive_; }
   [[nodiscard]] std::span<const std::uint8_t> alive() const { return alive_; }
-  std::span<std::uint8_t> generation() { return generation_; }
-  [[nodiscard]] std::span<const std::uint8_t> generation() const { return generation_; }
+  std::span<std::uint8_t> reuse() { return reuse_; }
+  [[nodiscard]] std::span<const std::uint8_t> reuse() const { return reuse_; }
   std::span<TypeId> type() { return type_; }
   [[nodiscard]] std::span<const TypeId> type() const { return type_; }
+  std::span<std::uint8_t> rest() { return rest_; }
+  [[nodiscard]] std::span<const std::uint8_t> rest() const { return rest_; }
   std::span<std::int32_t> p(std::size_t channel) { return p_[channel]; }
   [[nodiscard]] std::span<const std::int32_t> p(std::size_t channel) const { return p_[channel]; }
   std::span<std::int32_t> v(std::size_t channel) { return v_[channel]; }
@@ -61,20 +64,22 @@ class State {
   [[nodiscard]] std::span<const std::int32_t> c(std::size_t channel) const { return c_[channel]; }
 
   [[nodiscard]] BodyState body(Slot slot) const;
-  /// Sets p and v, clamped to their limits, and c = 0. The slot's alive bit is left as it is.
+  /// Sets p and v, clamped to their limits, c = 0 and rest = 0. The slot's alive bit is left as it is.
   void set_body(Slot slot, const BodyState& body);
-  /// Brings a slot to life with c = 0.
-  void spawn(Slot slot, std::uint8_t generation, TypeId type, const BodyState& body);
+  /// Brings a slot to life with c = 0 and rest = 0.
+  void spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& body);
   /// Kills a slot and zeroes all of its columns.
   void despawn(Slot slot);
   [[nodiscard]] std::uint32_t alive_count() const;
+  [[nodiscard]] std::uint32_t rest_count() const;
 
   friend bool operator==(const State&, const State&) = default;
 
  private:
   std::vector<std::uint8_t> alive_;
-  std::vector<std::uint8_t> generation_;
+  std::vector<std::uint8_t> reuse_;
   std::vector<TypeId> type_;
+  std::vector<std::uint8_t> rest_;
   std::array<std::vector<std::int32_t>, kPositionChannels> p_, v_, c_;
 };
 

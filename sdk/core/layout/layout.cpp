@@ -11,28 +11,45 @@ Result<void> check_layout(const Layout& layout) {
                   std::to_string(kMaxCapacity));
   }
   if (layout.type_count == 0) return refuse("a session has at least one type");
-  if (!valid_parameters(layout.parameters.codec)) return refuse("codec parameters out of range");
+  if (!valid_parameters(layout.parameters.codec)) return refuse("parameters unknown or out of range");
   if (layout.lead > kMaxLead)
     return refuse("lead " + std::to_string(layout.lead) + " is above " + std::to_string(kMaxLead));
+  if (layout.region_blocks != 0) return fail(ErrorCode::kUnsupported, "several regions are not supported");
+  for (const std::string& group : layout.groups) {
+    if (group != kPositionGroup)
+      return fail(ErrorCode::kUnsupported, "unknown channel group '" + group + "'");
+  }
+  if (layout.groups.size() != 1) return refuse("channel groups that are none or repeat");
+  if (!layout.radii.empty()) return refuse("radii that no channel group needs");
   return {};
 }
 
 std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
                           std::uint64_t lattice_unit_bits) {
   // A text, so that a client in any language can build the same bytes.
-  const CodecParameters& first = layout.parameters.codec;
   std::string text = "tandem-layout " + std::to_string(protocol_version);
+  const auto append = [&text](const auto& values) {
+    for (const std::int32_t value : values) text += ' ' + std::to_string(value);
+  };
   text += "\ncapacity " + std::to_string(layout.capacity);
+  text += "\ntypes " + std::to_string(layout.type_count);
   text += "\nlattice_unit " + to_hex(lattice_unit_bits);
   text += "\nlead " + std::to_string(layout.lead);
+  text += "\nregion_blocks " + std::to_string(layout.region_blocks);
+  text += "\ngroups";
+  for (const std::string& group : layout.groups) text += ' ' + group;
+  text += "\nradii";
+  append(layout.radii);
   text += "\ncodec " + layout.codec;
   text += "\ncodec_tables " + to_hex(hash_bytes(layout.codec_tables));
-  text += "\nparameters " + std::to_string(first.threshold) + ' ' + std::to_string(first.position_step) +
-          ' ' + std::to_string(first.velocity_step);
   text += "\npredictor " + layout.predictor;
   text += "\npredictor_constants";
-  for (const std::int32_t constant : layout.predictor_constants) text += ' ' + std::to_string(constant);
-  text += "\ntypes " + std::to_string(layout.type_count) + '\n';
+  append(layout.predictor_constants);
+  text += "\nparameters";
+  for (const auto& [id, value] : list_parameters(layout.parameters)) {
+    text += ' ' + std::to_string(id) + '=' + std::to_string(value);
+  }
+  text += '\n';
   return hash_bytes(std::as_bytes(std::span(text)));
 }
 

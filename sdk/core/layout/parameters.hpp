@@ -2,9 +2,14 @@
 // What may change between frames: each delta that changes something says so. Two types, for two readers who
 // start to read at different frames.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
+#include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/state.hpp"
+#include "tandem/result.hpp"
 
 namespace tandem {
 
@@ -41,5 +46,41 @@ inline constexpr std::int32_t kMaxStep = 1 << 24;
   return in(parameters.threshold, kPositionLimit) && in(parameters.position_step, kMaxStep) &&
          in(parameters.velocity_step, kMaxStep);
 }
+
+/// As they are named in sessions, deltas and snapshots: idl/PROTOCOL.md, "Parameters".
+enum class ParameterId : std::uint8_t {
+  kThreshold = 1,
+  kPositionStep = 2,
+  kVelocityStep = 3,
+  kDecay = 4,
+  kVelocityGain = 5,
+  kAccelerationGain = 6,
+};
+inline constexpr std::uint32_t kParameterCount = 6;
+inline constexpr std::size_t kMostParameterValueBytes = 5;
+/// Most bytes that write_parameters() writes.
+inline constexpr std::size_t kMostParametersBytes = kParameterCount * (1 + kMostParameterValueBytes);
+
+[[nodiscard]] std::int32_t parameter(const StreamParameters& values, ParameterId id);
+/// Errors: kUnsupported (unknown id), kMalformed (out of range); then nothing changed.
+[[nodiscard]] Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int32_t value);
+
+struct Parameter {
+  std::uint32_t id = 0;
+  std::int32_t value = 0;
+  friend bool operator==(const Parameter&, const Parameter&) = default;
+};
+/// All of them, ascending by id, as a session lists them.
+[[nodiscard]] std::array<Parameter, kParameterCount> list_parameters(const StreamParameters& values);
+/// From such a list, untrusted. Errors: kMalformed (out of order, repeated, missing, out of range),
+/// kUnsupported (unknown id).
+[[nodiscard]] Result<StreamParameters> parameters_from(std::span<const Parameter> list);
+
+/// Writes those of `values` that differ from what is in force; all of them where `in_force` is null.
+void write_parameters(const StreamParameters& values, const StreamParameters* in_force, ByteWriter& out);
+/// Reads untrusted bytes into `values`, those that are named. Returns how many were. Errors: kMalformed,
+/// kUnsupported (unknown id); then `values` is as before.
+[[nodiscard]] Result<std::uint32_t> read_parameters(std::span<const std::byte> section,
+                                                    StreamParameters& values);
 
 }  // namespace tandem

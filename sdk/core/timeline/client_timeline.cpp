@@ -59,7 +59,6 @@ struct ClientTimeline::Impl {
   Frame now = 0;
   bool playing = false;
   InputSchedule inputs;
-  StateHasher hasher;
   std::uint64_t hash = 0;
   Timings timings;
   Stopwatch::Clock clock = nullptr;
@@ -83,15 +82,16 @@ ClientTimeline::ClientTimeline(ClientTimeline&&) noexcept = default;
 ClientTimeline& ClientTimeline::operator=(ClientTimeline&&) noexcept = default;
 ClientTimeline::~ClientTimeline() = default;
 
-Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epoch) {
+Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epoch, StreamId stream) {
   Impl& m = *impl_;
   m.playing = false;
   State& state = m.ring[0].state;
   const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
-  const std::uint64_t hash = m.hasher.hash(state, m.parts.delta.codec().body_state());
-  if (hash != read->hash) {
+  if (read->stream != stream) return fail(ErrorCode::kOutOfOrder, "snapshot of another stream");
+  const std::uint64_t hash = m.parts.hash(state);
+  if (hash != read->hash || m.parts.hasher.region_hash() != read->region_hash) {
     return fail(ErrorCode::kMismatch,
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
   }
@@ -143,7 +143,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.now = std::max(m.now, frame);
   m.inputs.forget(frame);
   m.timings.decode_ns = watch.lap_ns();
-  m.hash = m.hasher.hash(state, m.parts.delta.codec().body_state());
+  m.hash = m.parts.hash(state);
   m.resimulate();
   m.timings.apply_ns = watch.lap_ns();
   if (m.hash != hash) {

@@ -14,7 +14,8 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
                            .run_blocks = local.run_blocks});
   if (!codec) return tl::unexpected<Error>(codec.error());
   return TimelineParts{std::move(predictor),
-                       DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count)};
+                       DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count),
+                       local.run_blocks, StateHasher()};
 }
 
 }  // namespace tandem

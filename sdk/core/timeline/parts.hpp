@@ -10,6 +10,13 @@ namespace tandem {
 struct TimelineParts {
   std::unique_ptr<Predictor> predictor;
   DeltaCodec delta;
+  RunBlocks run_blocks;
+  StateHasher hasher;
+
+  /// Of a state right after the delta codec was through with it. No predictor has columns of its own yet.
+  [[nodiscard]] std::uint64_t hash(const State& state) {
+    return hasher.hash(state, {.codec = delta.codec().columns(), .predictor = {}}, run_blocks);
+  }
 };
 
 /// Checks `layout` and makes its codec. Errors: kUnsupported, kMalformed, kInvalidArgument.

@@ -10,35 +10,40 @@
 namespace tandem {
 
 struct ServerTimeline::Impl {
-  Impl(TimelineParts made, std::uint32_t capacity, Epoch the_epoch)
-      : parts(std::move(made)), epoch(the_epoch), state(capacity), payload(parts.delta.bound()) {
-    hash = hasher.hash(state, parts.delta.codec().body_state());
+  Impl(TimelineParts made, std::uint32_t capacity, Epoch the_epoch, StreamId the_stream)
+      : parts(std::move(made)),
+        epoch(the_epoch),
+        stream(the_stream),
+        state(capacity),
+        payload(parts.delta.bound()) {
+    hash = parts.hash(state);
   }
 
   TimelineParts parts;
   Epoch epoch;
+  StreamId stream;
   Frame frame = 0;
   State state;
   Drive drive;
   InputSchedule inputs;
-  StateHasher hasher;
   std::uint64_t hash = 0;
   std::vector<std::byte> payload;
   Stopwatch::Clock clock = nullptr;
 };
 
-Result<ServerTimeline> ServerTimeline::create(const Layout& layout, Epoch epoch, const LocalOptions& local) {
+Result<ServerTimeline> ServerTimeline::create(const Layout& layout, Epoch epoch, const LocalOptions& local,
+                                              StreamId stream) {
   auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
   if (!predictor) return tl::unexpected<Error>(predictor.error());
-  return create(layout, epoch, std::move(*predictor), local);
+  return create(layout, epoch, std::move(*predictor), local, stream);
 }
 
 Result<ServerTimeline> ServerTimeline::create(const Layout& layout, Epoch epoch,
-                                              std::unique_ptr<Predictor> predictor,
-                                              const LocalOptions& local) {
+                                              std::unique_ptr<Predictor> predictor, const LocalOptions& local,
+                                              StreamId stream) {
   auto parts = make_parts(layout, local, std::move(predictor));
   if (!parts) return tl::unexpected<Error>(parts.error());
-  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), layout.capacity, epoch));
+  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), layout.capacity, epoch, stream));
 }
 
 ServerTimeline::ServerTimeline(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -52,7 +57,7 @@ void ServerTimeline::start(Frame frame, const State& state, const Drive& drive) 
   impl_->state = state;
   impl_->drive = drive;
   impl_->inputs.reset(0, {});
-  impl_->hash = impl_->hasher.hash(impl_->state, impl_->parts.delta.codec().body_state());
+  impl_->hash = impl_->parts.hash(impl_->state);
 }
 
 Result<void> ServerTimeline::schedule(const ScheduledDrive& input) {
@@ -79,7 +84,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   const DeltaCodec::Encoded encoded =
       m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer);
   result.encode_ns = watch.lap_ns();
-  m.hash = m.hasher.hash(m.state, m.parts.delta.codec().body_state());
+  m.hash = m.parts.hash(m.state);
   result.hash_ns = watch.lap_ns();
   result.frame = m.frame;
   result.last_input = m.inputs.held_to();
@@ -104,13 +109,15 @@ std::size_t ServerTimeline::payload_bound() const { return impl_->parts.delta.bo
 
 void ServerTimeline::snapshot(std::vector<std::byte>& out) {
   const auto pending = impl_->inputs.pending();
-  const Snapshot snapshot{impl_->epoch,
-                          impl_->frame,
-                          impl_->inputs.held_to(),
-                          impl_->drive,
-                          impl_->parts.delta.parameters(),
-                          impl_->hash,
-                          {pending.begin(), pending.end()}};
+  const Snapshot snapshot{.epoch = impl_->epoch,
+                          .stream = impl_->stream,
+                          .frame = impl_->frame,
+                          .last_input = impl_->inputs.held_to(),
+                          .drive = impl_->drive,
+                          .parameters = impl_->parts.delta.parameters(),
+                          .hash = impl_->hash,
+                          .region_hash = impl_->parts.hasher.region_hash(),
+                          .pending = {pending.begin(), pending.end()}};
   out.resize(snapshot_bound());
   ByteWriter writer(out);
   write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), writer);
@@ -119,7 +126,7 @@ void ServerTimeline::snapshot(std::vector<std::byte>& out) {
 }
 
 std::size_t ServerTimeline::snapshot_bound() const {
-  return snapshot_bytes_bound(impl_->state.capacity(), impl_->parts.delta.codec().save_bound());
+  return snapshot_bytes_bound(impl_->state.capacity(), impl_->parts.delta.codec());
 }
 
 }  // namespace tandem

@@ -13,22 +13,24 @@ namespace tandem {
 /// One cut right after delta `frame`.
 struct Snapshot {
   Epoch epoch = 0;
+  StreamId stream;
   Frame frame = 0;
   std::uint64_t last_input = 0;
   Drive drive;
   StreamParameters parameters;
-  std::uint64_t hash = 0;
+  std::uint64_t hash = 0;               ///< of the state
+  std::uint64_t region_hash = 0;        ///< of region 0
   std::vector<ScheduledDrive> pending;  ///< ascending by number, all <= last_input, frames beyond `frame`
 };
 
-/// Most bytes write_snapshot() writes. `coder_bytes`: most bytes of the codec's state.
-[[nodiscard]] std::size_t snapshot_bytes_bound(std::uint32_t capacity, std::size_t coder_bytes);
+/// Most bytes write_snapshot() writes.
+[[nodiscard]] std::size_t snapshot_bytes_bound(std::uint32_t capacity, const Codec& codec);
 
 /// Writes `snapshot`, `state` and the codec's state.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out);
 
 /// Reads untrusted bytes: fills `state` (whose capacity must match) and loads `codec`. Checks every range;
-/// the hash is the caller's to check. On error `state` and `codec` hold anything. Errors: kMalformed,
+/// the hashes are the caller's to check. On error `state` and `codec` hold anything. Errors: kMalformed,
 /// kUnsupported (version).
 [[nodiscard]] Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count,
                                              State& state, Codec& codec);

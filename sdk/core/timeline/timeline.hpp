@@ -35,10 +35,12 @@ inline constexpr std::size_t kMaxPendingInputs = 256;
 class ServerTimeline {
  public:
   /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
-  static Result<ServerTimeline> create(const Layout& layout, Epoch epoch, const LocalOptions& local = {});
+  static Result<ServerTimeline> create(const Layout& layout, Epoch epoch, const LocalOptions& local = {},
+                                       StreamId stream = {});
   /// With a predictor of the caller's own; the one that `layout` names is not looked at.
   static Result<ServerTimeline> create(const Layout& layout, Epoch epoch,
-                                       std::unique_ptr<Predictor> predictor, const LocalOptions& local = {});
+                                       std::unique_ptr<Predictor> predictor, const LocalOptions& local = {},
+                                       StreamId stream = {});
   ServerTimeline(ServerTimeline&&) noexcept;
   ServerTimeline& operator=(ServerTimeline&&) noexcept;
   ServerTimeline(const ServerTimeline&) = delete;
@@ -101,9 +103,9 @@ class ClientTimeline {
   ClientTimeline& operator=(const ClientTimeline&) = delete;
   ~ClientTimeline();
 
-  /// Starts over from a snapshot. Errors: kMalformed, kOutOfOrder (another epoch), kMismatch (its own hash);
-  /// on error the timeline holds nothing (`playing()` is false).
-  [[nodiscard]] Result<void> load(std::span<const std::byte> snapshot, Epoch epoch);
+  /// Starts over from a snapshot. Errors: kMalformed, kOutOfOrder (another epoch or stream), kMismatch (its
+  /// own hash); on error the timeline holds nothing (`playing()` is false).
+  [[nodiscard]] Result<void> load(std::span<const std::byte> snapshot, Epoch epoch, StreamId stream = {});
   [[nodiscard]] bool playing() const;
 
   /// Scheduled inputs in any order, after load(); duplicates and numbers the snapshot already counts are

@@ -36,8 +36,8 @@ class DdsClientPort final : public ClientPort {
     return epoch_ ? book.epoch_live(*epoch_) : book.any_live();
   }
 
-  Result<void> open_stream(const SessionMessage& session) override {
-    limits_ = Limits{session.max_delta_bytes, session.max_snapshot_bytes};
+  Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream) override {
+    limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     if (stream_ && epoch_ == session.epoch) return {};
     // New readers, because the old ones may already have been handed scheduled inputs of the new epoch, which
     // are sent once to each reader.
@@ -53,9 +53,8 @@ class DdsClientPort final : public ClientPort {
     stream_.emplace(Stream{std::move(*delta), std::move(*scheduled), std::move(*reply)});
     return {};
   }
-  Result<void> open_snapshots(const SessionMessage& session) override {
-    limits_.max_snapshot_bytes = session.max_snapshot_bytes;
-    snapshots_.reset();  // a reader that stayed open would not be handed what the writer holds
+  Result<void> open_snapshots() override {
+    if (snapshots_) return {};
     auto reader = endpoints_.node.reader<SnapshotMessage>("snapshots");
     if (!reader) return tl::unexpected(reader.error());
     snapshots_.emplace(std::move(*reader));

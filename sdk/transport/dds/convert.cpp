@@ -27,37 +27,100 @@ std::vector<Element> to_vector(const Sequence& sequence) {
   return std::vector<Element>(first, first + sequence._length);
 }
 
+std::vector<char*> lend_each(const std::vector<std::string>& texts) {
+  std::vector<char*> lent;
+  lent.reserve(texts.size());
+  for (const std::string& text : texts) lent.push_back(lend(text));
+  return lent;
+}
+
+// Keeps what a stream's struct points to.
+struct LentStream {
+  explicit LentStream(const StreamMessage& stream) : groups(lend_each(stream.layout.groups)) {
+    for (const auto& [id, value] : list_parameters(stream.layout.parameters)) {
+      parameters.push_back(tandem_Parameter{id, value});
+    }
+  }
+  std::vector<char*> groups;
+  std::vector<tandem_Parameter> parameters;
+};
+
+tandem_SessionStream to_wire(const StreamMessage& stream, const LentStream& lent) {
+  const Layout& layout = stream.layout;
+  tandem_SessionStream wire{};
+  wire.id = stream.id.id;
+  wire.generation = stream.id.generation;
+  wire.region_blocks = layout.region_blocks;
+  wire.client_cost_ns = stream.client_cost_ns;
+  wire.max_delta_bytes = stream.max_delta_bytes;
+  wire.max_snapshot_bytes = stream.max_snapshot_bytes;
+  wire.layout_hash = stream.layout_hash;
+  wire.codec = lend(layout.codec);
+  wire.predictor = lend(layout.predictor);
+  lend(wire.groups, lent.groups);
+  lend(wire.radii, layout.radii);
+  lend(wire.parameters, lent.parameters);
+  lend(wire.predictor_constants, layout.predictor_constants);
+  lend(wire.codec_tables, layout.codec_tables);
+  return wire;
+}
+
+StreamMessage to_stream(const tandem_SessionStream& wire) {
+  StreamMessage stream;
+  stream.id = {wire.id, wire.generation};
+  stream.client_cost_ns = wire.client_cost_ns;
+  stream.max_delta_bytes = wire.max_delta_bytes;
+  stream.max_snapshot_bytes = wire.max_snapshot_bytes;
+  stream.layout_hash = wire.layout_hash;
+  Layout& layout = stream.layout;
+  layout.region_blocks = wire.region_blocks;
+  layout.codec = to_string(wire.codec);
+  layout.predictor = to_string(wire.predictor);
+  layout.groups.clear();
+  for (std::uint32_t i = 0; i < wire.groups._length; ++i) {
+    layout.groups.push_back(to_string(wire.groups._buffer[i]));
+  }
+  layout.radii = to_vector<std::int32_t>(wire.radii);
+  std::vector<Parameter> parameters;
+  for (std::uint32_t i = 0; i < wire.parameters._length; ++i) {
+    parameters.push_back(Parameter{wire.parameters._buffer[i].id, wire.parameters._buffer[i].value});
+  }
+  layout.parameters = parameters_from(parameters).value_or(StreamParameters{});
+  layout.predictor_constants = to_vector<std::int32_t>(wire.predictor_constants);
+  layout.codec_tables = to_vector<std::byte>(wire.codec_tables);
+  return stream;
+}
+
 }  // namespace
 
 dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
   std::vector<tandem_BodyType> types;
   types.reserve(message.types.size());
   for (const BodyType& type : message.types) {
-    types.push_back(tandem_BodyType{type.radius, type.colour_rgba, lend(type.name)});
+    tandem_BodyType wire_type{};
+    wire_type.radius = type.radius;
+    wire_type.colour_rgba = type.colour_rgba;
+    wire_type.shape = static_cast<std::uint32_t>(type.shape);
+    wire_type.name = lend(type.name);
+    lend(wire_type.shape_values, type.shape_values);
+    types.push_back(wire_type);
   }
+  const std::vector<LentStream> lent(message.streams.begin(), message.streams.end());
+  std::vector<tandem_SessionStream> streams;
+  for (std::size_t i = 0; i < lent.size(); ++i) streams.push_back(to_wire(message.streams[i], lent[i]));
   tandem_TandemSession wire{};
   wire.epoch = message.epoch;
   wire.protocol_version = message.protocol_version;
-  wire.capacity = message.layout.capacity;
-  wire.layout_hash = message.layout_hash;
+  wire.capacity = message.capacity;
   wire.frame_rate_hz = message.frame_rate_hz;
   wire.lattice_unit = message.lattice_unit;
-  wire.lead = message.layout.lead;
+  wire.lead = message.lead;
   wire.window_ceiling = message.window_ceiling;
-  wire.max_delta_bytes = message.max_delta_bytes;
-  wire.max_snapshot_bytes = message.max_snapshot_bytes;
-  wire.threshold = message.layout.parameters.codec.threshold;
-  wire.position_step = message.layout.parameters.codec.position_step;
-  wire.velocity_step = message.layout.parameters.codec.velocity_step;
-  wire.client_cost_ns = message.client_cost_ns;
   wire.session = lend(message.session);
-  wire.codec = lend(message.layout.codec);
-  wire.predictor = lend(message.layout.predictor);
   wire.scene = lend(message.scene);
   wire.scene_description = lend(message.scene_description);
-  lend(wire.predictor_constants, message.layout.predictor_constants);
   lend(wire.types, types);
-  lend(wire.codec_tables, message.layout.codec_tables);
+  lend(wire.streams, streams);
   return dds_write(writer, &wire);
 }
 
@@ -65,37 +128,35 @@ SessionMessage to_message(const tandem_TandemSession& wire) {
   SessionMessage message;
   message.epoch = wire.epoch;
   message.protocol_version = wire.protocol_version;
-  message.layout.capacity = wire.capacity;
-  message.layout_hash = wire.layout_hash;
+  message.capacity = wire.capacity;
   message.frame_rate_hz = wire.frame_rate_hz;
   message.lattice_unit = wire.lattice_unit;
-  message.layout.lead = wire.lead;
+  message.lead = wire.lead;
   message.window_ceiling = wire.window_ceiling;
-  message.max_delta_bytes = wire.max_delta_bytes;
-  message.max_snapshot_bytes = wire.max_snapshot_bytes;
-  message.layout.parameters.codec.threshold = wire.threshold;
-  message.layout.parameters.codec.position_step = wire.position_step;
-  message.layout.parameters.codec.velocity_step = wire.velocity_step;
-  message.client_cost_ns = wire.client_cost_ns;
   message.session = to_string(wire.session);
-  message.layout.codec = to_string(wire.codec);
-  message.layout.predictor = to_string(wire.predictor);
   message.scene = to_string(wire.scene);
   message.scene_description = to_string(wire.scene_description);
-  message.layout.predictor_constants = to_vector<std::int32_t>(wire.predictor_constants);
-  message.layout.type_count = static_cast<TypeId>(wire.types._length);
   message.types.reserve(wire.types._length);
   for (std::uint32_t i = 0; i < wire.types._length; ++i) {
     const tandem_BodyType& type = wire.types._buffer[i];
-    message.types.push_back(BodyType{to_string(type.name), type.radius, type.colour_rgba});
+    message.types.push_back(BodyType{to_string(type.name), type.radius, type.colour_rgba,
+                                     static_cast<Shape>(type.shape), to_vector<float>(type.shape_values)});
   }
-  message.layout.codec_tables = to_vector<std::byte>(wire.codec_tables);
+  for (std::uint32_t i = 0; i < wire.streams._length; ++i) {
+    StreamMessage stream = to_stream(wire.streams._buffer[i]);
+    stream.layout.capacity = message.capacity;
+    stream.layout.lead = message.lead;
+    stream.layout.type_count = static_cast<TypeId>(message.types.size());
+    message.streams.push_back(std::move(stream));
+  }
   return message;
 }
 
 dds_return_t write_sample(dds_entity_t writer, const DeltaMessage& message) {
   tandem_TandemDelta wire{};
   wire.epoch = message.epoch;
+  wire.stream = message.stream.id;
+  wire.generation = message.stream.generation;
   wire.frame = message.frame;
   wire.part = message.part;
   wire.parts = message.parts;
@@ -109,6 +170,7 @@ dds_return_t write_sample(dds_entity_t writer, const DeltaMessage& message) {
 DeltaMessage to_message(const tandem_TandemDelta& wire) {
   DeltaMessage message;
   message.epoch = wire.epoch;
+  message.stream = {wire.stream, wire.generation};
   message.frame = wire.frame;
   message.part = wire.part;
   message.parts = wire.parts;
@@ -145,18 +207,25 @@ ScheduledInputMessage to_message(const tandem_TandemScheduledInput& wire) {
 
 dds_return_t write_sample(dds_entity_t writer, const SnapshotMessage& message) {
   tandem_TandemSnapshot wire{};
-  wire.slot = message.slot;
   wire.epoch = message.epoch;
+  wire.stream = message.stream.id;
+  wire.generation = message.stream.generation;
   wire.frame = message.frame;
+  wire.part = message.part;
+  wire.parts = message.parts;
+  wire.total_bytes = message.total_bytes;
   lend(wire.bytes, message.bytes);
   return dds_write(writer, &wire);
 }
 
 SnapshotMessage to_message(const tandem_TandemSnapshot& wire) {
   SnapshotMessage message;
-  message.slot = wire.slot;
   message.epoch = wire.epoch;
+  message.stream = {wire.stream, wire.generation};
   message.frame = wire.frame;
+  message.part = wire.part;
+  message.parts = wire.parts;
+  message.total_bytes = wire.total_bytes;
   message.bytes = to_vector<std::byte>(wire.bytes);
   return message;
 }
@@ -227,12 +296,17 @@ dds_return_t write_sample(dds_entity_t writer, const AckMessage& message) {
   wire.client = message.client;
   wire.epoch = message.epoch;
   wire.protocol_version = message.protocol_version;
+  wire.stream = message.stream.id;
+  wire.generation = message.stream.generation;
   wire.phase = static_cast<std::uint32_t>(message.phase);
   wire.applied = message.applied;
   wire.simulated = message.simulated;
   wire.role_wanted = static_cast<std::uint32_t>(message.role_wanted);
   wire.join_attempt = message.join_attempt;
   wire.clock_ns = message.clock_ns;
+  wire.snapshot_frame = message.snapshot_frame;
+  wire.snapshot_parts = message.snapshot_parts;
+  lend(wire.missing, message.missing);
   return dds_write(writer, &wire);
 }
 
@@ -241,12 +315,16 @@ AckMessage to_message(const tandem_TandemAck& wire) {
   message.client = wire.client;
   message.epoch = wire.epoch;
   message.protocol_version = wire.protocol_version;
+  message.stream = {wire.stream, wire.generation};
   message.phase = static_cast<Phase>(wire.phase);
   message.applied = wire.applied;
   message.simulated = wire.simulated;
   message.role_wanted = static_cast<Role>(wire.role_wanted);
   message.join_attempt = wire.join_attempt;
   message.clock_ns = wire.clock_ns;
+  message.snapshot_frame = wire.snapshot_frame;
+  message.snapshot_parts = wire.snapshot_parts;
+  message.missing = to_vector<std::uint32_t>(wire.missing);
   return message;
 }
 
@@ -261,18 +339,26 @@ dds_return_t write_sample(dds_entity_t writer, const ServerStatusMessage& messag
   wire.frame_ms_p50 = message.frame_ms_p50;
   wire.frame_ms_p99 = message.frame_ms_p99;
   wire.corrected_per_frame = message.corrected_per_frame;
+  wire.threshold = message.threshold;
   wire.bodies = message.bodies;
+  wire.at_rest = message.at_rest;
   wire.participants = message.participants;
   wire.observers = message.observers;
   wire.window = message.window;
-  wire.payload_bytes = message.payload_bytes;
+  wire.queue_high_water = message.queue_high_water;
+  wire.delta_bytes = message.delta_bytes;
+  wire.reply_bytes = message.reply_bytes;
+  wire.input_bytes = message.input_bytes;
+  wire.snapshot_bytes = message.snapshot_bytes;
   wire.stalls = message.stalls;
   wire.suspended_ms = message.suspended_ms;
   wire.refused_inputs = message.refused_inputs;
   wire.refused_messages = message.refused_messages;
   wire.snapshots = message.snapshots;
-  wire.queue_high_water = message.queue_high_water;
+  wire.stream = message.stream;
   wire.session = lend(message.session);
+  wire.codec = lend(message.codec);
+  wire.predictor = lend(message.predictor);
   return dds_write(writer, &wire);
 }
 
@@ -287,18 +373,26 @@ ServerStatusMessage to_message(const tandem_TandemServerStatus& wire) {
   message.frame_ms_p50 = wire.frame_ms_p50;
   message.frame_ms_p99 = wire.frame_ms_p99;
   message.corrected_per_frame = wire.corrected_per_frame;
+  message.threshold = wire.threshold;
   message.bodies = wire.bodies;
+  message.at_rest = wire.at_rest;
   message.participants = wire.participants;
   message.observers = wire.observers;
   message.window = wire.window;
-  message.payload_bytes = wire.payload_bytes;
+  message.queue_high_water = wire.queue_high_water;
+  message.delta_bytes = wire.delta_bytes;
+  message.reply_bytes = wire.reply_bytes;
+  message.input_bytes = wire.input_bytes;
+  message.snapshot_bytes = wire.snapshot_bytes;
   message.stalls = wire.stalls;
   message.suspended_ms = wire.suspended_ms;
   message.refused_inputs = wire.refused_inputs;
   message.refused_messages = wire.refused_messages;
   message.snapshots = wire.snapshots;
-  message.queue_high_water = wire.queue_high_water;
+  message.stream = wire.stream;
   message.session = to_string(wire.session);
+  message.codec = to_string(wire.codec);
+  message.predictor = to_string(wire.predictor);
   return message;
 }
 
@@ -307,8 +401,12 @@ dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& messag
   wire.client = message.client;
   wire.epoch = message.epoch;
   wire.applied = message.applied;
+  wire.stream = message.stream.id;
+  wire.generation = message.stream.generation;
   wire.role = message.role;
   wire.phase = message.phase;
+  wire.too_slow = message.too_slow;
+  wire.queue_high_water = message.queue_high_water;
   wire.lag_ms = message.lag_ms;
   wire.client_ms_p50 = message.client_ms_p50;
   wire.mbit_per_s = message.mbit_per_s;
@@ -317,7 +415,6 @@ dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& messag
   wire.hash_mismatches = message.hash_mismatches;
   wire.inputs_sent = message.inputs_sent;
   wire.inputs_refused = message.inputs_refused;
-  wire.queue_high_water = message.queue_high_water;
   wire.session = lend(message.session);
   return dds_write(writer, &wire);
 }
@@ -327,8 +424,11 @@ ClientStatusMessage to_message(const tandem_TandemClientStatus& wire) {
   message.client = wire.client;
   message.epoch = wire.epoch;
   message.applied = wire.applied;
+  message.stream = {wire.stream, wire.generation};
   message.role = wire.role;
   message.phase = wire.phase;
+  message.too_slow = wire.too_slow;
+  message.queue_high_water = wire.queue_high_water;
   message.lag_ms = wire.lag_ms;
   message.client_ms_p50 = wire.client_ms_p50;
   message.mbit_per_s = wire.mbit_per_s;
@@ -337,7 +437,6 @@ ClientStatusMessage to_message(const tandem_TandemClientStatus& wire) {
   message.hash_mismatches = wire.hash_mismatches;
   message.inputs_sent = wire.inputs_sent;
   message.inputs_refused = wire.inputs_refused;
-  message.queue_high_water = wire.queue_high_water;
   message.session = to_string(wire.session);
   return message;
 }

@@ -1,4 +1,3 @@
-#include <array>
 #include <utility>
 
 #include "sdk/transport/dds/announcements.hpp"
@@ -40,26 +39,9 @@ class DdsServerPort final : public ServerPort {
   Result<void> write(const ScheduledInputMessage& message) override {
     return endpoints_.scheduled.write(message);
   }
-  Result<void> write(const SnapshotMessage& message) override {
-    if (message.slot >= kSnapshotSlots) return fail(ErrorCode::kInvalidArgument, "snapshot slots are 0 to 3");
-    published_[message.slot] = true;
-    return endpoints_.snapshot.write(message);
-  }
+  Result<void> write(const SnapshotMessage& message) override { return endpoints_.snapshot.write(message); }
   Result<void> write(const ReplyMessage& message) override { return endpoints_.reply.write(message); }
   Result<void> write(const ServerStatusMessage& message) override { return endpoints_.status.write(message); }
-
-  Result<void> dispose_snapshots() override {
-    for (std::uint32_t slot = 0; slot < kSnapshotSlots; ++slot) {
-      if (!published_[slot]) continue;
-      tandem_TandemSnapshot key{};
-      key.slot = slot;
-      if (const auto code = dds_dispose(endpoints_.snapshot.get(), &key); code != DDS_RETCODE_OK) {
-        return dds::dds_failure("disposing of a snapshot", code);
-      }
-      published_[slot] = false;
-    }
-    return {};
-  }
 
   void take(std::vector<Received<InputMessage>>& out) override {
     endpoints_.input.take(limits_, dropped_, out);
@@ -101,7 +83,6 @@ class DdsServerPort final : public ServerPort {
   Endpoints endpoints_;
   std::string session_;
   Limits limits_;
-  std::array<bool, kSnapshotSlots> published_{};
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 

@@ -48,7 +48,7 @@ struct Topic<SnapshotMessage> {
   using Wire = tandem_TandemSnapshot;
   static constexpr const char* kName = "TandemSnapshot";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
-  static constexpr TopicQos kQos{true, true, 1, 1};
+  static constexpr TopicQos kQos{true, false, 64, 1200};
 };
 template <>
 struct Topic<ReplyMessage> {

@@ -15,7 +15,7 @@ constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
     {true, true},    // session
     {true, false},   // delta
     {true, true},    // scheduled input
-    {true, true},    // snapshot
+    {true, false},   // snapshot
     {true, true},    // reply
     {true, false},   // input
     {true, false},   // acknowledgement
@@ -29,7 +29,11 @@ constexpr std::size_t kOverheadBytes = 150;
 struct PayloadBytes {
   std::size_t operator()(const DeltaMessage& m) const { return m.payload.size(); }
   std::size_t operator()(const SnapshotMessage& m) const { return m.bytes.size(); }
-  std::size_t operator()(const SessionMessage& m) const { return m.layout.codec_tables.size(); }
+  std::size_t operator()(const SessionMessage& m) const {
+    std::size_t bytes = 0;
+    for (const StreamMessage& stream : m.streams) bytes += stream.layout.codec_tables.size();
+    return bytes;
+  }
   std::size_t operator()(const InputMessage& m) const { return 8 * m.values.size() + m.bytes.size(); }
   std::size_t operator()(const ReplyMessage& m) const { return 20 * m.entries.size(); }
   template <class Small>
@@ -160,8 +164,6 @@ Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) 
   }
   return {};
 }
-
-void Fabric::forget_history(Index writer) { writers_[writer].history.clear(); }
 
 std::optional<std::int64_t> Fabric::squeeze_ns(const LinkModel& model, const AnyMessage& message) const {
   if (!model.bottleneck) return 0;

@@ -54,8 +54,6 @@ class Fabric {
   void close_reader(Index reader);
   void close_participant(Index participant);
   [[nodiscard]] Result<void> write(Index writer, std::uint64_t key, AnyMessage message);
-  /// Drops what a writer keeps for late readers and repairs.
-  void forget_history(Index writer);
   /// Calls `sink(participant, message)` for all that arrived.
   template <class Sink>
   void take(Index reader, Sink&& sink) {

@@ -13,6 +13,8 @@ namespace {
 constexpr std::uint32_t kSessionReaderDepth = 8;
 constexpr std::uint32_t kScheduledDepth = 256;
 constexpr std::uint32_t kInputDepth = 64;
+constexpr std::uint32_t kSnapshotWriterDepth = 64;
+constexpr std::uint32_t kSnapshotReaderDepth = 1200;
 
 /// What both kinds of port share: a participant and its samples.
 class Member {
@@ -80,7 +82,7 @@ class SimulatedServerPort final : public ServerPort {
         session_(member_.writer<SessionMessage>()),
         delta_(member_.writer<DeltaMessage>(delta_depth)),
         scheduled_(member_.writer<ScheduledInputMessage>(kScheduledDepth)),
-        snapshot_(member_.writer<SnapshotMessage>()),
+        snapshot_(member_.writer<SnapshotMessage>(kSnapshotWriterDepth)),
         reply_(member_.writer<ReplyMessage>()),
         status_(member_.writer<ServerStatusMessage>()),
         others_(member_.reader<SessionMessage>(kSessionReaderDepth)),
@@ -102,18 +104,13 @@ class SimulatedServerPort final : public ServerPort {
     return member_.fabric().write(scheduled_, 0, message);
   }
   Result<void> write(const SnapshotMessage& message) override {
-    if (message.slot >= kSnapshotSlots) return fail(ErrorCode::kInvalidArgument, "snapshot slots are 0 to 3");
-    return member_.fabric().write(snapshot_, message.slot, message);
+    return member_.fabric().write(snapshot_, 0, message);
   }
   Result<void> write(const ReplyMessage& message) override {
     return member_.fabric().write(reply_, message.client, message);
   }
   Result<void> write(const ServerStatusMessage& message) override {
     return member_.fabric().write(status_, 0, message);
-  }
-  Result<void> dispose_snapshots() override {
-    member_.fabric().forget_history(snapshot_);
-    return {};
   }
   void take(std::vector<Received<InputMessage>>& out) override { member_.take(input_, Limits{}, out); }
   void take(std::vector<Received<AckMessage>>& out) override { member_.take(ack_, Limits{}, out); }
@@ -154,8 +151,8 @@ class SimulatedClientPort final : public ClientPort {
     member_.refresh(sessions_, book_);
     return stream_ ? book_.epoch_live(stream_->epoch) : book_.any_live();
   }
-  Result<void> open_stream(const SessionMessage& session) override {
-    limits_ = Limits{session.max_delta_bytes, session.max_snapshot_bytes};
+  Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream) override {
+    limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     if (stream_ && stream_->epoch == session.epoch) return {};
     if (stream_) {
       for (const Fabric::Index reader : {stream_->delta, stream_->scheduled, stream_->reply}) {
@@ -166,10 +163,8 @@ class SimulatedClientPort final : public ClientPort {
                      member_.reader<ScheduledInputMessage>(kScheduledDepth), member_.reader<ReplyMessage>()};
     return {};
   }
-  Result<void> open_snapshots(const SessionMessage& session) override {
-    limits_.max_snapshot_bytes = session.max_snapshot_bytes;
-    close_snapshots();
-    snapshots_ = member_.reader<SnapshotMessage>();
+  Result<void> open_snapshots() override {
+    if (!snapshots_) snapshots_ = member_.reader<SnapshotMessage>(kSnapshotReaderDepth);
     return {};
   }
   void close_snapshots() override {

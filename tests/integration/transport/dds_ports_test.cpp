@@ -38,8 +38,8 @@ class DdsPorts : public ::testing::Test {
   SessionMessage join(ServerPort& server, ClientPort& client) {
     const SessionMessage session = a_session(options_.session, kEpoch);
     EXPECT_TRUE(server.write(session));
-    EXPECT_TRUE(client.open_stream(session));
-    EXPECT_TRUE(client.open_snapshots(session));
+    EXPECT_TRUE(client.open_stream(session, session.streams[0]));
+    EXPECT_TRUE(client.open_snapshots());
     EXPECT_TRUE(eventually([&] { return server.joined(client.self()) && server.alive(client.self()); }));
     return session;
   }
@@ -174,7 +174,7 @@ TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
   EXPECT_EQ(sessions.at(0).message.session, options_.session);
 }
 
-TEST_F(DdsPorts, ALateJoinerGetsSessionScheduledInputsAndSnapshotButNoOldDeltas) {
+TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapshots) {
   const auto server = this->server();
   const SessionMessage session = a_session(options_.session, kEpoch);
   ASSERT_TRUE(server->write(session));
@@ -186,13 +186,14 @@ TEST_F(DdsPorts, ALateJoinerGetsSessionScheduledInputsAndSnapshotButNoOldDeltas)
 
   const auto client = this->client();
   EXPECT_EQ(receive_sessions(*client)[0].message, session);
-  ASSERT_TRUE(client->open_stream(session));
-  ASSERT_TRUE(client->open_snapshots(session));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_snapshots());
   const auto scheduled = receive<ScheduledInputMessage>(*client, 256);
   ASSERT_EQ(scheduled.size(), 256U) << "keep-last 256";
   for (std::size_t i = 0; i < 256; ++i) EXPECT_EQ(scheduled[i].message.number, 45 + i);
-  EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message.frame, 20U);
   ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
+  ASSERT_TRUE(server->write(a_snapshot(kEpoch, 21)));
+  EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message.frame, 21U);
   ASSERT_TRUE(server->write(a_delta(kEpoch, 21)));
   EXPECT_EQ(receive<DeltaMessage>(*client, 1)[0].message.frame, 21U);
 }
@@ -207,23 +208,6 @@ TEST_F(DdsPorts, EveryDeltaWrittenAfterJoinedArrives) {
     ASSERT_EQ(deltas.size(), 30U);
     for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(deltas[i].message.frame, i + 1);
   }
-}
-
-TEST_F(DdsPorts, ADisposedSnapshotIsNotDelivered) {
-  const auto server = this->server();
-  const SessionMessage session = a_session(options_.session, kEpoch);
-  ASSERT_TRUE(server->write(session));
-  for (Frame frame = 1; frame <= 4; ++frame) ASSERT_TRUE(server->write(a_snapshot(kEpoch, frame)));
-  ASSERT_TRUE(server->dispose_snapshots());
-  ASSERT_TRUE(server->dispose_snapshots()) << "twice is harmless";
-  const auto client = this->client();
-  ASSERT_TRUE(client->open_stream(session));
-  ASSERT_TRUE(client->open_snapshots(session));
-  ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
-  ASSERT_TRUE(server->write(a_snapshot(kEpoch, 9)));
-  const auto snapshots = receive<SnapshotMessage>(*client, 1);
-  ASSERT_EQ(snapshots.size(), 1U);
-  EXPECT_EQ(snapshots[0].message.frame, 9U);
 }
 
 TEST_F(DdsPorts, TheSameClientIdFromTwoParticipantsIsToldApart) {
@@ -245,8 +229,8 @@ TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   const SessionMessage session = a_session(options_.session, kEpoch);
   ASSERT_TRUE(eventually([&] { return server->alive(id); }));
   EXPECT_FALSE(server->joined(id));
-  ASSERT_TRUE(client->open_stream(session));
-  ASSERT_TRUE(client->open_snapshots(session));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_snapshots());
   ASSERT_TRUE(eventually([&] { return server->joined(id); }));
   client->close_snapshots();
   EXPECT_TRUE(eventually([&] { return !server->joined(id); }));
@@ -276,7 +260,7 @@ TEST_F(DdsPorts, WhenTheLatestServerEndsAClientIsToldOfTheOneThatStays) {
   const SessionMessage later = a_session(options_.session, kEpoch + 1);
   ASSERT_TRUE(ends->write(later));
   EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch + 1);
-  ASSERT_TRUE(client->open_stream(later));
+  ASSERT_TRUE(client->open_stream(later, later.streams[0]));
   EXPECT_TRUE(client->server_alive());
   ends.reset();
   EXPECT_TRUE(eventually([&] { return !client->server_alive(); }));
@@ -297,10 +281,10 @@ TEST_F(DdsPorts, OversizeAndMisshapenSamplesAreDroppedAndCounted) {
   const auto server = this->server();
   const auto client = this->client();
   SessionMessage session = join(*server, *client);
-  session.max_delta_bytes = 1000;
-  session.max_snapshot_bytes = 2000;
-  ASSERT_TRUE(client->open_stream(session));
-  ASSERT_TRUE(client->open_snapshots(session));
+  session.streams[0].max_delta_bytes = 1000;
+  session.streams[0].max_snapshot_bytes = 2000;
+  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_snapshots());
   ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
   ASSERT_TRUE(server->write(a_delta(kEpoch, 1, 1001)));
   DeltaMessage misshapen = a_delta(kEpoch, 2);
@@ -364,7 +348,7 @@ TEST_F(DdsPorts, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
   receive<DeltaMessage>(*client, 1);
   ASSERT_TRUE(server->write(a_delta(kEpoch, 2)));
   session.epoch = kEpoch + 1;
-  ASSERT_TRUE(client->open_stream(session));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
   EXPECT_EQ(receive<ScheduledInputMessage>(*client, 1).at(0).message.epoch, kEpoch + 1);
   std::vector<Received<DeltaMessage>> deltas;
   client->take(deltas);

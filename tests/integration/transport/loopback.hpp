@@ -43,23 +43,34 @@ inline SessionMessage a_session(const std::string& name, Epoch epoch) {
   SessionMessage session;
   session.session = name;
   session.epoch = epoch;
-  session.layout.capacity = 10000;
+  session.capacity = 10000;
   session.lattice_unit = 1.0 / 1024;
-  session.max_delta_bytes = 1U << 20U;
-  session.max_snapshot_bytes = 1U << 20U;
-  session.layout.codec = "entropy";
-  session.layout.parameters.codec.threshold = 100;
-  session.layout.parameters.codec.position_step = 7;
-  session.layout.parameters.codec.velocity_step = 9;
-  session.layout.predictor = "ballistic";
-  session.client_cost_ns = 12;
+  session.lead = 1;
   session.scene = "half_pipe";
   session.scene_description = "plane { }";
-  session.layout.predictor_constants = {1, -2, 3};
-  session.layout.type_count = 2;
-  session.types = {BodyType{"sand", 0.25F, 0xFF8800FF}, BodyType{"", 1.5F, 7}};
-  session.layout.codec_tables = Bytes(300, std::byte{5});
-  session.layout_hash = layout_hash(session);
+  session.types = {BodyType{"sand", 0.25F, 0xFF8800FF, Shape::kSphere, {}},
+                   BodyType{"", 1.5F, 7, Shape::kBox, {1, 2, 3.5F}}};
+  StreamMessage stream;
+  stream.client_cost_ns = 12;
+  stream.max_delta_bytes = 1U << 20U;
+  stream.max_snapshot_bytes = 1U << 20U;
+  stream.layout.capacity = session.capacity;
+  stream.layout.type_count = 2;
+  stream.layout.codec = "entropy";
+  stream.layout.parameters.codec.threshold = 100;
+  stream.layout.parameters.codec.position_step = 7;
+  stream.layout.parameters.codec.velocity_step = 9;
+  stream.layout.parameters.step.decay = 10;
+  stream.layout.predictor = "ballistic";
+  stream.layout.predictor_constants = {1, -2, 3};
+  stream.layout.codec_tables = Bytes(300, std::byte{5});
+  stream.layout_hash = layout_hash(session, stream);
+  session.streams.push_back(stream);
+  stream.id = {1, 3};
+  stream.layout.region_blocks = 4;
+  stream.layout.groups = {"position", "orientation"};
+  stream.layout.radii = {500, 700};
+  session.streams.push_back(stream);
   return session;
 }
 
@@ -76,9 +87,9 @@ inline DeltaMessage a_delta(Epoch epoch, Frame frame, std::size_t size = 100) {
 
 inline SnapshotMessage a_snapshot(Epoch epoch, Frame frame, std::size_t size = 1000) {
   SnapshotMessage snapshot;
-  snapshot.slot = static_cast<std::uint32_t>(frame % 4);
   snapshot.epoch = epoch;
   snapshot.frame = frame;
+  snapshot.total_bytes = static_cast<std::uint32_t>(size);
   snapshot.bytes = Bytes(size, static_cast<std::byte>(frame));
   return snapshot;
 }
@@ -105,6 +116,9 @@ inline AckMessage an_ack(ClientId client, Epoch epoch, Frame applied) {
   ack.role_wanted = Role::kParticipant;
   ack.clock_ns = 123456789;
   ack.join_attempt = 2;
+  ack.snapshot_frame = 3;
+  ack.snapshot_parts = 20;
+  ack.missing = {0, 2, 7, 1};
   return ack;
 }
 

@@ -62,14 +62,14 @@ Result<std::uint64_t> serve(std::int64_t lasts_ns) {
   TenBodies simulation;
   host::HostConfig config;
   config.session = "ten_bodies";
-  config.epoch = static_cast<Epoch>(transport::wall_ns() / host::kMillisecond);
+  config.epoch = static_cast<Epoch>(transport::wall_ns() / kMillisecond);
   const auto lattice = host::choose_lattice(kThreshold, kExtent, simulation.dt_s());
   if (!lattice) return tl::unexpected(lattice.error());
   const auto parameters = host::codec_parameters(*lattice, kThreshold, 0, 0);
   if (!parameters) return tl::unexpected(parameters.error());
   config.stream.lattice = *lattice;
   config.stream.layout.capacity = kBodies;
-  config.stream.layout.parameters = *parameters;
+  config.stream.layout.parameters.codec = *parameters;
 
   transport::DdsOptions dds;
   dds.session = config.session;

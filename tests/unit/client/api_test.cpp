@@ -75,9 +75,10 @@ TEST_F(ClientApi, ASampleDoesNotWaitForThePollInWork) {
   transport::SessionMessage session;
   session.session = options.session;
   session.epoch = 1;
-  session.layout.capacity = 1;
+  session.capacity = 1;
+  session.streams.emplace_back();
   session.lattice_unit = 1;  // the rest is nothing that one could play, which is worth a line in the log
-  session.types = {{"ball", 1, 0}};
+  session.types = {{"ball", 1, 0, transport::Shape::kSphere, {}}};
   ASSERT_TRUE((*server)->write(session).has_value());
 
   Client* sampled = nullptr;

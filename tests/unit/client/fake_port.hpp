@@ -15,11 +15,12 @@ class FakePort final : public transport::ClientPort {
     move(sessions, out);
   }
   [[nodiscard]] bool server_alive() override { return alive; }
-  Result<void> open_stream(const transport::SessionMessage& session) override {
+  Result<void> open_stream(const transport::SessionMessage& session,
+                           const transport::StreamMessage& /*stream*/) override {
     opened_epochs.push_back(session.epoch);
     return {};
   }
-  Result<void> open_snapshots(const transport::SessionMessage& /*session*/) override {
+  Result<void> open_snapshots() override {
     snapshots_open = true;
     return {};
   }

@@ -8,23 +8,26 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
   transport::SessionMessage s;
   s.session = "default";
   s.epoch = epoch;
-  s.layout.capacity = capacity;
+  s.capacity = capacity;
   s.lattice_unit = 0.001;
-  s.layout.lead = lead;
-  s.max_delta_bytes = s.max_snapshot_bytes = 100'000 + 64 * capacity;
-  s.layout.codec = "quantized";
-  s.layout.parameters.codec.threshold = 50;
-  s.layout.parameters.codec.position_step = 40;
-  s.layout.parameters.codec.velocity_step = 40;
-  s.layout.predictor = "ballistic";
+  s.lead = lead;
   s.scene = "test";
-  s.types = {{"ball", 0.1F, 0xFFFFFFFF}};
-  s.layout_hash = transport::layout_hash(s);
+  s.types = {{"ball", 0.1F, 0xFFFFFFFF, transport::Shape::kSphere, {}}};
+  transport::StreamMessage stream;
+  stream.max_delta_bytes = stream.max_snapshot_bytes = 100'000 + 64 * capacity;
+  stream.layout.capacity = capacity;
+  stream.layout.lead = lead;
+  stream.layout.codec = "quantized";
+  stream.layout.parameters.codec.threshold = 50;
+  stream.layout.parameters.codec.position_step = 40;
+  stream.layout.parameters.codec.velocity_step = 40;
+  stream.layout_hash = transport::layout_hash(s, stream);
+  s.streams.push_back(stream);
   return s;
 }
 
 ServerTimeline FakeServer::make(const transport::SessionMessage& s) {
-  return std::move(*ServerTimeline::create(s.layout, s.epoch));
+  return std::move(*ServerTimeline::create(s.streams[0].layout, s.epoch));
 }
 
 FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead)
@@ -77,8 +80,8 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
 transport::ScheduledInputMessage FakeServer::schedule(std::int32_t gravity_y) {
   ScheduledDrive input;
   input.number = ++last_number_;
-  input.frame = frame() + 1 + session.layout.lead;
-  input.drive = {{0, gravity_y, 0}, 300, 0};
+  input.frame = frame() + 1 + session.lead;
+  input.drive = {{0, gravity_y, 0}, 300};
   EXPECT_TRUE(timeline_.schedule(input).has_value());
   transport::ScheduledInputMessage message;
   message.epoch = session.epoch;
@@ -93,8 +96,8 @@ transport::SnapshotMessage FakeServer::snapshot() {
   transport::SnapshotMessage message;
   message.epoch = session.epoch;
   message.frame = frame();
-  message.slot = static_cast<std::uint32_t>(frame() % 4);
   timeline_.snapshot(message.bytes);
+  message.total_bytes = static_cast<std::uint32_t>(message.bytes.size());
   return message;
 }
 

@@ -8,6 +8,14 @@ namespace {
 
 using SessionTest = ClientTest;
 
+void rehash(transport::SessionMessage& session) {
+  for (auto& stream : session.streams) stream.layout_hash = transport::layout_hash(session, stream);
+}
+
+void set_capacity(transport::SessionMessage& session, std::uint32_t capacity) {
+  session.capacity = session.streams[0].layout.capacity = capacity;
+}
+
 TEST_F(SessionTest, WithoutAServerTheClientSearchesAndSaysNothing) {
   start();
   for (int i = 0; i < 100; ++i) poll(50 * kMs);
@@ -40,7 +48,7 @@ TEST_F(SessionTest, AnotherProtocolVersionIsRefusedAndSaid) {
 TEST_F(SessionTest, AnotherLayoutHashIsRefused) {
   start();
   auto other = server.session;
-  other.layout_hash ^= 1;
+  other.streams[0].layout_hash ^= 1;
   port.sessions.push_back(from_server(other));
   poll();
   EXPECT_EQ(core->phase(), ClientPhase::kRefused);
@@ -49,8 +57,8 @@ TEST_F(SessionTest, AnotherLayoutHashIsRefused) {
 TEST_F(SessionTest, AnUnknownCodecIsRefused) {
   start();
   auto other = server.session;
-  other.layout.codec = "of the future";
-  other.layout_hash = transport::layout_hash(other);
+  other.streams[0].layout.codec = "of the future";
+  rehash(other);
   port.sessions.push_back(from_server(other));
   poll();
   EXPECT_EQ(core->phase(), ClientPhase::kRefused);
@@ -71,22 +79,50 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
   const auto refused = [&](auto change) {
     auto s = server.session;
     change(s);
-    s.layout_hash = transport::layout_hash(s);
-    return !check_session(s).has_value();
+    rehash(s);
+    return !choose_stream(s).has_value();
   };
   EXPECT_FALSE(refused([](auto&) {}));
-  EXPECT_TRUE(refused([](auto& s) { s.layout.capacity = 0; }));
-  EXPECT_TRUE(refused([](auto& s) { s.layout.capacity = kMaxCapacity + 1; }));
+  EXPECT_TRUE(refused([](auto& s) { set_capacity(s, 0); }));
+  EXPECT_TRUE(refused([](auto& s) { set_capacity(s, kMaxCapacity + 1); }));
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 0; }));
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = 1e-300; }));  // periods would overflow all clocks
   EXPECT_TRUE(refused([](auto& s) { s.frame_rate_hz = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_TRUE(refused([](auto& s) { s.lattice_unit = std::numeric_limits<double>::infinity(); }));
-  EXPECT_TRUE(refused([](auto& s) { s.layout.lead = 2; }));
-  EXPECT_TRUE(refused([](auto& s) { s.max_delta_bytes = 0xFFFFFFFF; }));
-  EXPECT_TRUE(refused([](auto& s) { s.max_snapshot_bytes = 0xFFFFFFFF; }));
+  EXPECT_TRUE(refused([](auto& s) { s.lead = 2; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].max_delta_bytes = 0xFFFFFFFF; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].max_snapshot_bytes = 0xFFFFFFFF; }));
   EXPECT_TRUE(refused([](auto& s) { s.types.clear(); }));
-  EXPECT_TRUE(refused([](auto& s) { s.layout.parameters.codec.threshold = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.parameters.codec.threshold = 0; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.region_blocks = 1; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"orientation"}; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"position", "position"}; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.radii = {1}; }));
   EXPECT_TRUE(refused([](auto& s) { s.epoch = 0; }));
+}
+
+TEST_F(SessionTest, TheFirstStreamThatCanBePlayedIsPlayed) {
+  auto session = server.session;
+  session.streams.insert(session.streams.begin(), session.streams[0]);
+  session.streams[0].layout.groups = {"position", "orientation"};
+  session.streams[1].id.id = 1;
+  rehash(session);
+  const auto chosen = choose_stream(session);
+  ASSERT_TRUE(chosen.has_value());
+  EXPECT_EQ(chosen->stream, 1U);
+}
+
+TEST_F(SessionTest, WithoutAStreamToPlayTheReasonOfEachIsSaid) {
+  auto session = server.session;
+  session.streams.push_back(session.streams[0]);
+  session.streams[0].layout.groups = {"orientation"};
+  session.streams[1].id.id = 1;
+  session.streams[1].layout.codec = "of the future";
+  rehash(session);
+  const auto chosen = choose_stream(session);
+  ASSERT_FALSE(chosen.has_value());
+  EXPECT_NE(chosen.error().message.find("unknown channel group 'orientation'"), std::string::npos);
+  EXPECT_NE(chosen.error().message.find("stream 1: "), std::string::npos) << chosen.error().message;
 }
 
 TEST_F(SessionTest, ANewEpochEmptiesEverything) {

@@ -22,52 +22,56 @@ State three_of_four() {
 
 class Payload {
  public:
-  Payload& section(std::uint16_t type, std::initializer_list<std::int64_t> u32_values) {
-    put(type);
-    put(static_cast<std::uint32_t>(4 * u32_values.size()));
-    for (const std::int64_t value : u32_values) put(static_cast<std::uint32_t>(value));
-    return *this;
+  Payload& section(std::uint8_t type, std::initializer_list<int> body) {
+    Bytes bytes;
+    for (const int byte : body) bytes.push_back(static_cast<std::byte>(byte));
+    return section(type, bytes);
   }
-  Payload& parameters(const StreamParameters& values, std::size_t size_bytes = kParametersBytes) {
-    put(static_cast<std::uint16_t>(SectionType::kParameters));
-    put(static_cast<std::uint32_t>(size_bytes));
-    Bytes body(kParametersBytes);
-    ByteWriter out(body);
-    put_parameters(values, out);
-    body.resize(size_bytes);
-    bytes_.insert(bytes_.end(), body.begin(), body.end());
-    return *this;
+  Payload& section(SectionType type, const Bytes& body) {
+    return section(static_cast<std::uint8_t>(type), body);
+  }
+  Payload& parameters(const StreamParameters& values) {
+    return section(SectionType::kParameters,
+                   written([&](ByteWriter& out) { write_parameters(values, nullptr, out); }));
   }
   Payload& record(LifecycleKind kind, Slot slot, TypeId type = 0, std::int32_t px = 0, std::int32_t vx = 0) {
-    Bytes body;
-    std::swap(body, bytes_);
-    put(slot);
-    put(static_cast<std::uint8_t>(kind));
-    if (kind == LifecycleKind::kSpawn) put(std::uint8_t{9});
-    if (kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTypeChange) put(type);
-    if (kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport) {
-      for (const std::int32_t value : {px, 0, 0, vx, 0, 0}) put(value);
-    }
-    records_.insert(records_.end(), bytes_.begin(), bytes_.end());
-    std::swap(body, bytes_);
+    const Bytes record = written([&](ByteWriter& out) {
+      out.put_leb128(4 * (slot - previous_) + static_cast<std::uint32_t>(kind));
+      if (kind == LifecycleKind::kSpawn) out.put(std::uint8_t{9});
+      if (kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTypeChange) out.put_leb128(type);
+      if (kind == LifecycleKind::kTeleport) out.put(std::uint8_t{1});
+      if (kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport) {
+        for (const std::int32_t value : {px, 0, 0, vx, 0, 0}) out.put(value);
+      }
+    });
+    previous_ = slot;
+    records_.insert(records_.end(), record.begin(), record.end());
     return *this;
   }
   Payload& end_lifecycle() {
-    put(static_cast<std::uint16_t>(SectionType::kLifecycle));
-    put(static_cast<std::uint32_t>(records_.size()));
-    bytes_.insert(bytes_.end(), records_.begin(), records_.end());
+    section(SectionType::kLifecycle, records_);
     records_.clear();
     return *this;
   }
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
 
  private:
-  template <class T>
-  void put(T value) {
-    Bytes memory(sizeof value);
-    ByteWriter(memory).put(value);
-    bytes_.insert(bytes_.end(), memory.begin(), memory.end());
+  template <class Write>
+  static Bytes written(const Write& write) {
+    Bytes memory(100);
+    ByteWriter out(memory);
+    write(out);
+    memory.resize(out.size());
+    return memory;
   }
+  Payload& section(std::uint8_t type, const Bytes& body) {
+    bytes_.push_back(static_cast<std::byte>(type));
+    const Bytes length = written([&](ByteWriter& out) { out.put_leb128(body.size()); });
+    bytes_.insert(bytes_.end(), length.begin(), length.end());
+    bytes_.insert(bytes_.end(), body.begin(), body.end());
+    return *this;
+  }
+  Slot previous_ = 0;
   Bytes bytes_, records_;
 };
 
@@ -126,27 +130,27 @@ TEST(DeltaCodec, RecordsThatBreakTheRulesAreRefused) {
       << "p";
   EXPECT_FALSE(decode(Payload().record(K::kTeleport, 0, 0, 0, -kVelocityLimit - 1).end_lifecycle().bytes()))
       << "v";
-  EXPECT_FALSE(decode(Payload().record(K::kDespawn, 1).record(K::kDespawn, 0).end_lifecycle().bytes()))
-      << "order";
   EXPECT_FALSE(decode(Payload().record(K::kDespawn, 1).record(K::kDespawn, 1).end_lifecycle().bytes()))
       << "twice";
   EXPECT_FALSE(decode(Payload().record(K::kTeleport, 1).record(K::kTypeChange, 1).end_lifecycle().bytes()))
       << "pair";
-  EXPECT_FALSE(decode(Payload().record(static_cast<K>(4), 1).end_lifecycle().bytes())) << "kind";
+  EXPECT_FALSE(decode(Payload().section(0x81, {0x80, 0}).bytes())) << "not in shortest form";
+  EXPECT_FALSE(decode(Payload().section(0x81, {0xFF, 0xFF, 0xFF, 0x7F}).bytes())) << "beyond any capacity";
+  Bytes other_groups = Payload().record(K::kTeleport, 0).end_lifecycle().bytes();
+  for (const int mask : {0, 2, 3}) {
+    other_groups[3] = static_cast<std::byte>(mask);
+    EXPECT_FALSE(decode(other_groups)) << "groups " << mask;
+  }
   EXPECT_FALSE(decode(Payload().end_lifecycle().bytes())) << "no record";
 }
 
 TEST(DeltaCodec, CorrectionsSeeTheSlotsAfterLifecycle) {
   // Mask of slot 3, which this delta spawns at 70: one position step of 10 on x.
-  const std::int64_t mask_and_values = 0x08'01'0000;  // block 0, form 1, mask 0b1000
   Payload spawned;
   spawned.record(LifecycleKind::kSpawn, 3, 0, 70).end_lifecycle();
   Bytes payload = spawned.bytes();
-  const Payload corrections =
-      Payload().section(static_cast<std::uint16_t>(SectionType::kCorrections), {mask_and_values, 1});
-  Bytes section = corrections.bytes();
-  section.resize(section.size() + 2);  // the last two velocity residuals
-  section[2] = std::byte{10};
+  // Block 0, form 1, mask 0b1000.
+  const Bytes section = Payload().section(0x83, {0, 1, 0x08, 1, 0, 0, 0, 0, 0}).bytes();
   payload.insert(payload.end(), section.begin(), section.end());
   const auto state = decode(payload);
   ASSERT_TRUE(state) << state.error().message;
@@ -171,21 +175,32 @@ TEST(DeltaCodec, ParametersTravelWithTheDeltaThatUsesThemFirst) {
   EXPECT_EQ(client.parameters(), changed);
   const std::size_t with_parameters = encoded.size_bytes;
   encoded = server.encode(agreed, target, {}, kNoBudget, out);
-  EXPECT_EQ(encoded.size_bytes, with_parameters - 24);
+  EXPECT_EQ(encoded.size_bytes, with_parameters - 8);  // type, length, three ids with a byte each
   EXPECT_EQ(encoded.correction_bytes, encoded.size_bytes);
 }
 
 TEST(DeltaCodec, ParametersOutOfRangeAreRefused) {
-  const auto taken = [](const StreamParameters& parameters, std::size_t size_bytes = kParametersBytes) {
-    return decode(Payload().parameters(parameters, size_bytes).bytes()).has_value();
+  const auto taken = [](const StreamParameters& parameters) {
+    return decode(Payload().parameters(parameters).bytes()).has_value();
   };
-  EXPECT_TRUE(taken({1, 1, 1}));
-  EXPECT_TRUE(taken({1, 1, 1, 65535, 65535, 65535})) << "any decay and gains will do";
-  EXPECT_FALSE(taken({0, 1, 1}));
-  EXPECT_FALSE(taken({1, -1, 1}));
-  EXPECT_FALSE(taken({1, 1, kMaxStep + 1}));
-  EXPECT_FALSE(taken({1, 1, 1}, kParametersBytes - 1));
-  EXPECT_FALSE(taken({1, 1, 1}, kParametersBytes + 1));
+  const auto body_taken = [](std::initializer_list<int> body) {
+    return decode(Payload().section(0x82, body).bytes()).has_value();
+  };
+  EXPECT_TRUE(taken({{1, 1, 1}}));
+  EXPECT_TRUE(taken({{1, 1, 1, 65535, 65535}, {65535}})) << "any decay and gains will do";
+  EXPECT_FALSE(taken({{0, 1, 1}}));
+  EXPECT_FALSE(taken({{1, -1, 1}}));
+  EXPECT_FALSE(taken({{1, 1, kMaxStep + 1}}));
+  EXPECT_TRUE(body_taken({1, 2, 4, 0})) << "some";
+  EXPECT_TRUE(body_taken({1, 0xC8, 1})) << "100, as before";
+  EXPECT_FALSE(body_taken({})) << "none";
+  EXPECT_FALSE(body_taken({1})) << "truncated";
+  EXPECT_FALSE(body_taken({2, 2, 1, 2})) << "order";
+  EXPECT_FALSE(body_taken({1, 2, 1, 2})) << "twice";
+  EXPECT_FALSE(body_taken({1, 0x82, 0})) << "not in shortest form";
+  EXPECT_FALSE(body_taken({4, 0x80, 0x80, 8})) << "65536";
+  EXPECT_FALSE(body_taken({1, 0x80, 0x80, 0x80, 0x80, 0x10})) << "beyond 32 bits";
+  EXPECT_FALSE(body_taken({7, 2})) << "unknown";
 }
 
 TEST(DeltaCodec, UnknownSectionsAreSkippedUnlessCritical) {
@@ -226,7 +241,7 @@ TEST(DeltaCodec, EveryTruncationAndExtensionOfADeltaIsRefused) {
     const std::vector<LifecycleRecord> lifecycle{{LifecycleKind::kDespawn, 2, 0, 0, {}}};
     server.set_parameters({{99, 9, 9}});
     const auto encoded = server.encode(state, target, lifecycle, kNoBudget, out);
-    const std::vector<std::size_t> boundaries{0, 11, 11 + 24};  // between sections
+    const std::vector<std::size_t> boundaries{0, 3, 3 + 9};  // between sections
     for (std::size_t size = 0; size < encoded.size_bytes; ++size) {
       const bool whole = std::find(boundaries.begin(), boundaries.end(), size) != boundaries.end();
       EXPECT_EQ(decode(Bytes(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(size)), name).has_value(),

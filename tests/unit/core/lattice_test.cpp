@@ -33,17 +33,25 @@ TEST(State, DistanceIsExactAtTheCornersOfTheLattice) {
 TEST(StateHasher, TheHashOfTwoBodiesIsTheOneOfThePublishedFormat) {
   State state(2);
   state.spawn(1, 1, 3, {{-1, 2, 100000}, {64, -64, 0}});
-  std::vector<std::byte> bytes;
-  const auto add = [&bytes](std::initializer_list<int> values) {
+  state.rest()[1] = 1;
+  std::vector<std::byte> common, position;
+  const auto add = [](std::vector<std::byte>& bytes, std::initializer_list<int> values) {
     for (const int value : values) bytes.push_back(static_cast<std::byte>(value));
   };
-  add({0, 1});                                                                                  // alive
-  add({0, 1});                                                                                  // generation
-  add({0, 0, 3, 0});                                                                            // type
-  add({0, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0xA0, 0x86, 1, 0});  // p
-  add({0, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0, 0, 0xC0, 255, 255, 255, 0, 0, 0, 0, 0, 0, 0, 0});      // v
-  bytes.resize(bytes.size() + 24);                                                              // c
-  EXPECT_EQ(StateHasher().hash(state), hash_bytes(bytes));
+  add(common, {0, 1});        // alive
+  add(common, {0, 1});        // reuse
+  add(common, {0, 0, 3, 0});  // type
+  add(common, {0, 1});        // rest
+  add(common, {0, 7, 0, 9});  // two columns of a codec
+  add(common, {0, 5});        // one of a predictor
+  add(position, {0, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0xA0, 0x86, 1, 0});  // p
+  add(position, {0, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0, 0, 0xC0, 255, 255, 255, 0, 0, 0, 0, 0, 0, 0, 0});      // v
+  position.resize(position.size() + 24);                                                                  // c
+  const std::array leaves{hash_bytes(common), hash_bytes(position)};
+  const std::uint64_t region = hash_bytes(std::as_bytes(std::span(leaves)));
+  const std::array codec{std::byte{0}, std::byte{7}, std::byte{0}, std::byte{9}};
+  const std::array predictor{std::byte{0}, std::byte{5}};
+  EXPECT_EQ(StateHasher().hash(state, {codec, predictor}), hash_bytes(std::as_bytes(std::span(&region, 1))));
 }
 
 TEST(StateHasher, EveryColumnCounts) {
@@ -54,8 +62,25 @@ TEST(StateHasher, EveryColumnCounts) {
   state.c(2)[0] = 1;
   EXPECT_NE(hasher.hash(state), before);
   state.c(2)[0] = 0;
-  state.generation()[0] = 2;
+  state.reuse()[0] = 2;
   EXPECT_NE(hasher.hash(state), before);
+  state.reuse()[0] = 1;
+  state.rest()[0] = 1;
+  EXPECT_NE(hasher.hash(state), before);
+  state.rest()[0] = 0;
+  EXPECT_EQ(hasher.hash(state), before);
+}
+
+TEST(StateHasher, BlocksHashedInAnyOrderGiveTheSameHash) {
+  State state(2 * kBlockSlots + 5);
+  for (Slot slot = 0; slot < state.capacity(); slot += 3) {
+    const auto x = static_cast<std::int32_t>(slot);
+    state.spawn(slot, 0, 0, {{x, -x, 7}, {1, x, 3}});
+  }
+  const RunBlocks backwards = [](std::uint32_t count, const std::function<void(std::uint32_t)>& job) {
+    while (count > 0) job(--count);
+  };
+  EXPECT_EQ(StateHasher().hash(state, {}, backwards), StateHasher().hash(state));
 }
 
 TEST(Hex, PrintsSixteenDigits) { EXPECT_EQ(to_hex(0x0123456789ABCDEFULL), "0123456789abcdef"); }

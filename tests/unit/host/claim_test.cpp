@@ -135,17 +135,19 @@ TEST(HostCreate, DescribesTheSessionCompletely) {
   const auto& session = bench.port.sessions[0];
   EXPECT_EQ(session, bench.host->session());
   EXPECT_EQ(session.epoch, config.epoch);
-  EXPECT_EQ(session.layout.capacity, 4U);
+  EXPECT_EQ(session.capacity, 4U);
   EXPECT_EQ(session.lattice_unit, config.stream.lattice.unit);
-  EXPECT_EQ(session.layout.parameters.codec.threshold, 4096);
-  EXPECT_EQ(session.layout.lead, 1U);
+  EXPECT_EQ(session.lead, 1U);
   EXPECT_EQ(session.window_ceiling, 24U);
-  EXPECT_EQ(session.layout.codec, "selective");
   EXPECT_EQ(session.scene, "half_pipe");
   EXPECT_EQ(session.types, config.types);
-  EXPECT_EQ(session.layout_hash, transport::layout_hash(session));
-  EXPECT_GT(session.max_delta_bytes, 0U);
-  EXPECT_GT(session.max_snapshot_bytes, 0U);
+  ASSERT_EQ(session.streams.size(), 1U);
+  const auto& stream = session.streams[0];
+  EXPECT_EQ(stream.id, StreamId{});
+  EXPECT_EQ(stream.layout, config.stream.layout);
+  EXPECT_EQ(stream.layout_hash, transport::layout_hash(session, stream));
+  EXPECT_GT(stream.max_delta_bytes, 0U);
+  EXPECT_GT(stream.max_snapshot_bytes, 0U);
 }
 
 }  // namespace

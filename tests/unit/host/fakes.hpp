@@ -91,11 +91,6 @@ class FakePort final : public transport::ServerPort {
   Result<void> write(const transport::SnapshotMessage& m) override { return keep(snapshots, m, "snapshot"); }
   Result<void> write(const transport::ReplyMessage& m) override { return keep(replies, m, "reply"); }
   Result<void> write(const transport::ServerStatusMessage& m) override { return keep(statuses, m, "status"); }
-  Result<void> dispose_snapshots() override {
-    order.emplace_back("dispose");
-    ++disposals;
-    return {};
-  }
   void take(std::vector<transport::Received<transport::InputMessage>>& out) override { move(inputs, out); }
   void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
   [[nodiscard]] bool joined(const transport::ParticipantId& id) override { return !unmatched.contains(id); }
@@ -114,8 +109,7 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::ReplyMessage> replies;
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written
-  int disposals = 0;
-  int failing_writes = 0;  // the next so many deltas are refused
+  int failing_writes = 0;          // the next so many deltas are refused
 
  private:
   template <class M>

@@ -100,7 +100,7 @@ TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
   bench.run_ms(100);
   bench.joining(1);
   bench.run_ms(300);
-  auto client = *ClientTimeline::create(bench.host->session().layout);
+  auto client = *ClientTimeline::create(bench.host->session().streams[0].layout);
   ASSERT_TRUE(client.load(bench.port.snapshots.back().bytes, bench.host->session().epoch));
   bench.run_ms(20'000);
   for (const auto& delta : bench.port.deltas) {

@@ -27,8 +27,8 @@ TEST_F(JoinTest, ASnapshotIsMadeOnDemandOnly) {
   bench.run_ms(150);
   ASSERT_EQ(bench.port.snapshots.size(), 1U);
   EXPECT_EQ(bench.port.snapshots[0].epoch, bench.host->session().epoch);
-  EXPECT_EQ(bench.port.snapshots[0].slot, bench.port.snapshots[0].frame % 4);
-  EXPECT_LE(bench.port.snapshots[0].bytes.size(), bench.host->session().max_snapshot_bytes);
+  EXPECT_EQ(bench.port.snapshots[0].total_bytes, bench.port.snapshots[0].bytes.size());
+  EXPECT_LE(bench.port.snapshots[0].total_bytes, bench.host->session().streams[0].max_snapshot_bytes);
 }
 
 TEST_F(JoinTest, TheSnapshotWaitsUntilAllThreeWritersMatchedThatParticipant) {
@@ -74,7 +74,7 @@ TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {
   bench.send(bench.gravity(2, 1));  // pending when the snapshot is cut, or acting around it
   bench.run_ms(300);
   const auto& session = bench.host->session();
-  auto client = ClientTimeline::create(session.layout);
+  auto client = ClientTimeline::create(session.streams[0].layout);
   ASSERT_TRUE(client);
   const auto& snapshot = bench.port.snapshots.back();
   ASSERT_TRUE(client->load(snapshot.bytes, session.epoch));
@@ -115,28 +115,6 @@ TEST_F(JoinTest, OrAfterFiveSecondsHavePassed) {
   EXPECT_EQ(bench.port.snapshots.size(), 1U);
   bench.run_ms(400);
   EXPECT_EQ(bench.port.snapshots.size(), 2U);
-}
-
-TEST_F(JoinTest, SnapshotsAreDisposedWhenNobodyJoins) {
-  bench.joining(1);
-  bench.joining(2);
-  bench.run_ms(150);
-  bench.playing(1, bench.host->frame());
-  bench.run_ms(50);
-  EXPECT_EQ(bench.port.disposals, 0) << "client 2 still joins";
-  bench.playing(2, bench.host->frame());
-  bench.run_ms(50);
-  EXPECT_EQ(bench.port.disposals, 1);
-  bench.run_ms(5000);
-  EXPECT_EQ(bench.port.disposals, 1);
-}
-
-TEST_F(JoinTest, AJoinerThatDiesKeepsNoSnapshotAlive) {
-  bench.joining(1);
-  bench.run_ms(150);
-  bench.port.dead.insert(participant(1));
-  bench.run_ms(500);
-  EXPECT_EQ(bench.port.disposals, 1);
 }
 
 TEST_F(JoinTest, AJoinerIsServedWhileTheServerIsSuspended) {

@@ -103,7 +103,7 @@ TEST_F(MirrorTest, AnExpelledBodyComesBackAsANewOneWhenTheEngineTeleportsIt) {
   simulation.position[0][2] = 1;
   update({{Event::Kind::kTeleported, 2}});
   ASSERT_EQ(records(), (Records{{LifecycleKind::kSpawn, 2}}));
-  EXPECT_EQ(mirror.lifecycle()[0].generation, 1);
+  EXPECT_EQ(mirror.lifecycle()[0].reuse, 1);
 }
 
 TEST_F(MirrorTest, DespawnAndSpawnFollowTheBodiesEvenWithoutEvents) {
@@ -116,15 +116,15 @@ TEST_F(MirrorTest, DespawnAndSpawnFollowTheBodiesEvenWithoutEvents) {
   update();
   ASSERT_EQ(records(), (Records{{LifecycleKind::kSpawn, 1}}));
   EXPECT_EQ(mirror.lifecycle()[0].type, 2);
-  EXPECT_EQ(mirror.lifecycle()[0].generation, 1);
+  EXPECT_EQ(mirror.lifecycle()[0].reuse, 1);
   EXPECT_EQ(mirror.lifecycle()[0].body.p[0], 3 << 18);
-  EXPECT_EQ(mirror.target().generation()[1], 1);
+  EXPECT_EQ(mirror.target().reuse()[1], 1);
 }
 
 TEST_F(MirrorTest, ReuseWithinOneStepIsADespawnAndThenASpawn) {
   update({{Event::Kind::kDespawned, 1}, {Event::Kind::kSpawned, 1}});
   EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 1}, {LifecycleKind::kSpawn, 1}}));
-  EXPECT_EQ(mirror.target().generation()[1], 1);
+  EXPECT_EQ(mirror.target().reuse()[1], 1);
 }
 
 TEST_F(MirrorTest, ASpawnAndDespawnWithinOneStepIsNothingForADeadSlot) {
@@ -140,7 +140,7 @@ TEST_F(MirrorTest, GenerationsCountReuseAndWrapAfter256) {
     update();
     simulation.alive[0] = 1;
     update();
-    ASSERT_EQ(mirror.target().generation()[0], static_cast<std::uint8_t>(i));
+    ASSERT_EQ(mirror.target().reuse()[0], static_cast<std::uint8_t>(i));
   }
 }
 
@@ -152,7 +152,7 @@ TEST_F(MirrorTest, ASlotUsedForTheFirstTimeIsGenerationZero) {
   later.alive[2] = 1;
   other.update(later.bodies(), {});
   ASSERT_EQ(other.lifecycle().size(), 1U);
-  EXPECT_EQ(other.lifecycle()[0].generation, 0);
+  EXPECT_EQ(other.lifecycle()[0].reuse, 0);
 }
 
 TEST_F(MirrorTest, TeleportCarriesTheNewPlace) {
@@ -234,11 +234,11 @@ TEST_F(MirrorTest, RecordsAscendBySlotWithDespawnBeforeSpawn) {
       before = &record;
       if (record.kind == LifecycleKind::kDespawn) replica.despawn(record.slot);
       if (record.kind == LifecycleKind::kSpawn)
-        replica.spawn(record.slot, record.generation, record.type, record.body);
+        replica.spawn(record.slot, record.reuse, record.type, record.body);
       if (record.kind == LifecycleKind::kTypeChange) replica.type()[record.slot] = record.type;
     }
     ASSERT_TRUE(std::ranges::equal(replica.alive(), follower.target().alive()));
-    ASSERT_TRUE(std::ranges::equal(replica.generation(), follower.target().generation()));
+    ASSERT_TRUE(std::ranges::equal(replica.reuse(), follower.target().reuse()));
     ASSERT_TRUE(std::ranges::equal(replica.type(), follower.target().type()));
   }
 }

@@ -196,7 +196,7 @@ class RuntimeQuality : public ::testing::Test {
     bench.joining(1);
     bench.run_ms(300);
     const auto& session = bench.host->session();
-    client.emplace(std::move(*ClientTimeline::create(session.layout)));
+    client.emplace(std::move(*ClientTimeline::create(session.streams[0].layout)));
     EXPECT_TRUE(client->load(bench.port.snapshots.back().bytes, session.epoch));
   }
   /// Lets the client apply all that was published; every hash is checked on the way.

@@ -167,7 +167,7 @@ TEST(ClientTimeline, LifecycleAndTouchedSlotsOfTheLastDeltaCanBeAsked) {
   EXPECT_EQ(pair.client.lifecycle()[0].slot, dead);
   const auto touched = pair.client.touched();
   EXPECT_TRUE(std::find(touched.begin(), touched.end(), dead) != touched.end());
-  EXPECT_EQ(pair.client.state(pair.client.applied()).generation()[dead], 3);
+  EXPECT_EQ(pair.client.state(pair.client.applied()).reuse()[dead], 3);
 }
 
 }  // namespace

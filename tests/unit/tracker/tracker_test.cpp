@@ -18,14 +18,7 @@ using Bytes = std::vector<std::byte>;
 
 constexpr StreamParameters kParameters{{200, 1, 1}};
 
-Bytes coder_state(const DeltaCodec& delta) {
-  Bytes out(delta.codec().save_bound());
-  ByteWriter writer(out);
-  delta.codec().save(writer);
-  EXPECT_FALSE(writer.overflow());
-  out.resize(writer.size());
-  return out;
-}
+Bytes coder_state(const DeltaCodec& delta) { return synthetic::coder_state(delta.codec()); }
 
 Layout layout_of(std::uint32_t capacity) {
   Layout layout;
@@ -111,7 +104,7 @@ TEST(Tracker, SpawnTeleportAndDespawnForgetTheBody) {
     const auto remembered = [&server](Slot slot) {
       int sum = 0;
       for (std::size_t at = slot; at < 10; at += 2)
-        sum += server.codec().body_state()[at] != std::byte{0} ? 1 : 0;
+        sum += server.codec().columns()[at] != std::byte{0} ? 1 : 0;
       return sum;
     };
     EXPECT_GT(remembered(0), 1);
@@ -150,7 +143,7 @@ TEST(Tracker, ARefusedDeltaLeavesCoderAndBodiesUntouched) {
       Bytes mutated = payload;
       synthetic::mutate(random, mutated);
       DeltaCodec probe = synthetic::make_delta("tracker", 60, kParameters);
-      ASSERT_TRUE(probe.codec().load(before, held.alive()));
+      ASSERT_TRUE(synthetic::load_coder_state(probe.codec(), before, held.alive()));
       State state = held;
       if (synthetic::receive(probe, state, mutated)) {
         ASSERT_EQ(synthetic::broken_invariant(state), nullptr);
@@ -181,24 +174,24 @@ TEST(Tracker, RefusesCoderStatesThatAreNone) {
   }
   const Bytes good = coder_state(server);
   DeltaCodec client = synthetic::make_delta("tracker", 20, kParameters);
-  EXPECT_TRUE(client.codec().load(good, agreed.alive()));
+  EXPECT_TRUE(synthetic::load_coder_state(client.codec(), good, agreed.alive()));
   EXPECT_EQ(coder_state(client), good);
   Bytes impossible_age = good;
   impossible_age[3] = std::byte{255};
-  EXPECT_EQ(client.codec().load(impossible_age, agreed.alive()).error().code, ErrorCode::kMalformed);
+  EXPECT_EQ(synthetic::load_coder_state(client.codec(), impossible_age, agreed.alive()).error().code, ErrorCode::kMalformed);
   Bytes impossible_steps = good;
   impossible_steps[2 * 20 + 3] = std::byte{0x80};
-  EXPECT_FALSE(client.codec().load(impossible_steps, agreed.alive()));
+  EXPECT_FALSE(synthetic::load_coder_state(client.codec(), impossible_steps, agreed.alive()));
   std::vector<std::uint8_t> dead(agreed.alive().begin(), agreed.alive().end());
   dead[static_cast<std::size_t>(
       std::find_if(good.begin(), good.begin() + 20, [](std::byte age) { return age != std::byte{0}; }) -
       good.begin())] = 0;
-  EXPECT_FALSE(client.codec().load(good, dead));
+  EXPECT_FALSE(synthetic::load_coder_state(client.codec(), good, dead));
   Bytes longer = good;
   longer.push_back(std::byte{0});
-  EXPECT_FALSE(client.codec().load(longer, agreed.alive()));
+  EXPECT_FALSE(synthetic::load_coder_state(client.codec(), longer, agreed.alive()));
   for (std::size_t size = 0; size < good.size(); ++size) {
-    EXPECT_FALSE(client.codec().load(std::span(good).first(size), agreed.alive()));
+    EXPECT_FALSE(synthetic::load_coder_state(client.codec(), std::span(good).first(size), agreed.alive()));
   }
   EXPECT_EQ(coder_state(client), good);
 }
@@ -246,10 +239,10 @@ TEST(Tracker, CorrectionsBeyondTheCapacityRepeatedOrEmptyAreRefused) {
     for (const int byte : bytes) payload.push_back(static_cast<std::byte>(byte));
     return !synthetic::receive(client, state, payload);
   };
-  EXPECT_TRUE(refused({3, 0x80, 0, 0, 0, 0}));                     // no block
-  EXPECT_TRUE(refused({3, 0x80, 2, 0, 0, 0, 1, 0}));               // block 1 of 1
-  EXPECT_TRUE(refused({3, 0x80, 5, 0, 0, 0, 0, 0, 255, 255, 0}));  // a zero that nobody writes
-  EXPECT_TRUE(refused({3, 0x80, 12, 0, 0, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255}));
+  EXPECT_TRUE(refused({0x83, 0}));  // no block
+  EXPECT_TRUE(refused({0x83, 1, 1}));  // block 1 of 1
+  EXPECT_TRUE(refused({0x83, 4, 0, 255, 255, 0}));  // a zero that nobody writes
+  EXPECT_TRUE(refused({0x83, 11, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255}));
 }
 
 }  // namespace

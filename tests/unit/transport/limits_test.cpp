@@ -12,8 +12,10 @@ const Limits kLimits{1000, 2000};
 SessionMessage good_session() {
   SessionMessage session;
   session.session = "a";
-  session.layout.capacity = 1;
+  session.capacity = 1;
   session.lattice_unit = 0.5;
+  session.types.resize(1);
+  session.streams.resize(1);
   return session;
 }
 
@@ -24,28 +26,65 @@ bool session_passes(Change&& change) {
   return within_limits(session, kLimits);
 }
 
+template <class Change>
+bool stream_passes(Change&& change) {
+  return session_passes([&](auto& session) { change(session.streams[0]); });
+}
+
+bool shape_passes(Shape shape, std::vector<float> values) {
+  return session_passes([&](auto& session) {
+    session.types[0].shape = shape;
+    session.types[0].shape_values = std::move(values);
+  });
+}
+
 TEST(Limits, ASessionWithinAllLimitsPasses) { EXPECT_TRUE(within_limits(good_session(), kLimits)); }
 
 TEST(Limits, ASessionBeyondAnyLimitIsRefused) {
   EXPECT_FALSE(session_passes([](auto& s) { s.session = "a*"; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.layout.capacity = 0; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.layout.capacity = kMaxCapacity + 1; }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.capacity = 0; }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.capacity = kMaxCapacity + 1; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.frame_rate_hz = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.lattice_unit = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = kMaxWindowCeiling + 1; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.max_delta_bytes = kMaxSampleBytes + 1; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.max_snapshot_bytes = kMaxSampleBytes + 1; }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.layout.codec = std::string(65, 'c'); }));
   EXPECT_FALSE(
       session_passes([](auto& s) { s.scene_description = std::string(kMaxDescriptionBytes + 1, 's'); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.types.clear(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types.resize(kMaxTypes + 1); }));
-  EXPECT_FALSE(session_passes([](auto& s) {
-    s.types = {BodyType{"t", std::numeric_limits<float>::infinity(), 0}};
-  }));
-  EXPECT_FALSE(session_passes([](auto& s) { s.layout.codec_tables.resize(kMaxTableBytes + 1); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.types[0].radius = std::numeric_limits<float>::infinity(); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.streams.clear(); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.streams.resize(kMaxStreams + 1); }));
+}
+
+TEST(Limits, AStreamBeyondAnyLimitIsRefused) {
+  EXPECT_FALSE(stream_passes([](auto& s) { s.max_delta_bytes = kMaxSampleBytes + 1; }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.max_snapshot_bytes = kMaxSampleBytes + 1; }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.codec = std::string(65, 'c'); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.predictor = std::string(65, 'p'); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.groups.clear(); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.groups.resize(kMaxGroups + 1); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.groups[0] = std::string(65, 'g'); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.radii.resize(kMaxTypes + 1); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.layout.codec_tables.resize(kMaxTableBytes + 1); }));
   EXPECT_FALSE(
-      session_passes([](auto& s) { s.layout.predictor_constants.resize(kMaxPredictorConstants + 1); }));
+      stream_passes([](auto& s) { s.layout.predictor_constants.resize(kMaxPredictorConstants + 1); }));
+}
+
+TEST(Limits, AShapeHasTheNumberOfValuesThatItsKindSays) {
+  EXPECT_TRUE(shape_passes(Shape::kNone, {}));
+  EXPECT_FALSE(shape_passes(Shape::kNone, {1}));
+  EXPECT_TRUE(shape_passes(Shape::kSphere, {}));
+  EXPECT_TRUE(shape_passes(Shape::kBox, {1, 2, 3}));
+  EXPECT_FALSE(shape_passes(Shape::kBox, {1, 2}));
+  EXPECT_FALSE(shape_passes(Shape::kBox, {1, 2, std::numeric_limits<float>::quiet_NaN()}));
+  EXPECT_TRUE(shape_passes(Shape::kCapsule, {1, 2}));
+  EXPECT_TRUE(shape_passes(Shape::kCylinder, {1, 2}));
+  EXPECT_TRUE(shape_passes(Shape::kHull, std::vector<float>(12)));
+  EXPECT_FALSE(shape_passes(Shape::kHull, std::vector<float>(9)));
+  EXPECT_FALSE(shape_passes(Shape::kHull, std::vector<float>(13)));
+  EXPECT_FALSE(shape_passes(Shape::kHull, std::vector<float>(kMaxHullValues + 3)));
+  EXPECT_FALSE(shape_passes(static_cast<Shape>(6), {}));
 }
 
 TEST(Limits, AnotherProtocolVersionPassesBecauseItIsAnsweredNotDropped) {
@@ -67,17 +106,23 @@ TEST(Limits, ADeltaIsRefusedForItsSizeOrItsPart) {
   EXPECT_FALSE(within_limits(delta, kLimits));
 }
 
-TEST(Limits, ASnapshotIsRefusedForItsSizeOrAForeignKey) {
-  SnapshotMessage snapshot;
-  snapshot.frame = 7;
-  snapshot.slot = 3;
-  snapshot.bytes.resize(2000);
-  EXPECT_TRUE(within_limits(snapshot, kLimits));
-  snapshot.slot = 2;
-  EXPECT_FALSE(within_limits(snapshot, kLimits));
-  snapshot.slot = 3;
-  snapshot.bytes.resize(2001);
-  EXPECT_FALSE(within_limits(snapshot, kLimits));
+TEST(Limits, ASnapshotIsRefusedForItsSizesOrItsPart) {
+  const auto passes = [](auto&& change) {
+    SnapshotMessage snapshot;
+    snapshot.part = 1;
+    snapshot.parts = 2;
+    snapshot.total_bytes = 2000;
+    snapshot.bytes.resize(1000);
+    change(snapshot);
+    return within_limits(snapshot, kLimits);
+  };
+  EXPECT_TRUE(passes([](auto&) {}));
+  EXPECT_FALSE(passes([](auto& s) { s.total_bytes = 2001; }));
+  EXPECT_FALSE(passes([](auto& s) { s.bytes.resize(2001); }));
+  EXPECT_FALSE(passes([](auto& s) { s.bytes.clear(); }));
+  EXPECT_FALSE(passes([](auto& s) { s.part = 2; }));
+  EXPECT_FALSE(passes([](auto& s) { s.parts = 0; }));
+  EXPECT_FALSE(passes([](auto& s) { s.parts = kMaxParts + 1; }));
 }
 
 TEST(Limits, WhatAClientSendsIsBounded) {
@@ -101,6 +146,13 @@ TEST(Limits, WhatAClientSendsIsBounded) {
   EXPECT_FALSE(within_limits(ack, kLimits));
   ack.role_wanted = Role::kObserver;
   ack.phase = static_cast<Phase>(2);
+  EXPECT_FALSE(within_limits(ack, kLimits));
+  ack.phase = Phase::kJoining;
+  ack.missing.resize(2 * kMaxMissingRuns);
+  EXPECT_TRUE(within_limits(ack, kLimits));
+  ack.missing.resize(2 * kMaxMissingRuns - 1);
+  EXPECT_FALSE(within_limits(ack, kLimits)) << "a run without its count";
+  ack.missing.resize(2 * kMaxMissingRuns + 2);
   EXPECT_FALSE(within_limits(ack, kLimits));
 }
 

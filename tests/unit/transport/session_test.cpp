@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/session_book.hpp"
 
 namespace tandem::transport {
@@ -100,40 +101,52 @@ TEST(SessionName, RefusesWildcardsAndWhatIsNoName) {
 
 TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
   SessionMessage session;
-  session.layout.codec = "entropy";
-  session.layout.predictor = "ballistic";
-  std::set<std::uint64_t> hashes{layout_hash(session)};
-  const auto differs = [&](auto&& change) {
+  StreamMessage stream;
+  stream.layout.codec = "entropy";
+  stream.layout.predictor = "ballistic";
+  std::set<std::uint64_t> hashes{layout_hash(session, stream)};
+  const auto session_differs = [&](auto&& change) {
     SessionMessage changed = session;
     change(changed);
-    return hashes.insert(layout_hash(changed)).second;
+    return hashes.insert(layout_hash(changed, stream)).second;
   };
-  EXPECT_TRUE(differs([](auto& s) { s.protocol_version = 2; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.capacity = 1; }));
-  EXPECT_TRUE(differs([](auto& s) { s.lattice_unit = 0.5; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.lead = 0; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.codec = "none"; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.codec_tables = Bytes(1); }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.codec.threshold = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.codec.position_step = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.parameters.codec.velocity_step = 7; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.predictor = "field"; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.predictor_constants = {1}; }));
-  EXPECT_TRUE(differs([](auto& s) { s.layout.type_count = 2; }));
-  EXPECT_FALSE(differs([](auto& s) { s.epoch = 5; })) << "a restarted server has the same layout";
-  EXPECT_FALSE(differs([](auto& s) { s.scene_description = "x"; })) << "drawing does not matter";
+  const auto differs = [&](auto&& change) {
+    StreamMessage changed = stream;
+    change(changed.layout);
+    return hashes.insert(layout_hash(session, changed)).second;
+  };
+  EXPECT_TRUE(session_differs([](auto& s) { s.protocol_version = 2; }));
+  EXPECT_TRUE(session_differs([](auto& s) { s.lattice_unit = 0.5; }));
+  EXPECT_TRUE(differs([](auto& l) { l.capacity = 1; }));
+  EXPECT_TRUE(differs([](auto& l) { l.type_count = 2; }));
+  EXPECT_TRUE(differs([](auto& l) { l.lead = 0; }));
+  EXPECT_TRUE(differs([](auto& l) { l.region_blocks = 1; }));
+  EXPECT_TRUE(differs([](auto& l) { l.groups.emplace_back("orientation"); }));
+  EXPECT_TRUE(differs([](auto& l) { l.radii = {5}; }));
+  EXPECT_TRUE(differs([](auto& l) { l.codec = "none"; }));
+  EXPECT_TRUE(differs([](auto& l) { l.codec_tables = Bytes(1); }));
+  EXPECT_TRUE(differs([](auto& l) { l.predictor = "field"; }));
+  EXPECT_TRUE(differs([](auto& l) { l.predictor_constants = {1}; }));
+  EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.threshold = 7; }));
+  EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.position_step = 7; }));
+  EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.velocity_step = 7; }));
+  EXPECT_TRUE(differs([](auto& l) { l.parameters.step.decay = 7; }));
+  EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.velocity_gain = 7; }));
+  EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.acceleration_gain = 7; }));
+  EXPECT_FALSE(session_differs([](auto& s) { s.epoch = 5; })) << "a restarted server has the same layout";
+  EXPECT_FALSE(session_differs([](auto& s) { s.scene_description = "x"; })) << "drawing does not matter";
 }
 
-TEST(LayoutHash, OfAFixedSessionIsAFixedNumber) {
+TEST(LayoutHash, OfTheProtocolsExampleIsTheNumberItGives) {
   SessionMessage session;
-  session.layout.capacity = 10000;
   session.lattice_unit = 0.0009765625;
-  session.layout.codec = "entropy";
-  session.layout.parameters.codec.threshold = 100;
-  session.layout.predictor = "ballistic";
-  session.layout.type_count = 2;
-  EXPECT_EQ(layout_hash(session), 0xf2d62373ce44cb3cULL)
-      << "part of the protocol: old clients would refuse the session";
+  StreamMessage stream;
+  stream.layout.capacity = 10000;
+  stream.layout.type_count = 2;
+  stream.layout.codec = "tracker";
+  stream.layout.parameters.codec.threshold = 100;
+  EXPECT_EQ(to_hex(layout_hash(session, stream)), "ca623bc703a235bd")
+      << "part of the protocol: other clients would refuse the session";
 }
 
 }  // namespace

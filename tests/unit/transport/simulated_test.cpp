@@ -15,11 +15,18 @@ SessionMessage session(Epoch epoch = kEpoch) {
   SessionMessage message;
   message.session = "s";
   message.epoch = epoch;
-  message.layout.capacity = 10;
+  message.capacity = 10;
   message.lattice_unit = 1;
-  message.max_delta_bytes = 100;
-  message.max_snapshot_bytes = 100;
+  message.types.resize(1);
+  message.streams.resize(1);
+  message.streams[0].layout.capacity = message.capacity;
+  message.streams[0].max_delta_bytes = 100;
+  message.streams[0].max_snapshot_bytes = 100;
   return message;
+}
+
+Result<void> open_stream(ClientPort& port, const SessionMessage& about = session()) {
+  return port.open_stream(about, about.streams[0]);
 }
 
 DeltaMessage delta(Frame frame) {
@@ -40,7 +47,8 @@ SnapshotMessage snapshot(Frame frame) {
   SnapshotMessage message;
   message.epoch = kEpoch;
   message.frame = frame;
-  message.slot = static_cast<std::uint32_t>(frame % 4);
+  message.bytes.resize(1);
+  message.total_bytes = 1;
   return message;
 }
 
@@ -77,8 +85,8 @@ struct Pair {
         server(std::move(*network.make_server("s", delta_depth))),
         client(std::move(*network.make_client("s", delta_depth))) {
     EXPECT_TRUE(server->write(session()));
-    EXPECT_TRUE(client->open_stream(session()));
-    EXPECT_TRUE(client->open_snapshots(session()));
+    EXPECT_TRUE(open_stream(*client));
+    EXPECT_TRUE(client->open_snapshots());
     run(100 * kMs);
     EXPECT_TRUE(server->joined(client->self()));
   }
@@ -105,7 +113,7 @@ TEST(Simulated, WritersReachOnlyReadersTheyAreMatchedWith) {
   Network network(options);
   const auto server = std::move(*network.make_server("s"));
   const auto client = std::move(*network.make_client("s"));
-  ASSERT_TRUE(client->open_stream(session()));
+  ASSERT_TRUE(open_stream(*client));
   ASSERT_TRUE(server->write(delta(1)));
   network.advance_to(10 * kMs - 1);
   EXPECT_FALSE(server->alive(client->self()));
@@ -113,7 +121,7 @@ TEST(Simulated, WritersReachOnlyReadersTheyAreMatchedWith) {
   EXPECT_TRUE(server->alive(client->self()));
   EXPECT_FALSE(server->joined(client->self())) << "no snapshot reader yet";
   ASSERT_TRUE(server->write(delta(2)));
-  ASSERT_TRUE(client->open_snapshots(session()));
+  ASSERT_TRUE(client->open_snapshots());
   network.advance_to(30 * kMs);
   EXPECT_TRUE(server->joined(client->self()));
   EXPECT_EQ(frames(*client), range(2, 2)) << "deltas are volatile";
@@ -124,10 +132,10 @@ TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
   const auto server = std::move(*network.make_server("s"));
   ASSERT_TRUE(server->write(session()));
   for (std::uint64_t number = 1; number <= 300; ++number) ASSERT_TRUE(server->write(scheduled(number)));
-  for (Frame frame = 1; frame <= 6; ++frame) ASSERT_TRUE(server->write(snapshot(frame)));
+  ASSERT_TRUE(server->write(snapshot(1)));
   const auto client = std::move(*network.make_client("s"));
-  ASSERT_TRUE(client->open_stream(session()));
-  ASSERT_TRUE(client->open_snapshots(session()));
+  ASSERT_TRUE(open_stream(*client));
+  ASSERT_TRUE(client->open_snapshots());
   network.advance_to(100 * kMs);
   std::vector<Received<SessionMessage>> sessions;
   client->take_sessions(sessions);
@@ -138,18 +146,7 @@ TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
   ASSERT_EQ(inputs.size(), 256U);
   EXPECT_EQ(inputs.front().message.number, 45U);
   EXPECT_EQ(inputs.back().message.number, 300U);
-  const auto snapshots = take<SnapshotMessage>(*client);
-  ASSERT_EQ(snapshots.size(), 4U) << "one of each key";
-  EXPECT_EQ(snapshots.front().message.frame, 3U);
-}
-
-TEST(Simulated, DisposedSnapshotsAreNotHandedToLateReaders) {
-  Pair pair(NetworkOptions{});
-  ASSERT_TRUE(pair.server->write(snapshot(1)));
-  ASSERT_TRUE(pair.server->dispose_snapshots());
-  ASSERT_TRUE(pair.client->open_snapshots(session()));
-  pair.run(100 * kMs);
-  EXPECT_TRUE(take<SnapshotMessage>(*pair.client).empty());
+  EXPECT_TRUE(take<SnapshotMessage>(*client).empty()) << "snapshots are volatile";
 }
 
 TEST(Simulated, LostSamplesAreRepairedInOrderWhateverTheSeed) {
@@ -305,7 +302,7 @@ TEST(Simulated, ClientsNoticeTheEndOfAServerAndTheNextOne) {
   EXPECT_TRUE(pair.client->server_alive()) << "the lease of the first has not run out";
   pair.run(1000 * kMs);
   EXPECT_FALSE(pair.client->server_alive());
-  ASSERT_TRUE(pair.client->open_stream(session(kEpoch + 1)));
+  ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 1)));
   EXPECT_TRUE(pair.client->server_alive());
 }
 
@@ -326,7 +323,7 @@ TEST(Simulated, AFrozenClientGetsAfterwardsWhatTheServerStillKeeps) {
 TEST(Simulated, ACutLinkDeliversNothingUntilMended) {
   Pair pair(NetworkOptions{});
   const auto other = std::move(*pair.network.make_client("s"));
-  ASSERT_TRUE(other->open_stream(session()));
+  ASSERT_TRUE(open_stream(*other));
   pair.run(100 * kMs);
   pair.network.set_cut(pair.server->self(), pair.client->self(), true);
   ASSERT_TRUE(pair.server->write(delta(1)));
@@ -380,7 +377,7 @@ TEST(Simulated, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
   ASSERT_TRUE(pair.server->write(scheduled(1)));
   ASSERT_TRUE(pair.server->write(delta(1)));
   pair.run(100 * kMs);
-  ASSERT_TRUE(pair.client->open_stream(session(kEpoch + 1)));
+  ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 1)));
   pair.run(100 * kMs);
   EXPECT_TRUE(frames(*pair.client).empty());
   EXPECT_EQ(take<ScheduledInputMessage>(*pair.client).size(), 1U) << "kept by the server for new readers";
@@ -421,11 +418,11 @@ TEST(Bottleneck, IsSharedByAllPathsThatNameIt) {
   const auto server = std::move(*network.make_server("s", 64));
   std::vector<std::unique_ptr<ClientPort>> clients;
   auto about = session();
-  about.max_delta_bytes = 10'000;
+  about.streams[0].max_delta_bytes = 10'000;
   EXPECT_TRUE(server->write(about));
   for (int i = 0; i < 2; ++i) {
     clients.push_back(std::move(*network.make_client("s", 64)));
-    EXPECT_TRUE(clients.back()->open_stream(about));
+    EXPECT_TRUE(open_stream(*clients.back(), about));
   }
   network.advance_to(100 * kMs);
   DeltaMessage large = delta(1);
@@ -462,7 +459,7 @@ std::string busy_hour(std::uint64_t seed) {
   for (Frame frame = 1; frame <= 120; ++frame) {
     if (frame % 20 == 1) {
       clients.push_back(std::move(*network.make_client("s", 8)));
-      EXPECT_TRUE(clients.back()->open_stream(session()));
+      EXPECT_TRUE(open_stream(*clients.back()));
     }
     if (frame == 50) network.set_frozen(clients[0]->self(), true);
     if (frame == 60) network.set_frozen(clients[0]->self(), false);

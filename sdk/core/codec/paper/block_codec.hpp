@@ -43,9 +43,10 @@ class BlockCodec final : public Codec {
   [[nodiscard]] std::size_t bound() const override {
     std::size_t bytes = 0;
     for (std::uint32_t b = 0; b < block_count(capacity_); ++b) {
-      const std::uint32_t slots = block_at(b, capacity_).slots;
+      const Block block = block_at(b, capacity_);
       // A list is taken only where it is no longer than the mask.
-      bytes += section_bytes(SelectionForm::kMask, slots, 0, std::uint64_t{coding_.most_bits()} * slots);
+      bytes += section_bytes(
+          body_bytes(block, SelectionForm::kMask, 0, std::uint64_t{coding_.most_bits()} * block.slots));
     }
     return bytes;
   }
@@ -90,16 +91,17 @@ class BlockCodec final : public Codec {
     std::uint64_t bits = 0;
   };
 
-  static std::size_t section_bytes(SelectionForm form, std::uint32_t slots, std::uint32_t chosen,
-                                   std::uint64_t bits) {
-    return kSectionHeaderBytes + kBlockHeaderBytes + selection_bytes(form, slots, chosen) +
+  static std::size_t body_bytes(const Block& block, SelectionForm form, std::uint32_t chosen,
+                                std::uint64_t bits) {
+    return leb128_bytes(block.index) + 1 + selection_bytes(form, block.slots, chosen) +
            static_cast<std::size_t>((bits + 7) / 8);
   }
-  [[nodiscard]] std::size_t plan_bytes(std::uint32_t block) const {
-    const Plan& plan = plans_[block];
+  [[nodiscard]] std::size_t plan_bytes(std::uint32_t index) const {
+    const Plan& plan = plans_[index];
     if (plan.chosen == 0) return 0;
-    const std::uint32_t slots = block_at(block, capacity_).slots;
-    return section_bytes(smallest_form(slots, plan.chosen, plan.alive), slots, plan.chosen, plan.bits);
+    const Block block = block_at(index, capacity_);
+    const SelectionForm form = smallest_form(block.slots, plan.chosen, plan.alive);
+    return section_bytes(body_bytes(block, form, plan.chosen, plan.bits));
   }
   [[nodiscard]] std::size_t total_bytes() const {
     std::size_t bytes = 0;
@@ -111,7 +113,7 @@ class BlockCodec final : public Codec {
   Result<std::uint32_t> parse(const Section& section, std::span<const std::uint8_t> alive,
                               std::uint32_t& next_block, std::size_t first) {
     ByteReader in(section);
-    const std::uint32_t index = in.get<std::uint16_t>();
+    const auto index = static_cast<std::uint32_t>(in.get_leb128(kMostBlockNumberBytes));
     const auto form = static_cast<SelectionForm>(in.get<std::uint8_t>());
     if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
     if (index >= block_count(capacity_))
@@ -197,9 +199,9 @@ class BlockCodec final : public Codec {
     const std::span<Slot> slots = std::span(corrected_).subspan(first, count);
     for (std::uint32_t i = 0; i < count; ++i) slots[i] = chosen[i].slot;
     const SelectionForm form = smallest_form(block.slots, count, plans_[index].alive);
-    out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
-    out.put(static_cast<std::uint32_t>(plan_bytes(index) - kSectionHeaderBytes));
-    out.put(static_cast<std::uint16_t>(index));
+    out.put(static_cast<std::uint8_t>(SectionType::kCorrections));
+    out.put_leb128(body_bytes(block, form, count, plans_[index].bits));
+    out.put_leb128(index);
     out.put(static_cast<std::uint8_t>(form));
     write_selection(form, block, slots, out);
     const auto size_bytes = static_cast<std::size_t>((plans_[index].bits + 7) / 8);

@@ -32,11 +32,12 @@ inline constexpr std::int32_t kResidualLimit = 127;
   return q;
 }
 
-/// p += q * position_step, v += q * velocity_step, clamped to the lattice.
+/// rest = 0, p += q * position_step, v += q * velocity_step, clamped to the lattice.
 inline void apply_residual(State& state, Slot slot, const Residual& q, const CodecParameters& parameters) {
   const auto moved = [](std::int32_t from, std::int8_t steps, std::int32_t step, std::int64_t limit) {
     return static_cast<std::int32_t>(std::clamp(from + std::int64_t{steps} * step, -limit, limit));
   };
+  state.rest()[slot] = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     std::int32_t& p = state.p(i)[slot];
     std::int32_t& v = state.v(i)[slot];

@@ -1,5 +1,7 @@
 #include "sdk/core/codec/tracker/decoder.hpp"
 
+#include "sdk/core/layout/sections.hpp"
+
 namespace tandem {
 namespace {
 
@@ -46,15 +48,15 @@ Result<void> TrackerDecoder::assign(std::span<const Section> sections) {
   std::uint32_t next_block = 0;
   for (const Section& section : sections) {
     ByteReader in(section);
-    const std::uint32_t index = in.get<std::uint16_t>();
+    const auto index = static_cast<std::uint32_t>(in.get_leb128(kMostBlockNumberBytes));
     if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
     if (index >= parts_.size())
       return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
     if (index < next_block) return fail(ErrorCode::kMalformed, "blocks do not ascend");
     next_block = index + 1;
-    parts_[index].stream = in.get_bytes(in.remaining());
-    if (parts_[index].stream.empty())
-      return fail(ErrorCode::kMalformed, "corrections section without a body");
+    Part& part = parts_[index];
+    part.stream = in.get_bytes(in.remaining());
+    if (part.stream.empty()) return fail(ErrorCode::kMalformed, "corrections section without a body");
   }
   return {};
 }

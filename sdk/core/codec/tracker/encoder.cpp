@@ -11,7 +11,7 @@ namespace {
 // anyway. 0.85: at 0.8 bits grow by 1.4 % and the RMS error falls by a tenth, at 1 nobody goes early
 // (RESEARCH.md).
 constexpr std::int64_t kEarlyShare = 218;
-constexpr std::size_t kHeaderBytes = kSectionHeaderBytes + kTrackerBlockHeaderBytes;
+constexpr std::size_t kHeaderBytes = 1 + 2 + 1;  // estimated: type, length, block
 // Under a budget: this share of it may stay unused (1/64), and this often what is sent is written; if
 // estimates mislead, the last times with half as many bodies.
 constexpr std::size_t kSpareShare = 64;
@@ -55,9 +55,9 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
       (is_enough && write(frame, true) <= budget) || write_most_urgent(frame, target, budget);
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     if (frame.delta.blocks[b].corrected == 0) continue;
-    out.put(static_cast<std::uint16_t>(SectionType::kCorrections));
-    out.put(static_cast<std::uint32_t>(parts_[b].coded_bytes + kTrackerBlockHeaderBytes));
-    out.put(static_cast<std::uint16_t>(b));
+    out.put(static_cast<std::uint8_t>(SectionType::kCorrections));
+    out.put_leb128(leb128_bytes(b) + parts_[b].coded_bytes);
+    out.put_leb128(b);
     out.put_bytes(std::span(bytes_).subspan(parts_[b].first_byte, parts_[b].coded_bytes));
   }
   if (!all_fit || some_wait_) remember_waiting(frame);
@@ -232,7 +232,8 @@ std::size_t TrackerEncoder::write(const TrackerFrame& frame, bool all) {
   bool fits = true;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     fits = fits && parts_[b].fits;
-    if (frame.delta.blocks[b].corrected != 0) size_bytes += kHeaderBytes + parts_[b].coded_bytes;
+    if (frame.delta.blocks[b].corrected != 0)
+      size_bytes += section_bytes(leb128_bytes(b) + parts_[b].coded_bytes);
   }
   return fits ? size_bytes : kTooLarge;
 }

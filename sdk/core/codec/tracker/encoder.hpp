@@ -15,10 +15,9 @@ namespace tandem {
 /// What the encoder keeps to, as to a budget. Bodies that all jump at once take about a third of it.
 inline constexpr std::size_t kMostTrackerBytesPerBody = 24;
 inline constexpr std::size_t kTrackerSlackBytes = 64;
-inline constexpr std::size_t kTrackerBlockHeaderBytes = 2;  ///< u16 block
 /// Most bytes of sections for a capacity.
 [[nodiscard]] constexpr std::size_t tracker_bound(std::uint32_t capacity) {
-  return block_count(capacity) * (kSectionHeaderBytes + kTrackerBlockHeaderBytes + kTrackerSlackBytes) +
+  return block_count(capacity) * (kMostSectionHeaderBytes + kMostBlockNumberBytes + kTrackerSlackBytes) +
          kMostTrackerBytesPerBody * capacity;
 }
 

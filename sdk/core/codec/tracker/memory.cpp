@@ -67,6 +67,7 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
     const Slot slot = delta.slots[i];
     TrackerBody body = this->body(slot);
+    state.rest()[slot] = 0;
     correct_body(state, slot, delta.steps[i], steppings, threshold, gains_, body);
     set_body(slot, body);
     age[slot] = kYoungest;
@@ -84,33 +85,27 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   }
 }
 
-// Snapshot: columns of all slots, then per model: weight, and where that is not zero the probability.
-void TrackerMemory::save(ByteWriter& out) const {
-  out.put_bytes(columns_);
+// Per model: weight, and where that is not zero the probability.
+void TrackerMemory::save_models(ByteWriter& out) const {
   for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
     out.put(models_.weight[i]);
     if (models_.weight[i] != 0) out.put(models_.p1[i]);
   }
 }
 
-std::size_t TrackerMemory::save_bound() const {
-  return columns_.size() + TrackerModelIndex::kCount * kModelBytes;
-}
+std::size_t TrackerMemory::models_bound() const { return TrackerModelIndex::kCount * kModelBytes; }
 
-Result<void> TrackerMemory::load(std::span<const std::byte> bytes, std::span<const std::uint8_t> alive) {
-  ByteReader in(bytes);
-  const std::span<const std::byte> columns = in.get_bytes(columns_.size());
-  if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated coder state");
+Result<void> TrackerMemory::load(std::span<const std::byte> columns, std::span<const std::byte> model_bytes) {
+  if (columns.size() != columns_.size())
+    return fail(ErrorCode::kMalformed, "coder state of another number of columns");
   if (std::any_of(columns.begin(), columns.begin() + capacity_,
                   [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMostAge; })) {
     return fail(ErrorCode::kMalformed, "coder state with an impossible age");
   }
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const bool impossible =
-        i >= 2 * std::size_t{capacity_} && columns[i] == std::byte{0x80};  // steps of -128
-    if (impossible || (columns[i] != std::byte{0} && alive[i % capacity_] == 0))
-      return fail(ErrorCode::kMalformed, "coder state of a slot that cannot have it");
-  }
+  const auto steps = columns.subspan(2 * std::size_t{capacity_});
+  if (std::find(steps.begin(), steps.end(), std::byte{0x80}) != steps.end())
+    return fail(ErrorCode::kMalformed, "coder state with a step of -128");
+  ByteReader in(model_bytes);
   bool good = true;
   TrackerModels models;
   for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {

@@ -77,9 +77,9 @@ class TrackerMemory {
              State& state);
 
   /// As Codec has them.
-  void save(ByteWriter& out) const;
-  [[nodiscard]] std::size_t save_bound() const;
-  [[nodiscard]] Result<void> load(std::span<const std::byte> bytes, std::span<const std::uint8_t> alive);
+  void save_models(ByteWriter& out) const;
+  [[nodiscard]] std::size_t models_bound() const;
+  [[nodiscard]] Result<void> load(std::span<const std::byte> columns, std::span<const std::byte> model_bytes);
 
  private:
   void set_body(Slot slot, const TrackerBody& body);

@@ -25,12 +25,12 @@ class Tracker final : public Codec {
                      EncodeObserver* observer) override;
   Result<Corrections> decode(const CodecFrame& at, std::span<const Section> sections) override;
   void apply(const Corrections& corrections, State& state) override;
-  [[nodiscard]] std::span<const std::byte> body_state() const override { return memory_.columns(); }
-  void save(ByteWriter& out) const override { memory_.save(out); }
-  [[nodiscard]] std::size_t save_bound() const override { return memory_.save_bound(); }
-  [[nodiscard]] Result<void> load(std::span<const std::byte> bytes,
-                                  std::span<const std::uint8_t> alive) override {
-    return memory_.load(bytes, alive);
+  [[nodiscard]] std::span<const std::byte> columns() const override { return memory_.columns(); }
+  void save_models(ByteWriter& out) const override { memory_.save_models(out); }
+  [[nodiscard]] std::size_t models_bound() const override { return memory_.models_bound(); }
+  [[nodiscard]] Result<void> load(std::span<const std::byte> columns,
+                                  std::span<const std::byte> models) override {
+    return memory_.load(columns, models);
   }
 
  private:

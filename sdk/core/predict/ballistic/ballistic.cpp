@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
 namespace {
@@ -40,23 +41,26 @@ inline std::int32_t gravity_of(std::uint8_t alive, std::int32_t gravity) {
   return gravity & -static_cast<std::int32_t>(alive);
 }
 
-// One channel. Columns never overlap; a compiler that is told so vectorises.
-TANDEM_VECTOR_CLONES void step_channel(const std::int32_t* __restrict p, const std::int32_t* __restrict v,
-                                       const std::int32_t* __restrict c, std::int32_t* __restrict p_to,
-                                       std::int32_t* __restrict v_to, std::int32_t* __restrict c_to,
-                                       const std::uint8_t* __restrict alive, std::size_t count,
-                                       std::int32_t gravity, const StepInput& input) {
+// One channel; of bodies at rest nothing changes. Columns never overlap; a compiler that is told so
+// vectorises.
+TANDEM_VECTOR_CLONES void step_channel(const std::uint8_t* __restrict rest, const std::int32_t* __restrict p,
+                                       const std::int32_t* __restrict v, const std::int32_t* __restrict c,
+                                       std::int32_t* __restrict p_to, std::int32_t* __restrict v_to,
+                                       std::int32_t* __restrict c_to, const std::uint8_t* __restrict alive,
+                                       std::size_t count, std::int32_t gravity, const StepInput& input) {
   const std::uint32_t damping = input.drive.damping;
   const std::uint32_t decay = input.parameters.decay;
   for (std::size_t s = 0; s < count; ++s) {
     const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
-    p_to[s] = m.p;
-    v_to[s] = m.v;
-    c_to[s] = m.c;
+    const std::int32_t still = -static_cast<std::int32_t>(rest[s]);
+    p_to[s] = m.p ^ ((m.p ^ p[s]) & still);
+    v_to[s] = m.v ^ ((m.v ^ v[s]) & still);
+    c_to[s] = m.c ^ ((m.c ^ c[s]) & still);
   }
 }
 
-TANDEM_VECTOR_CLONES void step_channel_in_place(std::int32_t* __restrict p, std::int32_t* __restrict v,
+TANDEM_VECTOR_CLONES void step_channel_in_place(const std::uint8_t* __restrict rest,
+                                                std::int32_t* __restrict p, std::int32_t* __restrict v,
                                                 std::int32_t* __restrict c,
                                                 const std::uint8_t* __restrict alive, std::size_t count,
                                                 std::int32_t gravity, const StepInput& input) {
@@ -64,21 +68,23 @@ TANDEM_VECTOR_CLONES void step_channel_in_place(std::int32_t* __restrict p, std:
   const std::uint32_t decay = input.parameters.decay;
   for (std::size_t s = 0; s < count; ++s) {
     const Motion m = stepped({p[s], v[s], c[s]}, gravity_of(alive[s], gravity), damping, decay);
-    p[s] = m.p;
-    v[s] = m.v;
-    c[s] = m.c;
+    const std::int32_t still = -static_cast<std::int32_t>(rest[s]);
+    p[s] = m.p ^ ((m.p ^ p[s]) & still);
+    v[s] = m.v ^ ((m.v ^ v[s]) & still);
+    c[s] = m.c ^ ((m.c ^ c[s]) & still);
   }
 }
 
 void step_all(const State& from, State& to, const StepInput& input) {
   const std::size_t count = from.capacity();
   const std::uint8_t* alive = from.alive().data();
+  const std::uint8_t* rest = to.rest().data();
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     const std::int32_t gravity = input.drive.gravity[i];
     if (&from == &to) {
-      step_channel_in_place(to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, input);
+      step_channel_in_place(rest, to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, input);
     } else {
-      step_channel(from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
+      step_channel(rest, from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
                    to.c(i).data(), alive, count, gravity, input);
     }
   }
@@ -89,9 +95,10 @@ void step_all(const State& from, State& to, const StepInput& input) {
 void Ballistic::step(const State& from, State& to, const StepInput& input) {
   if (&from != &to) {
     std::copy(from.alive().begin(), from.alive().end(), to.alive().begin());
-    std::copy(from.generation().begin(), from.generation().end(), to.generation().begin());
+    std::copy(from.reuse().begin(), from.reuse().end(), to.reuse().begin());
     std::copy(from.type().begin(), from.type().end(), to.type().begin());
   }
+  keep_at_rest(from, to, input.drive);
   step_all(from, to, input);
 }
 
@@ -99,8 +106,10 @@ void Ballistic::step_slots(const State& from, State& to, const StepInput& input,
                            std::span<const Slot> slots) {
   for (const Slot s : slots) {
     to.alive()[s] = from.alive()[s];
-    to.generation()[s] = from.generation()[s];
+    to.reuse()[s] = from.reuse()[s];
     to.type()[s] = from.type()[s];
+    const bool still = from.rest()[s] != 0 && holds_still({from.c(0)[s], from.c(1)[s], from.c(2)[s]}, input.drive);
+    to.rest()[s] = static_cast<std::uint8_t>(still);
   }
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     const std::int32_t* p = from.p(i).data();
@@ -111,7 +120,8 @@ void Ballistic::step_slots(const State& from, State& to, const StepInput& input,
     std::int32_t* c_to = to.c(i).data();
     for (const Slot s : slots) {
       const std::int32_t gravity = gravity_of(from.alive()[s], input.drive.gravity[i]);
-      const Motion m = stepped({p[s], v[s], c[s]}, gravity, input.drive.damping, input.parameters.decay);
+      Motion m{p[s], v[s], c[s]};
+      if (to.rest()[s] == 0) m = stepped(m, gravity, input.drive.damping, input.parameters.decay);
       p_to[s] = m.p;
       v_to[s] = m.v;
       c_to[s] = m.c;

@@ -9,6 +9,7 @@
 
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/move.hpp"
+#include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
 namespace {
@@ -68,9 +69,13 @@ TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
   return all != 0;
 }
 
-// c -= (c*E + 2^15) >> 16, which is never larger than c.
-TANDEM_VECTOR_CLONES void decay(std::int32_t* c, std::size_t count, std::int64_t share) {
-  for (std::size_t s = 0; s < count; ++s) c[s] -= static_cast<std::int32_t>((c[s] * share + 32768) >> 16);
+// c -= (c*E + 2^15) >> 16, which is never larger than c; not of bodies at rest.
+TANDEM_VECTOR_CLONES void decay(std::int32_t* c, const std::uint8_t* rest, std::size_t count,
+                                std::int64_t share) {
+  for (std::size_t s = 0; s < count; ++s) {
+    const std::int32_t moving = static_cast<std::int32_t>(rest[s]) - 1;
+    c[s] -= static_cast<std::int32_t>((c[s] * share + 32768) >> 16) & moving;
+  }
 }
 
 }  // namespace
@@ -91,6 +96,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
       views_(capacity),
       forces_(capacity),
       accelerations_(capacity),
+      at_rest_(capacity),
       place_cell_(capacity),
       near_xy_(capacity + kBeyond),
       later_xy_(near_xy_.size()),
@@ -111,7 +117,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
   }
 }
 
-void Contact::sort(const State& state) {
+void Contact::sort(const State& state, std::span<const std::uint8_t> rest) {
   const std::uint32_t capacity = state.capacity();
   number_cells({shift_, side_bits_, cells_per_}, state.p(0).data(), state.p(1).data(), state.p(2).data(),
                cell_.data(), capacity);
@@ -136,6 +142,7 @@ void Contact::sort(const State& state) {
     const ContactConstants::Type& type = constants_.type_of(state.type()[s]);
     bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
     if (!one_mobility_) forces_[place].mobility = type.mobility;
+    if (some_rest_) at_rest_[place] = rest[s];
     if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};
   }
   for (std::uint32_t place = 0; place < count_; ++place) place_cell_[place] = cell_[bodies_[place].slot];
@@ -177,7 +184,7 @@ void Contact::write(const State& from, const StepInput& input, State& to) const 
       std::copy(column.begin(), column.end(), column_to.begin());
     };
     copy(from.alive(), to.alive());
-    copy(from.generation(), to.generation());
+    copy(from.reuse(), to.reuse());
     copy(from.type(), to.type());
     for (std::size_t i = 0; i < 3; ++i) {
       if (accelerated_) {
@@ -196,19 +203,25 @@ void Contact::write(const State& from, const StepInput& input, State& to) const 
     }
   }
   for (std::size_t i = 0; accelerated_ && i < 3; ++i)
-    decay(to.c(i).data(), to.c(i).size(), input.parameters.decay);
+    decay(to.c(i).data(), to.rest().data(), to.c(i).size(), input.parameters.decay);
 }
 
 void Contact::step(const State& from, State& to, const StepInput& input) {
-  sort(from);
+  some_rest_ = keep_at_rest(from, to, input.drive);
+  sort(from, to.rest());
   place_bodies(std::span(bodies_).first(count_),
                {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_);
   for (std::int32_t i = 0; i < constants_.substeps; ++i) {
     walls_.add_forces(std::span(bodies_).first(count_), forces_);
     add_pairs(i == 0);
     const bool first = i == 0;
-    const ContactMove move{shift_, one_mobility_, constants_.substeps, first ? input.drive.gravity : Vec3i{},
-                           first ? input.drive.damping : 0U};
+    const ContactMove move{
+        shift_,
+        one_mobility_,
+        constants_.substeps,
+        first ? input.drive.gravity : Vec3i{},
+        first ? input.drive.damping : 0U,
+        some_rest_ ? std::span<const std::uint8_t>(at_rest_) : std::span<const std::uint8_t>()};
     const bool pushed = first && accelerated_;
     move_bodies(move, std::span(bodies_).first(count_), forces_,
                 pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>(),

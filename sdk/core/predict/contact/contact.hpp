@@ -33,7 +33,7 @@ class Contact final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
 
  private:
-  void sort(const State& state);
+  void sort(const State& state, std::span<const std::uint8_t> rest);
   void add_pairs(bool first);
   void write(const State& from, const StepInput& input, State& to) const;
 
@@ -58,6 +58,8 @@ class Contact final : public Predictor {
   std::vector<ContactForce> forces_;
   std::vector<ContactForce> accelerations_;  // c, where any is not zero
   bool accelerated_ = false;
+  std::vector<std::uint8_t> at_rest_;  // where some_rest_
+  bool some_rest_ = false;
   std::vector<std::uint32_t> place_cell_, near_xy_, later_xy_, near_z_;
   std::vector<std::uint32_t> first_, second_;
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16

@@ -67,6 +67,10 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     ContactBody& body = bodies[k];
     ContactForce& force = forces[k];
+    if (!move.at_rest.empty() && move.at_rest[k] != 0) {
+      force.f = {};
+      continue;
+    }
     const Four f = clamped(load(force.f), most_force) << force_shift;
     const Four p_and_radius = load(body.p);
     const Four v_and_slot = load(body.v);

@@ -14,6 +14,7 @@ struct ContactMove {
   std::int32_t substeps;
   Vec3i gravity;
   std::uint32_t damping;
+  std::span<const std::uint8_t> at_rest;  ///< by place, bodies that do not move; empty: none
 };
 
 /// Moves bodies by the forces on them, which go back to 0, and writes what others see of them.

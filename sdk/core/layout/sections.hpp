@@ -1,0 +1,66 @@
+#pragma once
+// How payloads and snapshots are framed: typed sections. idl/PROTOCOL.md, "Payload".
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "sdk/core/lattice/bytes.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem {
+
+/// A reader that does not know a type refuses the whole if this bit is set, else it skips the section.
+inline constexpr std::uint8_t kCriticalSection = 0x80;
+enum class SectionType : std::uint8_t {
+  kLifecycle = 0x81,
+  kParameters = 0x82,
+  kCorrections = 0x83,
+  kInputs = 0x84,  ///< snapshots only, as regions
+  kRegion = 0x85,
+};
+inline constexpr std::size_t kMostSectionLengthBytes = 4;
+/// Most bytes before a section's body.
+inline constexpr std::size_t kMostSectionHeaderBytes = 1 + kMostSectionLengthBytes;
+
+/// Of a block number, as LEB128.
+inline constexpr std::size_t kMostBlockNumberBytes = 4;
+
+/// Bytes of a section whose body takes `body_bytes`.
+[[nodiscard]] constexpr std::size_t section_bytes(std::size_t body_bytes) {
+  return 1 + leb128_bytes(body_bytes) + body_bytes;
+}
+
+/// One of a payload or a snapshot.
+struct TypedSection {
+  std::uint8_t type = 0;
+  std::span<const std::byte> body;
+};
+
+/// Errors: kMalformed.
+[[nodiscard]] inline Result<TypedSection> next_section(ByteReader& in) {
+  TypedSection section;
+  section.type = in.get<std::uint8_t>();
+  section.body = in.get_bytes(static_cast<std::size_t>(in.get_leb128(kMostSectionLengthBytes)));
+  if (!in.ok()) return fail(ErrorCode::kMalformed, "section that is truncated or whose length is not LEB128");
+  return section;
+}
+
+/// Success for a section that may be skipped. Errors: kUnsupported.
+[[nodiscard]] inline Result<void> skip_section(std::uint8_t type) {
+  if ((type & kCriticalSection) == 0) return {};
+  return fail(ErrorCode::kUnsupported,
+              "unknown critical section " + std::to_string(type & ~kCriticalSection));
+}
+
+/// Writes a section whose body write(out) appends.
+template <class Write>
+void put_section(SectionType type, ByteWriter& out, Write&& write) {
+  out.put(static_cast<std::uint8_t>(type));
+  const std::size_t at = out.size();
+  write(out);
+  out.put_length_before(at);
+}
+
+}  // namespace tandem
