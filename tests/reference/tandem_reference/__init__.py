@@ -1,0 +1,1 @@
+"""Reference decoder of the Tandem protocol, written from idl/PROTOCOL.md alone."""

@@ -1,0 +1,148 @@
+"""XCDR version 1, little-endian, of the topic types of idl/tandem.idl."""
+
+import struct
+
+from .errors import Refused, require
+
+# The last two bits of the options may tell how many bytes of padding end the sample.
+ENCAPSULATION = bytes([0, 1, 0, 0])
+SCALARS = {"octet": "B", "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q", "float": "f", "double": "d"}
+
+# Fields in the order of the IDL: (type, name); "[T]" is a sequence of T.
+TYPES = {
+    "BodyType": [
+        ("float", "radius"), ("uint32", "colour_rgba"), ("uint32", "shape"), ("string", "name"),
+        ("[float]", "shape_values"),
+    ],
+    "Parameter": [("uint32", "id"), ("int32", "value")],
+    "Stream": [
+        ("uint32", "id"), ("uint32", "generation"), ("uint32", "region_blocks"), ("uint32", "client_cost_ns"),
+        ("uint32", "max_delta_bytes"), ("uint32", "max_snapshot_bytes"), ("uint64", "layout_hash"),
+        ("string", "codec"), ("string", "predictor"), ("[string]", "groups"), ("[int32]", "radii"),
+        ("[Parameter]", "parameters"), ("[int32]", "predictor_constants"), ("[octet]", "codec_tables"),
+    ],
+    "TandemSession": [
+        ("uint64", "epoch"), ("uint32", "protocol_version"), ("uint32", "capacity"), ("double", "frame_rate_hz"),
+        ("double", "lattice_unit"), ("uint32", "lead"), ("uint32", "window_ceiling"), ("string", "session"),
+        ("string", "scene"), ("string", "scene_description"), ("[BodyType]", "types"), ("[Stream]", "streams"),
+    ],
+    "TandemDelta": [
+        ("uint64", "epoch"), ("uint32", "stream"), ("uint32", "generation"), ("uint64", "frame"), ("uint32", "part"),
+        ("uint32", "parts"), ("uint64", "last_input"), ("int64", "server_time_ns"), ("uint64", "hash"),
+        ("[octet]", "payload"),
+    ],
+    "TandemScheduledInput": [
+        ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "source_client"),
+        ("uint64", "source_number"), ("uint32", "kind"), ("[int32]", "values"),
+    ],
+    "TandemSnapshot": [
+        ("uint64", "epoch"), ("uint32", "stream"), ("uint32", "generation"), ("uint64", "frame"), ("uint32", "part"),
+        ("uint32", "parts"), ("uint32", "total_bytes"), ("[octet]", "bytes"),
+    ],
+    "ReplyEntry": [("uint64", "number"), ("uint64", "frame"), ("uint32", "code")],
+    "TandemReply": [
+        ("uint64", "client"), ("uint64", "epoch"), ("uint32", "role"), ("uint32", "phase"), ("uint32", "reason"),
+        ("uint64", "highest_input"), ("int64", "client_clock_ns"), ("int64", "server_time_ns"),
+        ("[ReplyEntry]", "entries"),
+    ],
+    "TandemInput": [
+        ("uint64", "client"), ("uint64", "epoch"), ("uint64", "number"), ("uint64", "client_frame"),
+        ("uint32", "kind"), ("[double]", "values"), ("[octet]", "bytes"),
+    ],
+    "TandemAck": [
+        ("uint64", "client"), ("uint64", "epoch"), ("uint32", "protocol_version"), ("uint32", "stream"),
+        ("uint32", "generation"), ("uint32", "phase"), ("uint64", "applied"), ("uint64", "simulated"),
+        ("uint32", "role_wanted"), ("uint32", "join_attempt"), ("int64", "clock_ns"), ("uint64", "snapshot_frame"),
+        ("uint32", "snapshot_parts"), ("[uint32]", "missing"),
+    ],
+    "TandemServerStatus": [
+        ("uint64", "epoch"), ("uint64", "frame"), ("double", "uptime_s"), ("double", "frame_rate_hz"),
+        ("double", "mbit_per_s"), ("double", "raw_mbit_per_s"), ("double", "frame_ms_p50"), ("double", "frame_ms_p99"),
+        ("double", "corrected_per_frame"), ("double", "threshold"), ("uint32", "bodies"), ("uint32", "at_rest"),
+        ("uint32", "participants"), ("uint32", "observers"), ("uint32", "window"), ("uint32", "queue_high_water"),
+        ("uint64", "delta_bytes"), ("uint64", "reply_bytes"), ("uint64", "input_bytes"), ("uint64", "snapshot_bytes"),
+        ("uint64", "stalls"), ("uint64", "suspended_ms"), ("uint64", "refused_inputs"), ("uint64", "refused_messages"),
+        ("uint64", "snapshots"), ("uint32", "stream"), ("string", "session"), ("string", "codec"),
+        ("string", "predictor"),
+    ],
+    "TandemClientStatus": [
+        ("uint64", "client"), ("uint64", "epoch"), ("uint64", "applied"), ("uint32", "stream"),
+        ("uint32", "generation"), ("uint32", "role"), ("uint32", "phase"), ("uint32", "too_slow"),
+        ("uint32", "queue_high_water"), ("double", "lag_ms"), ("double", "client_ms_p50"), ("double", "mbit_per_s"),
+        ("uint64", "frames_applied"), ("uint64", "resyncs"), ("uint64", "hash_mismatches"), ("uint64", "inputs_sent"),
+        ("uint64", "inputs_refused"), ("string", "session"),
+    ],
+}  # fmt: skip
+TOPICS = [name for name in TYPES if name.startswith("Tandem")]
+
+
+class Message:
+    """A decoded struct; its fields are attributes."""
+
+    def __init__(self, type_name, fields):
+        self.type_name = type_name
+        self.__dict__.update(fields)
+
+
+class Decoder:
+    """Decodes what follows the encapsulation header; alignment counts from there."""
+
+    def __init__(self, data):
+        self.data = data
+        self.at = 0
+
+    def take(self, count):
+        """The next bytes, none of them beyond the end."""
+        require(self.at + count <= len(self.data), "sample", "a sample ends too soon")
+        self.at += count
+        return self.data[self.at - count : self.at]
+
+    def scalars(self, kind, count):
+        """`count` numbers of one kind, after the padding that the first needs."""
+        code = SCALARS[kind]
+        if count == 0:
+            return []
+        size = struct.calcsize("<" + code)
+        self.take(-self.at % size)
+        return list(struct.unpack(f"<{count}{code}", self.take(count * size)))
+
+    def string(self):
+        """A length that includes the closing zero, then the bytes."""
+        size = self.scalars("uint32", 1)[0]
+        require(size >= 1, "sample", "a string without its closing zero")
+        text = self.take(size)
+        require(text.find(0) == size - 1, "sample", "a string whose only zero is not its last byte")
+        try:
+            return text[:-1].decode("utf-8")
+        except UnicodeDecodeError:
+            raise Refused("sample", "a string that is not UTF-8") from None
+
+    def value(self, kind):
+        """One value of any kind."""
+        if kind == "string":
+            return self.string()
+        if kind.startswith("["):
+            return self.sequence(kind[1:-1])
+        if kind in TYPES:
+            return Message(kind, {name: self.value(field) for field, name in TYPES[kind]})
+        return self.scalars(kind, 1)[0]
+
+    def sequence(self, kind):
+        """A count, then the elements."""
+        count = self.scalars("uint32", 1)[0]
+        require(count <= len(self.data) - self.at, "sample", "a sequence longer than its sample")
+        if kind == "octet":
+            return self.take(count)
+        if kind in SCALARS:
+            return self.scalars(kind, count)
+        return [self.value(kind) for _ in range(count)]
+
+
+def decode(kind, sample):
+    """The message in a sample: encapsulation header, then the struct."""
+    require(sample[:3] == ENCAPSULATION[:3], "sample", "not XCDR version 1, little-endian")
+    require(len(sample) > 3 and sample[3] <= 3, "sample", "unknown options in the encapsulation header")
+    decoder = Decoder(bytes(sample[4:]))
+    message = decoder.value(kind)
+    require(len(decoder.data) - decoder.at < 4, "sample", "bytes left over behind a sample")
+    return message

@@ -1,0 +1,156 @@
+"""A delta: its sections, and what they do to the predicted state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import codecs, parameters, tracker
+from .errors import require
+from .reader import Reader
+from .state import MOST_P, MOST_V
+
+LIFECYCLE, PARAMETERS, CORRECTIONS = 0x81, 0x82, 0x83
+DESPAWN, SPAWN, TELEPORT, TYPE_CHANGE = range(4)
+
+
+@dataclass
+class World:
+    """All that client and server hold in common after a frame."""
+
+    state: object
+    parameters: dict
+    models: object
+
+    def copy(self):
+        """The same in memory of its own."""
+        models = self.models.copy() if self.models else None
+        return World(self.state.copy(), dict(self.parameters), models)
+
+
+def start_models(stream):
+    """The models of a stream at its start; codecs other than `tracker` have none."""
+    return tracker.Models() if stream.codec == "tracker" else None
+
+
+@dataclass
+class Record:
+    """One record of the section lifecycle."""
+
+    slot: int
+    kind: int
+    reuse: int = 0
+    type: int = 0
+    p: tuple = ()
+    v: tuple = ()
+
+
+@dataclass
+class Parsed:
+    """The known sections of a payload."""
+
+    records: list
+    parameters: dict
+    corrections: list  # (block, Reader at what the codec says)
+
+
+def sections(reader, known):
+    """(type, Reader of the body) of every section with a known type; the others are skipped or refused."""
+    while reader.left():
+        kind = reader.u8()
+        body = reader.take(reader.leb128(4))
+        if kind in known:
+            yield kind, Reader(body, known[kind])
+        else:
+            require(kind < 0x80, "critical", f"unknown critical section 0x{kind:02x}")
+
+
+def parse(data, state):
+    """The known sections of a payload, in the order that the protocol asks for."""
+    known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", CORRECTIONS: "corrections"}
+    parsed = Parsed([], {}, [])
+    before = 0
+    for kind, body in sections(Reader(data, "payload"), known):
+        require(kind > before or kind == before == CORRECTIONS, "order", f"{known[kind]} behind section 0x{before:02x}")
+        before = kind
+        if kind == LIFECYCLE:
+            parsed.records = read_records(body)
+        elif kind == PARAMETERS:
+            parsed.parameters = parameters.read(body)
+        else:
+            block = body.leb128(4)
+            require(block < state.blocks(), "corrections", f"block {block} does not exist")
+            if parsed.corrections:
+                require(block > parsed.corrections[-1][0], "order", "blocks that do not ascend")
+            parsed.corrections.append((block, body))
+    return parsed
+
+
+def read_position(body):
+    """p and v as lifecycle records hold them."""
+    values = [body.i32() for _ in range(6)]
+    p, v = tuple(values[:3]), tuple(values[3:])
+    require(all(abs(value) <= MOST_P for value in p), "values", "a position out of range")
+    require(all(abs(value) <= MOST_V for value in v), "values", "a velocity out of range")
+    return p, v
+
+
+def read_records(body):
+    """The records of a lifecycle section."""
+    records = []
+    slot = 0
+    while body.left() or not records:
+        key = body.leb128(4)
+        slot += key // 4
+        record = Record(slot, key % 4)
+        if records and records[-1].slot == slot:
+            pair = records[-1].kind, record.kind
+            require(pair == (DESPAWN, SPAWN), "lifecycle", f"slot {slot}: two records that may not follow each other")
+        if record.kind == SPAWN:
+            record.reuse = body.u8()
+        if record.kind in (SPAWN, TYPE_CHANGE):
+            record.type = body.leb128(3)
+        if record.kind == TELEPORT:
+            groups = body.u8()
+            require(groups == 1, "lifecycle", f"slot {slot}: a teleport of the groups {groups:#x}")
+        if record.kind in (SPAWN, TELEPORT):
+            record.p, record.v = read_position(body)
+        records.append(record)
+    return records
+
+
+def apply_records(state, records, types):
+    """Spawn, despawn and so on; which bodies were renewed."""
+    renewed = np.zeros(state.capacity, bool)
+    for record in records:
+        slot = record.slot
+        require(slot < state.capacity, "lifecycle", f"slot {slot} does not exist")
+        require(record.type < types, "lifecycle", f"slot {slot}: type {record.type} does not exist")
+        if record.kind == SPAWN:
+            require(not state.alive[slot], "lifecycle", f"slot {slot}: a spawn where a body lives")
+            state.alive[slot] = 1
+            state.reuse[slot] = record.reuse
+        else:
+            require(state.alive[slot], "lifecycle", f"slot {slot}: no body lives there")
+        if record.kind == DESPAWN:
+            state.clear(slot)
+        if record.kind in (SPAWN, TYPE_CHANGE):
+            state.type[slot] = record.type
+        if record.kind in (SPAWN, TELEPORT):
+            state.p[:, slot], state.v[:, slot], state.c[:, slot] = record.p, record.v, 0
+            state.rest[slot] = 0
+            state.codec[:, slot] = 0
+            renewed[slot] = 1
+    return renewed
+
+
+def apply_delta(world, stream, data):
+    """The world after a delta, from the one with the predicted state of its frame, which stays as it is."""
+    parsed = parse(data, world.state)
+    after = world.copy()
+    after.parameters.update(parsed.parameters)
+    renewed = apply_records(after.state, parsed.records, stream.types)
+    if stream.codec == "tracker":
+        tracker.apply_corrections(after, stream, parsed.corrections, renewed)
+    else:
+        codecs.apply_corrections(after, stream, parsed.corrections)
+    return after

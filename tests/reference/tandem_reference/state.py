@@ -1,0 +1,76 @@
+"""The agreed state of a frame: columns over slots, and its hash."""
+
+import numpy as np
+
+from .errors import require
+from .xxh3 import xxh3_64
+
+BLOCK = 16384
+MOST_P, MOST_V, MOST_C = 2**30, 2**28, 2**28
+CODEC_COLUMNS = {"tracker": 5}
+
+
+class State:
+    """Columns as arrays over the slots; p, v, c and the codec's have one row an axis or column."""
+
+    def __init__(self, capacity, codec):
+        self.capacity = capacity
+        self.alive = np.zeros(capacity, bool)
+        self.reuse = np.zeros(capacity, np.int64)
+        self.type = np.zeros(capacity, np.int64)
+        self.rest = np.zeros(capacity, bool)
+        self.p = np.zeros((3, capacity), np.int64)
+        self.v = np.zeros((3, capacity), np.int64)
+        self.c = np.zeros((3, capacity), np.int64)
+        self.codec = np.zeros((CODEC_COLUMNS.get(codec, 0), capacity), np.int64)
+
+    def copy(self):
+        """The same state in arrays of its own."""
+        twin = object.__new__(State)
+        twin.capacity = self.capacity
+        for name in ("alive", "reuse", "type", "rest", "p", "v", "c", "codec"):
+            setattr(twin, name, getattr(self, name).copy())
+        return twin
+
+    def clear(self, slot):
+        """What a despawn does: every column of the slot is zero."""
+        for column in (self.alive, self.reuse, self.type, self.rest):
+            column[slot] = 0
+        for rows in (self.p, self.v, self.c, self.codec):
+            rows[:, slot] = 0
+
+    def blocks(self):
+        """How many blocks there are."""
+        return -(-self.capacity // BLOCK)
+
+    def block_slots(self, block):
+        """First slot of a block, and the one behind its last."""
+        return block * BLOCK, min((block + 1) * BLOCK, self.capacity)
+
+    def leaves(self, block):
+        """The hashes of a block: of what every slot has, then of the group `position`."""
+        first, end = self.block_slots(block)
+        common = [
+            self.alive[first:end].astype("u1"),
+            self.reuse[first:end].astype("u1"),
+            self.type[first:end].astype("<u2"),
+            self.rest[first:end].astype("u1"),
+            *(row[first:end].astype("u1") for row in self.codec),
+        ]
+        position = [row[first:end].astype("<i4") for rows in (self.p, self.v, self.c) for row in rows]
+        return [xxh3_64(b"".join(column.tobytes() for column in columns)) for columns in (common, position)]
+
+    def region_hash(self):
+        """The hash of the one region: of the leaves of all blocks."""
+        leaves = [leaf for block in range(self.blocks()) for leaf in self.leaves(block)]
+        return xxh3_64(b"".join(leaf.to_bytes(8, "little") for leaf in leaves))
+
+    def hash(self):
+        """The state hash: of the hashes of the regions."""
+        return xxh3_64(self.region_hash().to_bytes(8, "little"))
+
+    def check_ranges(self, types, rule):
+        """Refuse a state with a value that no state may hold."""
+        require(not np.any(self.type >= types), rule, "a type that the session does not have")
+        for rows, most, name in ((self.p, MOST_P, "p"), (self.v, MOST_V, "v"), (self.c, MOST_C, "c")):
+            require(not np.any(np.abs(rows) > most), rule, f"{name} out of range")

@@ -1,0 +1,103 @@
+"""What is fixed in a stream: capacity, types, codec, predictor; and the hash of its layout."""
+
+import struct
+from dataclasses import dataclass, field
+
+from . import contact, huffman, parameters, xxh3
+from .errors import require
+
+CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
+PREDICTORS = ("ballistic", "contact", "field")
+VERSION = 1
+
+
+@dataclass
+class Stream:
+    """The parameters of a stream, checked; `parameters` are those of frame 0, by id."""
+
+    capacity: int
+    types: int
+    codec: str
+    predictor: str
+    parameters: dict
+    codec_tables: bytes = b""
+    predictor_constants: list = field(default_factory=list)
+    groups: list = field(default_factory=lambda: ["position"])
+    radii: list = field(default_factory=list)
+    region_blocks: int = 0
+    lattice_unit: float = 1.0
+    lead: int = 0
+
+    def __post_init__(self):
+        require(1 <= self.capacity <= 2**20, "session", f"capacity {self.capacity}")
+        require(1 <= self.types <= 65535, "session", f"{self.types} types")
+        require(self.groups == ["position"], "session", f"groups {self.groups}")
+        require(self.region_blocks == 0, "session", "regions are not played")
+        require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
+        require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
+        require(not self.radii, "session", "radii where no group needs them")
+        self.parameters = parameters.complete(list(self.parameters.items()))
+        if self.codec in ("entropy", "limited"):
+            self.tables = huffman.two_tables(self.codec_tables)
+        else:
+            require(self.codec_tables == b"", "session", f"codec {self.codec} has no tables")
+        if self.predictor == "ballistic":
+            require(not self.predictor_constants, "session", "ballistic has no constants")
+        else:
+            self.world = contact.read_world(self.predictor_constants)
+            if self.predictor == "field":
+                self.world = self.world.as_field()
+
+    def layout_text(self):
+        """The text whose hash is the layout hash."""
+        unit = struct.pack(">d", self.lattice_unit).hex()
+
+        def line(word, values):
+            return " ".join([word, *(str(value) for value in values)])
+
+        lines = [
+            line("tandem-layout", [VERSION]),
+            line("capacity", [self.capacity]),
+            line("types", [self.types]),
+            line("lattice_unit", [unit]),
+            line("lead", [self.lead]),
+            line("region_blocks", [self.region_blocks]),
+            line("groups", self.groups),
+            line("radii", self.radii),
+            line("codec", [self.codec]),
+            line("codec_tables", [xxh3.text(xxh3.xxh3_64(self.codec_tables))]),
+            line("predictor", [self.predictor]),
+            line("predictor_constants", self.predictor_constants),
+            line("parameters", [f"{identity}={value}" for identity, value in self.parameters.items()]),
+        ]
+        return "".join(one + "\n" for one in lines)
+
+    def layout_hash(self):
+        """What the session must announce."""
+        return xxh3.xxh3_64(self.layout_text().encode())
+
+
+def of_session(session, announced):
+    """The stream that a TandemSession announces; refused where it cannot be played."""
+    require(session.protocol_version == VERSION, "session", f"protocol version {session.protocol_version}")
+    stream = Stream(
+        capacity=session.capacity,
+        types=len(session.types),
+        codec=announced.codec,
+        predictor=announced.predictor,
+        parameters=parameters.complete([(entry.id, entry.value) for entry in announced.parameters]),
+        codec_tables=announced.codec_tables,
+        predictor_constants=announced.predictor_constants,
+        groups=announced.groups,
+        radii=announced.radii,
+        region_blocks=announced.region_blocks,
+        lattice_unit=session.lattice_unit,
+        lead=session.lead,
+    )
+    computed = stream.layout_hash()
+    require(
+        computed == announced.layout_hash,
+        "session",
+        f"layout hash {xxh3.text(announced.layout_hash)}, but its text hashes to {xxh3.text(computed)}",
+    )
+    return stream

@@ -1,0 +1,86 @@
+"""State hash, layout hash and parameters."""
+
+import unittest
+
+import worlds
+from tandem_reference import parameters, stream
+from tandem_reference.errors import Refused
+from tandem_reference.reader import Reader
+from tandem_reference.state import State
+from tandem_reference.xxh3 import xxh3_64
+
+
+def u64(value):
+    return value.to_bytes(8, "little")
+
+
+class Hashes(unittest.TestCase):
+    def test_one_slot_by_hand(self):
+        state = State(1, "tracker")
+        state.alive[0], state.reuse[0], state.type[0], state.rest[0] = 1, 2, 0x0304, 1
+        state.codec[:, 0] = 5, 6, -1, 0, 127
+        state.p[:, 0], state.v[:, 0], state.c[:, 0] = (1, -1, 2), (3, 4, 5), (6, 7, -8)
+        leaf0 = xxh3_64(bytes.fromhex("01 02 0403 01 05 06 ff 00 7f"))
+        leaf1 = xxh3_64(
+            bytes.fromhex("01000000 ffffffff 02000000 03000000 04000000 05000000 06000000 07000000 f8ffffff")
+        )
+        self.assertEqual(state.leaves(0), [leaf0, leaf1])
+        region = xxh3_64(u64(leaf0) + u64(leaf1))
+        self.assertEqual(state.hash(), xxh3_64(u64(region)))
+
+    def test_columns_go_by_block(self):
+        state = State(16385, "none")
+        state.alive[[0, 16384]] = 1
+        self.assertEqual(state.block_slots(1), (16384, 16385))
+        self.assertEqual(state.leaves(1), [xxh3_64(b"\1\0\0\0\0"), xxh3_64(bytes(36))])
+        leaves = state.leaves(0) + state.leaves(1)
+        self.assertEqual(state.region_hash(), xxh3_64(b"".join(u64(leaf) for leaf in leaves)))
+
+    def test_layout_text_of_the_specification(self):
+        values = {1: 100, 2: 1, 3: 1, 4: 0, 5: 26214, 6: 9830}
+        example = stream.Stream(10000, 2, "tracker", "ballistic", values, lattice_unit=2.0**-10, lead=1)
+        self.assertEqual(
+            example.layout_text(),
+            "tandem-layout 1\ncapacity 10000\ntypes 2\nlattice_unit 3f50000000000000\nlead 1\nregion_blocks 0\n"
+            "groups position\nradii\ncodec tracker\ncodec_tables 2d06800538d394c2\npredictor ballistic\n"
+            "predictor_constants\nparameters 1=100 2=1 3=1 4=0 5=26214 6=9830\n",
+        )
+
+
+class Parameters(unittest.TestCase):
+    def read(self, text):
+        return parameters.read(Reader(bytes.fromhex(text), "test"))
+
+    def test_id_and_zigzag_value(self):
+        self.assertEqual(self.read("01c801 0400"), {1: 100, 4: 0})
+
+    def test_what_is_refused(self):
+        for bad in ("0000", "0702", "0100", "0101", "0202 0102", "0202 0202", "04808008"):
+            with self.subTest(bytes=bad), self.assertRaises(Refused) as caught:
+                self.read(bad)
+            self.assertEqual(caught.exception.rule, "parameters")
+
+    def test_a_session_names_all_six(self):
+        self.assertEqual(parameters.complete(list(worlds.PARAMETERS.items())), worlds.PARAMETERS)
+        with self.assertRaises(Refused):
+            parameters.complete(list(worlds.PARAMETERS.items())[:5])
+
+
+class Sessions(unittest.TestCase):
+    def test_streams_that_cannot_be_played_are_refused(self):
+        for changes in (
+            {"capacity": 0},
+            {"codec": "other"},
+            {"predictor": "other"},
+            {"tables": bytes(512)},
+            {"codec": "entropy"},
+            {"codec": "limited", "tables": bytes([8]) * 511 + b"\7"},
+            {"codec": "limited", "tables": bytes([9]) * 512},
+        ):
+            with self.subTest(changes=changes), self.assertRaises(Refused) as caught:
+                worlds.stream(**changes)
+            self.assertEqual(caught.exception.rule, "session")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,71 @@
+"""Streams and states that several tests share."""
+
+import numpy as np
+
+from tandem_reference import payload
+from tandem_reference.predict import Drive
+from tandem_reference.state import State
+from tandem_reference.stream import Stream
+from tandem_reference.timeline import Timeline
+
+PARAMETERS = {1: 100, 2: 3, 3: 5, 4: 800, 5: 26214, 6: 9830}
+ONE = 2**30
+# Two sub-steps, two types, a plane, a box and a ball.
+CONTACT = [
+    2, 1820, 205, 205, 1820, 205, 205, 2, 1, 1, 1, 20000, 65536, 10000, 131072, 0, ONE, 0, 0,
+    200000, 0, 0, 50000, 50000, 50000, ONE, 0, 0, 0, ONE, 0, 0, 0, ONE, -200000, 0, 0, 60000,
+]  # fmt: skip
+FALL = Drive((0, -3000, 0), 200)
+
+
+def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b""):
+    """A small stream."""
+    constants = [] if predictor == "ballistic" else CONTACT
+    return Stream(capacity, types, codec, predictor, dict(parameters or PARAMETERS), tables, constants)
+
+
+def world(of, bodies=()):
+    """A world of bodies {slot: (p, v)}."""
+    state = State(of.capacity, of.codec)
+    for slot, (p, v) in dict(bodies).items():
+        state.alive[slot] = 1
+        state.p[:, slot], state.v[:, slot] = p, v
+    return payload.World(state, dict(of.parameters), payload.start_models(of))
+
+
+def timeline(of, bodies=(), drive=FALL, frame=0):
+    """A timeline that starts with such a world."""
+    return Timeline(of, world(of, bodies), frame, drive)
+
+
+def random_numbers(seed=1):
+    """A function next(limit): whole numbers from -limit up to limit - 1."""
+    x = seed
+
+    def following(limit):
+        nonlocal x
+        x = (1664525 * x + 1013904223) % 2**32
+        return (x >> 8) % (2 * limit) - limit
+
+    return following
+
+
+def two_hundred_bodies(codec="none"):
+    """200 bodies of two types that fall among the shapes of CONTACT."""
+    state = State(200, codec)
+    following = random_numbers()
+    state.alive[:] = 1
+    state.type = np.arange(200) % 2
+    for slot in range(200):
+        state.p[:, slot] = following(160000), following(60000) + 80000, following(80000)
+        state.v[:, slot] = [following(99999) for _ in range(3)]
+    return state
+
+
+def huffman_lengths():
+    """A complete code: 1 bit for 0, 3 for 1 and -1, 9 for 2, -2 and 3, 10 for the other 250."""
+    lengths = [10] * 256
+    lengths[0] = 1
+    lengths[1] = lengths[-1] = 3
+    lengths[2] = lengths[-2] = lengths[3] = 9
+    return bytes(lengths)
