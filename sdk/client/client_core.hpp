@@ -130,6 +130,12 @@ class ClientCore {
       ++statistics_.stale_messages;
       return false;
     }
+    if constexpr (requires { received.message.stream; }) {
+      if (received.message.stream != epoch_->stream.id) {
+        ++statistics_.stale_messages;
+        return false;
+      }
+    }
     return true;
   }
   [[nodiscard]] std::int64_t measure() const {

@@ -115,7 +115,7 @@ void ClientCore::join(Now now) {
 
 void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
   EpochState& e = *epoch_;
-  auto loaded = e.timeline.load(snapshot.bytes, e.session.epoch);
+  auto loaded = e.timeline.load(snapshot.bytes, e.session.epoch, e.stream.id);
   if (loaded && e.timeline.applied() != snapshot.frame) {
     loaded = fail(ErrorCode::kMalformed, "snapshot of another frame than announced");
   }

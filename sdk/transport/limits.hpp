@@ -16,7 +16,7 @@ inline constexpr std::uint32_t kMaxParts = 4096;  ///< of one delta or snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
 inline constexpr std::size_t kMaxHullValues = 768;
-inline constexpr std::size_t kMaxStreams = 8, kMaxGroups = 8, kMaxParameters = 64;
+inline constexpr std::size_t kMaxStreams = 8, kMaxGroups = 8;
 inline constexpr std::size_t kMaxPredictorConstants = 1U << 20U;
 inline constexpr std::size_t kMaxDescriptionBytes = 1U << 20U;
 inline constexpr std::size_t kMaxTableBytes = 4U << 20U;  ///< codec tables

@@ -105,7 +105,8 @@ class Host {
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
   Result<Frame> inject(const engine::Input& input);
 
-  /// What the decoder reads (threshold, quantisation steps, gains): see Stream::set_parameters().
+  /// What decoder and predicted step read (threshold, quantisation steps, gains, decay): see
+  /// Stream::set_parameters().
   [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
   [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units

@@ -95,19 +95,15 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
   const TypeId type = bodies.type[slot];
   const bool reused = was && shown && (marks & kSpawned) != 0;
   if (was && (!shown || reused)) {
-    lifecycle_.push_back(
-        {.kind = LifecycleKind::kDespawn, .slot = slot, .reuse = 0, .type = 0, .body = {}});
+    lifecycle_.push_back({.kind = LifecycleKind::kDespawn, .slot = slot, .reuse = 0, .type = 0, .body = {}});
   }
   if (shown && (!was || reused)) {
     spawn(slot, type);
   } else if (shown && (marks & kTeleported) != 0) {
     // A slot gets one record a frame; a type changed in the same step differs still in the next and follows
     // then.
-    lifecycle_.push_back({.kind = LifecycleKind::kTeleport,
-                          .slot = slot,
-                          .reuse = 0,
-                          .type = 0,
-                          .body = target_.body(slot)});
+    lifecycle_.push_back(
+        {.kind = LifecycleKind::kTeleport, .slot = slot, .reuse = 0, .type = 0, .body = target_.body(slot)});
   } else if (shown && target_.type()[slot] != type) {
     target_.type()[slot] = type;
     lifecycle_.push_back(

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string_view>
 
-
 namespace tandem::lab {
 
 /// Table 5.3 in Mbit/s, where it has this scene, size and codec.

@@ -22,9 +22,7 @@ void require(bool holds) {
 
 struct Side {
   Side() : delta(synthetic::make_delta("tracker", kCapacity, kParameters)), state(kCapacity) {}
-  void save(std::vector<std::byte>& bytes) const {
-    bytes = synthetic::coder_state(delta.codec());
-  }
+  void save(std::vector<std::byte>& bytes) const { bytes = synthetic::coder_state(delta.codec()); }
   DeltaCodec delta;
   State state;
 };

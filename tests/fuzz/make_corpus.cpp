@@ -103,7 +103,7 @@ bool write_snapshots(const std::filesystem::path& folder) {
 }  // namespace tandem
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
+  if (argc != 2 || argv[1][0] == '-') {
     std::fputs("usage: make_corpus FOLDER\n", stderr);
     return 2;
   }

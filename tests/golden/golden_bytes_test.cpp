@@ -77,8 +77,7 @@ TEST(GoldenBytes, OfNone) {
   two.spawn(1, 0, 0, {{1, -1, 256}, {64, 0, -2}});
   State moved = two;
   moved.set_body(1, {{2, -1, 256}, {64, 0, -2}});
-  expect_bytes("none", "83 1a 00 02 02000000 ffffffff 00010000 40000000 00000000 feffffff", two,
-               moved);
+  expect_bytes("none", "83 1a 00 02 02000000 ffffffff 00010000 40000000 00000000 feffffff", two, moved);
 }
 
 TEST(GoldenBytes, OfSelective) {
@@ -91,8 +90,7 @@ TEST(GoldenBytes, OfSelective) {
 
 TEST(GoldenBytes, OfQuantized) {
   // -2000 is beyond 127 steps of 10.
-  expect_bytes("quantized", "83 11 00 01 880000 0f0081 000200 00f300 000000", predicted(),
-               target());
+  expect_bytes("quantized", "83 11 00 01 880000 0f0081 000200 00f300 000000", predicted(), target());
 }
 
 TEST(GoldenBytes, OfEntropy) {

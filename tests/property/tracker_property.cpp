@@ -41,9 +41,7 @@ State target_of(Random& random, const State& state, Mood mood, std::int32_t thre
   return target;
 }
 
-Bytes saved(const DeltaCodec& codec) {
-  return synthetic::coder_state(codec.codec());
-}
+Bytes saved(const DeltaCodec& codec) { return synthetic::coder_state(codec.codec()); }
 
 // Also that a decoder which loads the coder state in mid-stream goes on like one that was there from the
 // start.

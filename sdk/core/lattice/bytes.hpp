@@ -61,10 +61,6 @@ class ByteWriter {
     ByteWriter(out_.subspan(at, header)).put_leb128(length);
     size_ += header;
   }
-  /// Overwrites four bytes written before, as for a length known only afterwards.
-  void patch_u32(std::size_t at, std::uint32_t value) {
-    ByteWriter(out_.subspan(at, sizeof value)).put(value);
-  }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool overflow() const { return overflow_; }
   [[nodiscard]] std::span<std::byte> rest() const { return out_.subspan(size_); }

@@ -26,6 +26,23 @@ TEST_F(PlayTest, DeltasInPartsAreApplied) {
   expect_agreed();
 }
 
+TEST_F(PlayTest, DeltasOfAnotherStreamOrGenerationAreIgnored) {
+  join();
+  const auto delta = server.advance();
+  for (const StreamId other : {StreamId{1, 0}, StreamId{0, 1}}) {
+    auto foreign = delta;
+    foreign.stream = other;
+    deliver(foreign);
+  }
+  poll();
+  EXPECT_EQ(core->timeline()->applied(), 1U);
+  EXPECT_EQ(figures().stale_messages, 2U);
+  deliver(delta);
+  poll();
+  EXPECT_EQ(core->timeline()->applied(), 2U);
+  expect_agreed();
+}
+
 TEST_F(PlayTest, ALostPartBringsARejoin) {
   join();
   auto parts = split(server.advance(), 3);

@@ -178,7 +178,8 @@ TEST(Tracker, RefusesCoderStatesThatAreNone) {
   EXPECT_EQ(coder_state(client), good);
   Bytes impossible_age = good;
   impossible_age[3] = std::byte{255};
-  EXPECT_EQ(synthetic::load_coder_state(client.codec(), impossible_age, agreed.alive()).error().code, ErrorCode::kMalformed);
+  EXPECT_EQ(synthetic::load_coder_state(client.codec(), impossible_age, agreed.alive()).error().code,
+            ErrorCode::kMalformed);
   Bytes impossible_steps = good;
   impossible_steps[2 * 20 + 3] = std::byte{0x80};
   EXPECT_FALSE(synthetic::load_coder_state(client.codec(), impossible_steps, agreed.alive()));
@@ -239,8 +240,8 @@ TEST(Tracker, CorrectionsBeyondTheCapacityRepeatedOrEmptyAreRefused) {
     for (const int byte : bytes) payload.push_back(static_cast<std::byte>(byte));
     return !synthetic::receive(client, state, payload);
   };
-  EXPECT_TRUE(refused({0x83, 0}));  // no block
-  EXPECT_TRUE(refused({0x83, 1, 1}));  // block 1 of 1
+  EXPECT_TRUE(refused({0x83, 0}));                  // no block
+  EXPECT_TRUE(refused({0x83, 1, 1}));               // block 1 of 1
   EXPECT_TRUE(refused({0x83, 4, 0, 255, 255, 0}));  // a zero that nobody writes
   EXPECT_TRUE(refused({0x83, 11, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255}));
 }

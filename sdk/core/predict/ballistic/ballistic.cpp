@@ -82,7 +82,8 @@ void step_all(const State& from, State& to, const StepInput& input) {
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     const std::int32_t gravity = input.drive.gravity[i];
     if (&from == &to) {
-      step_channel_in_place(rest, to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity, input);
+      step_channel_in_place(rest, to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity,
+                            input);
     } else {
       step_channel(rest, from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
                    to.c(i).data(), alive, count, gravity, input);
@@ -108,7 +109,8 @@ void Ballistic::step_slots(const State& from, State& to, const StepInput& input,
     to.alive()[s] = from.alive()[s];
     to.reuse()[s] = from.reuse()[s];
     to.type()[s] = from.type()[s];
-    const bool still = from.rest()[s] != 0 && holds_still({from.c(0)[s], from.c(1)[s], from.c(2)[s]}, input.drive);
+    const bool still =
+        from.rest()[s] != 0 && holds_still({from.c(0)[s], from.c(1)[s], from.c(2)[s]}, input.drive);
     to.rest()[s] = static_cast<std::uint8_t>(still);
   }
   for (std::size_t i = 0; i < kPositionChannels; ++i) {

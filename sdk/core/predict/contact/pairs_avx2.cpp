@@ -1,4 +1,4 @@
-// contact_pairs.cpp eight at a time. Nothing inline of other headers is called here: the linker might keep
+// pairs.cpp eight at a time. Nothing inline of other headers is called here: the linker might keep
 // the AVX2 copy for everybody.
 #include "sdk/core/predict/contact/cells.hpp"
 
@@ -145,7 +145,7 @@ inline Wide looked_up(const std::uint32_t* table, Wide index) {
   return _mm256_inserti128_si256(_mm256_castsi128_si256(four(0)), four(4), 1);
 }
 
-// The forces of eight pairs on the first of each, as in contact_pairs.cpp.
+// The forces of eight pairs on the first of each, as in pairs.cpp.
 struct Forces {
   Wide row[4];  // pair k in the lower half of row k, pair k + 4 in the upper half
 };
