@@ -141,7 +141,11 @@ void ClientCore::send_ack(Now now) {
   ack.epoch = epoch_->session.epoch;
   ack.stream = epoch_->stream.id;
   ack.phase = epoch_->joining ? transport::Phase::kJoining : transport::Phase::kPlaying;
-  if (!epoch_->joining) {
+  if (epoch_->joining) {
+    ack.snapshot_frame = epoch_->snapshot.frame();
+    ack.snapshot_parts = epoch_->snapshot.parts();
+    ack.missing = epoch_->snapshot.missing();
+  } else {
     ack.applied = epoch_->timeline.applied();
     ack.simulated = epoch_->timeline.now();
   }

@@ -112,7 +112,7 @@ class ClientCore {
   void take_stream(Now now);
   void take_deltas(Now now);
   void take_scheduled(Now now);
-  void take_snapshots();
+  void take_snapshots(Now now);
   void join(Now now);
   void load(transport::SnapshotMessage&& snapshot, Now now);
   void play(Now now, std::int64_t since_last_poll_ns);

@@ -11,6 +11,8 @@ namespace {
 
 // A scheduled input that a delta promised may be this late before the client joins again.
 constexpr std::int64_t kInputPatienceNs = 250 * kMillisecond;
+// Between acknowledgements while a snapshot comes in, at least.
+constexpr std::int64_t kPartAckNs = 50 * kMillisecond;
 
 // A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
@@ -26,7 +28,7 @@ void ClientCore::take_stream(Now now) {
   if (!epoch_->stream_open) return;
   take_deltas(now);
   take_scheduled(now);
-  take_snapshots();
+  take_snapshots(now);
 }
 
 void ClientCore::take_deltas(Now now) {
@@ -80,17 +82,20 @@ void ClientCore::take_scheduled(Now now) {
   }
 }
 
-void ClientCore::take_snapshots() {
+void ClientCore::take_snapshots(Now now) {
+  using Outcome = SnapshotAssembly::Outcome;
   if (!epoch_->joining) return;
   inbox_.snapshots.clear();
   port_.take(inbox_.snapshots);
   for (auto& received : inbox_.snapshots) {
-    if (!belongs(received)) continue;
-    if (received.message.bytes.size() > epoch_->stream.max_snapshot_bytes) {
-      ++statistics_.refused_messages;
-      continue;
-    }
-    epoch_->joiner.offer(std::move(received.message));
+    if (!belongs(received) || !epoch_->joiner.asked()) continue;
+    const Outcome outcome = epoch_->snapshot.add(std::move(received.message));
+    if (outcome == Outcome::kRefused) ++statistics_.refused_messages;
+    if (outcome != Outcome::kStored) continue;
+    epoch_->joiner.progress(now.steady_ns);
+    // Tells the server early what came, so that it can go on, and what did not.
+    if (now.steady_ns - last_ack_ns_ >= kPartAckNs) ack_due_ = true;
+    if (auto whole = epoch_->snapshot.take()) epoch_->joiner.offer(std::move(*whole));
   }
 }
 
@@ -126,10 +131,12 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
     ++statistics_.refused_messages;
     if (loaded.error().code == ErrorCode::kMismatch) ++statistics_.hash_mismatches;
     log(LogLevel::kWarning, "snapshot refused: " + loaded.error().message);
+    e.snapshot.clear();
     e.joiner.ask_again(now.steady_ns);
     return;
   }
   port_.close_snapshots();
+  e.snapshot.clear();
   e.assembly.drop_through(snapshot.frame);
   e.pictures.on_loaded(e.timeline, e.pacer);
   e.joining = false;

@@ -10,6 +10,7 @@
 #include "sdk/client/scheduled_inputs.hpp"
 #include "sdk/client/server_clock.hpp"
 #include "sdk/client/session_check.hpp"
+#include "sdk/client/snapshot_assembly.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/messages.hpp"
 
@@ -24,6 +25,7 @@ struct EpochState {
         timeline(std::move(playable.timeline)),
         lead(std::min(wanted_lead, session.lead)),
         assembly({.delta_bytes = stream.max_delta_bytes}),
+        snapshot(stream.max_snapshot_bytes),
         pacer(session.frame_rate_hz),
         pictures(exchange, session) {}
 
@@ -33,6 +35,7 @@ struct EpochState {
   ClientTimeline timeline;
   std::uint32_t lead;  ///< in force: not above the session's
   DeltaAssembly assembly;
+  SnapshotAssembly snapshot;  ///< coming in
   ScheduledInputs scheduled;
   Joiner joiner;
   Pacer pacer;

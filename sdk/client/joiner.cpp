@@ -28,6 +28,8 @@ bool Joiner::poll(std::int64_t now_ns) {
   return true;
 }
 
+void Joiner::progress(std::int64_t now_ns) { ask_due_ns_ = std::max(ask_due_ns_, now_ns + patience_ns_); }
+
 void Joiner::offer(transport::SnapshotMessage&& snapshot) {
   if (!asked_) return;
   if (!held_ || snapshot.frame >= held_->frame) held_ = std::move(snapshot);

@@ -15,7 +15,7 @@ class Joiner {
   /// Between two attempts at least; keeps a client that fails at once from asking on every frame.
   static constexpr std::int64_t kMinSpacingNs = 100'000'000;
   /// With no delta buffered, as while the server is suspended: how long to wait for snapshots newer than the
-  /// question. The server collects joiners for 0.1 s; one made for somebody else arrives before that.
+  /// question. The server collects joiners for 0.1 s; one sent for an earlier joiner arrives before that.
   static constexpr std::int64_t kQuietNs = 300'000'000;
   /// Ask again when nothing usable came: first after this, then doubled up to kMaxPatienceNs.
   static constexpr std::int64_t kPatienceNs = 1'000'000'000;
@@ -28,6 +28,9 @@ class Joiner {
   /// Returns true when a new question is due now; `attempt()` has then changed.
   bool poll(std::int64_t now_ns);
 
+  /// Part of a snapshot came: the next question is put off until nothing has come for as long as the
+  /// patience.
+  void progress(std::int64_t now_ns);
   /// Keeps the newest. Before the first question is out, snapshots are ignored: they can not be an answer.
   void offer(transport::SnapshotMessage&& snapshot);
   /// Takes the snapshot to start from, if there is one: not older than the first complete buffered delta - 1;

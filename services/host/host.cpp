@@ -15,6 +15,7 @@
 #include "services/host/publication.hpp"
 #include "services/host/replies.hpp"
 #include "services/host/roster.hpp"
+#include "services/host/snapshot_parts.hpp"
 #include "services/host/status.hpp"
 #include "services/host/window.hpp"
 
@@ -121,6 +122,7 @@ struct Host::Impl {
   Roster roster;
   InputDesk inputs;
   JoinDesk joins;
+  SnapshotParts snapshot_parts{outbox};
   ReplyDesk replies;
   Claim claim;
   Pacing pacing;
@@ -143,6 +145,7 @@ struct Host::Impl {
   HostTotals totals;
   DurationHistogram frame_durations;
   std::vector<std::string> notices;
+  std::vector<std::byte> snapshot;
   std::vector<transport::Received<transport::AckMessage>> acks;
   std::vector<transport::Received<transport::InputMessage>> input_samples;
 };
@@ -206,7 +209,7 @@ void Host::Impl::receive() {
 
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
   const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
-  if (reason == Reason::kNone) return;
+  if (reason == Reason::kNone) return snapshot_parts.missing(ack.message);
   ++totals.refused_messages;
   if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
   if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
@@ -310,16 +313,19 @@ void Host::Impl::produce_frame() {
 }
 
 void Host::Impl::serve_joiners() {
-  if (!joins.due(roster.accounts(), *port, now_ns)) return;
-  const std::size_t size_bytes = push_snapshot(outbox, config.epoch, stream);
-  if (size_bytes == 0) return;
-  joins.served(roster.accounts(), now_ns);
-  ++totals.snapshots;
-  totals.snapshot_bytes += size_bytes;
+  if (joins.due(roster.accounts(), *port, now_ns)) {
+    stream.snapshot(snapshot);
+    snapshot_parts.start(config.epoch, {}, stream.frame(), snapshot);
+    joins.served(roster.accounts(), now_ns);
+    ++totals.snapshots;
+  }
+  if (!JoinDesk::anybody(roster.accounts())) snapshot_parts.forget();
+  snapshot_parts.send(now_ns);
 }
 
 HostTotals Host::Impl::totals_now() const {
   HostTotals now = totals;
+  now.snapshot_bytes = snapshot_parts.bytes();
   now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
   now.refused_inputs += inputs.refused();
   now.refused_messages += port->dropped();

@@ -17,9 +17,6 @@
 
 namespace tandem::host {
 
-/// Most payload bytes of one delta sample.
-inline constexpr std::size_t kPartBytes = 60'000;
-
 struct HostConfig {
   std::string session = "default";
   Epoch epoch = 1;  ///< ms of wall clock at the process's start

@@ -1,5 +1,7 @@
 #include "services/host/joins.hpp"
 
+#include <algorithm>
+
 namespace tandem::host {
 namespace {
 
@@ -34,6 +36,10 @@ void JoinDesk::served(std::map<transport::ClientId, Account>& accounts, std::int
     known->second.join = {.served = true, .served_attempt = known->second.attempt, .served_at_ns = now_ns};
   }
   collecting_since_ns_.reset();
+}
+
+bool JoinDesk::anybody(const std::map<transport::ClientId, Account>& accounts) {
+  return std::ranges::any_of(accounts, [](const auto& entry) { return joins(entry.second); });
 }
 
 std::optional<std::int64_t> JoinDesk::due_ns() const {

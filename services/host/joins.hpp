@@ -24,6 +24,7 @@ class JoinDesk {
                          std::int64_t now_ns);
   /// One was queued for those who were ready at the last due().
   void served(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
+  [[nodiscard]] static bool anybody(const std::map<transport::ClientId, Account>& accounts);
   /// When the joiners collected so far get theirs.
   [[nodiscard]] std::optional<std::int64_t> due_ns() const;
 

@@ -24,11 +24,6 @@ bool Outbox::has_frame_room() const {
   return frames_ < limits_.frames;
 }
 
-bool Outbox::has_snapshot_room() const {
-  const std::scoped_lock lock(mutex_);
-  return snapshots_ < limits_.snapshots;
-}
-
 bool Outbox::has_control_room() const {
   const std::scoped_lock lock(mutex_);
   return control_ < limits_.control;

@@ -14,6 +14,9 @@
 
 namespace tandem::host {
 
+/// Most bytes of one part of a payload or a snapshot.
+inline constexpr std::size_t kPartBytes = 60'000;
+
 using Outgoing =
     std::variant<transport::SessionMessage, transport::DeltaMessage, transport::ScheduledInputMessage,
                  transport::SnapshotMessage, transport::ReplyMessage, transport::ServerStatusMessage>;
@@ -23,15 +26,14 @@ using Outgoing =
 class Outbox {
  public:
   struct Limits {
-    std::uint32_t frames = 8;  ///< whole deltas, whatever their number of parts
-    std::uint32_t snapshots = 2;
+    std::uint32_t frames = 8;      ///< whole deltas, whatever their number of parts
+    std::uint32_t snapshots = 64;  ///< parts of snapshots
     std::uint32_t control = 1024;  ///< everything else
   };
   explicit Outbox(const Limits& limits) : limits_(limits) {}
 
   /// Room for one more delta; stays true until the producer pushes one.
   [[nodiscard]] bool has_frame_room() const;
-  [[nodiscard]] bool has_snapshot_room() const;
   [[nodiscard]] bool has_control_room() const;
   /// False, and nothing queued, when the message's kind is at its limit. All parts of a delta count once,
   /// with the last; check has_frame_room() before the first.

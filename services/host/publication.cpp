@@ -49,15 +49,4 @@ void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, s
   }
 }
 
-std::size_t push_snapshot(Outbox& outbox, Epoch epoch, Stream& stream) {
-  if (!outbox.has_snapshot_room()) return 0;
-  transport::SnapshotMessage message;
-  message.epoch = epoch;
-  message.frame = stream.frame();
-  stream.snapshot(message.bytes);
-  message.total_bytes = static_cast<std::uint32_t>(message.bytes.size());
-  const std::size_t size_bytes = message.bytes.size();
-  return outbox.push(std::move(message)) ? size_bytes : 0;
-}
-
 }  // namespace tandem::host

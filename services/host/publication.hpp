@@ -1,7 +1,6 @@
 #pragma once
-// What leaves the host: the session, the parts of a delta, a snapshot.
+// What leaves the host: the session, the parts of a delta.
 
-#include <cstddef>
 #include <cstdint>
 
 #include "sdk/transport/messages.hpp"
@@ -16,8 +15,5 @@ namespace tandem::host {
 
 /// Queues a delta, cut into parts of kPartBytes. There must be room for a frame.
 void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, std::int64_t wall_ns);
-
-/// Queues a snapshot of the last frame. Returns its bytes; 0, and nothing queued, without room.
-[[nodiscard]] std::size_t push_snapshot(Outbox& outbox, Epoch epoch, Stream& stream);
 
 }  // namespace tandem::host

@@ -101,18 +101,32 @@ transport::SnapshotMessage FakeServer::snapshot() {
   return message;
 }
 
-std::vector<transport::DeltaMessage> split(const transport::DeltaMessage& whole, std::size_t parts) {
-  std::vector<transport::DeltaMessage> out(parts, whole);
-  const std::size_t step = (whole.payload.size() + parts - 1) / parts;
+namespace {
+
+template <class M>
+std::vector<M> split(const M& whole, transport::Bytes M::*bytes, std::size_t parts) {
+  std::vector<M> out(parts, whole);
+  const transport::Bytes& all = whole.*bytes;
+  const std::size_t step = (all.size() + parts - 1) / parts;
   for (std::size_t i = 0; i < parts; ++i) {
     const auto at = [&](std::size_t n) {
-      return whole.payload.begin() + static_cast<std::ptrdiff_t>(std::min(n * step, whole.payload.size()));
+      return all.begin() + static_cast<std::ptrdiff_t>(std::min(n * step, all.size()));
     };
     out[i].part = static_cast<std::uint32_t>(i);
     out[i].parts = static_cast<std::uint32_t>(parts);
-    out[i].payload.assign(at(i), at(i + 1));
+    (out[i].*bytes).assign(at(i), at(i + 1));
   }
   return out;
+}
+
+}  // namespace
+
+std::vector<transport::DeltaMessage> split(const transport::DeltaMessage& whole, std::size_t parts) {
+  return split(whole, &transport::DeltaMessage::payload, parts);
+}
+
+std::vector<transport::SnapshotMessage> split(const transport::SnapshotMessage& whole, std::size_t parts) {
+  return split(whole, &transport::SnapshotMessage::bytes, parts);
 }
 
 void ClientTest::start(std::uint32_t lead, transport::Role role) {

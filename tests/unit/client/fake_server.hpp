@@ -51,9 +51,12 @@ transport::Received<M> from_server(M message) {
   return {std::move(message), kServerId};
 }
 
-/// Several samples of one delta.
+/// Several samples of one delta, or of one snapshot.
 [[nodiscard]] std::vector<transport::DeltaMessage> split(const transport::DeltaMessage& whole,
                                                          std::size_t parts);
+
+[[nodiscard]] std::vector<transport::SnapshotMessage> split(const transport::SnapshotMessage& whole,
+                                                            std::size_t parts);
 
 class Recorder final : public CoreListener {
  public:

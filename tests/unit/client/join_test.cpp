@@ -34,6 +34,42 @@ TEST_F(JoinTest, AfterTheSnapshotItFollowsTheDeltasBufferedMeanwhile) {
   expect_agreed();
 }
 
+TEST_F(JoinTest, ASnapshotInPartsIsJoinedAndAcknowledgementsNameWhatIsMissing) {
+  start();
+  port.sessions.push_back(from_server(server.session));
+  poll();
+  deliver(server.advance());
+  const auto parts = split(server.snapshot(), 5);
+  for (const std::size_t i : {1U, 3U}) port.snapshots.push_back(from_server(parts[i]));
+  poll(60 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+  EXPECT_EQ(port.acks.back().snapshot_frame, 1U);
+  EXPECT_EQ(port.acks.back().snapshot_parts, 5U);
+  EXPECT_EQ(port.acks.back().missing, (std::vector<std::uint32_t>{0, 1, 2, 1, 4, 1}));
+  for (const std::size_t i : {0U, 1U, 2U}) port.snapshots.push_back(from_server(parts[i]));
+  poll(60 * kMs);
+  EXPECT_EQ(port.acks.back().missing, (std::vector<std::uint32_t>{4, 1}));
+  port.snapshots.push_back(from_server(parts[4]));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(recorder.loaded, std::vector<Frame>{1});
+  EXPECT_EQ(port.acks.back().snapshot_parts, 0U);
+  frame();
+  expect_agreed();
+}
+
+TEST_F(JoinTest, PartsOfAnotherStreamAreIgnored) {
+  start();
+  port.sessions.push_back(from_server(server.session));
+  poll();
+  deliver(server.advance());
+  auto other = server.snapshot();
+  other.stream.id = 1;
+  port.snapshots.push_back(from_server(other));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+}
+
 TEST_F(JoinTest, JoiningIsRepeatedUntilItPlays) {
   start();
   port.sessions.push_back(from_server(server.session));

@@ -83,6 +83,17 @@ TEST(Joiner, AClientThatFailsAtOnceDoesNotAskOnEveryFrame) {
   EXPECT_TRUE(joiner.poll(Joiner::kMinSpacingNs));
 }
 
+TEST(Joiner, DoesNotAskAgainWhileASnapshotComesIn) {
+  Joiner joiner;
+  joiner.start(0);
+  static_cast<void>(joiner.poll(0));
+  for (int part = 1; part <= 10; ++part) {
+    joiner.progress(part * 900 * kMs);
+    EXPECT_FALSE(joiner.poll((part + 1) * 900 * kMs));
+  }
+  EXPECT_TRUE(joiner.poll(10'000 * kMs));
+}
+
 TEST(Joiner, ARefusedSnapshotBringsAnotherQuestion) {
   Joiner joiner;
   joiner.start(0);

@@ -117,6 +117,31 @@ TEST_F(JoinTest, OrAfterFiveSecondsHavePassed) {
   EXPECT_EQ(bench.port.snapshots.size(), 2U);
 }
 
+TEST_F(JoinTest, PartsThatAJoinerLacksAreSentAgain) {
+  bench.joining(1);
+  bench.run_ms(150);
+  ASSERT_EQ(bench.port.snapshots.size(), 1U);
+  const auto lacking = [&] {
+    auto ack = bench.ack(1, Phase::kJoining, 0);
+    ack.snapshot_frame = bench.port.snapshots[0].frame;
+    ack.snapshot_parts = 1;
+    ack.missing = {0, 1};
+    return ack;
+  };
+  bench.send(lacking());
+  bench.run_ms(300);
+  EXPECT_EQ(bench.port.snapshots.size(), 1U) << "it may have been on its way";
+  bench.send(lacking());
+  bench.run_ms(10);
+  ASSERT_EQ(bench.port.snapshots.size(), 2U);
+  EXPECT_EQ(bench.port.snapshots[1], bench.port.snapshots[0]);
+  bench.playing(1, bench.host->frame());
+  bench.run_ms(300);
+  bench.send(lacking());
+  bench.run_ms(10);
+  EXPECT_EQ(bench.host->totals().snapshots, 1U);
+}
+
 TEST_F(JoinTest, AJoinerIsServedWhileTheServerIsSuspended) {
   bench.enter(2);
   bench.run_ms(300);  // suspended: client 2 is silent
