@@ -102,7 +102,7 @@ void ClientCore::take_snapshots(Now now) {
 void ClientCore::join(Now now) {
   EpochState& e = *epoch_;
   if (!e.stream_open) {
-    if (auto opened = port_.open_stream(e.session, e.stream); !opened) {
+    if (auto opened = port_.open_stream(e.session, e.stream, options_.id); !opened) {
       log(LogLevel::kError, opened.error().message);
       return;
     }

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
@@ -35,8 +36,14 @@ class ServerPort {
   virtual Result<void> write(const DeltaMessage&) = 0;
   virtual Result<void> write(const ScheduledInputMessage&) = 0;
   virtual Result<void> write(const SnapshotMessage&) = 0;
+  /// Reaches the client alone where open_replies() was called for it; otherwise every client of the session.
   virtual Result<void> write(const ReplyMessage&) = 0;
   virtual Result<void> write(const ServerStatusMessage&) = 0;
+  /// A reply writer of the client's own, in reply_partition(). No effect while there is one. Part of the
+  /// writes, as is close_replies().
+  virtual Result<void> open_replies(ClientId client) = 0;
+  /// Its account is gone: ends its writer, and with it what late readers are handed.
+  virtual void close_replies(ClientId client) = 0;
 
   virtual void take(std::vector<Received<InputMessage>>& out) = 0;
   virtual void take(std::vector<Received<AckMessage>>& out) = 0;
@@ -63,9 +70,11 @@ class ClientPort {
   /// False when the writer of the session's announcement is gone (server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;
 
-  /// Subscribes to the deltas of `stream`, one of the session's, to scheduled inputs and to replies, with the
-  /// stream's limits. Calling it again for another epoch or stream drops what was buffered.
-  virtual Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream) = 0;
+  /// Subscribes to the deltas of `stream`, one of the session's, to scheduled inputs and to replies to
+  /// `client` and to everybody, with the stream's limits. Calling it again for another epoch drops what was
+  /// buffered.
+  virtual Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
+                                   ClientId client) = 0;
   /// Subscribes to the snapshots of the stream that is open; close when one was taken. No effect while open.
   virtual Result<void> open_snapshots() = 0;
   virtual void close_snapshots() = 0;
@@ -87,6 +96,9 @@ class ClientPort {
 
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
 [[nodiscard]] Result<void> check_session_name(const std::string& name);
+
+/// Where the replies to a client with an account are: SESSION/ID, the id as 16 hex digits.
+[[nodiscard]] std::string reply_partition(const std::string& session, ClientId client);
 
 /// Over everything that decides how the bytes of a stream are read, stepped and scaled: its layout and the
 /// session's protocol version and lattice unit. A client that computes another value refuses the stream.

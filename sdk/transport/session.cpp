@@ -4,6 +4,7 @@
 #include <bit>
 #include <string>
 
+#include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/port.hpp"
 
@@ -23,6 +24,10 @@ Result<void> check_session_name(const std::string& name) {
                 "a session name consists of letters, digits, '.', '_' and '-' only (wildcards are refused)");
   }
   return {};
+}
+
+std::string reply_partition(const std::string& session, ClientId client) {
+  return session + '/' + to_hex(client);
 }
 
 std::uint64_t layout_hash(const SessionMessage& session, const StreamMessage& stream) {

@@ -164,7 +164,7 @@ bool Host::Impl::poll() {
     roster.refresh(moment());
     produced = advance_if_due();
     serve_joiners();
-    replies.send_due(roster.accounts(), now_ns, wall_ns);
+    replies.send_due(roster, now_ns, wall_ns);
     publish_status();
   }
   last_poll_ns = now_ns;

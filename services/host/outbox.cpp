@@ -73,8 +73,26 @@ std::size_t Outbox::high_water() const {
   return high_water_;
 }
 
+namespace {
+
+struct Write {
+  transport::ServerPort& port;
+
+  Result<void> operator()(const OpenReplies& open) const { return port.open_replies(open.client); }
+  Result<void> operator()(const CloseReplies& close) const {
+    port.close_replies(close.client);
+    return {};
+  }
+  template <class M>
+  Result<void> operator()(const M& sample) const {
+    return port.write(sample);
+  }
+};
+
+}  // namespace
+
 Result<void> publish(transport::ServerPort& port, const Outgoing& message) {
-  return std::visit([&port](const auto& m) { return port.write(m); }, message);
+  return std::visit(Write{port}, message);
 }
 
 Result<void> drain(Outbox& outbox, transport::ServerPort& port) {

@@ -17,9 +17,19 @@ namespace tandem::host {
 /// Most bytes of one part of a payload or a snapshot.
 inline constexpr std::size_t kPartBytes = 60'000;
 
+/// Asks the publisher for a client's own reply writer.
+struct OpenReplies {
+  transport::ClientId client = 0;
+};
+/// Asks the publisher to end it.
+struct CloseReplies {
+  transport::ClientId client = 0;
+};
+
 using Outgoing =
     std::variant<transport::SessionMessage, transport::DeltaMessage, transport::ScheduledInputMessage,
-                 transport::SnapshotMessage, transport::ReplyMessage, transport::ServerStatusMessage>;
+                 transport::SnapshotMessage, transport::ReplyMessage, transport::ServerStatusMessage,
+                 OpenReplies, CloseReplies>;
 
 /// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
 /// for one producer and one consumer.

@@ -18,13 +18,34 @@ bool elapsed(std::int64_t last_ns, std::int64_t now_ns, std::int64_t gap_ns) {
 
 }  // namespace
 
-void ReplyDesk::send_due(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns,
-                         std::int64_t wall_ns) {
-  for (auto& [id, account] : accounts) {
+// False while there is no room: a writer has to end before its client's next one is opened.
+bool ReplyDesk::close_forgotten(Roster& roster) {
+  auto& forgotten = roster.forgotten();
+  while (!forgotten.empty()) {
+    if (!outbox_->push(CloseReplies{forgotten.back()})) return false;
+    forgotten.pop_back();
+  }
+  return true;
+}
+
+bool ReplyDesk::spend(std::int64_t now_ns) {
+  const double returned = static_cast<double>(now_ns - spent_at_ns_) * 1e-9 * kStrangersPerSecond;
+  spent_ = std::max(0.0, spent_ - returned);
+  spent_at_ns_ = now_ns;
+  if (spent_ + 1 > kStrangersPerSecond) return false;
+  ++spent_;
+  return true;
+}
+
+void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns) {
+  if (!close_forgotten(roster)) return;
+  for (auto& [id, account] : roster.accounts()) {
     ReplyAccount& reply = account.reply;
     const bool change = reply.due && elapsed(reply.last_ns, now_ns, kChangeNs);
     const bool echo = reply.clock_moved && elapsed(reply.last_ns, now_ns, kEchoNs);
     if (!account.present || !(change || echo)) continue;
+    if (!reply.open && !outbox_->push(OpenReplies{id})) return;
+    reply.open = true;
     const bool queued =
         outbox_->push(transport::ReplyMessage{.client = id,
                                               .epoch = epoch_,
@@ -36,7 +57,7 @@ void ReplyDesk::send_due(std::map<transport::ClientId, Account>& accounts, std::
                                               .server_time_ns = wall_ns,
                                               .entries = account.inputs.outcomes});
     if (!queued) return;
-    reply = {.due = false, .clock_moved = false, .once = Reason::kNone, .last_ns = now_ns};
+    reply = {.open = true, .due = false, .clock_moved = false, .once = Reason::kNone, .last_ns = now_ns};
   }
 }
 
@@ -44,6 +65,7 @@ void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t n
   auto stranger = std::ranges::find(strangers_, client, &Stranger::client);
   if (stranger == strangers_.end()) stranger = std::ranges::min_element(strangers_, {}, &Stranger::last_ns);
   if (stranger->client == client && !elapsed(stranger->last_ns, now_ns, kEchoNs)) return;
+  if (!spend(now_ns)) return;
   *stranger = {client, now_ns};
   transport::ReplyMessage reply;
   reply.client = client;

@@ -12,19 +12,25 @@
 namespace tandem::host {
 
 /// Queues replies: on a change, otherwise at most twice a second. A reply that finds no room is tried again.
+/// A client with an account is answered through a writer of its own, opened with its first reply.
 class ReplyDesk {
  public:
   static constexpr std::int64_t kEchoNs = 500'000'000;   ///< between replies that only echo the clock
   static constexpr std::int64_t kChangeNs = 10'000'000;  ///< between replies to one client at all
+  static constexpr double kStrangersPerSecond = 20;      ///< and as many at once
 
   ReplyDesk(Epoch epoch, Outbox& outbox) : epoch_(epoch), outbox_(&outbox) {}
 
-  void send_due(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns, std::int64_t wall_ns);
-  /// Answers somebody without an account, at most twice a second each.
+  void send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns);
+  /// Answers somebody without an account, at most twice a second each, and 20 a second all together: every
+  /// client reads it.
   void refuse(transport::ClientId client, transport::Reason reason, std::int64_t now_ns,
               std::int64_t wall_ns);
 
  private:
+  [[nodiscard]] bool close_forgotten(Roster& roster);
+  [[nodiscard]] bool spend(std::int64_t now_ns);
+
   struct Stranger {
     transport::ClientId client = 0;
     std::int64_t last_ns = INT64_MIN;
@@ -32,6 +38,8 @@ class ReplyDesk {
   Epoch epoch_;
   Outbox* outbox_;
   std::array<Stranger, 64> strangers_{};  // the longest silent one makes room
+  double spent_ = 0;                      // answers to strangers, less what time gave back
+  std::int64_t spent_at_ns_ = 0;
 };
 
 }  // namespace tandem::host

@@ -25,6 +25,11 @@ void Roster::note(const Account& account, std::string_view what) {
     notices_.push_back(fmt::format("client {} {}", client_name(account.id), what));
 }
 
+Roster::Accounts::iterator Roster::forget(Accounts::iterator account) {
+  if (account->second.reply.open) forgotten_.push_back(account->first);
+  return accounts_.erase(account);
+}
+
 Account* Roster::admit(const transport::AckMessage& ack, const transport::ParticipantId& from,
                        std::int64_t now_ns) {
   const auto siblings =
@@ -35,7 +40,7 @@ Account* Roster::admit(const transport::AckMessage& ack, const transport::Partic
       return entry.second.present ? INT64_MAX : entry.second.heard_ns;
     });
     if (oldest == accounts_.end() || oldest->second.present) return nullptr;
-    accounts_.erase(oldest);
+    forget(oldest);
   }
   Account account;
   account.id = ack.client;
@@ -105,7 +110,7 @@ void Roster::look_for_dead(transport::ServerPort& port, const Now& now) {
       account.counted = false;
       note(account, "is gone");
     }
-    it = !account.present && silence_ns > kForgetNs ? accounts_.erase(it) : std::next(it);
+    it = !account.present && silence_ns > kForgetNs ? forget(it) : std::next(it);
   }
 }
 

@@ -29,6 +29,7 @@ struct JoinAccount {
 };
 
 struct ReplyAccount {
+  bool open = false;                                  ///< the client has a reply writer of its own
   bool due = true;                                    ///< something changed
   bool clock_moved = false;                           ///< only the echo of the client's clock is new
   transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
@@ -113,10 +114,14 @@ class Roster {
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
   [[nodiscard]] std::vector<std::string>& notices() { return notices_; }
+  /// Accounts with a reply writer that were forgotten, for whoever ends their writers and removes them here.
+  [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
 
  private:
   Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
+  using Accounts = std::map<transport::ClientId, Account>;
   void note(const Account& account, std::string_view what);
+  Accounts::iterator forget(Accounts::iterator account);
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
     return account.applied + window_ >= now.frame + 1;
   }
@@ -130,6 +135,7 @@ class Roster {
       accounts_;  // ordered, so that rules apply in the same order everywhere
   std::uint64_t seen_ = 0, demotions_ = 0;
   std::vector<std::string> notices_;
+  std::vector<transport::ClientId> forgotten_;
 };
 
 /// Sixteen hex digits, as ids are shown everywhere.

@@ -9,6 +9,7 @@ namespace {
 
 using dds::Node;
 using dds::Reader;
+using dds::Topic;
 using dds::Writer;
 
 class DdsClientPort final : public ClientPort {
@@ -36,7 +37,8 @@ class DdsClientPort final : public ClientPort {
     return epoch_ ? book.epoch_live(*epoch_) : book.any_live();
   }
 
-  Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream) override {
+  Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
+                           ClientId client) override {
     limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     if (stream_ && epoch_ == session.epoch) return {};
     // New readers, because the old ones may already have been handed scheduled inputs of the new epoch, which
@@ -48,7 +50,9 @@ class DdsClientPort final : public ClientPort {
     if (!delta) return tl::unexpected(delta.error());
     auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");
     if (!scheduled) return tl::unexpected(scheduled.error());
-    auto reply = endpoints_.node.reader<ReplyMessage>("replies");
+    auto reply =
+        endpoints_.node.reader<ReplyMessage>("replies", Topic<ReplyMessage>::kQos.reader_depth, false,
+                                             {options_.session, reply_partition(options_.session, client)});
     if (!reply) return tl::unexpected(reply.error());
     stream_.emplace(Stream{std::move(*delta), std::move(*scheduled), std::move(*reply)});
     return {};

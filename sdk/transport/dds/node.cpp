@@ -9,6 +9,15 @@ namespace {
 // write looks at its stop flag.
 constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
 
+Qos in_partitions(const std::vector<std::string>& partitions) {
+  std::vector<const char*> names;
+  names.reserve(partitions.size());
+  for (const std::string& partition : partitions) names.push_back(partition.c_str());
+  Qos qos(dds_create_qos());
+  dds_qset_partition(qos.get(), static_cast<std::uint32_t>(names.size()), names.data());
+  return qos;
+}
+
 }  // namespace
 
 Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
@@ -53,13 +62,11 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
   }
   node.self_ = to_participant_id(guid);
 
-  const Qos grouped(dds_create_qos());
-  dds_qset_partition1(grouped.get(), partition.c_str());
   const dds_entity_t parent = node.participant_.get();
-  auto publisher = own(dds_create_publisher(parent, grouped.get(), nullptr), "the publisher");
+  auto publisher = node.make_publisher({partition});
   if (!publisher) return tl::unexpected(publisher.error());
   node.publisher_ = std::move(*publisher);
-  auto subscriber = own(dds_create_subscriber(parent, grouped.get(), nullptr), "the subscriber");
+  auto subscriber = node.make_subscriber({partition});
   if (!subscriber) return tl::unexpected(subscriber.error());
   node.subscriber_ = std::move(*subscriber);
   auto waitset = own(dds_create_waitset(parent), "the waitset");
@@ -73,6 +80,16 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
     return dds_failure("attaching the guard condition", code);
   }
   return node;
+}
+
+Result<Entity> Node::make_publisher(const std::vector<std::string>& partitions) const {
+  return own(dds_create_publisher(participant_.get(), in_partitions(partitions).get(), nullptr),
+             "the publisher");
+}
+
+Result<Entity> Node::make_subscriber(const std::vector<std::string>& partitions) const {
+  return own(dds_create_subscriber(participant_.get(), in_partitions(partitions).get(), nullptr),
+             "the subscriber");
 }
 
 Result<Entity> Node::make_topic(const dds_topic_descriptor_t& descriptor, const char* name) {

@@ -20,8 +20,10 @@ namespace tandem::transport::dds {
 template <class M>
 class Writer {
  public:
-  Writer(Entity topic, Entity entity, const DdsOptions& options)
+  /// `publisher`: the writer's own, if it has one.
+  Writer(Entity topic, Entity publisher, Entity entity, const DdsOptions& options)
       : topic_(std::move(topic)),
+        publisher_(std::move(publisher)),
         entity_(std::move(entity)),
         timeout_(options.write_timeout),
         stop_(options.stop) {}
@@ -41,6 +43,7 @@ class Writer {
 
  private:
   Entity topic_;
+  Entity publisher_;
   Entity entity_;
   std::chrono::nanoseconds timeout_;
   const std::atomic<bool>* stop_;
@@ -50,8 +53,12 @@ class Writer {
 template <class M>
 class Reader {
  public:
-  Reader(Entity topic, Entity entity, std::unique_ptr<LiveWriters> writers)
-      : writers_(std::move(writers)), topic_(std::move(topic)), entity_(std::move(entity)) {}
+  /// `subscriber`: the reader's own, if it has one.
+  Reader(Entity topic, Entity subscriber, Entity entity, std::unique_ptr<LiveWriters> writers)
+      : writers_(std::move(writers)),
+        topic_(std::move(topic)),
+        subscriber_(std::move(subscriber)),
+        entity_(std::move(entity)) {}
 
   /// Calls `sink(writer, Received<M>&&)` for each sample in order; counts in `dropped` what breaks a limit.
   /// A sample whose writer has left the participant's endpoints in between cannot be attributed and is passed
@@ -90,6 +97,7 @@ class Reader {
  private:
   std::unique_ptr<LiveWriters> writers_;  // its listener runs until the entity is gone, so it comes first
   Entity topic_;
+  Entity subscriber_;
   Entity entity_;
   Participants participants_;
 };
@@ -100,35 +108,44 @@ class Node {
   static Result<Node> create(const DdsOptions& options, const std::string& name,
                              const std::string& partition);
 
+  /// In `partition`, through a publisher of its own; where that is empty, in the node's.
   template <class M>
-  Result<Writer<M>> writer(const std::string& name, std::int32_t depth = Topic<M>::kQos.writer_depth) {
+  Result<Writer<M>> writer(const std::string& name, std::int32_t depth = Topic<M>::kQos.writer_depth,
+                           const std::string& partition = {}) {
     auto topic = make_topic(Topic<M>::descriptor(), Topic<M>::kName);
     if (!topic) return tl::unexpected(topic.error());
+    auto publisher = partition.empty() ? Result<Entity>() : make_publisher({partition});
+    if (!publisher) return tl::unexpected(publisher.error());
+    const Entity& parent = *publisher ? *publisher : publisher_;
     // The status writer's short lease only paces the liveliness messages of its participant: at 0.4 s, two of
     // them may be late before the other writers' lease runs out.
     const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ * 2 / 5;
     const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
     dds_qset_entity_name(qos.get(), name.c_str());
-    auto entity = own(dds_create_writer(publisher_.get(), topic->get(), qos.get(), nullptr),
+    auto entity = own(dds_create_writer(parent.get(), topic->get(), qos.get(), nullptr),
                       std::string("the writer of ") + Topic<M>::kName);
     if (!entity) return tl::unexpected(entity.error());
-    return Writer<M>(std::move(*topic), std::move(*entity), options_);
+    return Writer<M>(std::move(*topic), std::move(*publisher), std::move(*entity), options_);
   }
 
+  /// In all of `partitions`, through a subscriber of its own; where there are none, in the node's.
   template <class M>
   Result<Reader<M>> reader(const std::string& name, std::int32_t depth = Topic<M>::kQos.reader_depth,
-                           bool ignore_own = false) {
+                           bool ignore_own = false, const std::vector<std::string>& partitions = {}) {
     auto topic = make_topic(Topic<M>::descriptor(), Topic<M>::kName);
     if (!topic) return tl::unexpected(topic.error());
+    auto subscriber = partitions.empty() ? Result<Entity>() : make_subscriber(partitions);
+    if (!subscriber) return tl::unexpected(subscriber.error());
+    const Entity& parent = *subscriber ? *subscriber : subscriber_;
     const Qos qos = make_qos(Topic<M>::kQos, depth, DDS_INFINITY);
     dds_qset_entity_name(qos.get(), name.c_str());
     if (ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
     auto writers = std::make_unique<LiveWriters>();
-    auto entity = own(dds_create_reader(subscriber_.get(), topic->get(), qos.get(), writers->listener()),
+    auto entity = own(dds_create_reader(parent.get(), topic->get(), qos.get(), writers->listener()),
                       std::string("the reader of ") + Topic<M>::kName);
     if (!entity) return tl::unexpected(entity.error());
     if (auto watched = watch(entity->get()); !watched) return tl::unexpected(watched.error());
-    return Reader<M>(std::move(*topic), std::move(*entity), std::move(writers));
+    return Reader<M>(std::move(*topic), std::move(*subscriber), std::move(*entity), std::move(writers));
   }
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
@@ -138,6 +155,8 @@ class Node {
 
  private:
   Node(DomainUse domain, const DdsOptions& options);
+  [[nodiscard]] Result<Entity> make_publisher(const std::vector<std::string>& partitions) const;
+  [[nodiscard]] Result<Entity> make_subscriber(const std::vector<std::string>& partitions) const;
   Result<Entity> make_topic(const dds_topic_descriptor_t& descriptor, const char* name);
   Result<void> watch(dds_entity_t reader);
 

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <deque>
+#include <map>
 #include <utility>
 
 #include "sdk/transport/dds/announcements.hpp"
@@ -7,6 +10,7 @@ namespace {
 
 using dds::Node;
 using dds::Reader;
+using dds::Topic;
 using dds::Writer;
 
 class DdsServerPort final : public ServerPort {
@@ -40,8 +44,25 @@ class DdsServerPort final : public ServerPort {
     return endpoints_.scheduled.write(message);
   }
   Result<void> write(const SnapshotMessage& message) override { return endpoints_.snapshot.write(message); }
-  Result<void> write(const ReplyMessage& message) override { return endpoints_.reply.write(message); }
+  Result<void> write(const ReplyMessage& message) override {
+    const auto own = replies_.find(message.client);
+    if (own != replies_.end()) return own->second.write(message);
+    auto written = endpoints_.reply.write(message);
+    if (written) remember_stranger(message.client);
+    return written;
+  }
   Result<void> write(const ServerStatusMessage& message) override { return endpoints_.status.write(message); }
+
+  Result<void> open_replies(ClientId client) override {
+    if (replies_.contains(client)) return {};
+    auto writer = endpoints_.node.writer<ReplyMessage>("replies", Topic<ReplyMessage>::kQos.writer_depth,
+                                                       reply_partition(session_, client));
+    if (!writer) return tl::unexpected(writer.error());
+    replies_.emplace(client, std::move(*writer));
+    forget_stranger(client);  // or what it was told before could be taken for news
+    return {};
+  }
+  void close_replies(ClientId client) override { replies_.erase(client); }
 
   void take(std::vector<Received<InputMessage>>& out) override {
     endpoints_.input.take(limits_, dropped_, out);
@@ -80,8 +101,27 @@ class DdsServerPort final : public ServerPort {
     return false;
   }
 
+  // The writer that all clients read keeps the last answer to each stranger for late readers; so that
+  // strangers cannot fill memory, it keeps the latest few.
+  void remember_stranger(ClientId client) {
+    if (std::ranges::find(strangers_, client) != strangers_.end()) return;
+    strangers_.push_back(client);
+    if (strangers_.size() > kMostStrangers) forget_stranger(strangers_.front());
+  }
+  void forget_stranger(ClientId client) {
+    if (std::erase(strangers_, client) == 0) return;
+    tandem_TandemReply key{};
+    key.client = client;
+    static_cast<void>(dds_dispose(endpoints_.reply.get(), &key));
+  }
+
+  static constexpr std::size_t kMostStrangers = 64;
+
   Endpoints endpoints_;
   std::string session_;
+  // Of the writing thread.
+  std::map<ClientId, Writer<ReplyMessage>> replies_;
+  std::deque<ClientId> strangers_;
   Limits limits_;
   std::atomic<std::uint64_t> dropped_ = 0;
 };

@@ -83,24 +83,28 @@ Fabric::Index Fabric::add_participant(const std::string& session) {
   return index;
 }
 
-Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint32_t depth) {
+Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint32_t depth,
+                                 std::string partition) {
   const auto index = static_cast<Index>(writers_.size());
   Writer writer;
   writer.participant = participant;
   writer.topic = topic;
   writer.depth = depth;
+  writer.partition = std::move(partition);
   writers_.push_back(std::move(writer));
   participants_[participant].writers.push_back(index);
   for (Index reader = 0; reader < readers_.size(); ++reader) add_pair(index, reader);
   return index;
 }
 
-Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint32_t depth) {
+Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint32_t depth,
+                                 std::string partition) {
   const auto index = static_cast<Index>(readers_.size());
   Reader reader;
   reader.participant = participant;
   reader.topic = topic;
   reader.depth = depth;
+  reader.partition = std::move(partition);
   readers_.push_back(std::move(reader));
   participants_[participant].readers.push_back(index);
   for (Index writer = 0; writer < writers_.size(); ++writer) add_pair(writer, index);
@@ -110,11 +114,10 @@ Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint
 void Fabric::add_pair(Index writer, Index reader) {
   const Writer& from = writers_[writer];
   const Reader& to = readers_[reader];
-  if (from.topic != to.topic || from.participant == to.participant || to.closed || gone(from.participant) ||
-      gone(to.participant) ||
-      participants_[from.participant].session != participants_[to.participant].session) {
-    return;
-  }
+  const bool fits = from.topic == to.topic && from.participant != to.participant &&
+                    participants_[from.participant].session == participants_[to.participant].session &&
+                    (from.partition.empty() || from.partition == to.partition);
+  if (!fits || from.closed || to.closed || gone(from.participant) || gone(to.participant)) return;
   const auto index = static_cast<Index>(pairs_.size());
   Pair pair;
   pair.writer = writer;
@@ -136,18 +139,21 @@ void Fabric::close_reader(Index reader) {
   readers_[reader].pairs.clear();
 }
 
+void Fabric::close_writer(Index writer) {
+  writers_[writer].closed = true;
+  for (const Index pair : writers_[writer].pairs) {
+    pairs_[pair].matched = false;
+    pairs_[pair].travelling.clear();
+    std::erase(readers_[pairs_[pair].reader].pairs, pair);
+  }
+  writers_[writer].pairs.clear();
+  writers_[writer].history.clear();
+}
+
 void Fabric::close_participant(Index participant) {
   participants_[participant].closed = true;
   for (const Index reader : participants_[participant].readers) close_reader(reader);
-  for (const Index writer : participants_[participant].writers) {
-    for (const Index pair : writers_[writer].pairs) {
-      pairs_[pair].matched = false;
-      pairs_[pair].travelling.clear();
-      std::erase(readers_[pairs_[pair].reader].pairs, pair);
-    }
-    writers_[writer].pairs.clear();
-    writers_[writer].history.clear();
-  }
+  for (const Index writer : participants_[participant].writers) close_writer(writer);
 }
 
 Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) {
@@ -214,7 +220,7 @@ void Fabric::process(Index pair) {
   Pair& way = pairs_[pair];
   const Writer& writer = writers_[way.writer];
   const Reader& reader = readers_[way.reader];
-  if (reader.closed || gone(reader.participant) || participants_[writer.participant].closed) return;
+  if (reader.closed || writer.closed || gone(reader.participant)) return;
   const bool unreachable = participants_[reader.participant].frozen_ns != kNever ||
                            participants_[writer.participant].frozen_ns != kNever ||
                            is_cut(writer.participant, reader.participant);

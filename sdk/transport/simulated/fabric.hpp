@@ -49,10 +49,15 @@ class Fabric {
 
   // What ports do.
   Index add_participant(const std::string& session);
-  Index add_writer(Index participant, std::size_t topic, std::uint32_t depth);
-  Index add_reader(Index participant, std::size_t topic, std::uint32_t depth);
+  /// `partition`: within the session; empty for what all its readers read.
+  Index add_writer(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});
+  /// Reads what has no partition, and `partition`.
+  Index add_reader(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});
+  void close_writer(Index writer);
   void close_reader(Index reader);
   void close_participant(Index participant);
+  /// Drops what a writer keeps of a key.
+  void forget(Index writer, std::uint64_t key) { writers_[writer].history.erase(key); }
   [[nodiscard]] Result<void> write(Index writer, std::uint64_t key, AnyMessage message);
   /// Calls `sink(participant, message)` for all that arrived.
   template <class Sink>
@@ -104,6 +109,8 @@ class Fabric {
     Index participant = 0;
     std::size_t topic = 0;
     std::uint32_t depth = 1;
+    std::string partition;
+    bool closed = false;
     std::uint64_t next_sequence = 1;
     std::map<std::uint64_t, std::deque<Sample>> history;  // by key, each ascending by sequence
     std::vector<Index> pairs;
@@ -117,6 +124,7 @@ class Fabric {
     Index participant = 0;
     std::size_t topic = 0;
     std::uint32_t depth = 1;
+    std::string partition;
     bool closed = false;
     std::deque<Arrived> arrived;
     std::vector<Index> pairs;

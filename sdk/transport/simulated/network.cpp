@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <map>
 #include <utility>
 
 #include "sdk/transport/limits.hpp"
@@ -30,15 +31,16 @@ class Member {
   [[nodiscard]] Fabric& fabric() const { return *fabric_; }
   [[nodiscard]] Fabric::Index index() const { return self_; }
   [[nodiscard]] ParticipantId id() const { return fabric_->id(self_); }
+  [[nodiscard]] const std::string& session() const { return session_; }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
   template <class M>
-  Fabric::Index writer(std::uint32_t depth = 1) {
-    return fabric_->add_writer(self_, kTopic<M>, depth);
+  Fabric::Index writer(std::uint32_t depth = 1, std::string partition = {}) {
+    return fabric_->add_writer(self_, kTopic<M>, depth, std::move(partition));
   }
   template <class M>
-  Fabric::Index reader(std::uint32_t depth = 1) {
-    return fabric_->add_reader(self_, kTopic<M>, depth);
+  Fabric::Index reader(std::uint32_t depth = 1, std::string partition = {}) {
+    return fabric_->add_reader(self_, kTopic<M>, depth, std::move(partition));
   }
   template <class M>
   void take(Fabric::Index reader, const Limits& limits, std::vector<Received<M>>& out) {
@@ -107,10 +109,23 @@ class SimulatedServerPort final : public ServerPort {
     return member_.fabric().write(snapshot_, 0, message);
   }
   Result<void> write(const ReplyMessage& message) override {
-    return member_.fabric().write(reply_, message.client, message);
+    const auto own = replies_.find(message.client);
+    return member_.fabric().write(own == replies_.end() ? reply_ : own->second, message.client, message);
   }
   Result<void> write(const ServerStatusMessage& message) override {
     return member_.fabric().write(status_, 0, message);
+  }
+  Result<void> open_replies(ClientId client) override {
+    if (replies_.contains(client)) return {};
+    replies_.emplace(client, member_.writer<ReplyMessage>(1, reply_partition(member_.session(), client)));
+    member_.fabric().forget(reply_, client);
+    return {};
+  }
+  void close_replies(ClientId client) override {
+    const auto own = replies_.find(client);
+    if (own == replies_.end()) return;
+    member_.fabric().close_writer(own->second);
+    replies_.erase(own);
   }
   void take(std::vector<Received<InputMessage>>& out) override { member_.take(input_, Limits{}, out); }
   void take(std::vector<Received<AckMessage>>& out) override { member_.take(ack_, Limits{}, out); }
@@ -129,6 +144,7 @@ class SimulatedServerPort final : public ServerPort {
   Member member_;
   Fabric::Index session_, delta_, scheduled_, snapshot_, reply_, status_;
   Fabric::Index others_, input_, ack_;
+  std::map<ClientId, Fabric::Index> replies_;
   SessionBook book_;
 };
 
@@ -151,7 +167,8 @@ class SimulatedClientPort final : public ClientPort {
     member_.refresh(sessions_, book_);
     return stream_ ? book_.epoch_live(stream_->epoch) : book_.any_live();
   }
-  Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream) override {
+  Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
+                           ClientId client) override {
     limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     if (stream_ && stream_->epoch == session.epoch) return {};
     if (stream_) {
@@ -160,7 +177,8 @@ class SimulatedClientPort final : public ClientPort {
       }
     }
     stream_ = Stream{session.epoch, member_.reader<DeltaMessage>(delta_depth_),
-                     member_.reader<ScheduledInputMessage>(kScheduledDepth), member_.reader<ReplyMessage>()};
+                     member_.reader<ScheduledInputMessage>(kScheduledDepth),
+                     member_.reader<ReplyMessage>(1, reply_partition(member_.session(), client))};
     return {};
   }
   Result<void> open_snapshots() override {

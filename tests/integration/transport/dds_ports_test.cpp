@@ -19,6 +19,7 @@ using test::eventually;
 using namespace std::chrono_literals;
 
 constexpr Epoch kEpoch = 1'700'000'000'000;
+constexpr ClientId kClient = 77;
 
 class DdsPorts : public ::testing::Test {
  protected:
@@ -38,7 +39,7 @@ class DdsPorts : public ::testing::Test {
   SessionMessage join(ServerPort& server, ClientPort& client) {
     const SessionMessage session = a_session(options_.session, kEpoch);
     EXPECT_TRUE(server.write(session));
-    EXPECT_TRUE(client.open_stream(session, session.streams[0]));
+    EXPECT_TRUE(client.open_stream(session, session.streams[0], kClient));
     EXPECT_TRUE(client.open_snapshots());
     EXPECT_TRUE(eventually([&] { return server.joined(client.self()) && server.alive(client.self()); }));
     return session;
@@ -135,6 +136,43 @@ TEST_F(DdsPorts, EveryTopicArrivesAsItWasWritten) {
   EXPECT_EQ(server->dropped() + client->dropped(), 0U);
 }
 
+TEST_F(DdsPorts, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
+  const auto server = this->server();
+  const auto owner = this->client();
+  const auto other = this->client();
+  const SessionMessage session = join(*server, *owner);
+  ASSERT_TRUE(other->open_stream(session, session.streams[0], kClient + 1));
+  ASSERT_TRUE(other->open_snapshots());
+  ASSERT_TRUE(eventually([&] { return server->joined(other->self()); }));
+  ReplyMessage reply;
+  reply.client = kClient;
+  reply.epoch = kEpoch;
+  ASSERT_TRUE(server->write(reply));
+  EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, reply);
+  EXPECT_EQ(receive<ReplyMessage>(*other, 1).at(0).message, reply) << "a stranger's answer is for everybody";
+  ASSERT_TRUE(server->open_replies(kClient));
+  ASSERT_TRUE(server->open_replies(kClient)) << "twice is harmless";
+  reply.highest_input = 5;
+  ASSERT_TRUE(server->write(reply));
+  EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, reply);
+  ReplyMessage last;
+  last.client = kClient + 1;
+  ASSERT_TRUE(server->write(last));
+  EXPECT_EQ(receive<ReplyMessage>(*other, 1).at(0).message, last) << "and nothing before it";
+
+  // A reader that comes late, as in another epoch, is handed what the owner's writer keeps and no more.
+  const SessionMessage later = a_session(options_.session, kEpoch + 1);
+  ASSERT_TRUE(owner->open_stream(later, later.streams[0], kClient));
+  const auto handed = receive<ReplyMessage>(*owner, 2);
+  for (const auto& [message, from] : handed) {
+    EXPECT_TRUE(message == reply || message == last) << "client " << message.client;
+  }
+  server->close_replies(kClient);
+  const SessionMessage latest = a_session(options_.session, kEpoch + 2);
+  ASSERT_TRUE(owner->open_stream(latest, latest.streams[0], kClient));
+  EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, last);
+}
+
 TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
   const auto monitor = make_dds_monitor(options_);
   ASSERT_TRUE(monitor);
@@ -186,7 +224,7 @@ TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapsh
 
   const auto client = this->client();
   EXPECT_EQ(receive_sessions(*client)[0].message, session);
-  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots());
   const auto scheduled = receive<ScheduledInputMessage>(*client, 256);
   ASSERT_EQ(scheduled.size(), 256U) << "keep-last 256";
@@ -229,7 +267,7 @@ TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   const SessionMessage session = a_session(options_.session, kEpoch);
   ASSERT_TRUE(eventually([&] { return server->alive(id); }));
   EXPECT_FALSE(server->joined(id));
-  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots());
   ASSERT_TRUE(eventually([&] { return server->joined(id); }));
   client->close_snapshots();
@@ -260,7 +298,7 @@ TEST_F(DdsPorts, WhenTheLatestServerEndsAClientIsToldOfTheOneThatStays) {
   const SessionMessage later = a_session(options_.session, kEpoch + 1);
   ASSERT_TRUE(ends->write(later));
   EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch + 1);
-  ASSERT_TRUE(client->open_stream(later, later.streams[0]));
+  ASSERT_TRUE(client->open_stream(later, later.streams[0], kClient));
   EXPECT_TRUE(client->server_alive());
   ends.reset();
   EXPECT_TRUE(eventually([&] { return !client->server_alive(); }));
@@ -283,7 +321,7 @@ TEST_F(DdsPorts, OversizeAndMisshapenSamplesAreDroppedAndCounted) {
   SessionMessage session = join(*server, *client);
   session.streams[0].max_delta_bytes = 1000;
   session.streams[0].max_snapshot_bytes = 2000;
-  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots());
   ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
   ASSERT_TRUE(server->write(a_delta(kEpoch, 1, 1001)));
@@ -348,7 +386,7 @@ TEST_F(DdsPorts, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
   receive<DeltaMessage>(*client, 1);
   ASSERT_TRUE(server->write(a_delta(kEpoch, 2)));
   session.epoch = kEpoch + 1;
-  ASSERT_TRUE(client->open_stream(session, session.streams[0]));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   EXPECT_EQ(receive<ScheduledInputMessage>(*client, 1).at(0).message.epoch, kEpoch + 1);
   std::vector<Received<DeltaMessage>> deltas;
   client->take(deltas);

@@ -161,7 +161,7 @@ TEST_F(DdsProcesses, AKilledServerIsNoticedAndTheNextOneIsFound) {
   };
   auto server = peer("server", kEpoch);
   ASSERT_TRUE(sees(kEpoch));
-  ASSERT_TRUE(client.open_stream(sessions.back().message, sessions.back().message.streams[0]));
+  ASSERT_TRUE(client.open_stream(sessions.back().message, sessions.back().message.streams[0], 77));
   EXPECT_TRUE(client.server_alive());
   server->signal(SIGKILL);
   auto start = Clock::now();
@@ -171,7 +171,7 @@ TEST_F(DdsProcesses, AKilledServerIsNoticedAndTheNextOneIsFound) {
   server = peer("server", kEpoch + 1);
   EXPECT_TRUE(sees(kEpoch + 1));
   std::cout << "next server found " << ms_since(start) << " ms after its start\n";
-  ASSERT_TRUE(client.open_stream(sessions.back().message, sessions.back().message.streams[0]));
+  ASSERT_TRUE(client.open_stream(sessions.back().message, sessions.back().message.streams[0], 77));
   EXPECT_TRUE(client.server_alive());
 }
 

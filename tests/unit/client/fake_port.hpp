@@ -16,7 +16,8 @@ class FakePort final : public transport::ClientPort {
   }
   [[nodiscard]] bool server_alive() override { return alive; }
   Result<void> open_stream(const transport::SessionMessage& session,
-                           const transport::StreamMessage& /*stream*/) override {
+                           const transport::StreamMessage& /*stream*/,
+                           transport::ClientId /*client*/) override {
     opened_epochs.push_back(session.epoch);
     return {};
   }

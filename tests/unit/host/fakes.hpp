@@ -91,6 +91,11 @@ class FakePort final : public transport::ServerPort {
   Result<void> write(const transport::SnapshotMessage& m) override { return keep(snapshots, m, "snapshot"); }
   Result<void> write(const transport::ReplyMessage& m) override { return keep(replies, m, "reply"); }
   Result<void> write(const transport::ServerStatusMessage& m) override { return keep(statuses, m, "status"); }
+  Result<void> open_replies(transport::ClientId client) override {
+    reply_writers.insert(client);
+    return {};
+  }
+  void close_replies(transport::ClientId client) override { reply_writers.erase(client); }
   void take(std::vector<transport::Received<transport::InputMessage>>& out) override { move(inputs, out); }
   void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
   [[nodiscard]] bool joined(const transport::ParticipantId& id) override { return !unmatched.contains(id); }
@@ -107,6 +112,7 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::ScheduledInputMessage> scheduled;
   std::vector<transport::SnapshotMessage> snapshots;
   std::vector<transport::ReplyMessage> replies;
+  std::set<transport::ClientId> reply_writers;
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written
   int failing_writes = 0;          // the next so many deltas are refused

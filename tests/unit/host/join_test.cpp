@@ -178,6 +178,39 @@ TEST_F(JoinTest, WithoutAChangeRepliesGoOutAtTwoHertzAtMostAndEchoTheClock) {
       << "answered in the poll it came";
 }
 
+TEST_F(JoinTest, AnAccountHasAReplyWriterOfItsOwnUntilItIsForgotten) {
+  bench.joining(1);
+  bench.run_ms(20);
+  EXPECT_TRUE(bench.port.reply_writers.contains(1));
+  const auto stranger = bench.ack(2, Phase::kJoining, 0);
+  auto other_version = stranger;
+  other_version.protocol_version += 1;
+  bench.send(other_version);
+  bench.run_ms(20);
+  ASSERT_NE(bench.last_reply(2), nullptr);
+  EXPECT_FALSE(bench.port.reply_writers.contains(2)) << "no account";
+  bench.port.dead.insert(participant(1));
+  bench.run_ms(59'000);
+  EXPECT_TRUE(bench.port.reply_writers.contains(1));
+  bench.run_ms(2'000);
+  EXPECT_TRUE(bench.port.reply_writers.empty());
+  bench.port.dead.clear();
+  bench.joining(1);
+  bench.run_ms(20);
+  EXPECT_TRUE(bench.port.reply_writers.contains(1));
+}
+
+TEST_F(JoinTest, StrangersAreAnsweredTwentyTimesASecondAllTogether) {
+  bench.on_ms = [this, next = transport::ClientId{1000}]() mutable {
+    auto ack = bench.ack(next++, Phase::kJoining, 0);
+    ack.protocol_version += 1;
+    bench.send(ack);
+  };
+  bench.run_ms(5'000);
+  EXPECT_GE(bench.port.replies.size(), 100U);
+  EXPECT_LE(bench.port.replies.size(), 120U);
+}
+
 TEST_F(JoinTest, ASilentClientIsSentNoReplies) {
   bench.enter(1, Role::kObserver);
   bench.run_ms(100);

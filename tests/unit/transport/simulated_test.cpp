@@ -25,8 +25,8 @@ SessionMessage session(Epoch epoch = kEpoch) {
   return message;
 }
 
-Result<void> open_stream(ClientPort& port, const SessionMessage& about = session()) {
-  return port.open_stream(about, about.streams[0]);
+Result<void> open_stream(ClientPort& port, const SessionMessage& about = session(), ClientId client = 77) {
+  return port.open_stream(about, about.streams[0], client);
 }
 
 DeltaMessage delta(Frame frame) {
@@ -370,6 +370,51 @@ TEST(Simulated, SamplesThatBreakALimitAreDroppedAndCounted) {
   EXPECT_EQ(pair.client->dropped(), 1U);
   EXPECT_TRUE(take<AckMessage>(*pair.server).empty());
   EXPECT_EQ(pair.server->dropped(), 1U);
+}
+
+ReplyMessage reply(ClientId client, std::uint64_t highest = 0) {
+  ReplyMessage message;
+  message.client = client;
+  message.highest_input = highest;
+  return message;
+}
+
+TEST(Simulated, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
+  Pair pair(NetworkOptions{});
+  const auto other = std::move(*pair.network.make_client("s"));
+  ASSERT_TRUE(open_stream(*other, session(), 78));
+  pair.run(100 * kMs);
+  ASSERT_TRUE(pair.server->write(reply(77)));
+  pair.run(100 * kMs);
+  EXPECT_EQ(take<ReplyMessage>(*pair.client).size(), 1U);
+  EXPECT_EQ(take<ReplyMessage>(*other).size(), 1U) << "a stranger's answer is for everybody";
+  ASSERT_TRUE(pair.server->open_replies(77));
+  ASSERT_TRUE(pair.server->open_replies(77)) << "twice is harmless";
+  ASSERT_TRUE(pair.server->write(reply(77, 5)));
+  pair.run(100 * kMs);
+  const auto own = take<ReplyMessage>(*pair.client);
+  ASSERT_EQ(own.size(), 1U) << "also what was written before the match";
+  EXPECT_EQ(own[0].message.highest_input, 5U);
+  EXPECT_TRUE(take<ReplyMessage>(*other).empty());
+}
+
+TEST(Simulated, AClosedReplyWriterHandsNothingToLateReaders) {
+  Pair pair(NetworkOptions{});
+  ASSERT_TRUE(pair.server->write(reply(77, 1)));
+  ASSERT_TRUE(pair.server->open_replies(77));
+  ASSERT_TRUE(pair.server->write(reply(77, 2)));
+  pair.run(100 * kMs);
+  take<ReplyMessage>(*pair.client);
+  ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 1)));
+  pair.run(100 * kMs);
+  const auto kept = take<ReplyMessage>(*pair.client);
+  ASSERT_EQ(kept.size(), 1U) << "the answer to the stranger it was is forgotten";
+  EXPECT_EQ(kept[0].message.highest_input, 2U);
+  pair.server->close_replies(77);
+  pair.server->close_replies(77);
+  ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 2)));
+  pair.run(100 * kMs);
+  EXPECT_TRUE(take<ReplyMessage>(*pair.client).empty());
 }
 
 TEST(Simulated, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
