@@ -73,6 +73,7 @@ struct StreamMessage {
 };
 
 struct SessionMessage {
+  static constexpr const char* kTopic = "TandemSession";
   std::string session;  ///< key; no wildcard characters, 1..64 bytes of [A-Za-z0-9._-]
   Epoch epoch = 0;      ///< ms of wall clock at the server's start
   std::uint32_t protocol_version = kProtocolVersion;
@@ -89,6 +90,7 @@ struct SessionMessage {
 };
 
 struct DeltaMessage {
+  static constexpr const char* kTopic = "TandemDelta";
   Epoch epoch = 0;
   StreamId stream;
   Frame frame = 0;
@@ -105,6 +107,7 @@ enum class ScheduledKind : std::uint32_t {
 };
 
 struct ScheduledInputMessage {
+  static constexpr const char* kTopic = "TandemScheduledInput";
   Epoch epoch = 0;
   std::uint64_t number = 0;
   Frame frame = 0;
@@ -116,6 +119,7 @@ struct ScheduledInputMessage {
 };
 
 struct SnapshotMessage {
+  static constexpr const char* kTopic = "TandemSnapshot";
   Epoch epoch = 0;
   StreamId stream;
   Frame frame = 0;
@@ -137,6 +141,7 @@ struct ReplyEntry {
 inline constexpr std::size_t kReplyRing = 32;
 
 struct ReplyMessage {
+  static constexpr const char* kTopic = "TandemReply";
   ClientId client = 0;  ///< key
   Epoch epoch = 0;
   Role role = Role::kObserver;
@@ -156,6 +161,7 @@ enum class InputKind : std::uint32_t {
 };
 
 struct InputMessage {
+  static constexpr const char* kTopic = "TandemInput";
   ClientId client = 0;  ///< key
   Epoch epoch = 0;
   std::uint64_t number = 0;  ///< starts at 1 in each epoch; gaps are legal
@@ -167,6 +173,7 @@ struct InputMessage {
 };
 
 struct AckMessage {
+  static constexpr const char* kTopic = "TandemAck";
   ClientId client = 0;  ///< key
   Epoch epoch = 0;
   std::uint32_t protocol_version = kProtocolVersion;
@@ -184,6 +191,7 @@ struct AckMessage {
 };
 
 struct ServerStatusMessage {
+  static constexpr const char* kTopic = "TandemServerStatus";
   std::string session;       ///< key
   std::uint32_t stream = 0;  ///< key
   Epoch epoch = 0;
@@ -201,6 +209,7 @@ struct ServerStatusMessage {
 };
 
 struct ClientStatusMessage {
+  static constexpr const char* kTopic = "TandemClientStatus";
   ClientId client = 0;  ///< key
   std::string session;
   Epoch epoch = 0;
@@ -213,5 +222,8 @@ struct ClientStatusMessage {
   std::uint64_t frames_applied = 0, resyncs = 0, hash_mismatches = 0, inputs_sent = 0, inputs_refused = 0;
   bool operator==(const ClientStatusMessage&) const = default;
 };
+
+/// Gives the layout of every stream what the session holds for all of them.
+void complete_layouts(SessionMessage& session);
 
 }  // namespace tandem::transport

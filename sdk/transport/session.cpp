@@ -26,6 +26,14 @@ Result<void> check_session_name(const std::string& name) {
   return {};
 }
 
+void complete_layouts(SessionMessage& session) {
+  for (StreamMessage& stream : session.streams) {
+    stream.layout.capacity = session.capacity;
+    stream.layout.lead = session.lead;
+    stream.layout.type_count = static_cast<TypeId>(session.types.size());
+  }
+}
+
 std::string reply_partition(const std::string& session, ClientId client) {
   return session + '/' + to_hex(client);
 }

@@ -6,7 +6,9 @@
 #include <fstream>
 
 #include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/cdr.hpp"
 #include "tests/property/synthetic.hpp"
+#include "tests/unit/transport/random_messages.hpp"
 
 namespace tandem {
 namespace {
@@ -44,6 +46,23 @@ bool write_deltas(const std::filesystem::path& folder) {
     }
   }
   return true;
+}
+
+// A message of every topic, behind the byte that says which.
+bool write_messages(const std::filesystem::path& folder) {
+  transport::RandomMessages random(1);
+  std::uint8_t topic = 0;
+  const auto write = [&]<class M>(const M& message) {
+    transport::Bytes bytes{std::byte{topic++}};
+    transport::write_cdr(message, bytes);
+    return write_file(folder / "cdr" / M::kTopic, bytes);
+  };
+  return write(random.make<transport::SessionMessage>()) && write(random.make<transport::DeltaMessage>()) &&
+         write(random.make<transport::ScheduledInputMessage>()) &&
+         write(random.make<transport::SnapshotMessage>()) && write(random.make<transport::ReplyMessage>()) &&
+         write(random.make<transport::InputMessage>()) && write(random.make<transport::AckMessage>()) &&
+         write(random.make<transport::ServerStatusMessage>()) &&
+         write(random.make<transport::ClientStatusMessage>());
 }
 
 // Streams for fuzz_tracker: a few deltas in a row, with an edit of the coder's state between them.
@@ -108,7 +127,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder(argv[1]);
-  if (tandem::write_deltas(folder) && tandem::write_streams(folder) && tandem::write_snapshots(folder))
+  if (tandem::write_messages(folder) && tandem::write_deltas(folder) && tandem::write_streams(folder) &&
+      tandem::write_snapshots(folder))
     return 0;
   std::fprintf(stderr, "could not write to %s\n", argv[1]);
   return 1;

@@ -143,12 +143,9 @@ SessionMessage to_message(const tandem_TandemSession& wire) {
                                      static_cast<Shape>(type.shape), to_vector<float>(type.shape_values)});
   }
   for (std::uint32_t i = 0; i < wire.streams._length; ++i) {
-    StreamMessage stream = to_stream(wire.streams._buffer[i]);
-    stream.layout.capacity = message.capacity;
-    stream.layout.lead = message.lead;
-    stream.layout.type_count = static_cast<TypeId>(message.types.size());
-    message.streams.push_back(std::move(stream));
+    message.streams.push_back(to_stream(wire.streams._buffer[i]));
   }
+  complete_layouts(message);
   return message;
 }
 

@@ -35,7 +35,7 @@ class Writer {
       if (code == DDS_RETCODE_OK) return {};
       const bool stopped = stop_ != nullptr && stop_->load();
       if (code != DDS_RETCODE_TIMEOUT || stopped || std::chrono::steady_clock::now() >= deadline) {
-        return dds_failure(std::string("writing ") + Topic<M>::kName, code);
+        return dds_failure(std::string("writing ") + M::kTopic, code);
       }
     }
   }
@@ -112,7 +112,7 @@ class Node {
   template <class M>
   Result<Writer<M>> writer(const std::string& name, std::int32_t depth = Topic<M>::kQos.writer_depth,
                            const std::string& partition = {}) {
-    auto topic = make_topic(Topic<M>::descriptor(), Topic<M>::kName);
+    auto topic = make_topic(Topic<M>::descriptor(), M::kTopic);
     if (!topic) return tl::unexpected(topic.error());
     auto publisher = partition.empty() ? Result<Entity>() : make_publisher({partition});
     if (!publisher) return tl::unexpected(publisher.error());
@@ -123,7 +123,7 @@ class Node {
     const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
     dds_qset_entity_name(qos.get(), name.c_str());
     auto entity = own(dds_create_writer(parent.get(), topic->get(), qos.get(), nullptr),
-                      std::string("the writer of ") + Topic<M>::kName);
+                      std::string("the writer of ") + M::kTopic);
     if (!entity) return tl::unexpected(entity.error());
     return Writer<M>(std::move(*topic), std::move(*publisher), std::move(*entity), options_);
   }
@@ -132,7 +132,7 @@ class Node {
   template <class M>
   Result<Reader<M>> reader(const std::string& name, std::int32_t depth = Topic<M>::kQos.reader_depth,
                            bool ignore_own = false, const std::vector<std::string>& partitions = {}) {
-    auto topic = make_topic(Topic<M>::descriptor(), Topic<M>::kName);
+    auto topic = make_topic(Topic<M>::descriptor(), M::kTopic);
     if (!topic) return tl::unexpected(topic.error());
     auto subscriber = partitions.empty() ? Result<Entity>() : make_subscriber(partitions);
     if (!subscriber) return tl::unexpected(subscriber.error());
@@ -142,7 +142,7 @@ class Node {
     if (ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
     auto writers = std::make_unique<LiveWriters>();
     auto entity = own(dds_create_reader(parent.get(), topic->get(), qos.get(), writers->listener()),
-                      std::string("the reader of ") + Topic<M>::kName);
+                      std::string("the reader of ") + M::kTopic);
     if (!entity) return tl::unexpected(entity.error());
     if (auto watched = watch(entity->get()); !watched) return tl::unexpected(watched.error());
     return Reader<M>(std::move(*topic), std::move(*subscriber), std::move(*entity), std::move(writers));

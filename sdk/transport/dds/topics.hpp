@@ -1,5 +1,5 @@
 #pragma once
-// The nine topics: name, generated type and QoS of each. Reasons: idl/PROTOCOL.md, "Topics".
+// The nine topics: generated type and QoS of each. Reasons: idl/PROTOCOL.md, "Topics".
 
 #include <dds/dds.h>
 
@@ -24,7 +24,6 @@ struct Topic;
 template <>
 struct Topic<SessionMessage> {
   using Wire = tandem_TandemSession;
-  static constexpr const char* kName = "TandemSession";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSession_desc; }
   // Two servers that start at once share the instance; a reader must see both.
   static constexpr TopicQos kQos{true, true, 1, 8};
@@ -32,42 +31,36 @@ struct Topic<SessionMessage> {
 template <>
 struct Topic<DeltaMessage> {
   using Wire = tandem_TandemDelta;
-  static constexpr const char* kName = "TandemDelta";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemDelta_desc; }
   static constexpr TopicQos kQos{true, false, 64, 64};  // the options say how deep
 };
 template <>
 struct Topic<ScheduledInputMessage> {
   using Wire = tandem_TandemScheduledInput;
-  static constexpr const char* kName = "TandemScheduledInput";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemScheduledInput_desc; }
   static constexpr TopicQos kQos{true, true, 256, 256};
 };
 template <>
 struct Topic<SnapshotMessage> {
   using Wire = tandem_TandemSnapshot;
-  static constexpr const char* kName = "TandemSnapshot";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
   static constexpr TopicQos kQos{true, false, 64, 1200};
 };
 template <>
 struct Topic<ReplyMessage> {
   using Wire = tandem_TandemReply;
-  static constexpr const char* kName = "TandemReply";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemReply_desc; }
   static constexpr TopicQos kQos{true, true, 1, 1};
 };
 template <>
 struct Topic<InputMessage> {
   using Wire = tandem_TandemInput;
-  static constexpr const char* kName = "TandemInput";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemInput_desc; }
   static constexpr TopicQos kQos{true, false, 64, 64};
 };
 template <>
 struct Topic<AckMessage> {
   using Wire = tandem_TandemAck;
-  static constexpr const char* kName = "TandemAck";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemAck_desc; }
   // A participant that writes another's client id must not displace the owner's sample before the server sees
   // it.
@@ -76,14 +69,12 @@ struct Topic<AckMessage> {
 template <>
 struct Topic<ServerStatusMessage> {
   using Wire = tandem_TandemServerStatus;
-  static constexpr const char* kName = "TandemServerStatus";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemServerStatus_desc; }
   static constexpr TopicQos kQos{false, false, 1, 1};
 };
 template <>
 struct Topic<ClientStatusMessage> {
   using Wire = tandem_TandemClientStatus;
-  static constexpr const char* kName = "TandemClientStatus";
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemClientStatus_desc; }
   static constexpr TopicQos kQos{false, false, 1, 1};
 };

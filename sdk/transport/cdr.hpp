@@ -1,0 +1,45 @@
+#pragma once
+// The one byte form of messages: XCDR version 1 (plain CDR) of the types in idl/tandem.idl, little-endian,
+// behind an encapsulation header. What DDS puts on the wire and what captures hold.
+
+#include <cstddef>
+#include <span>
+
+#include "sdk/transport/messages.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::transport {
+
+/// Before a message: 00 01 for little-endian CDR, then two bytes of options.
+inline constexpr std::size_t kCdrHeaderBytes = 4;
+
+/// Appends header and message to `out`. Texts end at their first NUL.
+template <class M>
+void write_cdr(const M& message, Bytes& out);
+
+/// Reads one message from untrusted bytes, which it must fill but for padding that the options announce.
+/// Allocates no more than a small multiple of what is there. Says nothing about values: see within_limits().
+/// Errors: kUnsupported (another encapsulation), kMalformed.
+template <class M>
+[[nodiscard]] Result<M> read_cdr(std::span<const std::byte> bytes);
+
+extern template void write_cdr(const SessionMessage&, Bytes&);
+extern template void write_cdr(const DeltaMessage&, Bytes&);
+extern template void write_cdr(const ScheduledInputMessage&, Bytes&);
+extern template void write_cdr(const SnapshotMessage&, Bytes&);
+extern template void write_cdr(const ReplyMessage&, Bytes&);
+extern template void write_cdr(const InputMessage&, Bytes&);
+extern template void write_cdr(const AckMessage&, Bytes&);
+extern template void write_cdr(const ServerStatusMessage&, Bytes&);
+extern template void write_cdr(const ClientStatusMessage&, Bytes&);
+extern template Result<SessionMessage> read_cdr(std::span<const std::byte>);
+extern template Result<DeltaMessage> read_cdr(std::span<const std::byte>);
+extern template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>);
+extern template Result<SnapshotMessage> read_cdr(std::span<const std::byte>);
+extern template Result<ReplyMessage> read_cdr(std::span<const std::byte>);
+extern template Result<InputMessage> read_cdr(std::span<const std::byte>);
+extern template Result<AckMessage> read_cdr(std::span<const std::byte>);
+extern template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>);
+extern template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>);
+
+}  // namespace tandem::transport
