@@ -123,15 +123,15 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
       if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
     }
   }
-  if (capture_) capture_->add(session);
+  if (capture_) capture_->add(session, transport::wall_ns());
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  if (capture_) capture_->add(snapshot);
+  if (capture_) capture_->add(snapshot, transport::wall_ns());
 }
 
 void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
-  if (capture_) capture_->add(input);
+  if (capture_) capture_->add(input, transport::wall_ns());
 }
 
 void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
@@ -142,7 +142,7 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
     std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch, delta.frame,
                  to_hex(delta.hash).c_str());
   }
-  if (capture_) capture_->add(epoch, delta);
+  if (capture_) capture_->add(epoch, delta, transport::wall_ns());
 }
 
 void HeadlessClient::send_script(client::Now now) {

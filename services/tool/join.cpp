@@ -102,7 +102,7 @@ void add_join(CLI::App& app, Run& run) {
       ->check(CLI::PositiveNumber);
   command->add_option("--hash-log", client.hash_log,
                       "Write a line `epoch,frame,hash` for every applied frame");
-  command->add_option("--capture", client.capture, "Write what was received and applied (idl/CAPTURE.md)");
+  command->add_option("--capture", client.capture, "Write what was received and applied (MCAP)");
   command
       ->add_option("--seconds", client.seconds,
                    "How long, from the first applied frame (default: until stopped)")

@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+"""Captures are MCAP files that tools which know nothing of Tandem read, types included.
+
+mcap_test.py --writer PATH --tandemd PATH --tandem PATH --modules FOLDER
+
+The npm packages are installed in FOLDER, which is kept. Exit 0 passed, 1 failed, 77 not run: without npm.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+LOOPBACK = (
+    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
+    f"</General><Discovery><Tag>mcap-test-{os.getpid()}</Tag></Discovery></Domain></CycloneDDS>"
+)
+NOT_RUN = 77
+
+
+def install(folder):
+    """The npm packages, as locked. Exits where they cannot be had."""
+    for program in ("npm", "node"):
+        if shutil.which(program) is None:
+            print(f"not run: {program} is not installed")
+            sys.exit(NOT_RUN)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("package.json", "package-lock.json", "read.mjs"):
+        shutil.copy(HERE / name, folder)
+    done = subprocess.run(
+        ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=folder, capture_output=True, text=True, check=False
+    )  # fmt: skip
+    if done.returncode != 0:
+        print(f"not run: npm cannot install the packages: {done.stderr.strip()[-300:]}")
+        sys.exit(NOT_RUN)
+
+
+def read(file, folder):
+    """What read.mjs says of a file."""
+    done = subprocess.run(["node", "read.mjs", file], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise AssertionError(f"{file.name} cannot be read: {done.stderr[-1000:]}")
+    return json.loads(done.stdout)
+
+
+def check_fixed(writer, folder, scratch):
+    """The messages of write_capture.cpp, decoded by their schema alone."""
+    file = scratch / "fixed.mcap"
+    subprocess.run([writer, file], check=True)
+    found = read(file, folder)
+    assert found["profile"] == "" and found["library"].startswith("tandem "), found["library"]
+    assert found["statistics"] == {"messages": "4", "channels": 4}, found["statistics"]
+    session, delta, scheduled, ack = found["messages"]
+    assert session["topic"] == "TandemSession"
+    content = session["content"]
+    assert content["epoch"] == "1700000000123" and content["session"] == "arena", content
+    assert content["lattice_unit"] == 1 / 1024
+    assert [each["name"] for each in content["types"]] == ["sand", "box"]
+    assert content["types"][1]["shape_values"] == [1, 2, 3.5]
+    stream = content["streams"][0]
+    assert stream["codec"] == "entropy" and stream["codec_tables"] == "ababab", stream
+    assert stream["groups"] == ["position"] and stream["layout_hash"] == str(0xFEDCBA9876543210)
+    assert stream["parameters"][0] == {"id": 1, "value": 100} and len(stream["parameters"]) == 6
+    assert stream["predictor_constants"] == [1, -2]
+    assert delta["topic"] == "TandemDelta"
+    assert delta["publishTime"] == "1700000001000000000" and delta["logTime"] == "1700000001005000000"
+    assert delta["content"]["stream"] == 2 and delta["content"]["generation"] == 3
+    assert delta["content"]["hash"] == str(0x0123456789ABCDEF) and delta["content"]["payload"] == "11" * 5
+    assert scheduled["content"]["values"] == [0, -980, 0, 12]
+    assert ack["content"]["clock_ns"] == "-5" and ack["content"]["missing"] == [1, 2]
+    print(f"fixed messages: {len(found['messages'])} read")
+
+
+def check_live(options, folder, scratch):
+    """A session of a second or two."""
+    file = scratch / "live.mcap"
+    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
+    server = subprocess.Popen(
+        [options.tandemd, "--scene", "half_pipe", "--bodies", "200", "--session", "mcap"], env=environment
+    )
+    try:
+        subprocess.run(
+            [options.tandem, "join", "--session", "mcap", "--observe", "--timeout", "60", "--seconds", "2", "--capture", file],
+            env=environment, check=True,
+        )  # fmt: skip
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.wait(60)
+    found = read(file, folder)
+    topics = [message["topic"] for message in found["messages"]]
+    assert topics[0] == "TandemSession" and "TandemSnapshot" in topics, topics[:5]
+    start = next(message["content"] for message in found["messages"] if message["topic"] == "TandemSnapshot")
+    assert start["part"] == 0 and start["parts"] == 1 and start["total_bytes"] == len(start["bytes"]) // 2
+    frames = [int(message["content"]["frame"]) for message in found["messages"] if message["topic"] == "TandemDelta"]
+    first = int(start["frame"]) + 1
+    assert len(frames) >= 30 and frames == list(range(first, first + len(frames))), frames
+    assert found["statistics"]["messages"] == str(len(topics))
+    print(f"live session: {len(frames)} deltas read")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for option in ("--writer", "--tandemd", "--tandem", "--modules"):
+        parser.add_argument(option, type=pathlib.Path, required=True)
+    options = parser.parse_args()
+    install(options.modules)
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            check_fixed(options.writer, options.modules, pathlib.Path(scratch))
+            check_live(options, options.modules, pathlib.Path(scratch))
+        except (AssertionError, subprocess.SubprocessError) as failure:
+            print(f"FAILED: {failure!r}", file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
