@@ -161,7 +161,16 @@ void ClientCore::send_status(Now now) {
   transport::ClientStatusMessage status = status_report_.next(statistics_, now.steady_ns);
   status.client = options_.id;
   status.session = options_.session;
+  statistics_.recent_cost.clear();
   if (epoch_) {
+    const double period_ms = 1e3 / epoch_->session.frame_rate_hz;
+    const bool too_slow = status.client_ms_p50 > period_ms / 2;
+    status.too_slow = too_slow ? 1 : 0;
+    if (too_slow && !std::exchange(epoch_->told_too_slow, true)) {
+      log(LogLevel::kWarning, "too slow for this session: half of the frames take more than " +
+                                  std::to_string(std::lround(status.client_ms_p50)) + " of " +
+                                  std::to_string(std::lround(period_ms)) + " ms");
+    }
     status.epoch = epoch_->session.epoch;
     status.stream = epoch_->stream.id;
     status.applied = epoch_->joining ? 0 : epoch_->timeline.applied();

@@ -184,7 +184,10 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
     ++statistics_.frames_applied;
     statistics_.payload_bytes += delta->payload.size();
     statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta->server_time_ns));
-    if (options_.measure_ns != nullptr) statistics_.frame_cost.add(cost_ns);
+    if (options_.measure_ns != nullptr) {
+      statistics_.frame_cost.add(cost_ns);
+      statistics_.recent_cost.add(cost_ns);
+    }
     if (statistics_.first_applied_ns == 0) statistics_.first_applied_ns = now.steady_ns;
     statistics_.last_applied_ns = now.steady_ns;
     sent_.on_applied(delta->frame, now.steady_ns, outcomes_);

@@ -47,7 +47,8 @@ struct EpochState {
   std::int64_t join_began_ns = 0;  ///< the session was learned, or something was lost
   /// How long the front delta has waited for a scheduled input.
   std::optional<std::int64_t> input_missing_ns;
-  std::int64_t frame_cost_ns = 0;                ///< simulation since the last applied delta
+  std::int64_t frame_cost_ns = 0;  ///< simulation since the last applied delta
+  bool told_too_slow = false;
   std::optional<transport::ReplyMessage> reply;  ///< newest
 };
 

@@ -41,6 +41,7 @@ struct Statistics {
   DurationHistogram latency;        ///< publish to applied
   DurationHistogram input_latency;  ///< sent to the frame it acted on applied
   DurationHistogram frame_cost;     ///< decode, apply and simulate, per applied frame
+  DurationHistogram recent_cost;    ///< the same since the last status report
 
   void add_latency(std::int64_t latency_ns) {
     latency.add(latency_ns);

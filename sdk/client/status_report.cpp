@@ -12,7 +12,7 @@ transport::ClientStatusMessage StatusReport::next(const Statistics& statistics, 
   const std::uint64_t bytes = statistics.payload_bytes - std::exchange(last_bytes_, statistics.payload_bytes);
   transport::ClientStatusMessage status;
   status.lag_ms = statistics.smoothed_latency_ns / 1e6;
-  status.client_ms_p50 = statistics.frame_cost.quantile_ms(0.5);
+  status.client_ms_p50 = statistics.recent_cost.quantile_ms(0.5);
   status.mbit_per_s = first ? 0 : static_cast<double>(bytes) * 8 / kBitsPerMbit / elapsed_s;
   status.frames_applied = statistics.frames_applied;
   status.resyncs = statistics.resyncs;

@@ -76,9 +76,9 @@ struct Host::Impl {
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate),
-        status(config.session, config.epoch, outbox),
-        session(session_message(config, stream)) {
+        status(config.session, config.epoch, outbox) {
     stream.set_clock(config.clock_ns);
+    session = session_message(config, stream);
     report.frame = config.start_frame;
     report.hash = stream.hash();
   }
@@ -326,6 +326,8 @@ void Host::Impl::serve_joiners() {
 HostTotals Host::Impl::totals_now() const {
   HostTotals now = totals;
   now.snapshot_bytes = snapshot_parts.bytes();
+  now.reply_bytes = outbox.traffic().replies;
+  now.input_bytes = outbox.traffic().scheduled_inputs;
   now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
   now.refused_inputs += inputs.refused();
   now.refused_messages += port->dropped();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/transport/cdr.hpp"
+
 namespace tandem::host {
 
 // Parts before the last are not counted: they never come without it.
@@ -29,6 +31,17 @@ bool Outbox::has_control_room() const {
   return control_ < limits_.control;
 }
 
+void Outbox::weigh(const Outgoing& message) {
+  cdr_.clear();
+  if (const auto* reply = std::get_if<transport::ReplyMessage>(&message)) {
+    transport::write_cdr(*reply, cdr_);
+    traffic_.replies += cdr_.size();
+  } else if (const auto* input = std::get_if<transport::ScheduledInputMessage>(&message)) {
+    transport::write_cdr(*input, cdr_);
+    traffic_.scheduled_inputs += cdr_.size();
+  }
+}
+
 bool Outbox::push(Outgoing message) {
   {
     const std::scoped_lock lock(mutex_);
@@ -36,6 +49,7 @@ bool Outbox::push(Outgoing message) {
     std::uint32_t* const count = count_of(message, limit);
     if (count != nullptr && *count >= limit) return false;
     if (count != nullptr) ++*count;
+    weigh(message);
     queue_.push_back(std::move(message));
     high_water_ = std::max(high_water_, queue_.size());
   }
@@ -66,6 +80,11 @@ std::size_t Outbox::size() const {
 std::uint32_t Outbox::unwritten_frames() const {
   const std::scoped_lock lock(mutex_);
   return frames_ + (writing_frame_ ? 1U : 0U);
+}
+
+Outbox::Traffic Outbox::traffic() const {
+  const std::scoped_lock lock(mutex_);
+  return traffic_;
 }
 
 std::size_t Outbox::high_water() const {

@@ -57,11 +57,17 @@ class Outbox {
   [[nodiscard]] std::size_t size() const;
   /// Deltas pushed and not yet written.
   [[nodiscard]] std::uint32_t unwritten_frames() const;
+  /// Of all messages of a kind pushed so far, in their byte form (sdk/transport/cdr.hpp).
+  struct Traffic {
+    std::uint64_t replies = 0, scheduled_inputs = 0;
+  };
+  [[nodiscard]] Traffic traffic() const;
   /// Most messages ever queued.
   [[nodiscard]] std::size_t high_water() const;
 
  private:
   std::uint32_t* count_of(const Outgoing& message, std::uint32_t& limit);
+  void weigh(const Outgoing& message);
 
   mutable std::mutex mutex_;
   std::condition_variable ready_;
@@ -70,6 +76,8 @@ class Outbox {
   std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
   bool writing_frame_ = false;  // the last pop() handed out a delta
   std::size_t high_water_ = 0;
+  Traffic traffic_;
+  transport::Bytes cdr_;  // kept to reuse its memory
 };
 
 /// Writes one message. Errors: what the port says.

@@ -20,7 +20,7 @@ transport::SessionMessage session_message(const HostConfig& config, const Stream
   session.scene_description = config.scene_description;
   session.types = config.types;
   transport::StreamMessage announced;
-  announced.client_cost_ns = of_stream.client_cost_ns;
+  announced.client_cost_ns = stream.measure_client_cost();
   announced.max_delta_bytes = static_cast<std::uint32_t>(stream.payload_bound());
   announced.max_snapshot_bytes = static_cast<std::uint32_t>(stream.snapshot_bound());
   announced.layout = layout;

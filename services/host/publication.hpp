@@ -10,7 +10,8 @@
 
 namespace tandem::host {
 
-/// What a client must know before it reads a byte of `stream`.
+/// What a client must know before it reads a byte of `stream`. Measures a client's cost, which takes as long
+/// as nine frames of a client.
 [[nodiscard]] transport::SessionMessage session_message(const HostConfig& config, const Stream& stream);
 
 /// Queues a delta, cut into parts of kPartBytes. There must be room for a frame.

@@ -37,6 +37,8 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   status.observers = present.observers;
   status.window = present.window;
   status.delta_bytes = totals.payload_bytes;
+  status.reply_bytes = totals.reply_bytes;
+  status.input_bytes = totals.input_bytes;
   status.snapshot_bytes = totals.snapshot_bytes;
   status.stalls = totals.stalls;
   status.suspended_ms = totals.suspended_ms;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -39,7 +41,8 @@ struct Stream::Impl final : EncodeObserver {
       : config(std::move(configuration)),
         mirror(config.lattice, config.layout.capacity, config.layout.type_count),
         timeline(std::move(server)),
-        parameters(config.layout.parameters) {
+        parameters(config.layout.parameters),
+        drive(start.drive) {
     mirror.start(start.bodies);
     timeline.start(start.frame, mirror.target(), start.drive);
     bodies = mirror.target().alive_count();
@@ -71,6 +74,7 @@ struct Stream::Impl final : EncodeObserver {
   Mirror mirror;
   ServerTimeline timeline;
   StreamParameters parameters;  // of the next frame
+  Drive drive;                  // of the start
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
   EncodeObserver* other = nullptr;  // of the frame at hand
@@ -128,6 +132,26 @@ Result<void> Stream::set_parameters(const StreamParameters& parameters) {
 void Stream::set_clock(std::int64_t (*now_ns)()) {
   impl_->clock = now_ns;
   impl_->timeline.set_clock(now_ns);
+}
+
+std::uint32_t Stream::measure_client_cost() const {
+  const Impl& m = *impl_;
+  const State& from = agreed();
+  const Layout& layout = m.config.layout;
+  const auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
+  if (m.clock == nullptr || m.bodies == 0 || !predictor) return 0;
+  const StepInput input{.drive = m.drive, .parameters = m.parameters.step};
+  State to(layout.capacity);
+  StateHasher hasher;
+  std::array<std::int64_t, 9> took_ns{};
+  for (std::int64_t& took : took_ns) {
+    const std::int64_t began_ns = m.clock();
+    (*predictor)->step(from, to, input);
+    static_cast<void>(hasher.hash(to));
+    took = m.clock() - began_ns;
+  }
+  std::ranges::nth_element(took_ns, took_ns.begin() + took_ns.size() / 2);
+  return static_cast<std::uint32_t>(took_ns[took_ns.size() / 2] / m.bodies);
 }
 
 Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timeline.schedule(input); }

@@ -25,7 +25,6 @@ struct StreamConfig {
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: so do decay and gains
   LocalOptions local;
-  std::uint32_t client_cost_ns = 2;  ///< announced: ns per body and frame on one desktop core of a client
 };
 
 /// Where a stream begins: bodies that were not stepped yet.
@@ -77,6 +76,9 @@ class Stream {
 
   /// For measurement only: a monotonic clock in nanoseconds.
   void set_clock(std::int64_t (*now_ns)());
+  /// What a client spends on predicted step and hash of agreed(), ns per body: the median of nine on this
+  /// machine, on one thread. 0 without a clock or a body. Changes nothing.
+  [[nodiscard]] std::uint32_t measure_client_cost() const;
 
   [[nodiscard]] const StreamConfig& config() const;
   [[nodiscard]] Frame frame() const;               ///< of the last delta

@@ -1,6 +1,7 @@
 #include "services/tool/top_view.hpp"
 
 #include <fmt/format.h>
+#include <array>
 
 #include <nlohmann/json.hpp>
 
@@ -39,13 +40,16 @@ Json json_of(const transport::ServerStatusMessage& s) {
           {"participants", s.participants},
           {"observers", s.observers},
           {"window", s.window},
-          {"delta_bytes", s.delta_bytes},
+          {"bytes",
+           {{"deltas", s.delta_bytes},
+            {"replies", s.reply_bytes},
+            {"inputs", s.input_bytes},
+            {"snapshots", s.snapshot_bytes}}},
           {"stalls", s.stalls},
           {"suspended_ms", s.suspended_ms},
           {"refused_inputs", s.refused_inputs},
           {"refused_messages", s.refused_messages},
           {"snapshots", s.snapshots},
-          {"snapshot_bytes", s.snapshot_bytes},
           {"codec", s.codec},
           {"predictor", s.predictor},
           {"threshold", s.threshold},
@@ -62,6 +66,7 @@ Json json_of(const transport::ClientStatusMessage& c) {
           {"phase", phase_word(c.phase)},
           {"lag_ms", c.lag_ms},
           {"client_ms_p50", c.client_ms_p50},
+          {"too_slow", c.too_slow != 0},
           {"mbit_per_s", c.mbit_per_s},
           {"frames_applied", c.frames_applied},
           {"resyncs", c.resyncs},
@@ -69,6 +74,18 @@ Json json_of(const transport::ClientStatusMessage& c) {
           {"inputs_sent", c.inputs_sent},
           {"inputs_refused", c.inputs_refused},
           {"queue_high_water", c.queue_high_water}};
+}
+
+/// In at most five characters.
+std::string short_bytes(std::uint64_t bytes) {
+  constexpr std::array<const char*, 5> kUnits{"", "k", "M", "G", "T"};
+  auto value = static_cast<double>(bytes);
+  std::size_t unit = 0;
+  while (value >= 999.5 && unit + 1 < kUnits.size()) {
+    value /= 1000;
+    ++unit;
+  }
+  return fmt::format("{:.0f}{}", value, kUnits.at(unit));
 }
 
 /// Names come from the network: what is not printable must not reach the terminal.
@@ -110,16 +127,19 @@ std::string TopView::to_json() const {
 
 std::string TopView::to_table() const {
   if (empty()) return "no session heard of on this domain\n";
-  std::string text = fmt::format("{:<20} {:>9} {:>6} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}  {}\n",
-                                 "SESSION", "FRAME", "HZ", "BODIES", "MBIT/S (OF RAW)", "CORRECTED",
-                                 "FRAME MS", "CLIENTS", "WINDOW", "STALLS", "CODEC, PREDICTOR, THRESHOLD");
+  std::string text =
+      fmt::format("{:<20} {:>9} {:>6} {:>8} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}  {:<20} {}\n",
+                  "SESSION", "FRAME", "HZ", "BODIES", "AT REST", "MBIT/S (OF RAW)", "CORRECTED", "FRAME MS",
+                  "CLIENTS", "WINDOW", "STALLS", "DELTA REPLY IN SNAP", "CODEC, PREDICTOR, THRESHOLD");
   for (const auto& [name, heard] : sessions_) {
     const transport::ServerStatusMessage& s = heard.status;
     text += fmt::format(
-        "{:<20} {:>9} {:>6.1f} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {}, {}, {:.3g}\n",
-        printable(s.session), s.frame, s.frame_rate_hz, s.bodies,
+        "{:<20} {:>9} {:>6.1f} {:>8} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {:<20} {}, {}, {:.3g}\n",
+        printable(s.session), s.frame, s.frame_rate_hz, s.bodies, s.at_rest,
         fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
         s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls,
+        fmt::format("{} {} {} {}", short_bytes(s.delta_bytes), short_bytes(s.reply_bytes),
+                    short_bytes(s.input_bytes), short_bytes(s.snapshot_bytes)),
         printable(s.codec), printable(s.predictor), s.threshold);
   }
   text +=
@@ -127,9 +147,10 @@ std::string TopView::to_table() const {
                   "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS", "MBIT/S", "REJOINS", "WRONG");
   for (const auto& [id, heard] : clients_) {
     const transport::ClientStatusMessage& c = heard.status;
-    text += fmt::format("{:016x} {:<20} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}\n",
+    text += fmt::format("{:016x} {:<20} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}{}\n",
                         c.client, printable(c.session), role_word(c.role), phase_word(c.phase), c.applied,
-                        c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches);
+                        c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
+                        c.too_slow != 0 ? "  too slow" : "");
   }
   return text;
 }

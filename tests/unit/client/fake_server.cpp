@@ -136,6 +136,7 @@ void ClientTest::start(std::uint32_t lead, transport::Role role) {
   options.role = role;
   options.lead = lead;
   options.log = [this](LogLevel, std::string_view line) { log.emplace_back(line); };
+  options.measure_ns = measure_ns;
   core = std::make_unique<ClientCore>(std::move(options), port, &recorder);
 }
 

@@ -98,6 +98,7 @@ class ClientTest : public ::testing::Test {
   Recorder recorder;
   std::vector<std::string> log;
   std::int64_t now_ns = 1'000'000'000'000;
+  std::int64_t (*measure_ns)() = nullptr;  ///< of the next start()
   std::unique_ptr<ClientCore> core;
 };
 

@@ -180,5 +180,28 @@ TEST_F(PlayTest, TheStatusGoesOutOnceASecond) {
   EXPECT_GT(port.statuses.back().frames_applied, 60U);
 }
 
+// A clock that goes on by so much whenever it is asked.
+std::int64_t tick_ns = 0;
+std::int64_t ticking_clock() {
+  static std::int64_t now_ns = 0;
+  return now_ns += tick_ns;
+}
+
+TEST_F(PlayTest, AClientWhoseMedianFrameTakesHalfAPeriodSaysSo) {
+  measure_ns = ticking_clock;
+  tick_ns = kMs;
+  join();
+  for (int i = 0; i < 70; ++i) frame();
+  EXPECT_EQ(port.statuses.back().too_slow, 0U);
+  tick_ns = 20 * kMs;
+  for (int i = 0; i < 70; ++i) frame();
+  EXPECT_EQ(port.statuses.back().too_slow, 1U);
+  const auto says = [](const std::string& line) { return line.find("too slow") != std::string::npos; };
+  EXPECT_EQ(std::ranges::count_if(log, says), 1) << "once an epoch";
+  tick_ns = kMs;
+  for (int i = 0; i < 70; ++i) frame();
+  EXPECT_EQ(port.statuses.back().too_slow, 0U) << "of the last second alone";
+}
+
 }  // namespace
 }  // namespace tandem::client

@@ -150,5 +150,20 @@ TEST(HostCreate, DescribesTheSessionCompletely) {
   EXPECT_GT(stream.max_snapshot_bytes, 0U);
 }
 
+// A clock that is asked twice for each of nine measurements: they take 1, 2, ... 9 us.
+std::int64_t uneven_clock() {
+  static std::int64_t asked = 0;
+  const std::int64_t pair = asked++ / 2 % 9;
+  return asked % 2 == 0 ? 1'000 * (pair + 1) : 0;
+}
+
+TEST(Announcement, TheCostOfAClientIsMeasured) {
+  HostConfig config = test_config();
+  config.clock_ns = uneven_clock;
+  EXPECT_EQ(Bench(config).host->session().streams[0].client_cost_ns, 5'000U / 4) << "median, per body";
+  config.clock_ns = nullptr;
+  EXPECT_EQ(Bench(config).host->session().streams[0].client_cost_ns, 0U) << "not measured";
+}
+
 }  // namespace
 }  // namespace tandem::host

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/cdr.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
@@ -120,6 +121,38 @@ TEST(Publish, StatusGoesOutOnceASecondWithReadableFigures) {
   EXPECT_NEAR(status.mbit_per_s, static_cast<double>(bench.host->report().payload_bytes) * 8 * 30 / 1048576,
               1e-3);
   EXPECT_EQ(status.delta_bytes, bench.host->totals().payload_bytes);
+}
+
+TEST(Publish, StatusTellsBytesByKind) {
+  Bench bench;
+  bench.poll();
+  bench.enter(1);
+  bench.joining(2);
+  bench.on_ms = [&] { bench.playing(1, bench.host->frame()); };
+  ASSERT_TRUE(bench.host->inject({.kind = 1, .values = {0, 0, -5}, .bytes = {}}));
+  bench.run_ms(2'000);
+  std::size_t replies = 0, inputs = 0, snapshots = 0;
+  transport::Bytes cdr;
+  for (const auto& reply : bench.port.replies) {
+    cdr.clear();
+    transport::write_cdr(reply, cdr);
+    replies += cdr.size();
+  }
+  for (const auto& input : bench.port.scheduled) {
+    cdr.clear();
+    transport::write_cdr(input, cdr);
+    inputs += cdr.size();
+  }
+  for (const auto& part : bench.port.snapshots) snapshots += part.bytes.size();
+  const HostTotals totals = bench.host->totals();
+  EXPECT_GT(replies, 0U);
+  EXPECT_GT(inputs, 0U);
+  EXPECT_GT(snapshots, 0U);
+  EXPECT_EQ(totals.reply_bytes, replies);
+  EXPECT_EQ(totals.input_bytes, inputs);
+  EXPECT_EQ(totals.snapshot_bytes, snapshots);
+  EXPECT_GT(bench.port.statuses.back().reply_bytes, 0U);
+  EXPECT_EQ(bench.port.statuses.back().input_bytes, inputs);
 }
 
 TEST(Publish, BodiesThatComeAndGoTravelAsLifecycleAndTheCountFollows) {

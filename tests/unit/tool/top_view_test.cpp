@@ -57,6 +57,26 @@ TEST(TopView, shows_the_newest_status_of_each_session_and_client) {
   EXPECT_THAT(view.to_table(), HasSubstr("2+1"));
 }
 
+TEST(TopView, tells_bytes_by_kind_bodies_at_rest_and_who_is_too_slow) {
+  TopView view;
+  auto status = server("a");
+  status.at_rest = 9876;
+  status.delta_bytes = 12'345'678;
+  status.reply_bytes = 999;
+  status.input_bytes = 1'000;
+  status.snapshot_bytes = 0;
+  view.update(status, 0);
+  auto slow = client(1, "a");
+  slow.too_slow = 1;
+  view.update(slow, 0);
+  EXPECT_THAT(view.to_table(), HasSubstr(" 9876 "));
+  EXPECT_THAT(view.to_table(), HasSubstr("12M 999 1k 0"));
+  EXPECT_THAT(view.to_table(), HasSubstr("too slow"));
+  const auto json = nlohmann::json::parse(view.to_json());
+  EXPECT_EQ(json["sessions"][0]["bytes"]["deltas"], 12'345'678);
+  EXPECT_EQ(json["clients"][0]["too_slow"], true);
+}
+
 TEST(TopView, forgets_who_is_silent_for_more_than_three_seconds) {
   TopView view;
   view.update(server("a"), 0);
