@@ -6,11 +6,14 @@
 #include <vector>
 
 #include "services/host/simulation.hpp"
+#include "services/scenes/random.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::scenes {
 
 struct Scene;
+struct Tilting;
+struct Poking;
 
 struct ScriptedInput {
   std::uint64_t frame = 1;  ///< acts in the step that produces this frame
@@ -18,8 +21,45 @@ struct ScriptedInput {
   engine::Input input;
 };
 
-/// What `users` users of the scene do up to frame `frames`, ascending by frame, then by user. The same for a
-/// seed on every machine; a larger `frames` only appends. `users` 0 means as many as the scene says.
+/// What `users` users of the scene do, frame by frame, for as long as a session lasts. The same for a seed on
+/// every machine. `users` 0 means as many as the scene says. Memory does not grow with the frames. Not
+/// thread-safe.
+class Script {
+ public:
+  /// `scene` must outlive the script.
+  Script(const Scene& scene, std::uint64_t seed, std::uint32_t users);
+
+  /// All that acts after the frame of the last call and up to `frame`, ascending by frame, then by user.
+  [[nodiscard]] std::vector<ScriptedInput> until(std::uint64_t frame);
+  /// Inputs made already that act on later frames.
+  [[nodiscard]] std::size_t pending() const { return pending_.size(); }
+
+ private:
+  struct Pending {
+    std::size_t rank = 0;  // of its routine: the order within a frame and user
+    ScriptedInput input;
+  };
+  // One user's tilting or poking: when it goes on, and what that depends on.
+  struct Routine {
+    std::uint32_t user = 0;
+    std::size_t rank = 0;
+    const Tilting* tilting = nullptr;  // either this
+    const Poking* poking = nullptr;    // or that
+    double next_s = 0;
+    Random random;
+    engine::Vec3 held{};  // the gravity of before
+    bool over = false;
+  };
+  void act(const Routine& routine, double time_s, engine::Input input);
+  void tilt(Routine& routine);
+  void poke(Routine& routine);
+
+  const Scene* scene_;
+  std::vector<Routine> routines_;  // ascending by rank
+  std::vector<Pending> pending_;   // in no order
+};
+
+/// All of a script up to frame `frames`.
 [[nodiscard]] std::vector<ScriptedInput> scripted_inputs(const Scene& scene, std::uint64_t seed,
                                                          std::uint32_t users, std::uint64_t frames);
 

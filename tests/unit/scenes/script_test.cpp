@@ -47,6 +47,28 @@ TEST(Scripts, RepeatForASeedAndOnlyGrowWithTheFrames) {
   for (const std::size_t count : by_user) EXPECT_GT(count, 50U);
 }
 
+TEST(Scripts, FrameByFrameForHoursGiveTheSameAndKeepNothing) {
+  const Scene scene = scene_with(
+      "script { tilting { period_s: 0.5 period_jitter: 0.5 spread: 1 swing_s: 0.2 send_every_s: 0.08 } "
+      "tilting { period_s: 2 swing_s: 1.5 } poking { start_s: 1 period_s: 0.7 radius_m: 2 } "
+      "events { frame: 5 gravity { x: 2 } user: 1 } }");
+  constexpr std::uint64_t kFrames = 50'000;
+  const auto at_once = scripted_inputs(scene, 9, 3, kFrames);
+  Script script(scene, 9, 3);
+  std::size_t sent = 0, most = 0;
+  for (std::uint64_t frame = 1; frame <= kFrames; ++frame) {
+    for (const ScriptedInput& input : script.until(frame)) {
+      ASSERT_LT(sent, at_once.size());
+      ASSERT_TRUE(same(input, at_once[sent++]));
+      ASSERT_EQ(input.frame, frame);
+    }
+    most = std::max(most, script.pending());
+  }
+  EXPECT_EQ(sent, at_once.size());
+  EXPECT_GT(sent, kFrames / 4);
+  EXPECT_LE(most, 100U);
+}
+
 TEST(Scripts, TiltingKeepsGravitysStrengthAndStaysInItsCone) {
   const Scene scene =
       scene_with("script { tilting { period_s: 0.2 spread: 0.5 swing_s: 0.12 send_every_s: 0.04 } }");
