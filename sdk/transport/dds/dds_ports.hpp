@@ -33,7 +33,8 @@ struct DdsOptions {
 };
 
 /// Joins the domain as "tandemd SESSION". Environment: CYCLONEDDS_URI, on top of our defaults
-/// (idl/PROTOCOL.md). Errors: kInvalidArgument (session name, depth, CYCLONEDDS_URI), kTransport.
+/// (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, session name, depth, lease), kTransport (also what
+/// CYCLONEDDS_URI says).
 [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
 
 /// Joins the domain as "tandem client ID". Errors: as above.

@@ -60,9 +60,9 @@ Result<DomainUse> DomainUse::acquire(std::uint32_t domain) {
   }
   const dds_entity_t handle = dds_create_domain(domain, domain_configuration().c_str());
   if (handle < 0 && handle != DDS_RETCODE_PRECONDITION_NOT_MET) {
-    return fail(ErrorCode::kInvalidArgument,
-                "DDS domain " + std::to_string(domain) + " cannot be opened (" + dds_strretcode(handle) +
-                    "): check CYCLONEDDS_URI, the interfaces it names and the number");
+    return fail(ErrorCode::kTransport, "DDS domain " + std::to_string(domain) + " cannot be opened (" +
+                                           dds_strretcode(handle) +
+                                           "): check CYCLONEDDS_URI, the interfaces it names and the number");
   }
   domains().uses.emplace(domain, Domains::Use{handle > 0 ? handle : 0, 1});
   return DomainUse(domain);

@@ -13,7 +13,8 @@ namespace tandem::transport::dds {
 /// as it is. Thread-safe.
 class DomainUse {
  public:
-  /// Errors: kInvalidArgument when CYCLONEDDS_URI or the domain number does not make a domain.
+  /// Errors: kTransport when no domain can be made, as when an interface that CYCLONEDDS_URI names is not
+  /// there (yet).
   static Result<DomainUse> acquire(std::uint32_t domain);
   DomainUse(DomainUse&& other) noexcept;
   DomainUse& operator=(DomainUse&&) = delete;

@@ -41,6 +41,9 @@ Node::Node(DomainUse domain, const DdsOptions& options)
     : domain_(std::move(domain)), options_(options), lease_(options.lease.count()) {}
 
 Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition) {
+  if (options.domain > kMaxDomain) {
+    return fail(ErrorCode::kInvalidArgument, "a DDS domain is 0 to " + std::to_string(kMaxDomain));
+  }
   if (options.delta_depth < 1 || options.delta_depth > (1U << 20U)) {
     return fail(ErrorCode::kInvalidArgument, "delta depth must be 1 to 2^20");
   }

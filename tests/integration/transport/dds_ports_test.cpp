@@ -78,13 +78,21 @@ TEST_F(DdsPorts, SessionNamesWithWildcardsAreRefused) {
   }
 }
 
-TEST_F(DdsPorts, AnUnreadableConfigurationIsAnErrorThatNamesIt) {
+// Not kInvalidArgument: the same configuration may work a moment later, once an interface is there.
+TEST_F(DdsPorts, AConfigurationThatMakesNoDomainIsATransportErrorThatNamesIt) {
   options_.domain = 230;
-  setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><NoSuchThing/></Domain></CycloneDDS>", 1);
-  const auto port = make_dds_server_port(options_);
-  ASSERT_FALSE(port);
-  EXPECT_EQ(port.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_NE(port.error().message.find("CYCLONEDDS_URI"), std::string::npos) << port.error().message;
+  for (const char* wrong :
+       {"<NoSuchThing/>",
+        "<General><Interfaces><NetworkInterface name=\"nowhere0\"/></Interfaces></General>"}) {
+    setenv("CYCLONEDDS_URI", (std::string("<CycloneDDS><Domain>") + wrong + "</Domain></CycloneDDS>").c_str(),
+           1);
+    const auto port = make_dds_server_port(options_);
+    ASSERT_FALSE(port);
+    EXPECT_EQ(port.error().code, ErrorCode::kTransport);
+    EXPECT_NE(port.error().message.find("CYCLONEDDS_URI"), std::string::npos) << port.error().message;
+  }
+  options_.domain = 231;
+  EXPECT_EQ(make_dds_server_port(options_).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST_F(DdsPorts, EveryTopicArrivesAsItWasWritten) {
