@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <system_error>
 
 namespace tandem::lab {
 namespace {
@@ -42,6 +44,18 @@ void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
   command.add_option("--bodies", bodies, "Numbers of bodies, separated by commas")
       ->delimiter(',')
       ->check(CLI::Range(1U, engine::kMaxBodies))
+      ->capture_default_str();
+}
+
+void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
+  // CLI11 reads -1 as 2^64 - 1, and what is too large as that.
+  command.add_option("--seed", seed, help)
+      ->check([](const std::string& text) {
+        std::uint64_t value = 0;
+        const char* const end = text.data() + text.size();
+        const auto read = std::from_chars(text.data(), end, value);
+        return read.ec == std::errc() && read.ptr == end ? "" : "a whole number below 2^64";
+      })
       ->capture_default_str();
 }
 

@@ -274,8 +274,7 @@ void add_bandwidth(CLI::App& bench, Run& run) {
                    "ballistic")
       ->check(CLI::IsMember({"auto", "ballistic", "field", "contact"}))
       ->capture_default_str();
-  command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
-      ->capture_default_str();
+  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
   add_quality_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
       ->check(CLI::Range(1U, kMaxThreads))

@@ -63,8 +63,7 @@ void add_engine(CLI::App& bench, Run& run) {
   command->add_option("--threads", options->run.threads, "Of the engine")
       ->check(CLI::Range(1U, kMaxThreads))
       ->capture_default_str();
-  command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
-      ->capture_default_str();
+  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
   command->add_option("--seconds", options->seconds, "How long")
       ->check(CLI::Range(0.01, 3600.0))
       ->capture_default_str();

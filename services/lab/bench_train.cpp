@@ -78,7 +78,7 @@ void add_train(CLI::App& bench, Run& run) {
   command->add_option("--frames", options->frames, "Frames, from the start block on")
       ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
       ->capture_default_str();
-  command->add_option("--seed", options->run.seed, "Of the training run")->capture_default_str();
+  add_seed_option(*command, options->run.seed, "Of the training run");
   add_threshold_options(*command, options->choice);
   command->add_option("--threads", options->run.threads, "Of the engine")
       ->check(CLI::Range(1U, kMaxThreads))

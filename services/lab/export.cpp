@@ -66,8 +66,7 @@ void add_export(CLI::App& app, Run& run) {
   command->add_option("--frames", options->run.frames, "Frames after the start")
       ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
       ->capture_default_str();
-  command->add_option("--seed", options->run.seed, "Of the start block and the scripted inputs")
-      ->capture_default_str();
+  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
   command->add_option("--threads", options->run.threads, "Of the engine")
       ->check(CLI::Range(1U, kMaxThreads))
       ->capture_default_str();

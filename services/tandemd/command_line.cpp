@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
+#include <type_traits>
 #include <utility>
 
 #include "sdk/core/codec/codec.hpp"
@@ -20,8 +21,11 @@ class Flags {
 
   template <class T>
   void add(const char* flag, void (idl::ServerConfig::*set)(T), const std::string& help) {
-    app_->add_option_function<T>(
+    CLI::Option* const option = app_->add_option_function<T>(
         flag, [config = config_, set](T value) { (config->*set)(value); }, help);
+    // CLI11 reads -1 as the largest number, and what is too large as that.
+    if constexpr (std::is_unsigned_v<T>)
+      option->check([](const std::string& text) { return number<T>(text) ? "" : "a whole number"; });
   }
   void add(const char* flag, std::string* (idl::ServerConfig::*field)(), const std::string& help) {
     app_->add_option_function<std::string>(
@@ -32,6 +36,9 @@ class Flags {
   CLI::App* app_;
   idl::ServerConfig* config_;
 };
+
+// fmt::print would throw where stderr takes no more.
+void print_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
@@ -120,14 +127,14 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   if (!path.empty()) {
     auto file = load_config(path);
     if (!file) {
-      fmt::print(stderr, "tandemd: {}\n", file.error().message);
+      print_error(fmt::format("tandemd: {}\n", file.error().message));
       return {.options = std::nullopt, .exit_code = 2};
     }
     config = merge(config, std::move(*file));
   }
   auto options = check_config(config);
   if (!options) {
-    fmt::print(stderr, "tandemd: {}\nRun with --help for all flags.\n", options.error().message);
+    print_error(fmt::format("tandemd: {}\nRun with --help for all flags.\n", options.error().message));
     return {.options = std::nullopt, .exit_code = 2};
   }
   options->json = json;

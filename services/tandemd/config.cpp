@@ -4,8 +4,8 @@
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/text_format.h>
 
+#include <array>
 #include <fstream>
-#include <iterator>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -133,7 +133,11 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
 Result<ServerConfig> load_config(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened", path));
-  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  // Not by iterators: where reading fails, as of a directory, they throw.
+  std::string text;
+  std::array<char, 4096> piece{};
+  while (in.read(piece.data(), piece.size()), in.gcount() > 0)
+    text.append(piece.data(), static_cast<std::size_t>(in.gcount()));
   if (in.bad()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be read", path));
   ServerConfig config;
   FirstError errors(path);

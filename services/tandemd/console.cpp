@@ -34,7 +34,7 @@ Console::Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
 Console::~Console() { clear_line(); }
 
 void Console::clear_line() {
-  if (line_shown_) fmt::print(stderr, "\r\x1b[K");
+  if (line_shown_) std::fputs("\r\x1b[K", stderr);
   line_shown_ = false;
 }
 
@@ -50,12 +50,13 @@ void Console::show(host::Host& host, std::int64_t now_ns) {
   const double bits = static_cast<double>(totals.payload_bytes - last_.payload_bytes) * 8;
   const double corrected = static_cast<double>(totals.corrected - last_.corrected);
   clear_line();
-  fmt::print(stderr,
-             "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
-             " window {}  threshold {:.3g} m  {}",
-             host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s,
-             frames > 0 ? corrected / frames : 0, host.report().frame_ms, host.participants(),
-             host.observers(), host.window(), host.threshold_m(), gains_text(host.parameters()));
+  const std::string line = fmt::format(
+      "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
+      " window {}  threshold {:.3g} m  {}",
+      host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s, frames > 0 ? corrected / frames : 0,
+      host.report().frame_ms, host.participants(), host.observers(), host.window(), host.threshold_m(),
+      gains_text(host.parameters()));
+  std::fputs(line.c_str(), stderr);
   std::fflush(stderr);
   line_shown_ = true;
   last_ = totals;

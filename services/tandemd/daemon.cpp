@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -46,7 +47,7 @@ class HashLog {
     return {};
   }
   void add(Frame frame, std::uint64_t hash) {
-    if (file_) fmt::print(file_.get(), "{},{},{}\n", epoch_, frame, to_hex(hash));
+    if (file_) std::fputs(fmt::format("{},{},{}\n", epoch_, frame, to_hex(hash)).c_str(), file_.get());
   }
   /// A full disk shows at the latest here.
   [[nodiscard]] Result<void> close() {
@@ -68,33 +69,23 @@ class HashLog {
 };
 
 /// Sends what the scene's users would, each input in time for its frame.
-class Script {
+class ScriptSender {
  public:
-  Script(const scenes::Scene& scene, const Options& options) : scene_(&scene), options_(&options) {}
+  ScriptSender(const scenes::Scene& scene, const Options& options) : lead_(options.lead) {
+    if (options.scripted) script_.emplace(scene, options.seed, options.users);
+  }
 
   void send_due(host::Host& host) {
-    if (!options_->scripted) return;
-    const Frame latest = host.frame() + 1 + options_->lead;
-    if (latest >= generated_to_) generate(latest);
-    for (; next_ < inputs_.size() && inputs_[next_].frame <= latest; ++next_) {
-      const auto sent = host.inject(inputs_[next_].input);
-      if (!sent) spdlog::warn("scripted input for frame {}: {}", inputs_[next_].frame, sent.error().message);
+    if (!script_) return;
+    for (const scenes::ScriptedInput& scripted : script_->until(host.frame() + 1 + lead_)) {
+      const auto sent = host.inject(scripted.input);
+      if (!sent) spdlog::warn("scripted input for frame {}: {}", scripted.frame, sent.error().message);
     }
   }
 
  private:
-  // A longer list only appends, so what was sent already is skipped by its number.
-  void generate(Frame latest) {
-    constexpr Frame kAhead = 3000;
-    generated_to_ = latest + kAhead;
-    inputs_ = scenes::scripted_inputs(*scene_, options_->seed, options_->users, generated_to_);
-  }
-
-  const scenes::Scene* scene_;
-  const Options* options_;
-  std::vector<scenes::ScriptedInput> inputs_;
-  std::size_t next_ = 0;
-  Frame generated_to_ = 0;
+  std::optional<scenes::Script> script_;
+  std::uint32_t lead_;
 };
 
 Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& options) {
@@ -132,31 +123,32 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
 
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame };
 
-Ending serve(host::Host& host, transport::ServerPort& port, Script& script, HashLog& hashes,
+Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              const Options& options, const std::atomic<bool>& stop) {
   Console console;
   const std::int64_t duration_ns =
       options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
-  std::int64_t end_ns = steady_ns() + duration_ns;
+  std::optional<std::int64_t> end_ns;  // nothing counts while the name is claimed
   bool running = false;
   hashes.add(host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
     if (host.poll(now_ns, wall_ns())) hashes.add(host.report().frame, host.report().hash);
     if (host.state() == host::Host::State::kRefused) return Ending::kRefused;
+    if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
     if (host.state() == host::Host::State::kRunning) {
       if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;
       script.send_due(host);
     }
     console.show(host, now_ns);
-    if (now_ns >= end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
+    if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
     const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
     if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
   }
   return Ending::kDone;
 }
 
-void print_report(const host::HostTotals& totals, double frame_rate_hz, bool json) {
+[[nodiscard]] Result<void> print_report(const host::HostTotals& totals, double frame_rate_hz, bool json) {
   const double per_frame = totals.frames == 0 ? 0 : 1 / static_cast<double>(totals.frames);
   const double mbit_per_s =
       static_cast<double>(totals.payload_bytes) * 8 / kBitsPerMbit * per_frame * frame_rate_hz;
@@ -165,7 +157,7 @@ void print_report(const host::HostTotals& totals, double frame_rate_hz, bool jso
       "({} ms), {} inputs refused",
       totals.frames, mbit_per_s, totals.frame_ms_p50, totals.frame_ms_p99, totals.clients_seen, totals.stalls,
       totals.suspended_ms, totals.refused_inputs);
-  if (!json) return;
+  if (!json) return {};
   const nlohmann::ordered_json object{
       {"frames", totals.frames},
       {"mbit_per_s", mbit_per_s},
@@ -173,7 +165,10 @@ void print_report(const host::HostTotals& totals, double frame_rate_hz, bool jso
       {"clients_seen", totals.clients_seen},
       {"stalls", totals.stalls},
       {"refused_inputs", totals.refused_inputs}};
-  fmt::print("{}\n", object.dump());
+  const std::string line = object.dump() + '\n';
+  if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+    return fail(ErrorCode::kIo, "the report could not be written to stdout");
+  return {};
 }
 
 // What was queued last still goes out, unless the middleware does not take it.
@@ -206,7 +201,7 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
                options.choice.bodies, coding, options.session, options.domain, (*host)->session().epoch);
 
   host::Publisher publisher((*host)->outbox(), **port);
-  Script script(*scene, options);
+  ScriptSender script(*scene, options);
   const Ending ending = serve(**host, **port, script, hashes, options, stop);
   flush((*host)->outbox());
   publisher.stop();
@@ -219,13 +214,14 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   if (options.choice.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
   if (const std::string gains = gains_text((*host)->parameters()); !gains.empty())
     spdlog::info("at the end: {}", gains);
-  print_report((*host)->totals(), frame_rate_hz, options.json);
+  const auto printed = print_report((*host)->totals(), frame_rate_hz, options.json);
+  if (!printed) spdlog::error(printed.error().message);
   if (ending == Ending::kNobodyCame) {
     return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
                                                           options.wait_for, *options.duration_s)},
                         1);
   }
-  return closed ? 0 : 1;
+  return closed && printed ? 0 : 1;
 }
 
 }  // namespace tandem::daemon

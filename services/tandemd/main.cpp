@@ -42,9 +42,9 @@ class SignalWatch {
 
 int main(int argc, char** argv) {
   try {
+    spdlog::set_default_logger(spdlog::stderr_color_mt("tandemd"));
     const auto command = tandem::daemon::parse_command_line(argc, argv);
     if (!command.options) return command.exit_code;
-    spdlog::set_default_logger(spdlog::stderr_color_mt("tandemd"));
     const SignalWatch signals;
     return tandem::daemon::run_daemon(*command.options, signals.stop());
   } catch (const std::exception& error) {

@@ -21,6 +21,9 @@ constexpr std::int64_t kTellWaitingNs = 2 * kSecond;
 // More than a second of deltas, even in parts: a busy machine may keep this process waiting.
 constexpr std::uint32_t kDeltaDepth = 512;
 
+// fmt::print would throw where stderr takes no more, and in a thread end the process.
+void print_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
 }  // namespace
 
 Result<std::unique_ptr<HeadlessClient>> HeadlessClient::create(const HeadlessOptions& options) {
@@ -113,7 +116,7 @@ void HeadlessClient::finish() {
   if (capture_) {
     if (auto committed = capture_->commit(); !committed) failure_ = committed.error().message;
   }
-  if (!failure_.empty()) fmt::print(stderr, "tandem join: {}{}\n", options_.name, failure_);
+  if (!failure_.empty()) print_error(fmt::format("tandem join: {}{}\n", options_.name, failure_));
 }
 
 void HeadlessClient::on_session(const transport::SessionMessage& session) {
@@ -183,14 +186,14 @@ void HeadlessClient::tell_live(client::Now now) {
   line["mbit_per_s"] = bytes * 8 / kBitsPerMbit / span_s;
   line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
   line["resyncs"] = figures.resyncs;
-  fmt::print(stderr, "{}\n", line.dump());
+  print_error(line.dump() + '\n');
   live_ns_ = now.steady_ns;
   live_bytes_ = figures.payload_bytes;
   live_frames_ = figures.frames_applied;
 }
 
 void HeadlessClient::tell(const std::string& line) const {
-  if (!options_.quiet) fmt::print(stderr, "tandem join: {}{}\n", options_.name, line);
+  if (!options_.quiet) print_error(fmt::format("tandem join: {}{}\n", options_.name, line));
 }
 
 bool HeadlessClient::succeeded() const {

@@ -32,7 +32,7 @@ void Progress::at(std::uint64_t done) {
   if (now_ns < next_ns_) return;
   next_ns_ = now_ns + kPeriodNs;
   shown_ = true;
-  fmt::print(stderr, "\r\x1b[K{}: {} of {}", what_, done, total_);
+  std::fputs(fmt::format("\r\x1b[K{}: {} of {}", what_, done, total_).c_str(), stderr);
   std::fflush(stderr);
 }
 

@@ -1,8 +1,10 @@
 // `tandem top`: sessions and clients of a DDS domain, from their status topics.
 
 #include <fmt/format.h>
+#include <stdio_ext.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -39,13 +41,20 @@ void collect(transport::Monitor& monitor, TopView& view) {
   view.forget_silent(now_ns);
 }
 
-/// False when nobody reads any more.
+/// False when stdout takes no more.
 bool show(const TopView& view, const TopOptions& options) {
   const bool screen = !options.once && !options.stream && ::isatty(STDOUT_FILENO) != 0;
   if (screen) std::fputs("\x1b[H\x1b[2J", stdout);
   std::fputs(options.json || options.stream ? (view.to_json() + '\n').c_str() : view.to_table().c_str(),
              stdout);
   return std::fflush(stdout) == 0;
+}
+
+/// Nobody reads any more, which is no failure.
+int reader_left() {
+  __fpurge(stdout);
+  std::clearerr(stdout);
+  return 0;
 }
 
 int run_top(const TopOptions& options) {
@@ -69,12 +78,11 @@ int run_top(const TopOptions& options) {
     const std::int64_t now_ns = transport::steady_ns();
     if (options.once) {
       if (now_ns - start_ns < kOnceNs) continue;
-      show(view, options);
-      return view.empty() ? 1 : 0;
+      return show(view, options) && !view.empty() ? 0 : 1;
     }
     if (now_ns - shown_ns >= kSecond) {
       shown_ns += kSecond;
-      if (!show(view, options)) return 0;
+      if (!show(view, options)) return errno == EPIPE ? reader_left() : 1;
     }
   }
   return 0;

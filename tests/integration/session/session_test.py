@@ -296,6 +296,31 @@ def no_server(stage):
         raise Failed(f"the message does not name the file: {said}")
 
 
+def endings(stage):
+    """Exit codes of runs that are short, cannot write, or find no interface."""
+    server = ("--scene", "half_pipe", "--bodies", 50, "--json")
+
+    def run(code, *command, out=subprocess.PIPE, err=subprocess.PIPE, uri=None):
+        environment = {**stage.environment, **({"CYCLONEDDS_URI": uri} if uri else {})}
+        done = subprocess.run(list(map(str, command)) + stage.common, stdout=out, stderr=err, env=environment,
+                              stdin=subprocess.DEVNULL, timeout=LIMIT_S, check=False)  # fmt: skip
+        if done.returncode != code:
+            raise Failed(f"{command} ended with {done.returncode}, not {code}: {done.stderr}")
+        return done
+
+    short = json.loads(run(0, stage.options.tandemd, *server, "--duration", 0.2).stdout)
+    if not short["frames"] > 0:
+        raise Failed("a duration of 0.2 s ends before the first frame")
+    missing = '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="nowhere0"/></Interfaces></General></Domain></CycloneDDS>'
+    run(1, stage.options.tandemd, *server, uri=missing)
+    with open("/dev/full", "wb") as full:
+        for error in (run(1, stage.options.tandemd, *server, "--duration", 0.2, out=full).stderr,
+                      run(1, stage.options.tandem, "top", "--once", "--json", out=full).stderr):  # fmt: skip
+            if b"stdout" not in error:
+                raise Failed(f"a full disk is not named: {error}")
+        run(1, stage.options.tandem, "join", "--count", 3, "--timeout", 1, err=full)
+
+
 def emitter(stage):
     """Bodies that come and go for some minutes, a client joining every ten seconds: no mismatch, flat memory."""
     seconds = stage.options.seconds
@@ -349,7 +374,7 @@ def reference(stage):
 # Accounts of up to 256 clients (1.1 KB each), and what was reserved at the start but is written to only later: a server of
 # 2,000 bodies reserves 5 MB.
 MEMORY_SLACK_KB = 4096
-SCENARIOS = {f.__name__: f for f in (two_thousand_frames, server_restart, no_server, emitter, reference)}
+SCENARIOS = {f.__name__: f for f in (two_thousand_frames, server_restart, no_server, endings, emitter, reference)}
 
 
 def main():

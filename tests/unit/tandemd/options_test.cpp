@@ -11,6 +11,7 @@
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/command_line.hpp"
 #include "services/tandemd/config.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -84,6 +85,7 @@ TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
   EXPECT_NE(refusal([](Config& s) { s.set_lead(2); }).find("--lead"), std::string::npos);
   EXPECT_NE(refusal([](Config& s) { s.set_domain(231); }).find("--domain"), std::string::npos);
   EXPECT_NE(refusal([](Config& s) { s.set_threads(0); }).find("--threads"), std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_threads(kMaxThreads + 1); }).find("--threads"), std::string::npos);
   EXPECT_NE(refusal([](Config& s) { s.set_client_limit(0); }).find("--client-limit"), std::string::npos);
   for (const char* bad : {"0", "25", "-1", "2x", "", "automatic"}) {
     EXPECT_NE(refusal([bad](Config& s) { s.set_window(bad); }).find("--window"), std::string::npos) << bad;
@@ -209,11 +211,22 @@ TEST_F(ConfigFile, AFileThatIsNotThereIsAnError) {
   EXPECT_EQ(missing.error().code, ErrorCode::kIo);
 }
 
+TEST_F(ConfigFile, ADirectoryIsAnErrorThatNamesIt) {
+  const auto folder = load_config("/tmp");
+  ASSERT_FALSE(folder);
+  EXPECT_EQ(folder.error().code, ErrorCode::kIo);
+  EXPECT_NE(folder.error().message.find("/tmp: cannot be read"), std::string::npos);
+}
+
 TEST(CommandLineOf, UnknownFlagsAndMissingValuesAreUsageErrors) {
   const char* unknown[] = {"tandemd", "--scene", "cube", "--bodies", "5", "--fast"};
   EXPECT_EQ(parse_command_line(6, unknown).exit_code, 2);
   const char* word[] = {"tandemd", "--scene", "cube", "--bodies", "many"};
   EXPECT_EQ(parse_command_line(5, word).exit_code, 2);
+  for (const char* seed : {"-1", "18446744073709551616", "1e5", ""}) {
+    const char* wrong[] = {"tandemd", "--scene", "cube", "--bodies", "5", "--seed", seed};
+    EXPECT_EQ(parse_command_line(7, wrong).exit_code, 2) << seed;
+  }
   const char* nothing[] = {"tandemd"};
   EXPECT_EQ(parse_command_line(1, nothing).exit_code, 2);
   const char* help[] = {"tandemd", "--help"};

@@ -56,6 +56,8 @@ class CommandLine(unittest.TestCase):
         for flag in ("--bodies", "--users", "--seed"):
             self.assert_usage(flag, "bench", "bandwidth", "--trajectory", "x.npy", flag, "5")
         self.assert_usage("zip", "bench", "bandwidth", "--scene", "half_pipe", "--codec", "zip")
+        for seed in ("-1", str(2**64)):
+            self.assert_usage("--seed", "bench", "bandwidth", "--scene", "cube", "--seed", seed)
         self.assert_usage("--scene", "bench", "bandwidth")
         self.assert_usage("--out", "export", "--scene", "half_pipe")
 
@@ -268,6 +270,13 @@ class CommandLine(unittest.TestCase):
         for row in rows:
             for part in ("engine", "server", "client"):
                 self.assertEqual(row[part]["slot_bytes"], row[part]["total_bytes"] / row["bodies"])
+
+    def test_results_that_cannot_be_written_are_a_failure(self):
+        with open("/dev/full", "wb") as full:
+            for command in (("doctor", "--json"), ("bench", "memory", "--bodies", "50", "--json")):
+                done = subprocess.run([PROGRAM, *command], stdout=full, stderr=subprocess.PIPE, timeout=60, check=False)
+                self.assertEqual(done.returncode, 1, command)
+                self.assertIn(b"stdout", done.stderr, command)
 
     def test_doctor_fails_on_a_configuration_file_that_is_not_there(self):
         done = run("doctor", "--json", CYCLONEDDS_URI="file:///nowhere/cyclonedds.xml")
