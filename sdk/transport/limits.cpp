@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "sdk/transport/port.hpp"
 
@@ -34,34 +35,61 @@ bool fits_shape(const BodyType& type) {
   return false;
 }
 
-bool within_limits(const BodyType& type) {
-  return is_name(type.name) && std::isfinite(type.radius) && fits_shape(type) && is_finite(type.shape_values);
+Result<void> check(const BodyType& type) {
+  const auto refuse = [&type](const char* what) {
+    return fail(ErrorCode::kInvalidArgument,
+                "body type '" + type.name.substr(0, kMaxNameBytes) + "': " + what);
+  };
+  if (!is_name(type.name)) return refuse("a name has at most 64 bytes");
+  if (!std::isfinite(type.radius) || type.radius < 0) return refuse("a radius is finite and not negative");
+  if (!fits_shape(type)) return refuse("shape values that its shape does not have");
+  if (!is_finite(type.shape_values)) return refuse("a shape value is not finite");
+  return {};
 }
 
-bool within_limits(const StreamMessage& stream) {
+Result<void> check(const StreamMessage& stream) {
   const Layout& layout = stream.layout;
-  return stream.max_delta_bytes <= kMaxSampleBytes && stream.max_snapshot_bytes <= kMaxSampleBytes &&
-         is_name(layout.codec) && is_name(layout.predictor) && !layout.groups.empty() &&
-         layout.groups.size() <= kMaxGroups &&
-         std::all_of(layout.groups.begin(), layout.groups.end(), is_name) &&
-         layout.radii.size() <= kMaxTypes && layout.predictor_constants.size() <= kMaxPredictorConstants &&
-         layout.codec_tables.size() <= kMaxTableBytes;
+  const auto refuse = [&stream](const char* what) {
+    return fail(ErrorCode::kInvalidArgument, "stream " + std::to_string(stream.id.id) + ": " + what);
+  };
+  if (stream.max_delta_bytes > kMaxSampleBytes || stream.max_snapshot_bytes > kMaxSampleBytes)
+    return refuse("deltas or snapshots above 64 MiB");
+  if (!is_name(layout.codec) || !is_name(layout.predictor)) return refuse("a name has at most 64 bytes");
+  if (layout.groups.empty() || layout.groups.size() > kMaxGroups ||
+      !std::all_of(layout.groups.begin(), layout.groups.end(), is_name))
+    return refuse("1 to 8 groups, with names of at most 64 bytes");
+  if (layout.radii.size() > kMaxTypes) return refuse("more radii than types");
+  if (layout.predictor_constants.size() > kMaxPredictorConstants) return refuse("more than 2^20 constants");
+  if (layout.codec_tables.size() > kMaxTableBytes) return refuse("codec tables above 4 MiB");
+  return {};
 }
 
 }  // namespace
 
+Result<void> check_announcement(const SessionMessage& message) {
+  const auto refuse = [](const char* what) { return fail(ErrorCode::kInvalidArgument, what); };
+  if (auto named = check_session_name(message.session); !named) return named;
+  if (message.capacity < 1 || message.capacity > kMaxCapacity) return refuse("capacity is 1 to 2^20 slots");
+  if (!is_positive(message.frame_rate_hz)) return refuse("a frame rate is positive");
+  if (!is_positive(message.lattice_unit)) return refuse("a lattice unit is positive");
+  if (message.window_ceiling < 1 || message.window_ceiling > kMaxWindowCeiling)
+    return refuse("a window ceiling is 1 to 1024 frames");
+  if (!is_name(message.scene)) return refuse("a scene's name has at most 64 bytes");
+  if (message.scene_description.size() > kMaxDescriptionBytes)
+    return refuse("a scene's description has at most 1 MiB");
+  if (message.types.empty() || message.types.size() > kMaxTypes) return refuse("1 to 65,535 body types");
+  if (message.streams.empty() || message.streams.size() > kMaxStreams) return refuse("1 to 8 streams");
+  for (const BodyType& type : message.types) {
+    if (auto good = check(type); !good) return good;
+  }
+  for (const StreamMessage& stream : message.streams) {
+    if (auto good = check(stream); !good) return good;
+  }
+  return {};
+}
+
 bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
-  return check_session_name(message.session).has_value() && message.capacity >= 1 &&
-         message.capacity <= kMaxCapacity && is_positive(message.frame_rate_hz) &&
-         is_positive(message.lattice_unit) && message.window_ceiling >= 1 &&
-         message.window_ceiling <= kMaxWindowCeiling && is_name(message.scene) &&
-         message.scene_description.size() <= kMaxDescriptionBytes && !message.types.empty() &&
-         message.types.size() <= kMaxTypes &&
-         std::all_of(message.types.begin(), message.types.end(),
-                     [](const BodyType& type) { return within_limits(type); }) &&
-         !message.streams.empty() && message.streams.size() <= kMaxStreams &&
-         std::all_of(message.streams.begin(), message.streams.end(),
-                     [](const StreamMessage& stream) { return within_limits(stream); });
+  return check_announcement(message).has_value();
 }
 
 bool within_limits(const DeltaMessage& message, const Limits& limits) {

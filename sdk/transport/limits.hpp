@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "sdk/transport/messages.hpp"
+#include "tandem/result.hpp"
 
 namespace tandem::transport {
 
@@ -42,6 +43,10 @@ struct Limits {
 [[nodiscard]] bool within_limits(const AckMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const ServerStatusMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const ClientStatusMessage& message, const Limits& limits);
+
+/// The same of an announcement, saying what breaks which limit: whoever announces it asks first, as those who
+/// receive it only count. Errors: kInvalidArgument.
+[[nodiscard]] Result<void> check_announcement(const SessionMessage& message);
 
 /// Deltas that writer and reader keep: at least two windows and 64, `parts` each, but no more than
 /// `memory_bytes` of them (never below one window, or a suspended server could overwrite what a participant

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/claim.hpp"
 #include "services/host/inputs.hpp"
@@ -383,6 +384,8 @@ Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation
                                                .frame = config.start_frame,
                                                .frame_rate_hz = config.frame_rate_hz});
   if (!stream) return tl::unexpected(stream.error());
+  if (auto good = transport::check_announcement(session_message(config, *stream)); !good)
+    return tl::unexpected(good.error());
   auto impl = std::make_unique<Impl>(std::move(config), simulation, port, std::move(*stream));
   return std::unique_ptr<Host>(new Host(std::move(impl)));
 }

@@ -79,7 +79,8 @@ class Host {
   };
 
   /// `simulation` and `port` must outlive the host. `simulation` was not stepped yet; its bodies now are the
-  /// start frame. Errors: kInvalidArgument (configuration, body columns not `capacity` long), kUnsupported
+  /// start frame. Errors: kInvalidArgument (configuration, also what clients would not take of the
+  /// announcement; body columns not `capacity` long), kUnsupported
   /// (codec, predictor), kMalformed (tables).
   static Result<std::unique_ptr<Host>> create(HostConfig config, engine::Simulation& simulation,
                                               transport::ServerPort& port);

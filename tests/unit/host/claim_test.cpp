@@ -110,6 +110,14 @@ TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
   EXPECT_TRUE(refused([](HostConfig& c) { c.client_limit = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types.clear(); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.epoch = 0; }));
+  // Every client would drop such an announcement without a word.
+  EXPECT_FALSE(refused([](HostConfig& c) { c.scene.assign(64, 's'); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.scene.assign(65, 's'); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.scene_description.assign((1U << 20U) + 1, 'd'); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].name.assign(65, 't'); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].radius = std::nanf(""); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].radius = -1; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].shape = transport::Shape::kBox; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.codec = "morse"; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.predictor = "oracle"; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.parameters.codec.threshold = 0; }));

@@ -53,6 +53,7 @@ TEST(Limits, ASessionBeyondAnyLimitIsRefused) {
   EXPECT_FALSE(session_passes([](auto& s) { s.types.clear(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types.resize(kMaxTypes + 1); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types[0].radius = std::numeric_limits<float>::infinity(); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.types[0].radius = -0.1F; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.streams.clear(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.streams.resize(kMaxStreams + 1); }));
 }
