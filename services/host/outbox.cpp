@@ -64,7 +64,8 @@ std::optional<Outgoing> Outbox::pop(std::chrono::nanoseconds timeout) {
   if (queue_.empty()) return std::nullopt;
   std::optional<Outgoing> message(std::move(queue_.front()));
   queue_.pop_front();
-  writing_frame_ = std::holds_alternative<transport::DeltaMessage>(*message);
+  const auto* const delta = std::get_if<transport::DeltaMessage>(&*message);
+  writing_frame_ = delta != nullptr && delta->part + 1 == delta->parts;
   std::uint32_t limit = 0;
   if (std::uint32_t* const count = count_of(*message, limit)) --*count;
   return message;

@@ -74,7 +74,7 @@ class Outbox {
   Limits limits_;
   std::deque<Outgoing> queue_;
   std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
-  bool writing_frame_ = false;  // the last pop() handed out a delta
+  bool writing_frame_ = false;  // the last pop() handed out the last part of a delta
   std::size_t high_water_ = 0;
   Traffic traffic_;
   transport::Bytes cdr_;  // kept to reuse its memory

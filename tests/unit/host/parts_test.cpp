@@ -138,6 +138,18 @@ TEST(Outbox, ADeltaIsUnwrittenUntilTheNextMessageIsAskedFor) {
   EXPECT_EQ(outbox.unwritten_frames(), 0U);
 }
 
+TEST(Outbox, ADeltaOfSeveralPartsIsOneUnwrittenDeltaUntilItsLastPartIsWritten) {
+  Outbox outbox({});
+  for (std::uint32_t part = 0; part < 3; ++part) ASSERT_TRUE(outbox.push(delta(1, part, 3)));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(outbox.unwritten_frames(), 1U);
+    ASSERT_TRUE(outbox.pop(std::chrono::nanoseconds{0}));
+  }
+  EXPECT_EQ(outbox.unwritten_frames(), 1U);
+  EXPECT_FALSE(outbox.pop(std::chrono::nanoseconds{0}));
+  EXPECT_EQ(outbox.unwritten_frames(), 0U);
+}
+
 TEST(Outbox, EachKindIsBoundedByItself) {
   Outbox outbox({.frames = 1, .snapshots = 1, .control = 1});
   EXPECT_TRUE(outbox.push(delta(1, 0, 1)));
