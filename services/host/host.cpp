@@ -30,7 +30,6 @@ constexpr std::int64_t kShortWakeNs = 10 * kMillisecond;
 constexpr std::int64_t kLookNs = kSecond / 4;  // between looks for rivals and for dead clients
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
-constexpr std::size_t kMostNotices = 256;  // until somebody takes them
 
 Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
   if (auto named = transport::check_session_name(config.session); !named) return named;
@@ -145,7 +144,6 @@ struct Host::Impl {
   FrameReport report;
   HostTotals totals;
   DurationHistogram frame_durations;
-  std::vector<std::string> notices;
   std::vector<std::byte> snapshot;
   std::vector<transport::Received<transport::AckMessage>> acks;
   std::vector<transport::Received<transport::InputMessage>> input_samples;
@@ -236,9 +234,7 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
                  now_ns, wall_ns);
 }
 
-void Host::Impl::note(std::string notice) {
-  if (notices.size() < kMostNotices) notices.push_back(std::move(notice));
-}
+void Host::Impl::note(std::string notice) { roster.notices().add(std::move(notice), now_ns); }
 
 void Host::Impl::note_foreigner(transport::ClientId client) {
   if (last_foreign_note_ns != INT64_MIN && now_ns - last_foreign_note_ns < kSecond) return;
@@ -314,10 +310,10 @@ void Host::Impl::produce_frame() {
 }
 
 void Host::Impl::serve_joiners() {
-  if (joins.due(roster.accounts(), *port, now_ns)) {
+  if (joins.due(roster, *port, now_ns)) {
     stream.snapshot(snapshot);
     snapshot_parts.start(config.epoch, {}, stream.frame(), snapshot);
-    joins.served(roster.accounts(), now_ns);
+    joins.served(roster, now_ns);
     ++totals.snapshots;
   }
   if (!JoinDesk::anybody(roster.accounts())) snapshot_parts.forget();
@@ -420,13 +416,6 @@ std::uint32_t Host::observers() const { return impl_->roster.watching(); }
 
 HostTotals Host::totals() const { return impl_->totals_now(); }
 
-std::vector<std::string> Host::take_notices() {
-  std::vector<std::string> all = std::move(impl_->notices);
-  impl_->notices.clear();
-  auto& more = impl_->roster.notices();
-  all.insert(all.end(), more.begin(), more.end());
-  more.clear();
-  return all;
-}
+std::vector<std::string> Host::take_notices() { return impl_->roster.notices().take(); }
 
 }  // namespace tandem::host

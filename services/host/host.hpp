@@ -120,6 +120,7 @@ class Host {
   [[nodiscard]] std::uint32_t observers() const;      ///< playing and not waited for
   [[nodiscard]] HostTotals totals() const;
   /// One line for a log per thing worth telling (joined, demoted, refused ...), oldest first; forgets them.
+  /// At most 2 a second on average, and of one client one in 10 s.
   [[nodiscard]] std::vector<std::string> take_notices();
 
  private:

@@ -11,16 +11,6 @@ namespace {
 
 using transport::Reason;
 
-// A token bucket, kept as what is missing from a full one.
-bool take_token(InputAccount& account, std::int64_t now_ns) {
-  const double earned = static_cast<double>(now_ns - account.spent_at_ns) * 1e-9 * kInputsPerSecond;
-  account.spent = std::max(account.spent - earned, 0.0);
-  account.spent_at_ns = now_ns;
-  if (account.spent + 1 > kInputBurst) return false;
-  account.spent += 1;
-  return true;
-}
-
 void remember(InputAccount& account, const transport::ReplyEntry& entry) {
   if (account.outcomes.size() == transport::kReplyRing) account.outcomes.erase(account.outcomes.begin());
   account.outcomes.push_back(entry);
@@ -71,7 +61,7 @@ Reason InputDesk::handle(Account& account, const transport::InputMessage& input,
 
 Reason InputDesk::decide(Account& account, const transport::InputMessage& input, std::int64_t now_ns,
                          Frame& acts_on) {
-  if (!take_token(account.inputs, now_ns)) return Reason::kRateLimited;
+  if (!account.inputs.rate.take(now_ns)) return Reason::kRateLimited;
   if (!may_play(account)) return Reason::kNotPlaying;
   if (account.demoted) return Reason::kDemoted;
   if (account.role() == transport::Role::kObserver) return Reason::kObserver;

@@ -13,8 +13,6 @@
 
 namespace tandem::host {
 
-inline constexpr double kInputsPerSecond = 60;       ///< per client, on average
-inline constexpr double kInputBurst = 60;            ///< per client, at once
 inline constexpr std::size_t kMostImmediate = 1024;  ///< waiting for one step, all clients together
 /// Scheduled inputs per frame, all clients together; those of lead + 1 frames fit kMaxPendingInputs.
 inline constexpr std::uint32_t kMostScheduledPerFrame = 100;

@@ -15,11 +15,12 @@ bool wants(const Account& account, std::int64_t now_ns) {
 
 }  // namespace
 
-bool JoinDesk::due(std::map<transport::ClientId, Account>& accounts, transport::ServerPort& port,
-                   std::int64_t now_ns) {
+bool JoinDesk::due(Roster& roster, transport::ServerPort& port, std::int64_t now_ns) {
   ready_.clear();
-  for (const auto& [id, account] : accounts) {
-    if (joins(account) && wants(account, now_ns) && port.joined(account.from)) ready_.push_back(id);
+  for (const auto& [id, account] : roster.accounts()) {
+    if (!joins(account) || !wants(account, now_ns)) continue;
+    if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
+    if (port.joined(account.from)) ready_.push_back(id);
   }
   if (ready_.empty()) {
     collecting_since_ns_.reset();
@@ -29,10 +30,11 @@ bool JoinDesk::due(std::map<transport::ClientId, Account>& accounts, transport::
   return now_ns - *collecting_since_ns_ >= kCollectNs;
 }
 
-void JoinDesk::served(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns) {
+void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
   for (const transport::ClientId id : ready_) {
-    const auto known = accounts.find(id);
-    if (known == accounts.end()) continue;
+    const auto known = roster.accounts().find(id);
+    if (known == roster.accounts().end()) continue;
+    if (known->second.join.served) roster.peer(known->second).snapshots_again.take(now_ns);
     known->second.join = {.served = true, .served_attempt = known->second.attempt, .served_at_ns = now_ns};
   }
   collecting_since_ns_.reset();

@@ -19,11 +19,11 @@ class JoinDesk {
   static constexpr std::int64_t kPatienceNs = 5'000'000'000;
 
   /// True when the time has come to make one snapshot for all who are ready: they say `joining`, all three
-  /// writers have matched their participant, and they were not served for this attempt within 5 s.
-  [[nodiscard]] bool due(std::map<transport::ClientId, Account>& accounts, transport::ServerPort& port,
-                         std::int64_t now_ns);
+  /// writers have matched their participant, they were not served for this attempt within 5 s, and where they
+  /// were served before, their participant has not asked too often.
+  [[nodiscard]] bool due(Roster& roster, transport::ServerPort& port, std::int64_t now_ns);
   /// One was queued for those who were ready at the last due().
-  void served(std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
+  void served(Roster& roster, std::int64_t now_ns);
   [[nodiscard]] static bool anybody(const std::map<transport::ClientId, Account>& accounts);
   /// When the joiners collected so far get theirs.
   [[nodiscard]] std::optional<std::int64_t> due_ns() const;

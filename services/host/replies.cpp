@@ -28,15 +28,6 @@ bool ReplyDesk::close_forgotten(Roster& roster) {
   return true;
 }
 
-bool ReplyDesk::spend(std::int64_t now_ns) {
-  const double returned = static_cast<double>(now_ns - spent_at_ns_) * 1e-9 * kStrangersPerSecond;
-  spent_ = std::max(0.0, spent_ - returned);
-  spent_at_ns_ = now_ns;
-  if (spent_ + 1 > kStrangersPerSecond) return false;
-  ++spent_;
-  return true;
-}
-
 void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns) {
   if (!close_forgotten(roster)) return;
   for (auto& [id, account] : roster.accounts()) {
@@ -65,7 +56,7 @@ void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t n
   auto stranger = std::ranges::find(strangers_, client, &Stranger::client);
   if (stranger == strangers_.end()) stranger = std::ranges::min_element(strangers_, {}, &Stranger::last_ns);
   if (stranger->client == client && !elapsed(stranger->last_ns, now_ns, kEchoNs)) return;
-  if (!spend(now_ns)) return;
+  if (!strangers_rate_.take(now_ns)) return;
   *stranger = {client, now_ns};
   transport::ReplyMessage reply;
   reply.client = client;

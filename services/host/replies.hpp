@@ -8,6 +8,7 @@
 #include "sdk/transport/messages.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/roster.hpp"
+#include "services/host/token_bucket.hpp"
 
 namespace tandem::host {
 
@@ -29,7 +30,6 @@ class ReplyDesk {
 
  private:
   [[nodiscard]] bool close_forgotten(Roster& roster);
-  [[nodiscard]] bool spend(std::int64_t now_ns);
 
   struct Stranger {
     transport::ClientId client = 0;
@@ -38,8 +38,7 @@ class ReplyDesk {
   Epoch epoch_;
   Outbox* outbox_;
   std::array<Stranger, 64> strangers_{};  // the longest silent one makes room
-  double spent_ = 0;                      // answers to strangers, less what time gave back
-  std::int64_t spent_at_ns_ = 0;
+  TokenBucket strangers_rate_{kStrangersPerSecond, kStrangersPerSecond};
 };
 
 }  // namespace tandem::host

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 namespace tandem::host {
 namespace {
@@ -14,26 +15,28 @@ using transport::Role;
 constexpr std::int64_t kReturnNs = 10'000'000'000;   // a demoted client must keep up this long
 constexpr std::int64_t kSilenceNs = 30'000'000'000;  // without an acknowledgement a client is taken for gone
 constexpr std::int64_t kForgetNs = 60'000'000'000;   // and its account deleted
-constexpr std::size_t kMostNotices = 256;
 
 }  // namespace
 
 std::string client_name(transport::ClientId id) { return fmt::format("{:016x}", id); }
 
-void Roster::note(const Account& account, std::string_view what) {
-  if (notices_.size() < kMostNotices)
-    notices_.push_back(fmt::format("client {} {}", client_name(account.id), what));
+void Roster::note(Account& account, std::string_view what, std::int64_t now_ns) {
+  notices_.add(fmt::format("client {} {}", client_name(account.id), what), account.notices, now_ns);
 }
 
 Roster::Accounts::iterator Roster::forget(Accounts::iterator account) {
   if (account->second.reply.open) forgotten_.push_back(account->first);
-  return accounts_.erase(account);
+  const transport::ParticipantId from = account->second.from;
+  const auto next = accounts_.erase(account);
+  if (std::ranges::none_of(accounts_, [&from](const auto& entry) { return entry.second.from == from; }))
+    peers_.erase(from);
+  return next;
 }
 
 Account* Roster::admit(const transport::AckMessage& ack, const transport::ParticipantId& from,
                        std::int64_t now_ns) {
-  const auto siblings =
-      std::ranges::count_if(accounts_, [&from](const auto& entry) { return entry.second.from == from; });
+  const auto siblings = std::ranges::count_if(
+      accounts_, [&from](const auto& entry) { return entry.second.present && entry.second.from == from; });
   if (siblings >= rules_.participant_limit) return nullptr;
   if (accounts_.size() >= rules_.client_limit) {
     const auto oldest = std::ranges::min_element(accounts_, {}, [](const auto& entry) {
@@ -48,6 +51,7 @@ Account* Roster::admit(const transport::AckMessage& ack, const transport::Partic
   account.heard_ns = now_ns;
   account.attempt = ack.join_attempt;
   ++seen_;
+  peers_.try_emplace(from);
   return &accounts_.emplace(ack.client, account).first->second;
 }
 
@@ -69,7 +73,8 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (account->phase != ack.phase || account->wanted != ack.role_wanted) account->reply.due = true;
   if (plays && starts_over) {
     account->timed_from = now.frame;
-    note(*account, ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer");
+    note(*account, ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer",
+         now.ns);
   } else if (plays && ack.applied > account->applied && ack.applied > account->timed_from) {
     if (const auto at_ns = times.of(ack.applied)) account->round_trip.measured(now.ns - *at_ns);
   }
@@ -108,7 +113,7 @@ void Roster::look_for_dead(transport::ServerPort& port, const Now& now) {
     if (account.present && (silence_ns > kSilenceNs || !port.alive(account.from))) {
       account.present = false;
       account.counted = false;
-      note(account, "is gone");
+      note(account, "is gone", now.ns);
     }
     it = !account.present && silence_ns > kForgetNs ? forget(it) : std::next(it);
   }
@@ -124,16 +129,18 @@ bool Roster::blamed(const Now& now) const {
 }
 
 void Roster::charge(std::int64_t duration_ns, const Now& now) {
+  std::set<transport::ParticipantId> charged;  // once, however many of its clients are to blame
   for (auto& [id, account] : accounts_) {
     if (!blamed(account, now)) continue;
-    account.stalls.charge(now.ns, duration_ns);
-    if (!rules_.stall_timeout_ns || account.stalls.total_ns(now.ns) <= *rules_.stall_timeout_ns) continue;
+    StallMeter& stalls = peer(account).stalls;
+    if (charged.insert(account.from).second) stalls.charge(now.ns, duration_ns);
+    if (!rules_.stall_timeout_ns || stalls.total_ns(now.ns) <= *rules_.stall_timeout_ns) continue;
     account.demoted = true;
     account.counted = false;
     account.kept_up = false;
     account.reply.due = true;
     ++demotions_;
-    note(account, "held the others up for too long: observer until it keeps up for 10 s");
+    note(account, "held the others up for too long: observer until it keeps up for 10 s", now.ns);
   }
 }
 
@@ -143,7 +150,7 @@ std::optional<std::int64_t> Roster::patience_ns(const Now& now) {
   for (auto& [id, account] : accounts_) {
     if (!blamed(account, now)) continue;
     const std::int64_t left =
-        std::max<std::int64_t>(*rules_.stall_timeout_ns - account.stalls.total_ns(now.ns), 0);
+        std::max<std::int64_t>(*rules_.stall_timeout_ns - peer(account).stalls.total_ns(now.ns), 0);
     least = std::min(least.value_or(left), left);
   }
   return least;
@@ -172,7 +179,7 @@ void Roster::refresh(const Now& now) {
       if (account.kept_up && abreast && now.ns - account.kept_up_since_ns >= kReturnNs) {
         account.demoted = false;
         account.reply.due = true;
-        note(account, "kept up for 10 s: participant again");
+        note(account, "kept up for 10 s: participant again", now.ns);
       }
     }
     if (abreast && account.role() == Role::kParticipant) account.counted = true;

@@ -9,17 +9,21 @@
 #include <vector>
 
 #include "sdk/transport/port.hpp"
+#include "services/host/notices.hpp"
 #include "services/host/stall_meter.hpp"
+#include "services/host/token_bucket.hpp"
 #include "services/host/window.hpp"
 
 namespace tandem::host {
+
+inline constexpr double kInputsPerSecond = 60;  ///< per client, on average
+inline constexpr double kInputBurst = 60;       ///< per client, at once
 
 /// The last outcomes of a client's inputs, oldest first, and how fast it may send.
 struct InputAccount {
   std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
   std::vector<transport::ReplyEntry> outcomes;
-  double spent = 0;  ///< of the burst, as of spent_at_ns
-  std::int64_t spent_at_ns = 0;
+  TokenBucket rate{kInputsPerSecond, kInputBurst};
 };
 
 struct JoinAccount {
@@ -52,14 +56,20 @@ struct Account {
   std::uint32_t attempt = 0;
   std::int64_t clock_ns = 0;
   std::int64_t heard_ns = 0;
-  StallMeter stalls;
   RoundTrip round_trip;
   InputAccount inputs;
   JoinAccount join;
   ReplyAccount reply;
+  TokenBucket notices = kNoticesOfClient;
 
   [[nodiscard]] transport::Role role() const { return demoted ? transport::Role::kObserver : wanted; }
   [[nodiscard]] bool plays() const { return present && phase == transport::Phase::kPlaying; }
+};
+
+/// What all clients of one DDS participant may cost together, or ids would multiply it.
+struct Peer {
+  StallMeter stalls;
+  TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
 };
 
 /// Rules of clients, without I/O. Not thread-safe.
@@ -97,7 +107,8 @@ class Roster {
   [[nodiscard]] bool blocked(const Now& now) const;
   /// Whether a client is to blame for that: it lacks a delta that was written.
   [[nodiscard]] bool blamed(const Now& now) const;
-  /// Charges a suspension that lasted `duration_ns` to all who are to blame, and demotes who caused too much.
+  /// Charges a suspension that lasted `duration_ns` to the DDS participants of all who are to blame, and
+  /// demotes those of them whose participant caused too much.
   void charge(std::int64_t duration_ns, const Now& now);
   /// Shortest time until somebody who is to blame has used up its allowance; nothing if nobody does or may.
   [[nodiscard]] std::optional<std::int64_t> patience_ns(const Now& now);
@@ -111,16 +122,17 @@ class Roster {
   [[nodiscard]] std::uint32_t counted() const;
   [[nodiscard]] std::uint32_t watching() const;  ///< playing and not counted
   [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
+  [[nodiscard]] Peer& peer(const Account& account) { return peers_.at(account.from); }
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
-  [[nodiscard]] std::vector<std::string>& notices() { return notices_; }
+  [[nodiscard]] Notices& notices() { return notices_; }
   /// Accounts with a reply writer that were forgotten, for whoever ends their writers and removes them here.
   [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
 
  private:
   Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
   using Accounts = std::map<transport::ClientId, Account>;
-  void note(const Account& account, std::string_view what);
+  void note(Account& account, std::string_view what, std::int64_t now_ns);
   Accounts::iterator forget(Accounts::iterator account);
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
     return account.applied + window_ >= now.frame + 1;
@@ -133,8 +145,9 @@ class Roster {
   std::uint32_t window_;
   std::map<transport::ClientId, Account>
       accounts_;  // ordered, so that rules apply in the same order everywhere
+  std::map<transport::ParticipantId, Peer> peers_;  // those with an account
   std::uint64_t seen_ = 0, demotions_ = 0;
-  std::vector<std::string> notices_;
+  Notices notices_;
   std::vector<transport::ClientId> forgotten_;
 };
 

@@ -109,6 +109,24 @@ TEST_F(JoinTest, TheSameJoinerGetsAnotherOnlyAfterItAsksAgain) {
   EXPECT_EQ(bench.port.snapshots.size(), 2U);
 }
 
+TEST_F(JoinTest, WhoAsksInALoopIsServedEveryTwoSecondsWhateverItsIds) {
+  std::uint32_t attempt = 0;
+  bench.on_ms = [&] {
+    ++attempt;
+    for (transport::ClientId id = 1; id <= 16; ++id) {
+      bench.port.acks.push_back(
+          {bench.ack(id, Phase::kJoining, 0, Role::kObserver, attempt), participant(1)});
+    }
+  };
+  bench.run_ms(20'000);
+  const std::size_t served = bench.port.snapshots.size();
+  EXPECT_LE(served, 1 + 4 + 10U);
+  bench.on_ms = {};
+  bench.joining(21);
+  bench.run_ms(150);
+  EXPECT_GT(bench.port.snapshots.size(), served) << "others are served at once";
+}
+
 TEST_F(JoinTest, OrAfterFiveSecondsHavePassed) {
   bench.joining(1);
   bench.run_ms(4900);
@@ -287,6 +305,19 @@ TEST(ClientLimit, OneParticipantHoldsSixteenClientsAtMost) {
   bench.joining(21);
   bench.run_ms(20);
   EXPECT_EQ(bench.host->totals().clients_seen, 17U) << "another participant's client finds a seat";
+}
+
+TEST(ClientLimit, ClientsOfAParticipantThatAreGoneHoldNoSeatOfIt) {
+  Bench bench;
+  bench.poll();
+  const auto joins = [&](transport::ClientId id) {
+    bench.port.acks.push_back({bench.ack(id, Phase::kJoining, 0), participant(1)});
+  };
+  for (transport::ClientId id = 1; id <= 16; ++id) joins(id);
+  bench.run_ms(31'000);  // nothing more is heard of them
+  for (transport::ClientId id = 21; id <= 36; ++id) joins(id);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().clients_seen, 32U);
 }
 
 }  // namespace

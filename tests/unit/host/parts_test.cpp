@@ -1,9 +1,11 @@
 // The small parts by themselves.
 #include <gtest/gtest.h>
 
+#include "services/host/notices.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/pacing.hpp"
 #include "services/host/stall_meter.hpp"
+#include "services/host/token_bucket.hpp"
 #include "services/host/window.hpp"
 #include "tests/unit/host/fakes.hpp"
 
@@ -24,6 +26,39 @@ TEST(StallMeter, AddsChargesWithinTheWindowAndDropsThemOneByOne) {
   EXPECT_EQ(meter.total_ns(19 * kSecond), 110 * kMillisecond);
   EXPECT_EQ(meter.total_ns(24 * kSecond), 60 * kMillisecond);
   EXPECT_EQ(meter.total_ns(1000 * kSecond), 0);
+}
+
+TEST(TokenBucket, GivesABurstAndThenARate) {
+  TokenBucket bucket(2, 3);
+  int taken = 0;
+  for (std::int64_t ms = 0; ms <= 10'000; ++ms) taken += bucket.take(kSecond + ms * kMillisecond) ? 1 : 0;
+  EXPECT_NEAR(taken, 3 + 20, 1);
+}
+
+TEST(Notices, OfOneClientAndOfAllAreBoundedAndSayWhatIsLeftOut) {
+  Notices notices;
+  TokenBucket loud = kNoticesOfClient, quiet = kNoticesOfClient;
+  std::vector<std::string> lines;
+  const auto collect = [&] {
+    for (auto& line : notices.take()) lines.push_back(std::move(line));
+  };
+  constexpr std::int64_t kSeconds = 600;
+  for (std::int64_t ms = 0; ms < 1000 * kSeconds; ++ms) {
+    notices.add("loud", loud, kSecond + ms * kMillisecond);
+    if (ms == 300'000) notices.add("quiet", quiet, kSecond + ms * kMillisecond);
+    collect();
+  }
+  EXPECT_NEAR(static_cast<double>(std::ranges::count(lines, "loud")), 8 + kSeconds / 10, 2);
+  EXPECT_EQ(std::ranges::count(lines, "quiet"), 1);
+  EXPECT_LE(lines.size(), 8 + 2 * kSeconds / 10 + 3);
+  EXPECT_TRUE(std::ranges::any_of(lines, [](const auto& l) { return l.ends_with(" lines left out"); }));
+  lines.clear();
+  for (std::int64_t ms = 0; ms < 1000 * kSeconds; ++ms) {
+    TokenBucket stranger = kNoticesOfClient;
+    notices.add("stranger", stranger, (kSeconds + 1) * kSecond + ms * kMillisecond);
+    collect();
+  }
+  EXPECT_LE(lines.size(), Notices::kBurst + 2 * kSeconds + kSeconds / 10 + 1);
 }
 
 TEST(PublishTimes, RemembersRecentFramesOnly) {

@@ -69,6 +69,34 @@ TEST_F(StallTest, SeveralFrozenAtOnceDelayNoLongerThanOne) {
   EXPECT_EQ(bench.host->participants(), 1U);
 }
 
+TEST_F(StallTest, OneParticipantWhoseClientsFreezeInTurnDelaysNoLongerThanOneClient) {
+  enter(1);
+  constexpr transport::ClientId kFirst = 100, kCount = 16;
+  for (const bool plays : {false, true}) {
+    for (transport::ClientId id = kFirst; id < kFirst + kCount; ++id) {
+      bench.port.acks.push_back(
+          {bench.ack(id, plays ? Phase::kPlaying : Phase::kJoining, plays ? bench.host->frame() : 0),
+           participant(9)});
+    }
+    bench.run_ms(5);
+  }
+  ASSERT_EQ(bench.host->participants(), 1 + kCount);
+  std::int64_t ms = 0;
+  bench.on_ms = [&] {
+    bench.playing(1, bench.host->frame());
+    const transport::ClientId frozen = kFirst + static_cast<transport::ClientId>(ms++ / 450) % kCount;
+    for (transport::ClientId id = kFirst; id < kFirst + kCount; ++id) {
+      if (id == frozen) continue;
+      bench.port.acks.push_back({bench.ack(id, Phase::kPlaying, bench.host->frame()), participant(9)});
+    }
+  };
+  const Frame before = bench.host->frame();
+  bench.run_ms(30'000);
+  EXPECT_GE(bench.host->frame() - before, 900U * 93 / 100)
+      << "0.5 s of each 10 s at most, and the return of many";
+  EXPECT_LE(bench.host->totals().suspended_ms, 3 * 600U);
+}
+
 TEST_F(StallTest, ADemotedClientIsToldSoByAReply) {
   enter(1);
   enter(2);
