@@ -52,7 +52,9 @@ void SentInputs::clear(std::vector<InputOutcome>& outcomes) {
   for (const Pending& input : pending_) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});
   }
+  const std::uint64_t last_number = last_number_;
   *this = SentInputs();
+  last_number_ = last_number;
 }
 
 }  // namespace tandem::client

@@ -25,7 +25,7 @@ struct InputOutcome {
   std::int64_t latency_ns = 0;  ///< kActed: from sending to applying the frame it acted on
 };
 
-/// Numbers inputs 1, 2, ... in an epoch and matches the replies with them. Bounded. Not thread-safe.
+/// Numbers inputs 1, 2, ... and matches the replies with them. Bounded. Not thread-safe.
 class SentInputs {
  public:
   /// Unanswered inputs held; beyond it the oldest counts as unknown.
@@ -35,7 +35,8 @@ class SentInputs {
   void on_sent(std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
   void on_reply(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
   void on_applied(Frame frame, std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
-  /// A new epoch: everything unanswered counts as unknown, and numbers start at 1 again.
+  /// A new epoch: everything unanswered counts as unknown. Numbers go on: should an earlier server come back,
+  /// it remembers what became of those it knows.
   void clear(std::vector<InputOutcome>& outcomes);
   [[nodiscard]] std::size_t pending() const { return pending_.size(); }
 

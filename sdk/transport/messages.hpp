@@ -164,7 +164,7 @@ struct InputMessage {
   static constexpr const char* kTopic = "TandemInput";
   ClientId client = 0;  ///< key
   Epoch epoch = 0;
-  std::uint64_t number = 0;  ///< starts at 1 in each epoch; gaps are legal
+  std::uint64_t number = 0;  ///< counts up for as long as the client lives; gaps are legal
   Frame client_frame = 0;
   std::uint32_t kind = 0;      ///< InputKind
   std::vector<double> values;  ///< at most 16

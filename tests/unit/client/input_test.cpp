@@ -42,6 +42,32 @@ TEST_F(InputTest, NumbersGoOnAfterARejoin) {
   EXPECT_EQ(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}).value(), 2U);
 }
 
+TEST_F(InputTest, NumbersGoOnOverServersSoThatNoneTakesThemForOldOnes) {
+  join();
+  const auto send = [&] {
+    return core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}).value();
+  };
+  EXPECT_EQ(send(), 1U);
+  port.replies.push_back(from_server(reply({{1, 2, 0}}, 1)));
+  frame();
+  FakeServer other(2000);
+  std::swap(server, other);
+  join();
+  EXPECT_EQ(send(), 2U);
+  std::swap(server, other);
+  join();
+  port.replies.push_back(from_server(reply({{1, 2, 0}}, 1)));  // as the first server remembers it
+  const std::uint64_t number = send();
+  EXPECT_EQ(number, 3U);
+  recorder.outcomes.clear();
+  frame();
+  EXPECT_TRUE(recorder.outcomes.empty());
+  port.replies.push_back(from_server(reply({{1, 2, 0}, {3, 0, 3}}, 3)));
+  frame();
+  ASSERT_EQ(recorder.outcomes.size(), 1U);
+  EXPECT_EQ(recorder.outcomes[0].kind, InputOutcome::Kind::kRefused);
+}
+
 TEST_F(InputTest, ObserversAreToldAtOnce) {
   start(1, transport::Role::kObserver);
   join();

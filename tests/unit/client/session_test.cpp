@@ -147,7 +147,7 @@ TEST_F(SessionTest, ANewEpochEmptiesEverything) {
   EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
   EXPECT_EQ(core->timeline()->hash(), next.hashes.at(1));
   EXPECT_EQ(figures().stale_messages, 1U);
-  EXPECT_EQ(core->send(transport::InputKind::kGravity, {0, -1, 0}, {}, {now_ns, wall_ns()}).value(), 1U);
+  EXPECT_EQ(core->send(transport::InputKind::kGravity, {0, -1, 0}, {}, {now_ns, wall_ns()}).value(), 2U);
 }
 
 TEST_F(SessionTest, TheSameAnnouncementAgainChangesNothing) {
