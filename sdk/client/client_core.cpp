@@ -252,7 +252,7 @@ ClientStatus ClientCore::status() const {
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
   pictures_.want();
-  if (epoch_ && epoch_->timeline.playing()) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer);
+  if (epoch_ && epoch_->played) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer);
 }
 
 // While joining again, the last picture is still there to be drawn, as long as it is of this epoch.

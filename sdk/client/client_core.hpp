@@ -111,7 +111,7 @@ class ClientCore {
   // client_stream.cpp: join, play, join again
   void take_stream(Now now);
   void take_deltas(Now now);
-  void take_scheduled(Now now);
+  void take_scheduled();
   void take_snapshots(Now now);
   void join(Now now);
   void load(transport::SnapshotMessage&& snapshot, Now now);

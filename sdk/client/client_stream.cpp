@@ -27,7 +27,7 @@ std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
 void ClientCore::take_stream(Now now) {
   if (!epoch_->stream_open) return;
   take_deltas(now);
-  take_scheduled(now);
+  take_scheduled();
   take_snapshots(now);
 }
 
@@ -58,7 +58,7 @@ void ClientCore::take_deltas(Now now) {
   }
 }
 
-void ClientCore::take_scheduled(Now now) {
+void ClientCore::take_scheduled() {
   inbox_.inputs.clear();
   port_.take(inbox_.inputs);
   for (const auto& received : inbox_.inputs) {
@@ -72,13 +72,6 @@ void ClientCore::take_scheduled(Now now) {
     }
     epoch_->scheduled.add(*input);
     listener_.on_scheduled(received.message);
-    if (epoch_->joining) continue;
-    if (auto scheduled = epoch_->timeline.schedule(*input); !scheduled) {
-      ++statistics_.refused_messages;
-      rejoin(ResyncReason::kRefused, scheduled.error().message, now);
-    } else if (input->frame <= epoch_->timeline.now()) {
-      epoch_->pictures.on_simulated(epoch_->timeline, epoch_->pacer);
-    }
   }
 }
 
@@ -124,9 +117,6 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
   if (loaded && e.timeline.applied() != snapshot.frame) {
     loaded = fail(ErrorCode::kMalformed, "snapshot of another frame than announced");
   }
-  for (auto it = e.scheduled.held().begin(); loaded && it != e.scheduled.held().end(); ++it) {
-    loaded = e.timeline.schedule(it->second);
-  }
   if (!loaded) {
     ++statistics_.refused_messages;
     if (loaded.error().code == ErrorCode::kMismatch) ++statistics_.hash_mismatches;
@@ -161,7 +151,12 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
       rejoin(ResyncReason::kGap, "gap before frame " + std::to_string(delta->frame), now);
       return;
     }
-    if (!e.timeline.holds_inputs(delta->last_input)) {
+    if (const auto scheduled = e.scheduled.hand_over(e.timeline, delta->last_input); !scheduled) {
+      ++statistics_.refused_messages;
+      rejoin(ResyncReason::kRefused, scheduled.error().message, now);
+      return;
+    }
+    if (e.timeline.inputs_held() < delta->last_input) {
       e.input_missing_ns = e.input_missing_ns ? *e.input_missing_ns + since_last_poll_ns : 0;
       if (*e.input_missing_ns < kInputPatienceNs) return;
       rejoin(ResyncReason::kMissingInput,

@@ -29,4 +29,11 @@ Result<ScheduledDrive> read_scheduled(const transport::ScheduledInputMessage& me
   return input;
 }
 
+Result<void> ScheduledInputs::hand_over(ClientTimeline& timeline, std::uint64_t last) const {
+  for (auto it = held_.upper_bound(timeline.inputs_held()); it != held_.end() && it->first <= last; ++it) {
+    if (auto scheduled = timeline.schedule(it->second); !scheduled) return scheduled;
+  }
+  return {};
+}
+
 }  // namespace tandem::client

@@ -20,15 +20,17 @@ namespace tandem::client {
 /// thread-safe.
 class ScheduledInputs {
  public:
-  /// As deep as the topic's history, twice: more can not be on their way to one reader.
-  static constexpr std::size_t kKept = 512;
+  /// For a client that is 1,024 frames behind, with two inputs a frame.
+  static constexpr std::size_t kKept = 2048;
 
   void add(const ScheduledDrive& input) {
     held_.emplace(input.number, input);
     if (held_.size() > kKept) held_.erase(held_.begin());
   }
-  void clear() { held_.clear(); }
-  [[nodiscard]] const std::map<std::uint64_t, ScheduledDrive>& held() const { return held_; }
+  /// Schedules those up to number `last`, and no others: a client that is behind holds more than may wait to
+  /// act at any one frame, and nothing that it simulates needs them before a delta counts them. Errors: those
+  /// of ClientTimeline::schedule().
+  [[nodiscard]] Result<void> hand_over(ClientTimeline& timeline, std::uint64_t last) const;
 
  private:
   std::map<std::uint64_t, ScheduledDrive> held_;

@@ -85,7 +85,10 @@ ClientTimeline::~ClientTimeline() = default;
 Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epoch, StreamId stream) {
   Impl& m = *impl_;
   m.playing = false;
-  State& state = m.ring[0].state;
+  // Beside the state that is drawn meanwhile; what was simulated beyond that goes.
+  m.now = m.applied;
+  Impl::Held& place = m.at(m.applied + 1);
+  State& state = place.state;
   const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
@@ -95,7 +98,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
     return fail(ErrorCode::kMismatch,
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
   }
-  std::swap(m.ring[0], m.at(read->frame));
+  std::swap(place, m.at(read->frame));
   m.at(read->frame).input.drive = read->drive;
   m.parts.delta.restore_parameters(read->parameters);
   m.inputs.reset(read->last_input, read->pending);
@@ -118,7 +121,7 @@ Result<void> ClientTimeline::schedule(const ScheduledDrive& input) {
   return {};
 }
 
-bool ClientTimeline::holds_inputs(std::uint64_t number) const { return number <= impl_->inputs.held_to(); }
+std::uint64_t ClientTimeline::inputs_held() const { return impl_->inputs.held_to(); }
 
 Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload) {
@@ -128,7 +131,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
     return fail(ErrorCode::kOutOfOrder,
                 "delta " + std::to_string(frame) + " does not follow " + std::to_string(m.applied));
   }
-  if (!holds_inputs(last_input)) {
+  if (last_input > inputs_held()) {
     return fail(ErrorCode::kOutOfOrder,
                 "scheduled inputs up to " + std::to_string(last_input) + " are not all here");
   }

@@ -104,7 +104,7 @@ class ClientTimeline {
   ~ClientTimeline();
 
   /// Starts over from a snapshot. Errors: kMalformed, kOutOfOrder (another epoch or stream), kMismatch (its
-  /// own hash); on error the timeline holds nothing (`playing()` is false).
+  /// own hash); on error `playing()` is false, and of all states that of applied() is still there.
   [[nodiscard]] Result<void> load(std::span<const std::byte> snapshot, Epoch epoch, StreamId stream = {});
   [[nodiscard]] bool playing() const;
 
@@ -113,11 +113,11 @@ class ClientTimeline {
   /// kCapacity; kMalformed; kOutOfOrder before load() and for a frame that was already applied (a gap in the
   /// server's promise).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
-  /// True when every input number up to `number` is held, counted from the snapshot's.
-  [[nodiscard]] bool holds_inputs(std::uint64_t number) const;
+  /// Every input number up to here is held, counted from the snapshot's.
+  [[nodiscard]] std::uint64_t inputs_held() const;
 
   /// Applies delta `frame` == applied() + 1, simulating up to it first if need be, checks the hash and
-  /// re-simulates what was simulated beyond it. Needs holds_inputs(last_input). Errors: kOutOfOrder,
+  /// re-simulates what was simulated beyond it. Needs inputs_held() >= last_input. Errors: kOutOfOrder,
   /// kMalformed, kUnsupported: state untouched. kMismatch: applied but wrong; load() again.
   [[nodiscard]] Result<void> apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload);

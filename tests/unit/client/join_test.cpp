@@ -137,6 +137,42 @@ TEST_F(JoinTest, ScheduledInputsThatTheSnapshotCountsAreNotNeededAgain) {
   expect_agreed();
 }
 
+TEST_F(JoinTest, MoreScheduledInputsThanMayWaitAtOnceCanComeWhileJoining) {
+  start();
+  port.sessions.push_back(from_server(server.session));
+  poll();
+  deliver(server.advance());
+  const auto snapshot = server.snapshot();
+  for (int i = 0; i < 300; ++i) {
+    port.inputs.push_back(from_server(server.schedule(i)));
+    deliver(server.advance());
+  }
+  poll();
+  port.snapshots.push_back(from_server(snapshot));
+  poll();
+  EXPECT_EQ(figures().refused_messages, 0U);
+  ASSERT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(core->timeline()->applied(), 301U);
+  expect_agreed();
+}
+
+TEST_F(JoinTest, WhatIsHeldCanBeDrawnAfterASnapshotWasRefused) {
+  join();
+  for (int i = 0; i < 3; ++i) frame();
+  static_cast<void>(server.advance());
+  frame();  // a gap
+  ASSERT_EQ(core->phase(), ClientPhase::kJoining);
+  auto broken = server.snapshot();
+  broken.bytes.back() ^= std::byte{1};
+  poll(300 * kMs);
+  port.snapshots.push_back(from_server(broken));
+  poll();
+  ASSERT_EQ(figures().refused_messages, 1U);
+  core->start_sampling();
+  Sample sample;
+  EXPECT_TRUE(core->sample(sample, SampleMode::kExtrapolate, {now_ns, wall_ns()}));
+}
+
 TEST_F(JoinTest, AGapWhileJoiningStartsTheBufferAgainBehindIt) {
   start();
   port.sessions.push_back(from_server(server.session));
