@@ -121,11 +121,31 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   return transport::make_dds_server_port(dds);
 }
 
-enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame };
+/// Tells of writes that fail: the first at once, then how many there were, every 10 s.
+class FailureLog {
+ public:
+  explicit FailureLog(const host::Publisher& publisher) : publisher_(&publisher) {}
+
+  void show(std::int64_t now_ns) {
+    const std::uint64_t failures = publisher_->failures();
+    if (failures == told_ || now_ns < next_ns_) return;
+    spdlog::warn("{} writes failed, the last: {}", failures - told_, publisher_->last_failure());
+    told_ = failures;
+    next_ns_ = now_ns + 10 * kSecond;
+  }
+
+ private:
+  const host::Publisher* publisher_;
+  std::uint64_t told_ = 0;
+  std::int64_t next_ns_ = 0;
+};
+
+enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
-             const Options& options, const std::atomic<bool>& stop) {
+             const host::Publisher& publisher, const Options& options, const std::atomic<bool>& stop) {
   Console console;
+  FailureLog failures(publisher);
   const std::int64_t duration_ns =
       options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
   std::optional<std::int64_t> end_ns;  // nothing counts while the name is claimed
@@ -141,6 +161,8 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       script.send_due(host);
     }
     console.show(host, now_ns);
+    failures.show(now_ns);
+    if (publisher.gave_up()) return Ending::kCannotWrite;
     if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
     const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
     if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
@@ -202,11 +224,11 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
 
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
-  const Ending ending = serve(**host, **port, script, hashes, options, stop);
+  const Ending ending = serve(**host, **port, script, hashes, publisher, options, stop);
   flush((*host)->outbox());
   publisher.stop();
   if (publisher.failures() > 0) {
-    spdlog::warn("{} writes failed, the last: {}", publisher.failures(), publisher.last_failure());
+    spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());
   }
   const auto closed = hashes.close();
   if (!closed) spdlog::error(closed.error().message);
@@ -216,6 +238,9 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
     spdlog::info("at the end: {}", gains);
   const auto printed = print_report((*host)->totals(), frame_rate_hz, options.json);
   if (!printed) spdlog::error(printed.error().message);
+  if (ending == Ending::kCannotWrite) {
+    return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
+  }
   if (ending == Ending::kNobodyCame) {
     return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
                                                           options.wait_for, *options.duration_s)},

@@ -116,13 +116,14 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written
   int failing_writes = 0;          // the next so many deltas are refused
+  ErrorCode failure = ErrorCode::kTransport;
 
  private:
   template <class M>
   Result<void> keep(std::vector<M>& kept, const M& message, const char* kind) {
     if (std::is_same_v<M, transport::DeltaMessage> && failing_writes > 0) {
       --failing_writes;
-      return fail(ErrorCode::kTransport, "refused by the test");
+      return fail(failure, "refused by the test");
     }
     kept.push_back(message);
     order.emplace_back(kind);

@@ -52,6 +52,31 @@ TEST(Publisher, ARefusedDeltaIsWrittenAgainUntilItIsAccepted) {
   EXPECT_EQ(port.order[0], "delta");
 }
 
+TEST(Publisher, WhatTheMiddlewareRefusesForGoodEndsTheSessionInsteadOfBeingTriedForEver) {
+  Outbox outbox({});
+  FakePort port(participant(1));
+  port.failing_writes = 1'000'000;
+  Publisher publisher(outbox, port, 50ms);
+  ASSERT_TRUE(outbox.push(transport::DeltaMessage{}));
+  for (int i = 0; i < 5000 && !publisher.gave_up(); ++i) std::this_thread::sleep_for(1ms);
+  EXPECT_TRUE(publisher.gave_up());
+  EXPECT_GT(publisher.failures(), 1U);
+}
+
+TEST(Publisher, WhatOnlyTakesTimeIsTriedForAsLongAsItTakes) {
+  Outbox outbox({});
+  FakePort port(participant(1));
+  port.failing_writes = 100;
+  port.failure = ErrorCode::kTimeout;
+  Publisher publisher(outbox, port, 1ms);
+  ASSERT_TRUE(outbox.push(transport::DeltaMessage{}));
+  ASSERT_TRUE(outbox.push(transport::ReplyMessage{}));
+  wait_until_empty(outbox);
+  publisher.stop();
+  EXPECT_FALSE(publisher.gave_up());
+  EXPECT_EQ(port.deltas.size(), 1U);
+}
+
 TEST(Publisher, StopsPromptlyEvenWhileAWriteKeepsFailing) {
   Outbox outbox({});
   FakePort port(participant(1));
