@@ -16,6 +16,8 @@ namespace {
 constexpr std::int64_t kAckRepeatNs = 250 * kMillisecond;
 // Longest that poll() asks to sleep.
 constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
+// A server from which nothing comes for so long while it is joined makes room for another, if there is one.
+constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
 
 }  // namespace
 
@@ -29,6 +31,10 @@ std::int64_t ClientCore::poll(Now now) {
   last_poll_ns_ = now.steady_ns;
   poll_began_ns_ = measure();
   server_alive_ = port_.server_alive();
+  if (epoch_ != nullptr && epoch_->joining && (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
+    epoch_->silence_ns = 0;
+    port_.pass_over_session(transport::PassOver::kWhileThereIsAnother);
+  }
   take_sessions(now);
   if (epoch_ != nullptr) {
     take_stream(now);
@@ -59,24 +65,28 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
 }
 
 void ClientCore::take_sessions(Now now) {
-  inbox_.sessions.clear();
-  port_.take_sessions(inbox_.sessions);
-  for (const auto& announcement : inbox_.sessions) {
-    const auto& message = announcement.message;
-    if (message.session != options_.session) continue;
-    const bool same =
-        session_ && session_->epoch == message.epoch && (!epoch_ || epoch_->server == announcement.from);
-    if (!same) adopt(announcement, now);
-  }
+  do {
+    inbox_.sessions.clear();
+    port_.take_sessions(inbox_.sessions);
+    for (const auto& announcement : inbox_.sessions) {
+      const auto& message = announcement.message;
+      if (message.session != options_.session) continue;
+      const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
+      if (!same) adopt(announcement, now);
+      if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
+    }
+    // Of one that cannot be played the next is looked at; each once, so this ends.
+  } while (!epoch_ && !inbox_.sessions.empty());
 }
 
 // A new epoch: everything of the old one is dropped, unseen.
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
-  port_.close_snapshots();
+  port_.close_stream();
   epoch_.reset();
   pictures_.clear();
   sent_.clear(outcomes_);
   session_ = announcement.message;
+  session_from_ = announcement.from;
   refusal_.clear();
   listener_.on_session(*session_);
   auto playable = choose_stream(*session_);

@@ -136,6 +136,7 @@ class ClientCore {
         return false;
       }
     }
+    epoch_->silence_ns = 0;
     return true;
   }
   [[nodiscard]] std::int64_t measure() const {
@@ -159,8 +160,9 @@ class ClientCore {
   Sampler sampler_;  ///< in turns: while reading a picture
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
-  std::string refusal_;                               ///< why it is not
-  std::unique_ptr<EpochState> epoch_;                 ///< null while there is no playable session
+  transport::ParticipantId session_from_;
+  std::string refusal_;                ///< why it is not
+  std::unique_ptr<EpochState> epoch_;  ///< null while there is no playable session
 
   bool server_alive_ = false;
   bool ack_due_ = false;

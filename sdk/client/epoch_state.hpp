@@ -44,6 +44,7 @@ struct EpochState {
   bool stream_open = false;
   bool joining = true;
   bool played = false;             ///< has been playing in this epoch
+  std::int64_t silence_ns = 0;     ///< time with polls since anything came from the server
   std::int64_t join_began_ns = 0;  ///< the session was learned, or something was lost
   /// How long the front delta has waited for a scheduled input.
   std::optional<std::int64_t> input_missing_ns;

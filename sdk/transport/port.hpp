@@ -59,14 +59,22 @@ class ServerPort {
   virtual void wake() {}
 };
 
+/// For how long an announcement is not followed.
+enum class PassOver : std::uint8_t {
+  kUntilAnnouncedAnew,   ///< it cannot be played
+  kWhileThereIsAnother,  ///< nothing comes from it
+};
+
 /// A client's endpoints in one session. All calls from one thread; takes as in ServerPort.
 class ClientPort {
  public:
   virtual ~ClientPort() = default;
 
   [[nodiscard]] virtual ParticipantId self() const = 0;
-  /// Session announcements with a live writer, newest first seen last.
+  /// The announcement to follow, when it is another than before: one server's for as long as that lives.
   virtual void take_sessions(std::vector<Received<SessionMessage>>& out) = 0;
+  /// What take_sessions() handed out last is of no use: others come first.
+  virtual void pass_over_session(PassOver until) = 0;
   /// False when the writer of the session's announcement is gone (server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;
 
@@ -75,6 +83,8 @@ class ClientPort {
   /// buffered.
   virtual Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                                    ClientId client) = 0;
+  /// Ends all subscriptions that open_stream() and open_snapshots() made.
+  virtual void close_stream() = 0;
   /// Subscribes to the snapshots of the stream that is open; close when one was taken. No effect while open.
   virtual Result<void> open_snapshots() = 0;
   virtual void close_snapshots() = 0;

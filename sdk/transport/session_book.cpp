@@ -5,15 +5,32 @@
 
 namespace tandem::transport {
 namespace {
-// Sessions have one server, for a moment two; somebody who announces from many writers must not fill our
+// Sessions have one server, for a moment two; somebody who announces from many participants must not fill our
 // memory.
-constexpr std::size_t kMaxWriters = 64;
+constexpr std::size_t kMaxEntries = 64;
 }  // namespace
 
 void SessionBook::put(std::uint64_t writer, Received<SessionMessage> announcement) {
-  std::erase_if(entries_, [writer](const Entry& entry) { return entry.writer == writer; });
-  if (entries_.size() >= kMaxWriters) entries_.erase(entries_.begin());
-  entries_.push_back(Entry{writer, next_order_++, true, std::move(announcement)});
+  const auto known = std::ranges::find_if(
+      entries_, [&](const Entry& entry) { return entry.announcement.from == announcement.from; });
+  Entry entry{.writer = writer, .version = ++versions_, .announcement = std::move(announcement)};
+  if (known == entries_.end()) {
+    if (entries_.size() >= kMaxEntries) make_room();
+    entries_.push_back(std::move(entry));
+    return;
+  }
+  if (current_ == known->writer) current_ = writer;
+  const bool back_of_the_line = known->passed_over.has_value();
+  *known = std::move(entry);
+  if (back_of_the_line) std::rotate(known, known + 1, entries_.end());
+}
+
+// The current one stays, whoever crowds in.
+void SessionBook::make_room() {
+  auto least = std::ranges::find_if(entries_, [](const Entry& entry) { return !entry.live; });
+  const auto other = [this](const Entry& entry) { return entry.writer != current_; };
+  if (least == entries_.end() || !other(*least)) least = std::ranges::find_if(entries_, other);
+  entries_.erase(least);
 }
 
 void SessionBook::update(const StateOf& state_of) {
@@ -25,11 +42,26 @@ void SessionBook::update(const StateOf& state_of) {
 }
 
 void SessionBook::take_current(std::vector<Received<SessionMessage>>& out) {
-  const auto current =
-      std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& entry) { return entry.live; });
-  const std::uint64_t order = current == entries_.rend() ? 0 : current->order;
-  if (order != 0 && order != reported_) out.push_back(current->announcement);
-  reported_ = order;
+  const auto usable = [](const Entry& entry) { return entry.live && !entry.passed_over; };
+  auto current = std::ranges::find_if(
+      entries_, [&](const Entry& entry) { return entry.writer == current_ && usable(entry); });
+  if (current == entries_.end()) current = std::ranges::find_if(entries_, usable);
+  if (current == entries_.end()) {
+    for (Entry& entry : entries_) {
+      if (entry.passed_over == PassOver::kWhileThereIsAnother) entry.passed_over.reset();
+    }
+    current = std::ranges::find_if(entries_, usable);
+  }
+  const std::uint64_t version = current == entries_.end() ? 0 : current->version;
+  if (version != 0 && version != reported_) out.push_back(current->announcement);
+  reported_ = version;
+  current_ = version == 0 ? std::nullopt : std::optional(current->writer);
+}
+
+void SessionBook::pass_over_current(PassOver until) {
+  for (Entry& entry : entries_) {
+    if (entry.writer == current_) entry.passed_over = until;
+  }
 }
 
 void SessionBook::list_live(std::vector<Received<SessionMessage>>& out) const {

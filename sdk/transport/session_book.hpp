@@ -1,5 +1,5 @@
 #pragma once
-// The session announcements a port has seen, by writer: which one is current, and what to report.
+// The session announcements a port has seen, by participant: which one is current, and what to report.
 
 #include <cstdint>
 #include <functional>
@@ -13,9 +13,12 @@ namespace tandem::transport {
 /// How a writer of announcements stands. A silent one may come back; a gone one has to be discovered again.
 enum class WriterState : std::uint8_t { kLive, kSilent, kGone };
 
-/// Remembers each writer's newest announcement, because a transport hands out a sample once, while a server
-/// that was silent for a while (stopped, cut off) comes back without announcing itself again. Not
+/// Remembers each participant's newest announcement, because a transport hands out a sample once, while a
+/// server that was silent for a while (stopped, cut off) comes back without announcing itself again. Not
 /// thread-safe.
+///
+/// One of them is current: the one seen first among those that live and were not passed over. It stays so for
+/// as long as it lives, whatever others announce.
 class SessionBook {
  public:
   using StateOf = std::function<WriterState(std::uint64_t writer, const ParticipantId& participant)>;
@@ -25,8 +28,9 @@ class SessionBook {
   /// Forgets writers that are gone and takes note of who lives.
   void update(const StateOf& state_of);
 
-  /// Appends the announcement seen last among the live ones, when it is not the one appended before.
+  /// Appends the current announcement, when it is not the one appended before.
   void take_current(std::vector<Received<SessionMessage>>& out);
+  void pass_over_current(PassOver until);
   /// Appends all live announcements in the order they were first seen.
   void list_live(std::vector<Received<SessionMessage>>& out) const;
   [[nodiscard]] bool any_live() const;
@@ -35,13 +39,17 @@ class SessionBook {
  private:
   struct Entry {
     std::uint64_t writer = 0;
-    std::uint64_t order = 0;
+    std::uint64_t version = 0;  // of all announcements, counted
     bool live = true;
+    std::optional<PassOver> passed_over = {};
     Received<SessionMessage> announcement;
   };
-  std::vector<Entry> entries_;  // ascending by order
-  std::uint64_t next_order_ = 1;
-  std::uint64_t reported_ = 0;  // order of the entry appended last; 0: none
+  void make_room();
+
+  std::vector<Entry> entries_;  // in the order in which they are considered
+  std::uint64_t versions_ = 0;
+  std::optional<std::uint64_t> current_;  // its writer
+  std::uint64_t reported_ = 0;            // version of the announcement appended last; 0: none
 };
 
 }  // namespace tandem::transport

@@ -172,13 +172,14 @@ bool Host::Impl::poll() {
 }
 
 void Host::Impl::claim_name() {
-  error = claim.check(*port, false);
+  error = claim.check(*port, roster.notices(), now_ns);
   if (error) {
     state = State::kRefused;
     return;
   }
   if (now_ns - *first_poll_ns < config.claim_ns || !outbox.push(session)) return;
   state = State::kWaiting;
+  claim.announced(now_ns);
   last_look_ns = now_ns;
 }
 
@@ -207,6 +208,7 @@ void Host::Impl::receive() {
 }
 
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
+  claim.acknowledged(ack.message.epoch, ack.from, now_ns);
   const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
   if (reason == Reason::kNone) return snapshot_parts.missing(ack.message);
   ++totals.refused_messages;
@@ -257,7 +259,7 @@ void Host::Impl::look_around() {
   if (now_ns - last_look_ns < (waiting == Waiting::kParticipants ? kLongestWakeNs : kLookNs)) return;
   last_look_ns = now_ns;
   roster.look_for_dead(*port, moment());
-  error = claim.check(*port, true);
+  error = claim.check(*port, roster.notices(), now_ns);
   if (error) state = State::kRefused;
 }
 

@@ -16,11 +16,11 @@ namespace tandem::transport::dds {
 /// next sample. A session is announced once, so a server lives as long as any of its writers does.
 class Announcements {
  public:
-  /// `own`: hears the participant of `node` itself, too.
-  static Result<Announcements> create(Node& node, bool own) {
-    auto sessions = node.reader<SessionMessage>("sessions", Topic<SessionMessage>::kQos.reader_depth, !own);
+  /// `options.watched`: whoever waits calls refresh() each time.
+  static Result<Announcements> create(Node& node, const ReaderOptions& options = {}) {
+    auto sessions = node.reader<SessionMessage>("sessions", options);
     if (!sessions) return tl::unexpected(sessions.error());
-    auto status = node.reader<ServerStatusMessage>("server status", 1, !own);
+    auto status = node.reader<ServerStatusMessage>("server status", options);
     if (!status) return tl::unexpected(status.error());
     return Announcements(std::move(*sessions), std::move(*status));
   }

@@ -31,6 +31,7 @@ class DdsClientPort final : public ClientPort {
     refresh();
     endpoints_.servers.book().take_current(out);
   }
+  void pass_over_session(PassOver until) override { endpoints_.servers.book().pass_over_current(until); }
   [[nodiscard]] bool server_alive() override {
     refresh();
     const SessionBook& book = endpoints_.servers.book();
@@ -46,16 +47,20 @@ class DdsClientPort final : public ClientPort {
     stream_.reset();
     epoch_ = session.epoch;
     const auto depth = static_cast<std::int32_t>(options_.delta_depth);
-    auto delta = endpoints_.node.reader<DeltaMessage>("deltas", depth);
+    auto delta = endpoints_.node.reader<DeltaMessage>("deltas", {.depth = depth});
     if (!delta) return tl::unexpected(delta.error());
     auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");
     if (!scheduled) return tl::unexpected(scheduled.error());
-    auto reply =
-        endpoints_.node.reader<ReplyMessage>("replies", Topic<ReplyMessage>::kQos.reader_depth, false,
-                                             {options_.session, reply_partition(options_.session, client)});
+    auto reply = endpoints_.node.reader<ReplyMessage>(
+        "replies", {.partitions = {options_.session, reply_partition(options_.session, client)}});
     if (!reply) return tl::unexpected(reply.error());
     stream_.emplace(Stream{std::move(*delta), std::move(*scheduled), std::move(*reply)});
     return {};
+  }
+  void close_stream() override {
+    snapshots_.reset();
+    stream_.reset();
+    epoch_.reset();
   }
   Result<void> open_snapshots() override {
     if (snapshots_) return {};
@@ -122,7 +127,7 @@ Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& optio
   if (!input) return tl::unexpected(input.error());
   auto status = node->writer<ClientStatusMessage>("client status");
   if (!status) return tl::unexpected(status.error());
-  auto servers = dds::Announcements::create(*node, true);
+  auto servers = dds::Announcements::create(*node);
   if (!servers) return tl::unexpected(servers.error());
   return std::make_unique<DdsClientPort>(
       DdsClientPort::Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(*input),

@@ -45,7 +45,7 @@ class DdsMonitor final : public Monitor {
 Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options) {
   auto node = dds::Node::create(options, "tandem monitor", "*");
   if (!node) return tl::unexpected(node.error());
-  auto servers = dds::Announcements::create(*node, true);
+  auto servers = dds::Announcements::create(*node);
   if (!servers) return tl::unexpected(servers.error());
   auto clients = node->reader<ClientStatusMessage>("client status");
   if (!clients) return tl::unexpected(clients.error());

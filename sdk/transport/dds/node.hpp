@@ -102,6 +102,14 @@ class Reader {
   Participants participants_;
 };
 
+/// How a reader differs from its topic's.
+struct ReaderOptions {
+  std::optional<std::int32_t> depth = {};
+  bool ignore_own = false;  ///< not what its own participant writes
+  bool watched = true;      ///< what comes ends Node::wait(); whoever watches it has to take it
+  std::vector<std::string> partitions = {};  ///< through a subscriber of its own; none: the node's
+};
+
 class Node {
  public:
   /// `name` is what DDS tools show. `partition` may be "*".
@@ -128,28 +136,29 @@ class Node {
     return Writer<M>(std::move(*topic), std::move(*publisher), std::move(*entity), options_);
   }
 
-  /// In all of `partitions`, through a subscriber of its own; where there are none, in the node's.
   template <class M>
-  Result<Reader<M>> reader(const std::string& name, std::int32_t depth = Topic<M>::kQos.reader_depth,
-                           bool ignore_own = false, const std::vector<std::string>& partitions = {}) {
+  Result<Reader<M>> reader(const std::string& name, const ReaderOptions& options = {}) {
     auto topic = make_topic(Topic<M>::descriptor(), M::kTopic);
     if (!topic) return tl::unexpected(topic.error());
-    auto subscriber = partitions.empty() ? Result<Entity>() : make_subscriber(partitions);
+    auto subscriber = options.partitions.empty() ? Result<Entity>() : make_subscriber(options.partitions);
     if (!subscriber) return tl::unexpected(subscriber.error());
     const Entity& parent = *subscriber ? *subscriber : subscriber_;
-    const Qos qos = make_qos(Topic<M>::kQos, depth, DDS_INFINITY);
+    const Qos qos =
+        make_qos(Topic<M>::kQos, options.depth.value_or(Topic<M>::kQos.reader_depth), DDS_INFINITY);
     dds_qset_entity_name(qos.get(), name.c_str());
-    if (ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+    if (options.ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
     auto writers = std::make_unique<LiveWriters>();
     auto entity = own(dds_create_reader(parent.get(), topic->get(), qos.get(), writers->listener()),
                       std::string("the reader of ") + M::kTopic);
     if (!entity) return tl::unexpected(entity.error());
-    if (auto watched = watch(entity->get()); !watched) return tl::unexpected(watched.error());
+    if (options.watched) {
+      if (auto watched = watch(entity->get()); !watched) return tl::unexpected(watched.error());
+    }
     return Reader<M>(std::move(*topic), std::move(*subscriber), std::move(*entity), std::move(writers));
   }
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
-  /// Until a reader created here has something to take, wake() was called, or the timeout.
+  /// Until a watched reader created here has something to take, wake() was called, or the timeout.
   void wait(std::chrono::nanoseconds timeout);
   void wake();
 

@@ -139,7 +139,8 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   auto snapshot = node->writer<SnapshotMessage>("snapshots");
   auto reply = node->writer<ReplyMessage>("replies");
   auto status = node->writer<ServerStatusMessage>("server status");
-  auto others = dds::Announcements::create(*node, false);
+  // Looked at now and then: what others say about themselves must not wake the simulation.
+  auto others = dds::Announcements::create(*node, {.ignore_own = true, .watched = false});
   auto input = node->reader<InputMessage>("inputs");
   auto ack = node->reader<AckMessage>("acknowledgements");
   const Error* failed = nullptr;

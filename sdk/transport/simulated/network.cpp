@@ -163,6 +163,7 @@ class SimulatedClientPort final : public ClientPort {
     member_.refresh(sessions_, book_);
     book_.take_current(out);
   }
+  void pass_over_session(PassOver until) override { book_.pass_over_current(until); }
   [[nodiscard]] bool server_alive() override {
     member_.refresh(sessions_, book_);
     return stream_ ? book_.epoch_live(stream_->epoch) : book_.any_live();
@@ -171,15 +172,16 @@ class SimulatedClientPort final : public ClientPort {
                            ClientId client) override {
     limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     if (stream_ && stream_->epoch == session.epoch) return {};
-    if (stream_) {
-      for (const Fabric::Index reader : {stream_->delta, stream_->scheduled, stream_->reply}) {
-        member_.fabric().close_reader(reader);
-      }
-    }
+    close_readers();
     stream_ = Stream{session.epoch, member_.reader<DeltaMessage>(delta_depth_),
                      member_.reader<ScheduledInputMessage>(kScheduledDepth),
                      member_.reader<ReplyMessage>(1, reply_partition(member_.session(), client))};
     return {};
+  }
+  void close_stream() override {
+    close_snapshots();
+    close_readers();
+    stream_.reset();
   }
   Result<void> open_snapshots() override {
     if (!snapshots_) snapshots_ = member_.reader<SnapshotMessage>(kSnapshotReaderDepth);
@@ -218,6 +220,13 @@ class SimulatedClientPort final : public ClientPort {
     Epoch epoch = 0;
     Fabric::Index delta = 0, scheduled = 0, reply = 0;
   };
+  void close_readers() {
+    if (!stream_) return;
+    for (const Fabric::Index reader : {stream_->delta, stream_->scheduled, stream_->reply}) {
+      member_.fabric().close_reader(reader);
+    }
+  }
+
   Member member_;
   std::uint32_t delta_depth_;
   Fabric::Index ack_, input_, status_, sessions_;

@@ -61,5 +61,47 @@ TEST(Rivals, ALaterServerLeavesAndTheClientsOfTheFirstDoNotNotice) {
   });
 }
 
+TEST(Rivals, AServerThatWasAwayWhileAnotherTookOverLeavesAndNoClientGoesBackToIt) {
+  for_seeds(20, [](std::uint64_t seed) {
+    Dice dice(seed);
+    Stage stage(seed, {.delay_ns = 2'000'000, .jitter_ns = 10'000'000});
+    Server& first = stage.add_server(1'000'000);
+    for (int i = 0; i < 3; ++i) stage.add_client();
+    stage.run_ms(3000);
+    stage.set_frozen(first, true);
+    stage.run_ms(2000);
+    Server& second = stage.add_server(1'005'000);
+    stage.run_ms(3000 + static_cast<std::int64_t>(dice.below(30'000)));
+    for (const auto& client : stage.clients) ASSERT_TRUE(Stage::plays(*client, *second.host));
+    stage.set_frozen(first, false);
+    stage.on_ms = [&] { leave_if_refused(first); };
+    stage.run_ms(5000);
+    EXPECT_EQ(first.host, nullptr) << "left";
+    EXPECT_EQ(second.host->state(), Host::State::kRunning);
+    for (const auto& client : stage.clients) {
+      EXPECT_TRUE(Stage::plays(*client, *second.host));
+      EXPECT_EQ(client->core->statistics().epochs, 2U);
+    }
+  });
+}
+
+TEST(Rivals, AForgedAnnouncementMovesNeitherServerNorClients) {
+  Stage stage(1);
+  Server& server = stage.add_server(1'000'000);
+  Client& client = stage.add_client();
+  stage.run_ms(5000);
+  std::vector<std::unique_ptr<transport::ServerPort>> forgers;
+  for (Epoch i = 0; i < 80; ++i) {
+    forgers.push_back(must(stage.network.make_server("default")));
+    transport::SessionMessage forged = server.host->session();
+    forged.epoch = i % 2 == 0 ? 5 + i : 2'000'000 + i;
+    ASSERT_TRUE(forgers.back()->write(forged));
+  }
+  stage.run_ms(10'000);
+  EXPECT_EQ(server.host->state(), Host::State::kRunning);
+  EXPECT_TRUE(Stage::plays(client, *server.host));
+  EXPECT_EQ(client.core->statistics().epochs, 1U);
+}
+
 }  // namespace
 }  // namespace tandem::host

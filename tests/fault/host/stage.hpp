@@ -56,6 +56,7 @@ struct Server {
   client::Wanderers simulation;
   std::unique_ptr<Host> host;
   bool publishes = true;
+  bool frozen = false;
 };
 
 struct Client {
@@ -101,7 +102,7 @@ class Stage {
       network.advance_to(now_ns);
       if (on_ms) on_ms();
       for (auto& server : servers) {
-        if (server->host == nullptr) continue;
+        if (server->host == nullptr || server->frozen) continue;
         server->host->poll(now_ns, wall_ns());
         if (server->publishes) must_drain(*server);
       }
@@ -110,9 +111,10 @@ class Stage {
       }
     }
   }
-  void set_frozen(Client& client, bool frozen) {
-    client.frozen = frozen;
-    network.set_frozen(client.port->self(), frozen);
+  template <class Member>
+  void set_frozen(Member& member, bool frozen) {
+    member.frozen = frozen;
+    network.set_frozen(member.port->self(), frozen);
   }
   [[nodiscard]] static bool plays(const Client& client, const Host& host) {
     return client.core->phase() == ClientPhase::kPlaying &&

@@ -297,20 +297,45 @@ TEST_F(DdsPorts, AServerSeesOthersButNotItself) {
   EXPECT_EQ(seen_by_second[0].from, first->self());
 }
 
-TEST_F(DdsPorts, WhenTheLatestServerEndsAClientIsToldOfTheOneThatStays) {
-  const auto stays = this->server();
+TEST_F(DdsPorts, WhatOtherServersSayDoesNotWakeAServer) {
+  const auto first = server();
+  const auto other = server();
+  auto monitor = make_dds_monitor(options_);
+  ASSERT_TRUE(monitor);
+  ServerStatusMessage status;
+  status.session = options_.session;
+  std::vector<Received<ServerStatusMessage>> heard;
+  EXPECT_TRUE(eventually([&] {
+    EXPECT_TRUE(other->write(status));
+    (*monitor)->take(heard);
+    return heard.size() >= 5;
+  }));
+  // A sample that waits to be taken would end every wait at once.
+  std::size_t waits = 0;
+  for (const auto end = std::chrono::steady_clock::now() + 200ms; std::chrono::steady_clock::now() < end;) {
+    first->wait(50ms);
+    ++waits;
+  }
+  EXPECT_LT(waits, 100U);
+}
+
+TEST_F(DdsPorts, AClientStaysWithItsServerAndIsToldOfAnotherWhenThatEnds) {
   auto ends = this->server();
+  const auto stays = this->server();
   const auto client = this->client();
-  ASSERT_TRUE(stays->write(a_session(options_.session, kEpoch)));
+  const SessionMessage session = a_session(options_.session, kEpoch);
+  ASSERT_TRUE(ends->write(session));
   EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch);
-  const SessionMessage later = a_session(options_.session, kEpoch + 1);
-  ASSERT_TRUE(ends->write(later));
-  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch + 1);
-  ASSERT_TRUE(client->open_stream(later, later.streams[0], kClient));
+  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
+  ASSERT_TRUE(stays->write(a_session(options_.session, kEpoch + 1)));
+  receive_sessions(*ends);  // by now others have heard of it, too
+  std::vector<Received<SessionMessage>> news;
+  client->take_sessions(news);
+  EXPECT_TRUE(news.empty());
   EXPECT_TRUE(client->server_alive());
   ends.reset();
   EXPECT_TRUE(eventually([&] { return !client->server_alive(); }));
-  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch);
+  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch + 1);
 }
 
 TEST_F(DdsPorts, SessionsWithDifferentNamesDoNotMeet) {

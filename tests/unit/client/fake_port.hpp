@@ -14,12 +14,18 @@ class FakePort final : public transport::ClientPort {
   void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
     move(sessions, out);
   }
+  void pass_over_session(transport::PassOver until) override { passed_over.push_back(until); }
   [[nodiscard]] bool server_alive() override { return alive; }
   Result<void> open_stream(const transport::SessionMessage& session,
                            const transport::StreamMessage& /*stream*/,
                            transport::ClientId /*client*/) override {
     opened_epochs.push_back(session.epoch);
+    stream_open = true;
     return {};
+  }
+  void close_stream() override {
+    close_snapshots();
+    stream_open = false;
   }
   Result<void> open_snapshots() override {
     snapshots_open = true;
@@ -53,7 +59,8 @@ class FakePort final : public transport::ClientPort {
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
   bool alive = true;
-  bool snapshots_open = false;
+  bool stream_open = false, snapshots_open = false;
+  std::vector<transport::PassOver> passed_over;
   std::vector<Epoch> opened_epochs;
   std::vector<transport::Received<transport::SessionMessage>> sessions;
   std::vector<transport::Received<transport::DeltaMessage>> deltas;

@@ -150,6 +150,45 @@ TEST_F(SessionTest, ANewEpochEmptiesEverything) {
   EXPECT_EQ(core->send(transport::InputKind::kGravity, {0, -1, 0}, {}, {now_ns, wall_ns()}).value(), 2U);
 }
 
+TEST_F(SessionTest, WhatCannotBePlayedIsPassedOverAndTheNextIsLookedAt) {
+  start();
+  FakeServer foreign(3000);
+  foreign.session.streams[0].layout.codec = "morse";
+  port.sessions.push_back({foreign.session, {{9}}});
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+  EXPECT_EQ(port.passed_over, (std::vector{transport::PassOver::kUntilAnnouncedAnew}));
+  foreign.session.epoch = server.session.epoch;  // as the forger could say
+  port.sessions.push_back({foreign.session, {{9}}});
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+  join();
+}
+
+TEST_F(SessionTest, ARefusedClientHoldsNoReaderOfAStream) {
+  join();
+  EXPECT_TRUE(port.stream_open);
+  FakeServer foreign(3000);
+  foreign.session.streams[0].layout.codec = "morse";
+  port.sessions.push_back({foreign.session, {{9}}});
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+  EXPECT_FALSE(port.stream_open) << "what comes would not be taken, and end every wait at once";
+}
+
+TEST_F(SessionTest, AServerFromWhichNothingComesMakesRoomForAnother) {
+  start();
+  port.sessions.push_back(from_server(server.session));
+  for (int i = 0; i < 240; ++i) poll(40 * kMs);
+  EXPECT_TRUE(port.passed_over.empty());
+  deliver(server.advance());
+  for (int i = 0; i < 240; ++i) poll(40 * kMs);
+  EXPECT_TRUE(port.passed_over.empty());
+  for (int i = 0; i < 20; ++i) poll(40 * kMs);
+  EXPECT_EQ(port.passed_over, (std::vector{transport::PassOver::kWhileThereIsAnother}));
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+}
+
 TEST_F(SessionTest, TheSameAnnouncementAgainChangesNothing) {
   join();
   port.sessions.push_back(from_server(server.session));

@@ -80,6 +80,61 @@ TEST(Claim, AServerOlderByMoreThanTwoSecondsStaysWhateverItsGuid) {
   EXPECT_EQ(younger.host->state(), Host::State::kRefused);
 }
 
+// Clients that acknowledge the epoch of a server, four times a second.
+void follow(Bench& bench, Epoch epoch, std::uint8_t first, std::uint8_t count) {
+  for (std::uint8_t i = 0; i < count; ++i) {
+    const auto tag = static_cast<std::uint8_t>(first + i);
+    auto ack = bench.ack(tag, transport::Phase::kJoining, 0, transport::Role::kObserver);
+    ack.epoch = epoch;
+    bench.port.acks.push_back({ack, participant(tag)});
+  }
+}
+
+struct Followed {
+  std::uint8_t ours = 0, theirs = 0;
+};
+
+Host::State after_ten_seconds(Followed followers, const transport::Received<transport::SessionMessage>& other,
+                              std::vector<std::string>* notices = nullptr) {
+  Bench bench;
+  bench.poll();
+  int ms = 0;
+  bench.on_ms = [&] {
+    if (++ms == 3000) bench.port.rivals.push_back(other);
+    if (ms % 250 != 0) return;
+    follow(bench, test_config().epoch, 1, followers.ours);
+    follow(bench, other.message.epoch, 100, followers.theirs);
+  };
+  bench.run_ms(10'000);
+  if (notices != nullptr) *notices = bench.host->take_notices();
+  return bench.host->state();
+}
+
+TEST(Claim, AnAnnouncementThatNobodyFollowsEndsNobodyAndIsToldOnce) {
+  for (const auto ours : std::initializer_list<std::uint8_t>{0, 1, 5}) {
+    std::vector<std::string> notices;
+    EXPECT_EQ(after_ten_seconds({ours, 0}, rival(-60'000, 0x01), &notices), Host::State::kRunning);
+    EXPECT_EQ(std::ranges::count_if(
+                  notices, [](const auto& line) { return line.find("1699999940000") != std::string::npos; }),
+              1);
+  }
+}
+
+TEST(Claim, AServerThatWasAwayLeavesToTheOneThatIsFollowedNow) {
+  EXPECT_EQ(after_ten_seconds({0, 1}, rival(60'000, 0xFF)), Host::State::kRefused);
+  EXPECT_EQ(after_ten_seconds({2, 3}, rival(60'000, 0xFF)), Host::State::kRefused);
+}
+
+TEST(Claim, TheOneThatTookOverStaysWhateverTheAgeOfTheOther) {
+  EXPECT_EQ(after_ten_seconds({1, 0}, rival(-60'000, 0x01)), Host::State::kRunning);
+  EXPECT_EQ(after_ten_seconds({3, 2}, rival(-60'000, 0x01)), Host::State::kRunning);
+}
+
+TEST(Claim, OfTwoFollowedAlikeExactlyOneStays) {
+  EXPECT_EQ(after_ten_seconds({2, 2}, rival(-60'000, 0xFF)), Host::State::kRefused);
+  EXPECT_EQ(after_ten_seconds({2, 2}, rival(60'000, 0x01)), Host::State::kRunning);
+}
+
 TEST(Claim, ARefusedServerProducesNothingMore) {
   Bench bench(claiming_config());
   bench.port.rivals.push_back(rival(-60'000, 0x0B));

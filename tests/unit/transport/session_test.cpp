@@ -9,9 +9,12 @@
 namespace tandem::transport {
 namespace {
 
+// Of one participant every ten epochs.
 Received<SessionMessage> announcement(Epoch epoch) {
   Received<SessionMessage> received;
   received.message.epoch = epoch;
+  received.from.bytes[0] = static_cast<std::uint8_t>(epoch / 10);
+  received.from.bytes[1] = static_cast<std::uint8_t>(epoch / 2560);
   return received;
 }
 
@@ -42,12 +45,66 @@ TEST_F(Book, ReportsEachAnnouncementOnce) {
   EXPECT_EQ(current(), Epochs{11});
 }
 
-TEST_F(Book, ReportsTheLatestOfTwoServersAndTheOtherWhenItEnds) {
+TEST_F(Book, StaysWithAServerWhileItLivesAndThenReportsAnother) {
   book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
   book_.put(2, announcement(20));
+  EXPECT_EQ(current(), Epochs{});
+  states_[1] = WriterState::kSilent;
   EXPECT_EQ(current(), Epochs{20});
+  states_[1] = WriterState::kLive;
+  EXPECT_EQ(current(), Epochs{}) << "who was away does not take over again";
   states_[2] = WriterState::kGone;
   EXPECT_EQ(current(), Epochs{10});
+}
+
+TEST_F(Book, OneThatCannotBePlayedIsPassedOverUntilItIsAnnouncedAnew) {
+  book_.put(1, announcement(10));
+  book_.put(2, announcement(20));
+  EXPECT_EQ(current(), Epochs{10});
+  book_.pass_over_current(PassOver::kUntilAnnouncedAnew);
+  EXPECT_EQ(current(), Epochs{20});
+  book_.pass_over_current(PassOver::kUntilAnnouncedAnew);
+  EXPECT_EQ(current(), Epochs{});
+  EXPECT_EQ(current(), Epochs{});
+  book_.put(1, announcement(11));
+  EXPECT_EQ(current(), Epochs{11});
+}
+
+TEST_F(Book, OneFromWhichNothingComesIsPassedOverAsLongAsThereIsAnother) {
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
+  book_.pass_over_current(PassOver::kWhileThereIsAnother);
+  EXPECT_EQ(current(), Epochs{}) << "there is no other";
+  book_.put(2, announcement(20));
+  book_.pass_over_current(PassOver::kWhileThereIsAnother);
+  EXPECT_EQ(current(), Epochs{20});
+  book_.pass_over_current(PassOver::kWhileThereIsAnother);
+  EXPECT_EQ(current(), Epochs{10});
+}
+
+TEST_F(Book, KeepsTheServerFollowedWhoeverAnnounces) {
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
+  for (std::uint64_t writer = 2; writer <= 200; ++writer) {
+    states_[writer] = WriterState::kLive;
+    book_.put(writer, announcement(writer * 10));
+  }
+  EXPECT_EQ(current(), Epochs{});
+  EXPECT_TRUE(book_.epoch_live(10));
+}
+
+TEST_F(Book, HoldsOneAnnouncementOfAParticipantHoweverManyItsWriters) {
+  for (std::uint64_t writer = 1; writer <= 80; ++writer) {
+    states_[writer] = WriterState::kLive;
+    Received<SessionMessage> forged = announcement(writer);
+    forged.from = {};
+    book_.put(writer, std::move(forged));
+  }
+  update();
+  std::vector<Received<SessionMessage>> out;
+  book_.list_live(out);
+  EXPECT_EQ(out.size(), 1U);
 }
 
 TEST_F(Book, ReportsAServerAgainThatWasSilentForAWhile) {
@@ -76,13 +133,13 @@ TEST_F(Book, ListsEveryLiveServerInTheOrderSeen) {
 TEST_F(Book, IsBoundedInTheNumberOfWriters) {
   for (std::uint64_t writer = 1; writer <= 1000; ++writer) {
     states_[writer] = WriterState::kLive;
-    book_.put(writer, announcement(writer));
+    book_.put(writer, announcement(writer * 10));
   }
   update();
   std::vector<Received<SessionMessage>> out;
   book_.list_live(out);
   EXPECT_EQ(out.size(), 64U);
-  EXPECT_EQ(out.back().message.epoch, 1000U);
+  EXPECT_EQ(out.back().message.epoch, 10'000U);
 }
 
 TEST(SessionName, TakesLettersDigitsDotUnderscoreAndMinus) {
