@@ -187,6 +187,10 @@ BandwidthRow row_of(Lane& lane, double frames) {
   lane.errors.fill(row);
   lane.snaps.fill(row, stream.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
+  std::vector<std::byte> snapshot;
+  lane.stream.snapshot(snapshot);
+  row.snapshot_bytes_per_body =
+      static_cast<double>(snapshot.size()) / std::max(1U, lane.stream.agreed().alive_count());
   row.predict_ms = lane.predict.quantile_ms(0.5);
   row.encode_ms = lane.encode.quantile_ms(0.5);
   row.decode_ms = lane.decode.quantile_ms(0.5);

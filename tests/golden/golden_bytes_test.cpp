@@ -162,16 +162,8 @@ TEST(GoldenBytes, OfASnapshot) {
       "933a3916bebd5cc5 09000000"
       "82 11 01 c801 02 14 03 28 04 00 05 cc9903 06 cc9901"
       "84 1e 0100000000000000 0500000000000000 01000000 02000000 03000000 0400"
-      "85 43 00 40e3ab95e48141ca"
-      "0201"
-      "01 05 40"
-      "02 0000 20"
-      "00 00"
-      "02 ffffffff 30"
-      "00 64000000"
-      "01 07000000 40"
-      "00 40000000  00 00000000  00 00000000"
-      "00 00000000  00 00000000  00 00000000";
+      "85 1d 00 40e3ab95e48141ca"
+      "9d7dc39ab122c0dfbf6a93982517b6541690b00c";
   EXPECT_EQ(to_text(bytes), to_text(from_text(golden)));
   auto client = *ClientTimeline::create(layout);
   const auto loaded = client.load(from_text(golden), 0x0102);

@@ -192,10 +192,10 @@ inline void mutate(Random& random, std::vector<std::byte>& bytes) {
 inline std::vector<std::byte> coder_state(const Codec& codec) {
   const std::span<const std::byte> columns = codec.columns();
   std::vector<std::byte> bytes(columns.begin(), columns.end());
-  bytes.resize(columns.size() + codec.models_bound());
-  ByteWriter models{std::span(bytes).subspan(columns.size())};
+  bytes.resize(columns.size() + codec.models_bits_bound());
+  NumberEncoder models{std::span(bytes).subspan(columns.size())};
   codec.save_models(models);
-  bytes.resize(columns.size() + models.size());
+  bytes.resize(columns.size() + models.finish());
   return bytes;
 }
 
@@ -208,7 +208,8 @@ inline Result<void> load_coder_state(Codec& codec, std::span<const std::byte> by
     if (bytes[at] != std::byte{0} && alive[at % alive.size()] == 0)
       return fail(ErrorCode::kMalformed, "coder state of a dead slot");
   }
-  return codec.load(bytes.first(columns), bytes.subspan(columns));
+  NumberDecoder models(bytes.subspan(columns));
+  return codec.load(bytes.first(columns), models);
 }
 
 }  // namespace tandem::synthetic

@@ -2,12 +2,11 @@
 
 import unittest
 
-import numpy as np
 import worlds
 import writer
 from refusals import RefusalCase
 from tandem_reference import predict, snapshot
-from tandem_reference.reader import Reader
+from tandem_reference.number_decoder import Model, NumberDecoder, NumberModels
 from tandem_reference.xxh3 import xxh3_64
 
 
@@ -23,16 +22,22 @@ class ByHand(RefusalCase):
         column = "00000000 {} 00000000"
         p = "".join(column.format(x) for x in ("01000000", "feffffff", "03000000"))
         leaf1 = xxh3_64(bytes.fromhex(p) + bytes(72))
-        self.region = xxh3_64(u64(leaf0) + u64(leaf1))
-        self.state = xxh3_64(u64(self.region))
+        self.hash = xxh3_64(u64(leaf0) + u64(leaf1))
+        self.state = xxh3_64(u64(self.hash))
 
-    def bytes(self, alive="02", reuse="0002", inputs="", tail=b""):
+    def region(self, reuse=2, kind=1, x=1):
+        """The code stream of the body."""
+        world = worlds.world(self.stream, {1: ((x, -2, 3), (0, 0, 0))})
+        state = world.state
+        state.reuse[1], state.type[1], state.rest[1] = reuse, kind, 1
+        return writer.region(world)[9:]
+
+    def bytes(self, stream=None, inputs="", tail=b""):
         """The snapshot, or one with a fault."""
         head = b"TDSP\1" + u64(11) + bytes.fromhex("02000000 03000000") + u64(40) + u64(9)
         head += bytes.fromhex("01000000 ffffffff 00000000 c800") + u64(self.state) + bytes.fromhex("03000000")
         values = bytes.fromhex("820e 01c801 0206 030a 04c00c 0500 0600")
-        region = b"\0" + u64(self.region) + bytes.fromhex(alive + reuse + "000100 0001")
-        region += b"".join(bytes([0]) + value.to_bytes(4, "little", signed=True) for value in (1, -2, 3)) + bytes(30)
+        region = b"\0" + u64(self.hash) + (self.region() if stream is None else stream)
         return head + values + bytes.fromhex(inputs) + writer.section(0x85, region + tail)
 
     def test_every_field(self):
@@ -70,11 +75,12 @@ class ByHand(RefusalCase):
             ("snapshot", good[:63] + good[79:]),  # no parameters
             ("snapshot", good[:79]),  # no region
             ("order", good[:63] + good[79:] + good[63:79]),
-            ("padding", self.bytes(alive="0a")),
-            ("hash", self.bytes(reuse="0003")),
+            ("hash", self.bytes(self.region(reuse=3))),
             ("hash", good[:51] + bytes(8) + good[59:]),
-            ("snapshot", self.bytes(reuse="2102" + "00" * 5)),  # 33 bits
-            ("length", self.bytes(tail=b"\0")),
+            ("snapshot", self.bytes(self.region(kind=2))),
+            ("snapshot", self.bytes(self.region(x=2**30 + 1))),
+            ("snapshot", self.bytes(tail=b"\0")),
+            ("snapshot", self.bytes(tail=b"\1" * 8)),
             ("length", good[:-1]),
             ("length", good[:50]),
         ):
@@ -82,23 +88,40 @@ class ByHand(RefusalCase):
                 self.refused(rule, snapshot.read, bad, self.stream)
 
 
-class Runs(RefusalCase):
-    def test_widths_and_least_values(self):
-        body = Reader(bytes.fromhex("03 feff ffff 0e00"), "test")  # 3 bits: 0, 3, 4 -> 000 011 10|0
-        self.assertEqual(snapshot.read_run(body, 4, True, 3).tolist(), [-2, 1, 2])
-        wide = Reader(bytes.fromhex("20 00000080 ffffffff 00000000"), "test")
-        self.assertEqual(snapshot.read_run(wide, 4, True, 2).tolist(), [2**31 - 1, -(2**31)])
-        flat = Reader(bytes.fromhex("00 07"), "test")
-        self.assertEqual(snapshot.read_run(flat, 1, False, 64).tolist(), [7] * 64)
+class Numbers(unittest.TestCase):
+    # some:      bound 7fffffff of ffffffff: below: 1; range 7fffffff
+    # length:    five decisions 0: code - 7bffffff, range 04000000; or four and a 1: code - 77ffffff, range 04000000
+    # sign:      bound 02000000: below: 1, negative
+    # next of 2: bound 01000000
+    def test_by_hand(self):
+        for data, number in (("80", 0), ("7c", -1), ("7e", 1), ("7b", 2), ("7a", 3)):
+            with self.subTest(number=number):
+                decoder = NumberDecoder(bytes.fromhex(data))
+                self.assertEqual(decoder.number(NumberModels()), number)
+                decoder.end()
 
-    def test_a_value_beyond_its_type_and_unused_bits_are_refused(self):
-        self.refused("snapshot", snapshot.read_column, Reader(bytes.fromhex("08 01 ff"), "test"), 1, False, 1)
-        self.refused("padding", snapshot.read_column, Reader(bytes.fromhex("04 01 f1"), "test"), 1, False, 1)
+    def test_models_learn_fast_then_slowly(self):
+        model = Model()
+        model.learn(True)
+        self.assertEqual((model.p, model.seen), (49152, 2))
+        model.learn(False)
+        self.assertEqual((model.p, model.seen), (49152 - 12288, 3))
+        for _ in range(2000):
+            model.learn(False)
+        self.assertEqual((model.p, model.seen), (127, 127))
 
-    def test_columns_have_runs_of_64(self):
-        values = np.arange(200) ** 2 - 20000
-        read = snapshot.read_column(Reader(writer.column(values, 4, True), "test"), 4, True, 200)
-        self.assertEqual(read.tolist(), values.tolist())
+    def test_columns_of_every_kind(self):
+        numbers = [0, 0, 5, -(2**29), 2**30, -(2**30), 17, 1, -1] + [i * i - 300 for i in range(60)]
+        at_rest = [i % 3 == 0 for i in range(len(numbers))]
+        for how in (snapshot.ZERO, snapshot.BEFORE, snapshot.HALF):
+            for shift in (0, 1):
+                values = [number >> shift << shift for number in numbers]
+                encoder = writer.NumberEncoder()
+                writer.column(encoder, values, how, at_rest)
+                decoder = NumberDecoder(encoder.finish())
+                read = snapshot.read_column(decoder, snapshot.Guess(how), at_rest, (-(2**30), 2**30))
+                self.assertEqual(read, values)
+                decoder.end()
 
 
 class WithModels(RefusalCase):

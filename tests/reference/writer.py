@@ -5,6 +5,8 @@ import struct
 import numpy as np
 
 from tandem_reference import cdr, tracker
+from tandem_reference import snapshot as reference
+from tandem_reference.number_decoder import SHORT, Model, NumberModels
 
 
 def leb128(value):
@@ -46,12 +48,12 @@ def joined_codes(codes):
 class RangeEncoder:
     """The counterpart of the range decoder: `low` is a number of as many bytes as were shifted, and four."""
 
-    def __init__(self, models):
+    def __init__(self, models=None):
         self.low, self.range, self.shifted = 0, 2**32 - 1, 0
-        self.probabilities = models.p.tolist()
+        self.probabilities = models.p.tolist() if models else []
 
     def decide(self, model, one):
-        """Write a decision of a model."""
+        """Write a decision of a model of the codec."""
         self.decision(self.probabilities[model], one)
 
     def decision(self, probability, one):
@@ -62,18 +64,63 @@ class RangeEncoder:
         else:
             self.low += bound
             self.range -= bound
+        self.shift()
+
+    def even_bits(self, value, count):
+        """Write a number of up to 16 bits, each of which is as likely 0 as 1."""
+        share = self.range >> count
+        self.low += share * value
+        self.range = self.range - share * value if value == (1 << count) - 1 else share
+        self.shift()
+
+    def shift(self):
+        """Keep the range at 25 bits at least."""
         while self.range < 2**24:
             self.low, self.range, self.shifted = self.low << 8, self.range << 8, self.shifted + 1
 
-    def finish(self):
-        """The shortest bytes within the range that are not all zero."""
+    def finish(self, least=0):
+        """The shortest bytes within the range, zeros left out behind, of a number of at least `least`."""
         size = 4 + self.shifted
-        for kept in range(1, size + 1):
+        for kept in range(size + 1):
             unit = 256 ** (size - kept)
-            value = max(-(-self.low // unit), 1) * unit
+            value = max(-(-self.low // unit), least) * unit
             if value < self.low + self.range:
                 return value.to_bytes(size, "big").rstrip(b"\0")
         raise AssertionError("a range is never empty")
+
+
+class NumberEncoder(RangeEncoder):
+    """The counterpart of the number decoder."""
+
+    def decide(self, model, one):
+        """Write a decision, which teaches its model."""
+        self.decision(model.p, one)
+        model.learn(one)
+
+    def number(self, models, x):
+        """Write a number of a kind."""
+        size = abs(x)
+        self.decide(models.some, size > 0)
+        if not size:
+            return
+        bits, node = size.bit_length(), 1
+        for i in range(4, -1, -1):
+            bit = (bits - 1) >> i & 1
+            self.decide(models.length[node], bit)
+            node = 2 * node + bit
+        value, left = 1, bits - 1
+        if bits > SHORT:
+            high = min(left, 15)
+            left -= high
+            self.even_bits(2 * (size >> left & ((1 << high) - 1)) + (x < 0), high + 1)
+        else:
+            self.decide(models.sign[bits], x < 0)
+            while left > 0 and value < 4:
+                left -= 1
+                self.decide(models.next[bits][value], size >> left & 1)
+                value = size >> left
+        if left > 0:
+            self.even_bits(size & ((1 << left) - 1), left)
 
 
 def write_steps(encoder, contexts, slot, steps):
@@ -110,35 +157,59 @@ def tracker_section(world, threshold, steps, renewed=None, block=0):
             encoder.decide(int(contexts.flag[slot]), slot in steps)
     for slot in sorted(steps):
         write_steps(encoder, contexts, slot, steps[slot])
-    return section(0x83, leb128(block) + encoder.finish())
+    return section(0x83, leb128(block) + encoder.finish(1))
 
 
-def run(values, size, signed):
-    """A run of a snapshot's column."""
-    least = min(values)
-    width = (max(values) - least).bit_length()
-    head = bytes([width]) + int(least).to_bytes(size, "little", signed=signed)
-    return head + joined_codes([(width, int(value) - int(least)) for value in values])
-
-
-def column(values, size, signed=False):
-    """A column of a snapshot."""
+def column(numbers, values, how, at_rest):
+    """A column of a region."""
     values = [int(value) for value in values]
-    return b"".join(run(values[i : i + 64], size, signed) for i in range(0, len(values), 64))
+    used = 0
+    for value in values:
+        used |= value
+    shift = (used & -used).bit_length() - 1 if used else 0
+    numbers.even_bits(shift, 5)
+    kinds, guess = [NumberModels(), NumberModels()], reference.Guess(how)
+    for value, rest in zip(values, at_rest):
+        x = value >> shift
+        numbers.number(kinds[rest], x - guess.values[rest])
+        guess.saw(rest, x)
+
+
+def models_of(numbers, models):
+    """The models of the codec `tracker`."""
+    weights, probabilities, before = NumberModels(), NumberModels(), 32768
+    for weight, p in zip(models.weight.tolist(), models.p.tolist()):
+        numbers.number(weights, -weight % 256)
+        if weight:
+            numbers.number(probabilities, p - before)
+            before = p
+
+
+def region(world):
+    """The body of a region's section."""
+    state, numbers = world.state, NumberEncoder()
+    living, before = [Model(), Model()], 0
+    for alive in state.alive.tolist():
+        numbers.decide(living[before], alive)
+        before = int(alive)
+    slots = np.flatnonzero(state.alive)
+    at_rest = [int(rest) for rest in state.rest[slots]]
+    column(numbers, at_rest, reference.ZERO, [0] * len(slots))
+    column(numbers, state.reuse[slots], reference.ZERO, at_rest)
+    column(numbers, state.type[slots], reference.ZERO, at_rest)
+    for rows, how in ((state.p, reference.BEFORE), (state.v, reference.HALF), (state.c, reference.HALF)):
+        for axis in range(3):
+            column(numbers, rows[axis, slots], how, at_rest)
+    for row in state.codec:
+        column(numbers, (row[slots] + 128) % 256 - 128, reference.ZERO, at_rest)
+    if world.models:
+        models_of(numbers, world.models)
+    return leb128(0) + struct.pack("<Q", state.region_hash()) + numbers.finish()
 
 
 def snapshot(timeline, epoch=1, stream=0, generation=0):
     """The snapshot of a timeline's frame."""
     world, state, drive = timeline.world, timeline.world.state, timeline.drive
-    slots = np.flatnonzero(state.alive)
-    region = [leb128(0), struct.pack("<Q", state.region_hash())]
-    region.append(np.packbits(state.alive, bitorder="little").tobytes())
-    region += [column(state.reuse[slots], 1), column(state.type[slots], 2), column(state.rest[slots], 1)]
-    region += [column(rows[axis, slots], 4, True) for rows in (state.p, state.v, state.c) for axis in range(3)]
-    region += [column(row[slots] % 256, 1) for row in state.codec]
-    if world.models:
-        for weight, p in zip(world.models.weight, world.models.p):
-            region.append(struct.pack("<BH", weight, p) if weight else b"\0")
     waiting = [
         struct.pack("<QQ3iH", number, frame, *act.gravity, act.damping)
         for number, (frame, act) in sorted(timeline.inputs.items())
@@ -151,7 +222,7 @@ def snapshot(timeline, epoch=1, stream=0, generation=0):
             struct.pack("<QI", state.hash(), state.capacity),
             section(0x82, parameters(world.parameters)),
             section(0x84, b"".join(waiting)) if waiting else b"",
-            section(0x85, b"".join(region)),
+            section(0x85, region(world)),
         ]
     )
 

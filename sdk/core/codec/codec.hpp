@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 
+#include "sdk/core/codec/numbers.hpp"
 #include "sdk/core/codec/observer.hpp"
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
@@ -70,14 +71,13 @@ class Codec {
   /// another; zero for dead slots. Empty for the paper's codecs.
   [[nodiscard]] virtual std::span<const std::byte> columns() const { return {}; }
   /// What else lives across frames, as it goes into a snapshot. Nothing for the paper's codecs.
-  virtual void save_models(ByteWriter& /*out*/) const {}
-  /// Most bytes save_models() writes.
-  [[nodiscard]] virtual std::size_t models_bound() const { return 0; }
-  /// `columns`: as many as columns() has, zero for dead slots. Errors: kMalformed for what this codec would
-  /// not have written; then nothing changed.
-  [[nodiscard]] virtual Result<void> load(std::span<const std::byte> /*columns*/,
-                                          std::span<const std::byte> models) {
-    if (!models.empty()) return fail(ErrorCode::kMalformed, "this codec keeps no models");
+  virtual void save_models(NumberEncoder& /*out*/) const {}
+  /// Most bits that save_models() writes.
+  [[nodiscard]] virtual std::size_t models_bits_bound() const { return 0; }
+  /// `columns`: as many as columns() has, zero for dead slots. `models`: what save_models() wrote, and
+  /// nothing behind it. Errors: kMalformed for what this codec would not have written; then nothing changed.
+  [[nodiscard]] virtual Result<void> load(std::span<const std::byte> /*columns*/, NumberDecoder& models) {
+    if (!models.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length");
     return {};
   }
 };

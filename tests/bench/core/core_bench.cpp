@@ -3,6 +3,7 @@
 #include <benchmark/benchmark.h>
 #include <time.h>
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,7 @@ struct Recording {
   Layout layout;
   std::vector<std::byte> snapshot;
   std::vector<Delta> deltas;
+  std::shared_ptr<ServerTimeline> server;  // after the last of them
   double corrected = 0;
 };
 
@@ -61,7 +63,8 @@ Recording record(std::string_view codec, ServerTimes& times) {
     return Vec3i{random.even(limit), random.even(limit), random.even(limit)};
   };
   for (Slot slot = 0; slot < kBodies; ++slot) state.spawn(slot, 0, 0, {vector(1 << 22), vector(1 << 19)});
-  auto server = *ServerTimeline::create(r.layout, 1);
+  r.server = std::make_shared<ServerTimeline>(*ServerTimeline::create(r.layout, 1));
+  ServerTimeline& server = *r.server;
   server.set_clock(now_ns);
   server.start(0, state, Drive{{0, -2000, 0}, 300});
   server.snapshot(r.snapshot);
@@ -98,7 +101,26 @@ void server_frame(benchmark::State& bench, std::string_view codec) {
   bench.counters["hash_us"] = median_us(times.hash);
   bench.counters["corrected"] = r.corrected;
   bench.counters["bytes"] = bytes;
-  bench.counters["snapshot_B_per_body"] = static_cast<double>(r.snapshot.size()) / kBodies;
+}
+
+// Writing and loading a snapshot in the middle of a session.
+void snapshot(benchmark::State& bench, std::string_view codec) {
+  ServerTimes ignored;
+  const Recording r = record(codec, ignored);
+  auto client = *ClientTimeline::create(r.layout);
+  DurationHistogram write, load;
+  std::vector<std::byte> bytes;
+  for (auto _ : bench) {
+    const std::int64_t start = now_ns();
+    r.server->snapshot(bytes);
+    const std::int64_t written = now_ns();
+    if (!client.load(bytes, 1)) bench.SkipWithError("snapshot refused");
+    load.add(now_ns() - written);
+    write.add(written - start);
+  }
+  bench.counters["write_us"] = median_us(write);
+  bench.counters["load_us"] = median_us(load);
+  bench.counters["B_per_body"] = static_cast<double>(bytes.size()) / kBodies;
 }
 
 // Lead 1: simulate a frame ahead, then take the delta of the frame before it.
@@ -170,6 +192,8 @@ const bool kRegistered = [] {
     benchmark::RegisterBenchmark(("client/" + std::string(codec)).c_str(), client_frame, codec)
         ->UseManualTime()
         ->Unit(benchmark::kMicrosecond);
+    benchmark::RegisterBenchmark(("snapshot/" + std::string(codec)).c_str(), snapshot, codec)
+        ->Unit(benchmark::kMillisecond);
   }
   for (const std::uint32_t threads : {1U, 2U}) {
     benchmark::RegisterBenchmark(("blocks/threads:" + std::to_string(threads)).c_str(), blocks_frame, threads)

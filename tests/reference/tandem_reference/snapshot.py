@@ -5,17 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import parameters
-from .codecs import bits_of
 from .errors import require
+from .number_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
 from .predict import Drive
 from .reader import Reader
-from .state import State
+from .state import MOST_C, MOST_P, MOST_V, State
 from .xxh3 import text
 
 INPUTS, REGION = 0x84, 0x85
 MOST_GRAVITY = 2**28
 MOST_INPUTS = 256
+ZERO, BEFORE, HALF = range(3)
 
 
 @dataclass
@@ -59,23 +60,32 @@ def read_inputs(body, frame, last_input):
     return inputs
 
 
-def read_run(body, size, signed, count):
-    """Up to 64 values of a column of `size` bytes a value."""
-    width = body.u8()
-    require(width <= 32, "snapshot", f"a run of {width} bits a value")
-    least = body.signed(size) if signed else body.unsigned(size)
-    bits = np.unpackbits(np.frombuffer(body.take(-(-width * count // 8)), np.uint8))
-    require(not bits[width * count :].any(), "padding", "snapshot: unused bits of a run that are not zero")
-    values = bits[: width * count].reshape(count, width).astype(np.int64)
-    return least + values @ (2 ** np.arange(width - 1, -1, -1, dtype=np.int64))
+class Guess:
+    """What the next number of a column is expected to be: 0, the one before, or half way to it."""
+
+    def __init__(self, how):
+        self.how = how
+        self.values = [0, 0]  # of bodies not at rest, and at rest
+
+    def saw(self, rest, x):
+        """Learn the number of a body."""
+        if self.how == BEFORE or (self.how == HALF and rest):
+            self.values[rest] = x
+        elif self.how == HALF:
+            self.values[rest] = (self.values[rest] + x) >> 1
 
 
-def read_column(body, size, signed, count):
-    """A column over the alive slots; every value fits its type."""
-    runs = [read_run(body, size, signed, min(64, count - at)) for at in range(0, count, 64)]
-    values = np.concatenate([np.zeros(0, np.int64), *runs])
-    most = 2 ** (8 * size - signed) - 1
-    require(not np.any(values > most), "snapshot", "a value beyond its column's type")
+def read_column(numbers, guess, at_rest, most):
+    """A column over bodies, of which some are at rest; `most`: least and largest value allowed."""
+    shift = numbers.even_bits(5)
+    kinds = [NumberModels(), NumberModels()]
+    values = []
+    for rest in at_rest:
+        x = guess.values[rest] + numbers.number(kinds[rest])
+        guess.saw(rest, x)
+        value = x << shift
+        require(most[0] <= value <= most[1], "snapshot", f"a value of {value}")
+        values.append(value)
     return values
 
 
@@ -83,32 +93,34 @@ def read_region(body, stream):
     """The state of the one region, and its models."""
     require(body.leb128(4) == 0, "snapshot", "a region that does not exist")
     announced = body.u64()
+    numbers = NumberDecoder(body.rest())
     state = State(stream.capacity, stream.codec)
-    mask = body.take(-(-stream.capacity // 8))
-    state.alive = bits_of(mask, stream.capacity, "padding", "snapshot")
+    living, before = [Model(), Model()], 0
+    for slot in range(stream.capacity):
+        before = int(numbers.decide(living[before]))
+        state.alive[slot] = before
     slots = np.flatnonzero(state.alive)
+    at_rest = [0] * len(slots)
 
-    def column(size, signed=False):
-        return read_column(body, size, signed, len(slots))
+    def column(how, least, most):
+        return read_column(numbers, Guess(how), at_rest, (least, most))
 
-    state.reuse[slots] = column(1)
-    state.type[slots] = column(2)
-    rest = column(1)
-    require(not np.any(rest > 1), "snapshot", "a rest that is neither 0 nor 1")
-    state.rest[slots] = rest
-    for rows in (state.p, state.v, state.c):
+    at_rest = column(ZERO, 0, 1)
+    state.rest[slots] = at_rest
+    state.reuse[slots] = column(ZERO, 0, 255)
+    state.type[slots] = column(ZERO, 0, stream.types - 1)
+    for rows, how, most in ((state.p, BEFORE, MOST_P), (state.v, HALF, MOST_V), (state.c, HALF, MOST_C)):
         for axis in range(3):
-            rows[axis, slots] = column(4, signed=True)
+            rows[axis, slots] = column(how, -most, most)
     for i, row in enumerate(state.codec):
-        values = column(1)
-        row[slots] = values if i < 2 else values - 256 * (values > 127)
+        values = np.array(column(ZERO, -128, 127), np.int64)
+        row[slots] = values % 256 if i < 2 else values
     require(not len(state.codec) or not np.any(state.codec[0] > 254), "snapshot", "an age of 255")
     require(not np.any(state.codec[2:] < -127), "snapshot", "a last step of -128")
-    state.check_ranges(stream.types, "snapshot")
     models = start_models(stream)
     if models:
-        models.read(body)
-    body.end()
+        models.read(numbers)
+    numbers.end()
     computed = state.region_hash()
     require(computed == announced, "hash", f"snapshot: region hash {text(announced)}, computed {text(computed)}")
     return state, models

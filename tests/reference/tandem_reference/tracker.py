@@ -5,7 +5,8 @@ import numpy as np
 from . import parameters
 from .errors import require
 from .integers import clamp
-from .range_decoder import RangeDecoder
+from .number_decoder import NumberModels
+from .range_decoder import CountingDecoder
 from .state import MOST_C, MOST_P, MOST_V
 
 FLAG, ZERO, SIGN, MAGNITUDE, ESCAPE = 0, 675, 1035, 1359, 1863
@@ -36,13 +37,17 @@ class Models:
         self.p = np.where(made, learnt, self.p)
         self.weight = np.where(made, np.minimum(255, self.weight + zeros + ones), self.weight)
 
-    def read(self, reader):
+    def read(self, numbers):
         """Take the models of a snapshot."""
+        weights, probabilities, before = NumberModels(), NumberModels(), 32768
         for model in range(MODELS):
-            self.weight[model] = reader.u8()
-            if self.weight[model]:
-                self.p[model] = reader.u16()
-                require(32 <= self.p[model] <= 65504, "snapshot", "a model's probability out of range")
+            lacks = numbers.number(weights)
+            require(0 <= lacks <= 255, "snapshot", f"a model that lacks {lacks} of its weight")
+            self.weight[model] = -lacks % 256
+            if lacks:
+                before += numbers.number(probabilities)
+                require(32 <= before <= 65504, "snapshot", "a model's probability out of range")
+                self.p[model] = before
 
 
 def count_below(x, limits):
@@ -115,7 +120,7 @@ def apply_corrections(world, stream, corrections, renewed):
     slots, steps = [], []
     for block, body in corrections:
         first, end = state.block_slots(block)
-        decoder = RangeDecoder(body.rest(), models.p.tolist(), zeros, ones)
+        decoder = CountingDecoder(body.rest(), models.p.tolist(), zeros, ones)
         alive = first + np.flatnonzero(state.alive[first:end])
         flags = contexts.flag[alive].tolist()
         corrected = [slot for slot, flag in zip(alive.tolist(), flags) if decoder.decide(flag)]

@@ -163,7 +163,7 @@ TEST_F(JoinTest, WhatIsHeldCanBeDrawnAfterASnapshotWasRefused) {
   frame();  // a gap
   ASSERT_EQ(core->phase(), ClientPhase::kJoining);
   auto broken = server.snapshot();
-  broken.bytes.back() ^= std::byte{1};
+  broken.bytes[51] ^= std::byte{1};  // of the state hash
   poll(300 * kMs);
   port.snapshots.push_back(from_server(broken));
   poll();

@@ -201,8 +201,11 @@ TEST(Codec, AValueBeyondTheLatticeIsRefused) {
 TEST(Codec, ThePaperCodecsKeepNoCoderState) {
   const auto codec = codec_of("entropy", 4);
   EXPECT_TRUE(codec->columns().empty());
-  EXPECT_TRUE(codec->load({}, {}));
-  EXPECT_FALSE(codec->load({}, std::vector<std::byte>(1)));
+  NumberDecoder nothing({});
+  EXPECT_TRUE(codec->load({}, nothing));
+  const std::vector<std::byte> bytes(9, std::byte{1});
+  NumberDecoder something(bytes);
+  EXPECT_FALSE(codec->load({}, something));
 }
 
 }  // namespace

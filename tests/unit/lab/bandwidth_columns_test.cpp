@@ -18,9 +18,9 @@ TEST(BandwidthColumns, rows_have_the_agreed_fields) {
                         "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain",
                         "acceleration_gain", "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit",
                         "mbit_per_s", "ideal_mbit_per_s", "bound_mbit_per_s", "max_error", "rms_error",
-                        "max_snap", "rms_snap", "corrected_per_frame", "colliding_per_frame", "step_ms",
-                        "predict_ms", "encode_ms", "decode_ms", "apply_ms", "paper_mbit_per_s",
-                        "paper_colliding_per_frame", "missing"));
+                        "max_snap", "rms_snap", "corrected_per_frame", "snapshot_bytes_per_body",
+                        "colliding_per_frame", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms",
+                        "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
   EXPECT_TRUE(json["rows"][0]["number"].is_null());
   EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
 }

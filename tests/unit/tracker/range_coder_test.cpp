@@ -1,4 +1,4 @@
-#include "sdk/core/codec/tracker/range_coder.hpp"
+#include "sdk/core/codec/range_coder.hpp"
 
 #include <gtest/gtest.h>
 

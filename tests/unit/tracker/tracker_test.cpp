@@ -189,9 +189,9 @@ TEST(Tracker, RefusesCoderStatesThatAreNone) {
       good.begin())] = 0;
   EXPECT_FALSE(synthetic::load_coder_state(client.codec(), good, dead));
   Bytes longer = good;
-  longer.push_back(std::byte{0});
+  longer.resize(good.size() + 8, std::byte{1});
   EXPECT_FALSE(synthetic::load_coder_state(client.codec(), longer, agreed.alive()));
-  for (std::size_t size = 0; size < good.size(); ++size) {
+  for (std::size_t size = 0; size < server.codec().columns().size(); ++size) {
     EXPECT_FALSE(synthetic::load_coder_state(client.codec(), std::span(good).first(size), agreed.alive()));
   }
   EXPECT_EQ(coder_state(client), good);

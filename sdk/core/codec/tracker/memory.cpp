@@ -5,7 +5,26 @@
 namespace tandem {
 namespace {
 
-constexpr std::size_t kModelBytes = 3;
+// Models in a snapshot: each one's weight, as what it lacks of 256 (most that are used at all lack one), and
+// the probability of one that is used, as how far it is from the one before.
+class ModelsCoder {
+ public:
+  /// False: a decoder read what no model is.
+  template <class Coder>
+  bool code(Coder& coder, std::uint8_t& weight, std::uint16_t& p1) {
+    const std::int64_t lacks = code_number(coder, weights_, static_cast<std::uint8_t>(0U - weight));
+    if (lacks < 0 || lacks > UINT8_MAX) return false;
+    weight = static_cast<std::uint8_t>(-lacks);
+    if (weight == 0) return true;
+    guess_ += code_number(coder, probabilities_, p1 - guess_);
+    p1 = static_cast<std::uint16_t>(guess_);
+    return guess_ >= TrackerModels::kLeast && guess_ <= TrackerModels::kMost;
+  }
+
+ private:
+  NumberModels weights_, probabilities_;
+  std::int64_t guess_ = 32768;
+};
 
 }  // namespace
 
@@ -85,17 +104,20 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   }
 }
 
-// Per model: weight, and where that is not zero the probability.
-void TrackerMemory::save_models(ByteWriter& out) const {
+void TrackerMemory::save_models(NumberEncoder& out) const {
+  ModelsCoder coder;
   for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
-    out.put(models_.weight[i]);
-    if (models_.weight[i] != 0) out.put(models_.p1[i]);
+    std::uint8_t weight = models_.weight[i];
+    std::uint16_t p1 = models_.p1[i];
+    coder.code(out, weight, p1);
   }
 }
 
-std::size_t TrackerMemory::models_bound() const { return TrackerModelIndex::kCount * kModelBytes; }
+std::size_t TrackerMemory::models_bits_bound() {
+  return TrackerModelIndex::kCount * (most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX));
+}
 
-Result<void> TrackerMemory::load(std::span<const std::byte> columns, std::span<const std::byte> model_bytes) {
+Result<void> TrackerMemory::load(std::span<const std::byte> columns, NumberDecoder& in) {
   if (columns.size() != columns_.size())
     return fail(ErrorCode::kMalformed, "coder state of another number of columns");
   if (std::any_of(columns.begin(), columns.begin() + capacity_,
@@ -105,16 +127,13 @@ Result<void> TrackerMemory::load(std::span<const std::byte> columns, std::span<c
   const auto steps = columns.subspan(2 * std::size_t{capacity_});
   if (std::find(steps.begin(), steps.end(), std::byte{0x80}) != steps.end())
     return fail(ErrorCode::kMalformed, "coder state with a step of -128");
-  ByteReader in(model_bytes);
-  bool good = true;
+  ModelsCoder coder;
   TrackerModels models;
   for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
-    models.weight[i] = in.get<std::uint8_t>();
-    if (models.weight[i] == 0) continue;
-    models.p1[i] = in.get<std::uint16_t>();
-    good &= models.p1[i] >= TrackerModels::kLeast && models.p1[i] <= TrackerModels::kMost;
+    if (!coder.code(in, models.weight[i], models.p1[i]))
+      return fail(ErrorCode::kMalformed, "coder state with an impossible model");
   }
-  if (!good || !in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length or content");
+  if (!in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length");
   std::copy(columns.begin(), columns.end(), columns_.begin());
   for (Slot slot = 0; slot < capacity_; ++slot) history_[slot] = flag_history(body(slot));
   models_ = models;

@@ -77,9 +77,9 @@ class TrackerMemory {
              State& state);
 
   /// As Codec has them.
-  void save_models(ByteWriter& out) const;
-  [[nodiscard]] std::size_t models_bound() const;
-  [[nodiscard]] Result<void> load(std::span<const std::byte> columns, std::span<const std::byte> model_bytes);
+  void save_models(NumberEncoder& out) const;
+  [[nodiscard]] static std::size_t models_bits_bound();
+  [[nodiscard]] Result<void> load(std::span<const std::byte> columns, NumberDecoder& models);
 
  private:
   void set_body(Slot slot, const TrackerBody& body);

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/codec/range_coder.hpp"
 #include "sdk/core/codec/selection.hpp"
 #include "sdk/core/codec/tracker/filter.hpp"
-#include "sdk/core/codec/tracker/range_coder.hpp"
 
 namespace tandem {
 

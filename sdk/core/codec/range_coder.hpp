@@ -12,6 +12,7 @@
 // (range * P) >> 16 takes less than 1/256 of a 1's share even at P = 1, which is 0.006 bits, and neither
 // share is ever empty for P in 1 .. 65535.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -31,11 +32,17 @@ class RangeEncoder {
     const std::uint32_t one = 0U - static_cast<std::uint32_t>(bit);  // a mask: bits are hard to guess
     low_ += bound & ~one;
     range_ = rest ^ ((rest ^ bound) & one);
-    while (range_ < kLeastRange) {
-      range_ <<= 8U;
-      low_ <<= 8U;
-      if (++held_ == kMostHeld) flush();
-    }
+    shift_out();
+  }
+
+  /// `count` bits (at most 16), each as likely 0 as 1, in one step: `value` < 2^count. The highest value has
+  /// what the division leaves over too.
+  void put_even(std::uint32_t value, unsigned count) {
+    const std::uint32_t share = range_ >> count;
+    const bool is_last = value == (1U << count) - 1;
+    low_ += std::uint64_t{share} * value;
+    range_ = is_last ? range_ - share * value : share;
+    shift_out();
   }
 
   /// Fewest bytes that decode to what was put, zeros at the end left out. Returns the size.
@@ -58,6 +65,13 @@ class RangeEncoder {
   static constexpr std::uint32_t kLeastRange = 1U << 24U;
   static constexpr std::uint32_t kMostHeld = 3;
 
+  void shift_out() {
+    while (range_ < kLeastRange) {
+      range_ <<= 8U;
+      low_ <<= 8U;
+      if (++held_ == kMostHeld) flush();
+    }
+  }
   void flush() {
     const std::uint64_t bytes = low_ >> 32U;
     if (bytes >> (8U * held_) != 0) carry();
@@ -119,6 +133,17 @@ class RangeDecoder {
     code_ -= bound & ~one;
     fill();
     return (one & 1U) != 0;
+  }
+
+  /// What put_even() put.
+  std::uint32_t get_even(unsigned count) {
+    const std::uint32_t share = range_ >> count;
+    const std::uint32_t last = (1U << count) - 1;
+    const std::uint32_t value = std::min(code_ / share, last);
+    code_ -= share * value;
+    range_ = value == last ? range_ - share * value : share;
+    fill();
+    return value;
   }
 
   /// True when every byte was used and the last one is not a zero that could have been left out.

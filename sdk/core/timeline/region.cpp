@@ -1,0 +1,184 @@
+#include "sdk/core/timeline/region.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <string>
+#include <vector>
+
+#include "sdk/core/codec/numbers.hpp"
+
+namespace tandem {
+namespace {
+
+// What a body's number is expected to be.
+enum class Guess : std::uint8_t {
+  kZero,
+  kBefore,  // that of the body before: slots were filled side by side
+  kHalf,    // half way from the guess before to that number
+};
+
+// Coding one column. Bodies at rest are a kind of their own: most have v = 0 and the same c.
+class ColumnCoder {
+ public:
+  explicit ColumnCoder(Guess guess) : guess_(guess) {}
+
+  /// The number of the next body; `x` is what an encoder writes.
+  template <class Coder>
+  [[gnu::always_inline]] std::int64_t code(Coder& coder, bool at_rest, std::int64_t x) {
+    Kind& kind = kinds_[at_rest ? 1 : 0];
+    x = kind.guess + code_number(coder, kind.models, x - kind.guess);
+    if (guess_ == Guess::kBefore || (guess_ == Guess::kHalf && at_rest)) kind.guess = x;
+    if (guess_ == Guess::kHalf && !at_rest) kind.guess = (kind.guess + x) >> 1;
+    return x;
+  }
+
+ private:
+  struct Kind {
+    std::int64_t guess = 0;
+    NumberModels models;
+  };
+  Guess guess_;
+  std::array<Kind, 2> kinds_;
+};
+
+// Numbers that are all multiples of 2^n are written without their n lowest bits.
+constexpr unsigned kShiftBits = 5;
+constexpr std::size_t kMostRegionNumberBytes = 4;
+
+class RegionWriter {
+ public:
+  RegionWriter(const State& state, std::span<std::byte> out) : coder_(out) {
+    std::array<LearningModel, 2> models;
+    bool before = false;
+    for (Slot slot = 0; slot < state.capacity(); ++slot) {
+      before = coder_.decide(state.alive()[slot] != 0, models[before ? 1 : 0]);
+      if (before) bodies_.push_back(slot);
+    }
+  }
+  template <class T>
+  void column(std::span<const T> column, Guess guess, std::int64_t /*least*/, std::int64_t /*most*/) {
+    std::uint32_t used = 0;
+    for (const Slot slot : bodies_) used |= static_cast<std::uint32_t>(column[slot]);
+    const auto shift = static_cast<unsigned>(used == 0 ? 0 : std::countr_zero(used));
+    coder_.even(shift, kShiftBits);
+    ColumnCoder numbers(guess);
+    NumberEncoder coder = coder_;  // a copy, so that bytes written leave it in registers
+    for (const Slot slot : bodies_)
+      numbers.code(coder, !rest_.empty() && rest_[slot] != 0, std::int64_t{column[slot]} >> shift);
+    coder_ = coder;
+  }
+  /// From the next column on, bodies at rest are a kind of their own.
+  void know_rest(std::span<const std::uint8_t> rest) { rest_ = rest; }
+  NumberEncoder& coder() { return coder_; }
+
+ private:
+  NumberEncoder coder_;
+  std::span<const std::uint8_t> rest_;
+  std::vector<Slot> bodies_;
+};
+
+class RegionReader {
+ public:
+  RegionReader(State& state, std::span<const std::byte> in) : coder_(in) {
+    std::array<LearningModel, 2> models;
+    bool before = false;
+    for (Slot slot = 0; slot < state.capacity(); ++slot) {
+      before = coder_.decide(false, models[before ? 1 : 0]);
+      if (!before) continue;
+      state.alive()[slot] = 1;
+      bodies_.push_back(slot);
+    }
+  }
+  template <class T>
+  void column(std::span<T> column, Guess guess, std::int64_t least, std::int64_t most) {
+    const unsigned shift = coder_.even(0, kShiftBits);
+    ColumnCoder numbers(guess);
+    NumberDecoder coder = coder_;
+    for (const Slot slot : bodies_) {
+      if (!good_) break;
+      const std::int64_t x = numbers.code(coder, !rest_.empty() && rest_[slot] != 0, 0);
+      // Within 2^33 of numbers that were: shifted, it fits.
+      const std::int64_t value = x * (std::int64_t{1} << shift);
+      good_ = value >= least && value <= most;
+      if (good_) column[slot] = static_cast<T>(value);
+    }
+    coder_ = coder;
+  }
+  void know_rest(std::span<const std::uint8_t> rest) { rest_ = rest; }
+  [[nodiscard]] bool good() const { return good_; }
+  NumberDecoder& coder() { return coder_; }
+
+ private:
+  NumberDecoder coder_;
+  std::span<const std::uint8_t> rest_;
+  std::vector<Slot> bodies_;
+  bool good_ = true;
+};
+
+// All columns in their order, to a writer or a reader of them.
+template <class Columns, class TheState, class CodecColumns>
+void code_columns(Columns& columns, TheState& state, CodecColumns codec_columns, std::int64_t most_type) {
+  columns.column(state.rest(), Guess::kZero, 0, 1);
+  columns.know_rest(state.rest());
+  columns.column(state.reuse(), Guess::kZero, 0, UINT8_MAX);
+  columns.column(state.type(), Guess::kZero, 0, most_type);
+  for (std::size_t i = 0; i < kPositionChannels; ++i)
+    columns.column(state.p(i), Guess::kBefore, -kPositionLimit, kPositionLimit);
+  for (std::size_t i = 0; i < kPositionChannels; ++i)
+    columns.column(state.v(i), Guess::kHalf, -kVelocityLimit, kVelocityLimit);
+  for (std::size_t i = 0; i < kPositionChannels; ++i)
+    columns.column(state.c(i), Guess::kHalf, -kVelocityLimit, kVelocityLimit);
+  for (std::size_t at = 0; at < codec_columns.size(); at += state.capacity())
+    columns.column(codec_columns.subspan(at, state.capacity()), Guess::kZero, INT8_MIN, INT8_MAX);
+}
+
+std::span<const std::int8_t> numbers(std::span<const std::byte> columns) {
+  return {reinterpret_cast<const std::int8_t*>(columns.data()), columns.size()};
+}
+std::span<std::int8_t> numbers(std::span<std::byte> columns) {
+  return {reinterpret_cast<std::int8_t*>(columns.data()), columns.size()};
+}
+
+}  // namespace
+
+std::size_t region_bytes_bound(std::uint32_t capacity, const Codec& codec) {
+  // Differences of two numbers have a bit more than the numbers.
+  const std::size_t slot_bits =
+      1 + most_number_bits(1) + most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX) +
+      kPositionChannels *
+          (most_number_bits(2U * kPositionLimit) + 2 * most_number_bits(2U * kVelocityLimit)) +
+      codec.columns().size() / capacity * most_number_bits(UINT8_MAX);
+  const std::size_t bits = capacity * slot_bits + codec.models_bits_bound();
+  constexpr std::size_t kFixedBytes = 256;  // region, hash, shifts; what models lose before they have learnt
+  return kFixedBytes + bits / 8 + bits / 256;
+}
+
+void write_region(std::uint64_t hash, const State& state, const Codec& codec, ByteWriter& out) {
+  out.put_leb128(0);
+  out.put(hash);
+  RegionWriter region(state, out.rest());
+  code_columns(region, state, numbers(codec.columns()), UINT16_MAX);
+  codec.save_models(region.coder());
+  const std::size_t size = region.coder().finish();
+  // One byte more than there is room for is refused.
+  out.advance(region.coder().overflow() ? out.rest().size() + 1 : size);
+}
+
+Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId type_count, State& state,
+                                  Codec& codec) {
+  ByteReader in(section);
+  if (in.get_leb128(kMostRegionNumberBytes) != 0 && in.ok())
+    return fail(ErrorCode::kMalformed, "snapshot of a region that the stream does not have");
+  const auto hash = in.get<std::uint64_t>();
+  if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated region of a snapshot");
+  state = State(state.capacity());
+  RegionReader region(state, in.get_bytes(in.remaining()));
+  std::vector<std::byte> columns(codec.columns().size());
+  code_columns(region, state, numbers(std::span(columns)), type_count - 1);
+  if (!region.good()) return fail(ErrorCode::kMalformed, "snapshot value out of range");
+  if (auto loaded = codec.load(columns, region.coder()); !loaded)
+    return tl::unexpected<Error>(loaded.error());
+  return hash;
+}
+
+}  // namespace tandem

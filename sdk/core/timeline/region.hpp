@@ -1,0 +1,23 @@
+#pragma once
+// A region of a snapshot: its bodies, and what the codec remembers of them. idl/PROTOCOL.md, "Regions".
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "sdk/core/codec/codec.hpp"
+
+namespace tandem {
+
+/// Most bytes write_region() writes.
+[[nodiscard]] std::size_t region_bytes_bound(std::uint32_t capacity, const Codec& codec);
+
+/// Writes region 0, the only one, with everything in it; `hash`: the region's.
+void write_region(std::uint64_t hash, const State& state, const Codec& codec, ByteWriter& out);
+
+/// Reads untrusted bytes: replaces `state`, loads `codec`, returns the hash, which is the caller's to check.
+/// On error both hold anything. Errors: kMalformed.
+[[nodiscard]] Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId type_count,
+                                                State& state, Codec& codec);
+
+}  // namespace tandem
