@@ -153,7 +153,7 @@ void client_frame(benchmark::State& bench, std::string_view codec) {
   bench.counters["apply_us"] = median_us(apply);
 }
 
-// Blocks side by side: wall time of encode() and decode() at 65,536 bodies in four blocks.
+// Blocks side by side: wall time of encode(), decode() and the state hash at 65,536 bodies in four blocks.
 void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   constexpr std::uint32_t kMany = 4 * kBlockSlots;
   constexpr StreamParameters kParameters{{4096, 256, 1024}};
@@ -167,7 +167,8 @@ void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   std::vector<std::byte> out(server.bound());
   State held = state;
   State target = state;
-  DurationHistogram encode, decode;
+  StateHasher hasher;
+  DurationHistogram encode, decode, hash;
   for (auto _ : bench) {
     for (Slot slot = 0; slot < kMany; ++slot) {
       if (random.one_in(10)) target.p(random.below(3))[slot] += random.one_in(2) ? 5000 : -5000;
@@ -177,11 +178,15 @@ void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
     const std::int64_t encoded_ns = transport::steady_ns();
     encode.add(encoded_ns - start_ns);
     const bool good = synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)).has_value();
-    decode.add(transport::steady_ns() - encoded_ns);
+    const std::int64_t decoded_ns = transport::steady_ns();
+    decode.add(decoded_ns - encoded_ns);
+    benchmark::DoNotOptimize(hasher.hash(held, {.codec = client.codec().columns(), .predictor = {}}, run));
+    hash.add(transport::steady_ns() - decoded_ns);
     if (!good || held != state) bench.SkipWithError("client differs");
   }
   bench.counters["encode_us"] = median_us(encode);
   bench.counters["decode_us"] = median_us(decode);
+  bench.counters["hash_us"] = median_us(hash);
 }
 
 const bool kRegistered = [] {
