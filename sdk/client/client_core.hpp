@@ -114,6 +114,7 @@ class ClientCore {
   void take_scheduled();
   void take_snapshots(Now now);
   void join(Now now);
+  [[nodiscard]] bool too_old(Frame snapshot) const;
   void load(transport::SnapshotMessage&& snapshot, Now now);
   void play(Now now, std::int64_t since_last_poll_ns);
   void play_ahead(Now now);

@@ -12,7 +12,7 @@ namespace {
 // A scheduled input that a delta promised may be this late before the client joins again.
 constexpr std::int64_t kInputPatienceNs = 250 * kMillisecond;
 // Between acknowledgements while a snapshot comes in, at least.
-constexpr std::int64_t kPartAckNs = 50 * kMillisecond;
+constexpr std::int64_t kPartAckNs = 20 * kMillisecond;
 
 // A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
@@ -82,6 +82,7 @@ void ClientCore::take_snapshots(Now now) {
   port_.take(inbox_.snapshots);
   for (auto& received : inbox_.snapshots) {
     if (!belongs(received) || !epoch_->joiner.asked()) continue;
+    if (too_old(received.message.frame)) continue;  // made for an earlier joiner
     const Outcome outcome = epoch_->snapshot.add(std::move(received.message));
     if (outcome == Outcome::kRefused) ++statistics_.refused_messages;
     if (outcome != Outcome::kStored) continue;
@@ -90,6 +91,11 @@ void ClientCore::take_snapshots(Now now) {
     if (now.steady_ns - last_ack_ns_ >= kPartAckNs) ack_due_ = true;
     if (auto whole = epoch_->snapshot.take()) epoch_->joiner.offer(std::move(*whole));
   }
+}
+
+bool ClientCore::too_old(Frame snapshot) const {
+  const CompleteDelta* first = epoch_->assembly.front();
+  return first != nullptr && snapshot + 1 < first->frame;
 }
 
 void ClientCore::join(Now now) {
@@ -104,6 +110,11 @@ void ClientCore::join(Now now) {
   if (e.joiner.poll(now.steady_ns)) {
     if (auto opened = port_.open_snapshots(); !opened) log(LogLevel::kError, opened.error().message);
     ack_due_ = true;
+  }
+  // The deltas in between were lost meanwhile, or sent before this client read them.
+  if (e.snapshot.parts() > 0 && too_old(e.snapshot.frame())) {
+    e.snapshot.reject();
+    e.joiner.ask_again(now.steady_ns);
   }
   const CompleteDelta* first = e.assembly.front();
   auto snapshot =
@@ -121,7 +132,7 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
     ++statistics_.refused_messages;
     if (loaded.error().code == ErrorCode::kMismatch) ++statistics_.hash_mismatches;
     log(LogLevel::kWarning, "snapshot refused: " + loaded.error().message);
-    e.snapshot.clear();
+    e.snapshot.reject();
     e.joiner.ask_again(now.steady_ns);
     return;
   }

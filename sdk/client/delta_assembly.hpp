@@ -25,7 +25,7 @@ class DeltaAssembly {
  public:
   struct Limits {
     std::size_t delta_bytes = 0;           ///< of a whole payload, as the session declares
-    std::size_t frames = 1024;             ///< complete deltas held
+    std::size_t frames = 1U << 14U;        ///< complete deltas held
     std::size_t total_bytes = 64U << 20U;  ///< held payload; at least four deltas are allowed in any case
   };
   enum class Outcome : std::uint8_t {

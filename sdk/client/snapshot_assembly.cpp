@@ -15,6 +15,7 @@ SnapshotAssembly::Outcome SnapshotAssembly::add(transport::SnapshotMessage&& par
     clear();
     return Outcome::kRefused;
   }
+  if (part.frame == rejected_) return Outcome::kIgnored;
   if (!held_.empty() && part.frame < head_.frame) return Outcome::kIgnored;
   if (held_.empty() || part.frame > head_.frame) {
     clear();
@@ -59,6 +60,11 @@ void SnapshotAssembly::clear() {
   held_.clear();
   held_bytes_ = held_parts_ = 0;
   taken_ = false;
+}
+
+void SnapshotAssembly::reject() {
+  if (!held_.empty()) rejected_ = head_.frame;
+  clear();
 }
 
 std::vector<std::uint32_t> SnapshotAssembly::missing() const {

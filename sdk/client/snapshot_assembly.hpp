@@ -23,12 +23,14 @@ class SnapshotAssembly {
   /// `most_bytes`: the largest snapshot that the stream declares.
   explicit SnapshotAssembly(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// Takes one sample of the session's epoch and stream. A newer frame takes the place of an older one.
-  /// Untrusted.
+  /// Takes one sample of the session's epoch and stream. A newer frame takes the place of an older one;
+  /// the one rejected last is ignored. Untrusted.
   Outcome add(transport::SnapshotMessage&& part);
   /// The whole, as part 0 of 1, once all parts are there; afterwards they still count as held.
   [[nodiscard]] std::optional<transport::SnapshotMessage> take();
   void clear();
+  /// The snapshot held cannot be used: drops it, and no part of it counts any more.
+  void reject();
 
   /// What an acknowledgement tells: of the snapshot that is coming in.
   [[nodiscard]] Frame frame() const { return head_.frame; }
@@ -44,6 +46,7 @@ class SnapshotAssembly {
   std::size_t held_bytes_ = 0;
   std::size_t held_parts_ = 0;
   bool taken_ = false;
+  std::optional<Frame> rejected_;
 };
 
 }  // namespace tandem::client

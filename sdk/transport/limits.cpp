@@ -131,13 +131,18 @@ bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/)
   return message.client != 0 && check_session_name(message.session).has_value();
 }
 
-std::uint32_t delta_depth(std::uint32_t window_ceiling, std::uint32_t parts, std::uint32_t max_part_bytes,
+std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling, std::size_t largest_delta_bytes,
                           std::uint64_t memory_bytes) {
+  constexpr double kMostFrames = 1U << 20U;
   const std::uint64_t window = std::clamp<std::uint64_t>(window_ceiling, 1, kMaxWindowCeiling);
-  const std::uint64_t count = std::clamp<std::uint64_t>(parts, 1, kMaxParts);
-  const std::uint64_t wanted = std::max<std::uint64_t>(64, 2 * window * count);
-  const std::uint64_t affordable = memory_bytes / std::max<std::uint64_t>(1, max_part_bytes);
-  return static_cast<std::uint32_t>(std::max(std::min(wanted, affordable), (window + 1) * count));
+  const std::uint64_t parts =
+      std::clamp<std::uint64_t>((largest_delta_bytes + kPartBytes - 1) / kPartBytes, 1, kMaxParts);
+  const auto frames =
+      static_cast<std::uint64_t>(std::clamp(frame_rate_hz * kHistorySeconds, 1.0, kMostFrames));
+  const std::uint64_t wanted = std::max<std::uint64_t>(64, std::max(frames, 2 * window) * parts);
+  const std::uint64_t affordable = memory_bytes / std::clamp<std::size_t>(largest_delta_bytes, 1, kPartBytes);
+  return static_cast<std::uint32_t>(
+      std::clamp(wanted, (window + 1) * parts, std::max(affordable, (window + 1) * parts)));
 }
 
 }  // namespace tandem::transport

@@ -48,11 +48,16 @@ struct Limits {
 /// receive it only count. Errors: kInvalidArgument.
 [[nodiscard]] Result<void> check_announcement(const SessionMessage& message);
 
-/// Deltas that writer and reader keep: at least two windows and 64, `parts` each, but no more than
-/// `memory_bytes` of them (never below one window, or a suspended server could overwrite what a participant
-/// still needs).
-[[nodiscard]] std::uint32_t delta_depth(std::uint32_t window_ceiling, std::uint32_t parts,
-                                        std::uint32_t max_part_bytes,
+/// Payloads and snapshots are cut into parts of at most so many bytes; a reader takes parts of any size.
+inline constexpr std::size_t kPartBytes = 60'000;
+/// So long a link may be lost without a snapshot being needed. The lease of participants outlasts it.
+inline constexpr double kHistorySeconds = 30;
+
+/// Samples of TandemDelta that writer and reader keep: kHistorySeconds of frames, at least two windows and
+/// 64, each of as many parts as the largest, but no more than `memory_bytes` of them (never below one window,
+/// or a suspended server could overwrite what a participant still needs).
+[[nodiscard]] std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling,
+                                        std::size_t largest_delta_bytes,
                                         std::uint64_t memory_bytes = 256ULL << 20U);
 
 }  // namespace tandem::transport

@@ -16,7 +16,7 @@
 #include "services/host/publication.hpp"
 #include "services/host/replies.hpp"
 #include "services/host/roster.hpp"
-#include "services/host/snapshot_parts.hpp"
+#include "services/host/snapshot_transfer.hpp"
 #include "services/host/status.hpp"
 #include "services/host/window.hpp"
 
@@ -122,7 +122,7 @@ struct Host::Impl {
   Roster roster;
   InputDesk inputs;
   JoinDesk joins;
-  SnapshotParts snapshot_parts{outbox};
+  SnapshotTransfer transfer{outbox};
   ReplyDesk replies;
   Claim claim;
   Pacing pacing;
@@ -210,7 +210,7 @@ void Host::Impl::receive() {
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
   claim.acknowledged(ack.message.epoch, ack.from, now_ns);
   const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
-  if (reason == Reason::kNone) return snapshot_parts.missing(ack.message);
+  if (reason == Reason::kNone) return transfer.acknowledged(ack.message, now_ns);
   ++totals.refused_messages;
   if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
   if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
@@ -312,19 +312,18 @@ void Host::Impl::produce_frame() {
 }
 
 void Host::Impl::serve_joiners() {
-  if (joins.due(roster, *port, now_ns)) {
+  if (joins.due(roster, *port, transfer, now_ns)) {
     stream.snapshot(snapshot);
-    snapshot_parts.start(config.epoch, {}, stream.frame(), snapshot);
+    transfer.start(config.epoch, {}, stream.frame(), snapshot, joins.ready(), now_ns);
     joins.served(roster, now_ns);
     ++totals.snapshots;
   }
-  if (!JoinDesk::anybody(roster.accounts())) snapshot_parts.forget();
-  snapshot_parts.send(now_ns);
+  transfer.send(roster.accounts(), now_ns);
 }
 
 HostTotals Host::Impl::totals_now() const {
   HostTotals now = totals;
-  now.snapshot_bytes = snapshot_parts.bytes();
+  now.snapshot_bytes = transfer.bytes();
   now.reply_bytes = outbox.traffic().replies;
   now.input_bytes = outbox.traffic().scheduled_inputs;
   now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
@@ -363,7 +362,7 @@ void Host::Impl::plan_wake() {
       at(std::max(now_ns, pacing.suspended_from_ns()) + *left + kMillisecond);
     }
   }
-  if (const auto due = joins.due_ns()) at(*due);
+  if (const auto due = joins.due_ns(transfer, now_ns)) at(*due);
   for (const auto& [id, account] : roster.accounts()) {
     const bool unmatched = account.present && account.phase == transport::Phase::kJoining;
     if (unmatched || account.reply.due) at(now_ns + kShortWakeNs);

@@ -5,20 +5,17 @@
 namespace tandem::host {
 namespace {
 
-bool joins(const Account& account) { return account.present && account.phase == transport::Phase::kJoining; }
-
-bool wants(const Account& account, std::int64_t now_ns) {
-  const JoinAccount& join = account.join;
-  return !join.served || join.served_attempt != account.attempt ||
-         now_ns - join.served_at_ns >= JoinDesk::kPatienceNs;
+bool wants(const Account& account) {
+  return !account.join.served || account.join.served_attempt != account.attempt;
 }
 
 }  // namespace
 
-bool JoinDesk::due(Roster& roster, transport::ServerPort& port, std::int64_t now_ns) {
+bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
+                   std::int64_t now_ns) {
   ready_.clear();
   for (const auto& [id, account] : roster.accounts()) {
-    if (!joins(account) || !wants(account, now_ns)) continue;
+    if (!joins(account) || !wants(account) || transfer.serves(id, now_ns)) continue;
     if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
     if (port.joined(account.from)) ready_.push_back(id);
   }
@@ -27,7 +24,8 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, std::int64_t now
     return false;
   }
   if (!collecting_since_ns_) collecting_since_ns_ = now_ns;
-  return now_ns - *collecting_since_ns_ >= kCollectNs;
+  const bool spaced = !served_at_ns_ || now_ns - *served_at_ns_ >= kSpacingNs;
+  return spaced && now_ns - *collecting_since_ns_ >= kCollectNs && !transfer.busy(now_ns);
 }
 
 void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
@@ -35,18 +33,16 @@ void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
     const auto known = roster.accounts().find(id);
     if (known == roster.accounts().end()) continue;
     if (known->second.join.served) roster.peer(known->second).snapshots_again.take(now_ns);
-    known->second.join = {.served = true, .served_attempt = known->second.attempt, .served_at_ns = now_ns};
+    known->second.join = {.served = true, .served_attempt = known->second.attempt};
   }
   collecting_since_ns_.reset();
+  served_at_ns_ = now_ns;
 }
 
-bool JoinDesk::anybody(const std::map<transport::ClientId, Account>& accounts) {
-  return std::ranges::any_of(accounts, [](const auto& entry) { return joins(entry.second); });
-}
-
-std::optional<std::int64_t> JoinDesk::due_ns() const {
-  if (!collecting_since_ns_) return std::nullopt;
-  return *collecting_since_ns_ + kCollectNs;
+std::optional<std::int64_t> JoinDesk::due_ns(const SnapshotTransfer& transfer, std::int64_t now_ns) const {
+  if (!collecting_since_ns_ || transfer.busy(now_ns)) return std::nullopt;
+  const std::int64_t spaced_ns = served_at_ns_ ? *served_at_ns_ + kSpacingNs : INT64_MIN;
+  return std::max(*collecting_since_ns_ + kCollectNs, spaced_ns);
 }
 
 }  // namespace tandem::host

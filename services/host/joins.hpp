@@ -4,32 +4,38 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sdk/transport/port.hpp"
 #include "services/host/roster.hpp"
+#include "services/host/snapshot_transfer.hpp"
 
 namespace tandem::host {
 
-/// Decides when a snapshot is made.
+/// Decides when a snapshot is made, and for whom.
 class JoinDesk {
  public:
-  static constexpr std::int64_t kCollectNs = 100'000'000;  ///< joiners of one snapshot
-  /// A joiner that does not ask again gets another after this.
-  static constexpr std::int64_t kPatienceNs = 5'000'000'000;
+  static constexpr std::int64_t kCollectNs = 100 * kMillisecond;  ///< joiners of one snapshot
+  static constexpr std::int64_t kSpacingNs = 250 * kMillisecond;  ///< between two snapshots at least
 
   /// True when the time has come to make one snapshot for all who are ready: they say `joining`, all three
-  /// writers have matched their participant, they were not served for this attempt within 5 s, and where they
-  /// were served before, their participant has not asked too often.
-  [[nodiscard]] bool due(Roster& roster, transport::ServerPort& port, std::int64_t now_ns);
-  /// One was queued for those who were ready at the last due().
+  /// writers have matched their participant, they are not being sent one, they were not served for this
+  /// attempt, and where they were served before, their participant has not asked too often. While `transfer`
+  /// serves somebody there is no other snapshot.
+  [[nodiscard]] bool due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
+                         std::int64_t now_ns);
+  /// Who was ready at the last due().
+  [[nodiscard]] std::span<const transport::ClientId> ready() const { return ready_; }
+  /// One was made for them.
   void served(Roster& roster, std::int64_t now_ns);
-  [[nodiscard]] static bool anybody(const std::map<transport::ClientId, Account>& accounts);
   /// When the joiners collected so far get theirs.
-  [[nodiscard]] std::optional<std::int64_t> due_ns() const;
+  [[nodiscard]] std::optional<std::int64_t> due_ns(const SnapshotTransfer& transfer,
+                                                   std::int64_t now_ns) const;
 
  private:
   std::optional<std::int64_t> collecting_since_ns_;
+  std::optional<std::int64_t> served_at_ns_;
   std::vector<transport::ClientId> ready_;
 };
 

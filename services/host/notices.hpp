@@ -21,7 +21,7 @@ class Notices {
   /// Of all clients together, and of the server. 17 MB a day at most.
   static constexpr double kPerSecond = 2;
   static constexpr double kBurst = 256;
-  static constexpr std::size_t kMostLines = 256;  ///< that wait to be taken
+  static constexpr std::size_t kMostLines = 256;                  ///< that wait to be taken
   static constexpr std::int64_t kTellLeftOutNs = 10'000'000'000;  ///< between two lines about lines left out
 
   void add(std::string line, std::int64_t now_ns);

@@ -14,9 +14,6 @@
 
 namespace tandem::host {
 
-/// Most bytes of one part of a payload or a snapshot.
-inline constexpr std::size_t kPartBytes = 60'000;
-
 /// Asks the publisher for a client's own reply writer.
 struct OpenReplies {
   transport::ClientId client = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/transport/limits.hpp"
+
 namespace tandem::host {
 
 transport::SessionMessage session_message(const HostConfig& config, const Stream& stream) {
@@ -31,10 +33,11 @@ transport::SessionMessage session_message(const HostConfig& config, const Stream
 
 void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, std::int64_t wall_ns) {
   const std::size_t size = frame.payload.size();
-  const std::size_t parts = std::max<std::size_t>((size + kPartBytes - 1) / kPartBytes, 1);
+  const std::size_t parts =
+      std::max<std::size_t>((size + transport::kPartBytes - 1) / transport::kPartBytes, 1);
   for (std::size_t part = 0; part < parts; ++part) {
-    const auto bytes =
-        frame.payload.subspan(part * kPartBytes, std::min(kPartBytes, size - part * kPartBytes));
+    const auto bytes = frame.payload.subspan(
+        part * transport::kPartBytes, std::min(transport::kPartBytes, size - part * transport::kPartBytes));
     transport::DeltaMessage delta;
     delta.epoch = epoch;
     delta.frame = frame.frame;

@@ -29,7 +29,6 @@ struct InputAccount {
 struct JoinAccount {
   bool served = false;
   std::uint32_t served_attempt = 0;
-  std::int64_t served_at_ns = 0;
 };
 
 struct ReplyAccount {
@@ -71,6 +70,11 @@ struct Peer {
   StallMeter stalls;
   TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
 };
+
+/// It is there, and on its way into the session.
+[[nodiscard]] inline bool joins(const Account& account) {
+  return account.present && account.phase == transport::Phase::kJoining;
+}
 
 /// Rules of clients, without I/O. Not thread-safe.
 class Roster {

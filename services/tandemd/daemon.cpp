@@ -114,9 +114,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.session = options.session;
-  dds.delta_depth = transport::delta_depth(
-      config.window_ceiling, static_cast<std::uint32_t>((*largest + host::kPartBytes - 1) / host::kPartBytes),
-      static_cast<std::uint32_t>(host::kPartBytes));
+  dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
   dds.stop = &stop;
   return transport::make_dds_server_port(dds);
 }
@@ -186,7 +184,10 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       {"frame_ms", {{"p50", totals.frame_ms_p50}, {"p99", totals.frame_ms_p99}}},
       {"clients_seen", totals.clients_seen},
       {"stalls", totals.stalls},
-      {"refused_inputs", totals.refused_inputs}};
+      {"refused_inputs", totals.refused_inputs},
+      {"snapshots", totals.snapshots},
+      {"snapshot_bytes", totals.snapshot_bytes},
+      {"demotions", totals.demotions}};
   const std::string line = object.dump() + '\n';
   if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     return fail(ErrorCode::kIo, "the report could not be written to stdout");

@@ -18,8 +18,6 @@ namespace tandem::tool {
 namespace {
 
 constexpr std::int64_t kTellWaitingNs = 2 * kSecond;
-// More than a second of deltas, even in parts: a busy machine may keep this process waiting.
-constexpr std::uint32_t kDeltaDepth = 512;
 
 // fmt::print would throw where stderr takes no more, and in a thread end the process.
 void print_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
@@ -60,7 +58,6 @@ Result<void> HeadlessClient::open() {
   dds.domain = options_.domain;
   dds.session = options_.session;
   dds.client = core.id;
-  dds.delta_depth = kDeltaDepth;
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());
   port_ = std::move(*port);

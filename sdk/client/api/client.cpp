@@ -18,8 +18,6 @@ namespace tandem {
 namespace {
 
 constexpr double kLongestWaitS = 1e6;
-// Deltas that wait while the application does not poll; more than a second's worth, even in parts.
-constexpr std::uint32_t kDeltaDepth = 512;
 
 client::CoreOptions core_options(const ClientOptions& options) {
   client::CoreOptions core;
@@ -90,7 +88,6 @@ Result<Client> Client::connect(const ClientOptions& options) {
   dds.domain = options.domain;
   dds.session = options.session;
   dds.client = core.id;
-  dds.delta_depth = kDeltaDepth;
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());
   auto impl = std::make_unique<Impl>(std::move(core), std::move(*port));

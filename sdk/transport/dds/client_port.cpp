@@ -46,7 +46,10 @@ class DdsClientPort final : public ClientPort {
     // are sent once to each reader.
     stream_.reset();
     epoch_ = session.epoch;
-    const auto depth = static_cast<std::int32_t>(options_.delta_depth);
+    // As deep as the writer's, or what was repaired after a lost link would push itself out. It is memory
+    // only while the application does not take it.
+    const auto depth = static_cast<std::int32_t>(
+        delta_depth(session.frame_rate_hz, session.window_ceiling, stream.max_delta_bytes));
     auto delta = endpoints_.node.reader<DeltaMessage>("deltas", {.depth = depth});
     if (!delta) return tl::unexpected(delta.error());
     auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");

@@ -20,8 +20,7 @@ struct DdsOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
   std::string session = "default";
   ClientId client = 0;  ///< client ports: only for the name that DDS tools show
-  /// Deltas a server keeps for slow readers and a client for a slow application; see delta_depth() in
-  /// limits.hpp.
+  /// Server ports: deltas kept for slow readers; see delta_depth() in limits.hpp.
   std::uint32_t delta_depth = 64;
   /// A peer that shows no sign of life for this long counts as dead. Shorter gives false alarms on busy
   /// machines.

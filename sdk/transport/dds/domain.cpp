@@ -31,11 +31,11 @@ Domains& domains() {
 // Reasons and effects: idl/PROTOCOL.md, "Cyclone DDS configuration".
 std::string defaults() {
   return "<CycloneDDS><Domain id=\"any\"><Discovery>"
+         "<LeaseDuration>45s</LeaseDuration>"
          "<SPDPInterval>1s</SPDPInterval>"
          "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
          "</Discovery><Internal>"
          "<NackDelay>10ms</NackDelay>"
-         "<HeartbeatInterval>20ms</HeartbeatInterval>"
          "<MaxSampleSize>" +
          std::to_string(kMaxSampleBytes + (1U << 20U)) +
          " B</MaxSampleSize></Internal></Domain></CycloneDDS>";

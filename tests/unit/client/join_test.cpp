@@ -194,13 +194,13 @@ TEST_F(JoinTest, TooManyDeltasWhileJoiningStartAgainWithANewQuestion) {
   start();
   port.sessions.push_back(from_server(server.session));
   poll();
-  for (int i = 0; i < 1100; ++i) deliver(server.advance());
+  for (int i = 0; i < (1 << 14) + 100; ++i) deliver(server.advance());
   poll();
   ASSERT_FALSE(recorder.resyncs.empty());
   EXPECT_EQ(recorder.resyncs[0], ResyncReason::kOverflow);
   poll(250 * kMs);
   EXPECT_EQ(core->join_attempt(), 2U);
-  EXPECT_EQ(figures().queue_high_water, 1024U);
+  EXPECT_EQ(figures().queue_high_water, 1U << 14U);
   port.snapshots.push_back(from_server(server.snapshot()));
   poll();
   EXPECT_EQ(core->phase(), ClientPhase::kPlaying);

@@ -173,15 +173,17 @@ TEST(Limits, WhatAServerAnswersIsBounded) {
   EXPECT_FALSE(within_limits(scheduled, kLimits));
 }
 
-TEST(DeltaDepth, HoldsTwoWindowsButAtLeast64) {
-  EXPECT_EQ(delta_depth(2, 1, 1000), 64U);
-  EXPECT_EQ(delta_depth(24, 1, 1000), 64U);
-  EXPECT_EQ(delta_depth(24, 4, 1000), 192U);
+TEST(DeltaDepth, HoldsHalfAMinuteTwoWindowsAndAtLeast64) {
+  EXPECT_EQ(delta_depth(30, 24, 1000), 900U);
+  EXPECT_EQ(delta_depth(30, 24, 4 * kPartBytes), 3600U);
+  EXPECT_EQ(delta_depth(1, 24, 1000), 64U);
+  EXPECT_EQ(delta_depth(1, 100, 1000), 200U);
 }
 
 TEST(DeltaDepth, IsBoundedByMemoryButNeverBelowOneWindow) {
-  EXPECT_EQ(delta_depth(24, 4, 1U << 20U, 128ULL << 20U), 128U);
-  EXPECT_EQ(delta_depth(24, 4, 1U << 20U, 1), 100U);
+  EXPECT_EQ(delta_depth(30, 24, 4 * kPartBytes, 60'000'000), 1000U);
+  EXPECT_EQ(delta_depth(30, 24, 4 * kPartBytes, 1), 100U);
+  EXPECT_LT(delta_depth(1e9, 24, 1), 1U << 21U) << "whatever the rate";
 }
 
 }  // namespace
