@@ -268,7 +268,7 @@ void write_cdr(const M& message, Bytes& out) {
 }
 
 template <class M>
-Result<M> read_cdr(std::span<const std::byte> bytes) {
+Result<M> read_cdr(std::span<const std::byte> bytes, Padding padding) {
   const auto refuse = [](const char* why) {
     return fail(ErrorCode::kMalformed, std::string(M::kTopic) + ": " + why);
   };
@@ -281,7 +281,9 @@ Result<M> read_cdr(std::span<const std::byte> bytes) {
   fields(reader, message);
   if (!reader.ok()) return refuse("truncated, or a text without its end");
   // The options' lowest two bits count the bytes that fill up the last word.
-  if (reader.remaining() != (std::to_integer<unsigned>(bytes[3]) & 3U)) return refuse("bytes left over");
+  const std::size_t announced = std::to_integer<unsigned>(bytes[3]) & 3U;
+  const bool whole = padding == Padding::kAny ? reader.remaining() <= 3 : reader.remaining() == announced;
+  if (!whole) return refuse("bytes left over");
   if constexpr (std::is_same_v<M, SessionMessage>) complete_layouts(message);
   return message;
 }
@@ -295,14 +297,14 @@ template void write_cdr(const InputMessage&, Bytes&);
 template void write_cdr(const AckMessage&, Bytes&);
 template void write_cdr(const ServerStatusMessage&, Bytes&);
 template void write_cdr(const ClientStatusMessage&, Bytes&);
-template Result<SessionMessage> read_cdr(std::span<const std::byte>);
-template Result<DeltaMessage> read_cdr(std::span<const std::byte>);
-template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>);
-template Result<SnapshotMessage> read_cdr(std::span<const std::byte>);
-template Result<ReplyMessage> read_cdr(std::span<const std::byte>);
-template Result<InputMessage> read_cdr(std::span<const std::byte>);
-template Result<AckMessage> read_cdr(std::span<const std::byte>);
-template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>);
-template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>);
+template Result<SessionMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<DeltaMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<SnapshotMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<ReplyMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<InputMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<AckMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>, Padding);
 
 }  // namespace tandem::transport

@@ -3,6 +3,7 @@
 // behind an encapsulation header. What DDS puts on the wire and what captures hold.
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "sdk/transport/messages.hpp"
@@ -17,11 +18,14 @@ inline constexpr std::size_t kCdrHeaderBytes = 4;
 template <class M>
 void write_cdr(const M& message, Bytes& out);
 
-/// Reads one message from untrusted bytes, which it must fill but for padding that the options announce.
+/// Whether bytes that fill up the last word may follow a message without being announced by the options.
+enum class Padding : std::uint8_t { kAnnounced, kAny };
+
+/// Reads one message from untrusted bytes, which it must fill but for padding.
 /// Allocates no more than a small multiple of what is there. Says nothing about values: see within_limits().
 /// Errors: kUnsupported (another encapsulation), kMalformed.
 template <class M>
-[[nodiscard]] Result<M> read_cdr(std::span<const std::byte> bytes);
+[[nodiscard]] Result<M> read_cdr(std::span<const std::byte> bytes, Padding padding = Padding::kAnnounced);
 
 extern template void write_cdr(const SessionMessage&, Bytes&);
 extern template void write_cdr(const DeltaMessage&, Bytes&);
@@ -32,14 +36,14 @@ extern template void write_cdr(const InputMessage&, Bytes&);
 extern template void write_cdr(const AckMessage&, Bytes&);
 extern template void write_cdr(const ServerStatusMessage&, Bytes&);
 extern template void write_cdr(const ClientStatusMessage&, Bytes&);
-extern template Result<SessionMessage> read_cdr(std::span<const std::byte>);
-extern template Result<DeltaMessage> read_cdr(std::span<const std::byte>);
-extern template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>);
-extern template Result<SnapshotMessage> read_cdr(std::span<const std::byte>);
-extern template Result<ReplyMessage> read_cdr(std::span<const std::byte>);
-extern template Result<InputMessage> read_cdr(std::span<const std::byte>);
-extern template Result<AckMessage> read_cdr(std::span<const std::byte>);
-extern template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>);
-extern template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>);
+extern template Result<SessionMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<DeltaMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<SnapshotMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<ReplyMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<InputMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<AckMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>, Padding);
 
 }  // namespace tandem::transport

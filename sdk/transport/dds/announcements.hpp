@@ -29,14 +29,14 @@ class Announcements {
   /// `alive(participant)` may know of further signs of life.
   template <class Alive>
   void refresh(const std::string& name, std::atomic<std::uint64_t>& dropped, Alive&& alive) {
-    sessions_.take(Limits{}, dropped, [&](dds_instance_handle_t writer, Received<SessionMessage>&& received) {
+    sessions_.take(dropped, [&](dds_instance_handle_t writer, Received<SessionMessage>&& received) {
       if (name.empty() || received.message.session == name) {
         book_.put(writer, std::move(received));
       } else {
         ++dropped;
       }
     });
-    status_.take(Limits{}, dropped, statuses_);
+    status_.take(dropped, statuses_);
     if (statuses_.size() > kMaxStatuses) statuses_.erase(statuses_.begin(), statuses_.end() - kMaxStatuses);
     book_.update([&](dds_instance_handle_t writer, const ParticipantId& participant) {
       const WriterState state = sessions_.state(writer);

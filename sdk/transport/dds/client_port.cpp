@@ -41,7 +41,11 @@ class DdsClientPort final : public ClientPort {
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override {
     limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
-    if (stream_ && epoch_ == session.epoch) return {};
+    if (stream_ && epoch_ == session.epoch) {
+      stream_->delta.set_limits(limits_);
+      if (snapshots_) snapshots_->set_limits(limits_);
+      return {};
+    }
     // New readers, because the old ones may already have been handed scheduled inputs of the new epoch, which
     // are sent once to each reader.
     stream_.reset();
@@ -57,6 +61,7 @@ class DdsClientPort final : public ClientPort {
     auto reply = endpoints_.node.reader<ReplyMessage>(
         "replies", {.partitions = {options_.session, reply_partition(options_.session, client)}});
     if (!reply) return tl::unexpected(reply.error());
+    delta->set_limits(limits_);
     stream_.emplace(Stream{std::move(*delta), std::move(*scheduled), std::move(*reply)});
     return {};
   }
@@ -69,22 +74,23 @@ class DdsClientPort final : public ClientPort {
     if (snapshots_) return {};
     auto reader = endpoints_.node.reader<SnapshotMessage>("snapshots");
     if (!reader) return tl::unexpected(reader.error());
+    reader->set_limits(limits_);
     snapshots_.emplace(std::move(*reader));
     return {};
   }
   void close_snapshots() override { snapshots_.reset(); }
 
   void take(std::vector<Received<DeltaMessage>>& out) override {
-    if (stream_) stream_->delta.take(limits_, dropped_, out);
+    if (stream_) stream_->delta.take(dropped_, out);
   }
   void take(std::vector<Received<ScheduledInputMessage>>& out) override {
-    if (stream_) stream_->scheduled.take(limits_, dropped_, out);
+    if (stream_) stream_->scheduled.take(dropped_, out);
   }
   void take(std::vector<Received<SnapshotMessage>>& out) override {
-    if (snapshots_) snapshots_->take(limits_, dropped_, out);
+    if (snapshots_) snapshots_->take(dropped_, out);
   }
   void take(std::vector<Received<ReplyMessage>>& out) override {
-    if (stream_) stream_->reply.take(limits_, dropped_, out);
+    if (stream_) stream_->reply.take(dropped_, out);
   }
 
   Result<void> write(const AckMessage& message) override { return endpoints_.ack.write(message); }
@@ -114,7 +120,7 @@ class DdsClientPort final : public ClientPort {
   std::optional<Stream> stream_;
   std::optional<Reader<SnapshotMessage>> snapshots_;
   std::optional<Epoch> epoch_;  // of the open stream
-  Limits limits_;
+  Limits limits_;               // of the open stream
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 

@@ -19,14 +19,6 @@ void lend(Sequence& sequence, const std::vector<Element>& elements) {
 
 char* lend(const std::string& text) { return const_cast<char*>(text.c_str()); }
 
-std::string to_string(const char* text) { return text == nullptr ? std::string() : std::string(text); }
-
-template <class Element, class Sequence>
-std::vector<Element> to_vector(const Sequence& sequence) {
-  const auto* const first = reinterpret_cast<const Element*>(sequence._buffer);
-  return std::vector<Element>(first, first + sequence._length);
-}
-
 std::vector<char*> lend_each(const std::vector<std::string>& texts) {
   std::vector<char*> lent;
   lent.reserve(texts.size());
@@ -65,32 +57,6 @@ tandem_SessionStream to_wire(const StreamMessage& stream, const LentStream& lent
   return wire;
 }
 
-StreamMessage to_stream(const tandem_SessionStream& wire) {
-  StreamMessage stream;
-  stream.id = {wire.id, wire.generation};
-  stream.client_cost_ns = wire.client_cost_ns;
-  stream.max_delta_bytes = wire.max_delta_bytes;
-  stream.max_snapshot_bytes = wire.max_snapshot_bytes;
-  stream.layout_hash = wire.layout_hash;
-  Layout& layout = stream.layout;
-  layout.region_blocks = wire.region_blocks;
-  layout.codec = to_string(wire.codec);
-  layout.predictor = to_string(wire.predictor);
-  layout.groups.clear();
-  for (std::uint32_t i = 0; i < wire.groups._length; ++i) {
-    layout.groups.push_back(to_string(wire.groups._buffer[i]));
-  }
-  layout.radii = to_vector<std::int32_t>(wire.radii);
-  std::vector<Parameter> parameters;
-  for (std::uint32_t i = 0; i < wire.parameters._length; ++i) {
-    parameters.push_back(Parameter{wire.parameters._buffer[i].id, wire.parameters._buffer[i].value});
-  }
-  layout.parameters = parameters_from(parameters).value_or(StreamParameters{});
-  layout.predictor_constants = to_vector<std::int32_t>(wire.predictor_constants);
-  layout.codec_tables = to_vector<std::byte>(wire.codec_tables);
-  return stream;
-}
-
 }  // namespace
 
 dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
@@ -124,31 +90,6 @@ dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
   return dds_write(writer, &wire);
 }
 
-SessionMessage to_message(const tandem_TandemSession& wire) {
-  SessionMessage message;
-  message.epoch = wire.epoch;
-  message.protocol_version = wire.protocol_version;
-  message.capacity = wire.capacity;
-  message.frame_rate_hz = wire.frame_rate_hz;
-  message.lattice_unit = wire.lattice_unit;
-  message.lead = wire.lead;
-  message.window_ceiling = wire.window_ceiling;
-  message.session = to_string(wire.session);
-  message.scene = to_string(wire.scene);
-  message.scene_description = to_string(wire.scene_description);
-  message.types.reserve(wire.types._length);
-  for (std::uint32_t i = 0; i < wire.types._length; ++i) {
-    const tandem_BodyType& type = wire.types._buffer[i];
-    message.types.push_back(BodyType{to_string(type.name), type.radius, type.colour_rgba,
-                                     static_cast<Shape>(type.shape), to_vector<float>(type.shape_values)});
-  }
-  for (std::uint32_t i = 0; i < wire.streams._length; ++i) {
-    message.streams.push_back(to_stream(wire.streams._buffer[i]));
-  }
-  complete_layouts(message);
-  return message;
-}
-
 dds_return_t write_sample(dds_entity_t writer, const DeltaMessage& message) {
   tandem_TandemDelta wire{};
   wire.epoch = message.epoch;
@@ -164,20 +105,6 @@ dds_return_t write_sample(dds_entity_t writer, const DeltaMessage& message) {
   return dds_write(writer, &wire);
 }
 
-DeltaMessage to_message(const tandem_TandemDelta& wire) {
-  DeltaMessage message;
-  message.epoch = wire.epoch;
-  message.stream = {wire.stream, wire.generation};
-  message.frame = wire.frame;
-  message.part = wire.part;
-  message.parts = wire.parts;
-  message.last_input = wire.last_input;
-  message.server_time_ns = wire.server_time_ns;
-  message.hash = wire.hash;
-  message.payload = to_vector<std::byte>(wire.payload);
-  return message;
-}
-
 dds_return_t write_sample(dds_entity_t writer, const ScheduledInputMessage& message) {
   tandem_TandemScheduledInput wire{};
   wire.epoch = message.epoch;
@@ -188,18 +115,6 @@ dds_return_t write_sample(dds_entity_t writer, const ScheduledInputMessage& mess
   wire.kind = message.kind;
   lend(wire.values, message.values);
   return dds_write(writer, &wire);
-}
-
-ScheduledInputMessage to_message(const tandem_TandemScheduledInput& wire) {
-  ScheduledInputMessage message;
-  message.epoch = wire.epoch;
-  message.number = wire.number;
-  message.frame = wire.frame;
-  message.source_client = wire.source_client;
-  message.source_number = wire.source_number;
-  message.kind = wire.kind;
-  message.values = to_vector<std::int32_t>(wire.values);
-  return message;
 }
 
 dds_return_t write_sample(dds_entity_t writer, const SnapshotMessage& message) {
@@ -213,18 +128,6 @@ dds_return_t write_sample(dds_entity_t writer, const SnapshotMessage& message) {
   wire.total_bytes = message.total_bytes;
   lend(wire.bytes, message.bytes);
   return dds_write(writer, &wire);
-}
-
-SnapshotMessage to_message(const tandem_TandemSnapshot& wire) {
-  SnapshotMessage message;
-  message.epoch = wire.epoch;
-  message.stream = {wire.stream, wire.generation};
-  message.frame = wire.frame;
-  message.part = wire.part;
-  message.parts = wire.parts;
-  message.total_bytes = wire.total_bytes;
-  message.bytes = to_vector<std::byte>(wire.bytes);
-  return message;
 }
 
 dds_return_t write_sample(dds_entity_t writer, const ReplyMessage& message) {
@@ -246,24 +149,6 @@ dds_return_t write_sample(dds_entity_t writer, const ReplyMessage& message) {
   return dds_write(writer, &wire);
 }
 
-ReplyMessage to_message(const tandem_TandemReply& wire) {
-  ReplyMessage message;
-  message.client = wire.client;
-  message.epoch = wire.epoch;
-  message.role = static_cast<Role>(wire.role);
-  message.phase = static_cast<Phase>(wire.phase);
-  message.reason = wire.reason;
-  message.highest_input = wire.highest_input;
-  message.client_clock_ns = wire.client_clock_ns;
-  message.server_time_ns = wire.server_time_ns;
-  message.entries.reserve(wire.entries._length);
-  for (std::uint32_t i = 0; i < wire.entries._length; ++i) {
-    const tandem_ReplyEntry& entry = wire.entries._buffer[i];
-    message.entries.push_back(ReplyEntry{entry.number, entry.frame, entry.code});
-  }
-  return message;
-}
-
 dds_return_t write_sample(dds_entity_t writer, const InputMessage& message) {
   tandem_TandemInput wire{};
   wire.client = message.client;
@@ -274,18 +159,6 @@ dds_return_t write_sample(dds_entity_t writer, const InputMessage& message) {
   lend(wire.values, message.values);
   lend(wire.bytes, message.bytes);
   return dds_write(writer, &wire);
-}
-
-InputMessage to_message(const tandem_TandemInput& wire) {
-  InputMessage message;
-  message.client = wire.client;
-  message.epoch = wire.epoch;
-  message.number = wire.number;
-  message.client_frame = wire.client_frame;
-  message.kind = wire.kind;
-  message.values = to_vector<double>(wire.values);
-  message.bytes = to_vector<std::byte>(wire.bytes);
-  return message;
 }
 
 dds_return_t write_sample(dds_entity_t writer, const AckMessage& message) {
@@ -305,24 +178,6 @@ dds_return_t write_sample(dds_entity_t writer, const AckMessage& message) {
   wire.snapshot_parts = message.snapshot_parts;
   lend(wire.missing, message.missing);
   return dds_write(writer, &wire);
-}
-
-AckMessage to_message(const tandem_TandemAck& wire) {
-  AckMessage message;
-  message.client = wire.client;
-  message.epoch = wire.epoch;
-  message.protocol_version = wire.protocol_version;
-  message.stream = {wire.stream, wire.generation};
-  message.phase = static_cast<Phase>(wire.phase);
-  message.applied = wire.applied;
-  message.simulated = wire.simulated;
-  message.role_wanted = static_cast<Role>(wire.role_wanted);
-  message.join_attempt = wire.join_attempt;
-  message.clock_ns = wire.clock_ns;
-  message.snapshot_frame = wire.snapshot_frame;
-  message.snapshot_parts = wire.snapshot_parts;
-  message.missing = to_vector<std::uint32_t>(wire.missing);
-  return message;
 }
 
 dds_return_t write_sample(dds_entity_t writer, const ServerStatusMessage& message) {
@@ -359,40 +214,6 @@ dds_return_t write_sample(dds_entity_t writer, const ServerStatusMessage& messag
   return dds_write(writer, &wire);
 }
 
-ServerStatusMessage to_message(const tandem_TandemServerStatus& wire) {
-  ServerStatusMessage message;
-  message.epoch = wire.epoch;
-  message.frame = wire.frame;
-  message.uptime_s = wire.uptime_s;
-  message.frame_rate_hz = wire.frame_rate_hz;
-  message.mbit_per_s = wire.mbit_per_s;
-  message.raw_mbit_per_s = wire.raw_mbit_per_s;
-  message.frame_ms_p50 = wire.frame_ms_p50;
-  message.frame_ms_p99 = wire.frame_ms_p99;
-  message.corrected_per_frame = wire.corrected_per_frame;
-  message.threshold = wire.threshold;
-  message.bodies = wire.bodies;
-  message.at_rest = wire.at_rest;
-  message.participants = wire.participants;
-  message.observers = wire.observers;
-  message.window = wire.window;
-  message.queue_high_water = wire.queue_high_water;
-  message.delta_bytes = wire.delta_bytes;
-  message.reply_bytes = wire.reply_bytes;
-  message.input_bytes = wire.input_bytes;
-  message.snapshot_bytes = wire.snapshot_bytes;
-  message.stalls = wire.stalls;
-  message.suspended_ms = wire.suspended_ms;
-  message.refused_inputs = wire.refused_inputs;
-  message.refused_messages = wire.refused_messages;
-  message.snapshots = wire.snapshots;
-  message.stream = wire.stream;
-  message.session = to_string(wire.session);
-  message.codec = to_string(wire.codec);
-  message.predictor = to_string(wire.predictor);
-  return message;
-}
-
 dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& message) {
   tandem_TandemClientStatus wire{};
   wire.client = message.client;
@@ -414,28 +235,6 @@ dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& messag
   wire.inputs_refused = message.inputs_refused;
   wire.session = lend(message.session);
   return dds_write(writer, &wire);
-}
-
-ClientStatusMessage to_message(const tandem_TandemClientStatus& wire) {
-  ClientStatusMessage message;
-  message.client = wire.client;
-  message.epoch = wire.epoch;
-  message.applied = wire.applied;
-  message.stream = {wire.stream, wire.generation};
-  message.role = wire.role;
-  message.phase = wire.phase;
-  message.too_slow = wire.too_slow;
-  message.queue_high_water = wire.queue_high_water;
-  message.lag_ms = wire.lag_ms;
-  message.client_ms_p50 = wire.client_ms_p50;
-  message.mbit_per_s = wire.mbit_per_s;
-  message.frames_applied = wire.frames_applied;
-  message.resyncs = wire.resyncs;
-  message.hash_mismatches = wire.hash_mismatches;
-  message.inputs_sent = wire.inputs_sent;
-  message.inputs_refused = wire.inputs_refused;
-  message.session = to_string(wire.session);
-  return message;
 }
 
 }  // namespace tandem::transport::dds

@@ -45,7 +45,7 @@ class Monitor {
   virtual ~Monitor() = default;
   /// Announcements of all live servers.
   virtual void list_sessions(std::vector<Received<SessionMessage>>& out) = 0;
-  /// Status samples since the last call, at most one of each server and client.
+  /// Status samples since the last call, the latest 8 of each server and client, oldest first.
   virtual void take(std::vector<Received<ServerStatusMessage>>& out) = 0;
   virtual void take(std::vector<Received<ClientStatusMessage>>& out) = 0;
   virtual void wait(std::chrono::nanoseconds timeout) = 0;

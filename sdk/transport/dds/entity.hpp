@@ -1,5 +1,5 @@
 #pragma once
-// Ownership of Cyclone DDS handles: entities, QoS, loans.
+// Ownership of Cyclone DDS handles: entities, QoS.
 
 #include <dds/dds.h>
 
@@ -56,34 +56,5 @@ using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
   if (created < 0) return dds_failure("creating " + doing, created);
   return Entity(created);
 }
-
-/// Up to kBatch samples taken from a reader without copying; given back at the end of its life.
-class Loan {
- public:
-  static constexpr std::uint32_t kBatch = 64;
-
-  explicit Loan(dds_entity_t reader)
-      : reader_(reader), count_(dds_take(reader, samples_, infos_, kBatch, kBatch)) {}
-  Loan(const Loan&) = delete;
-  Loan& operator=(const Loan&) = delete;
-  Loan(Loan&&) = delete;
-  Loan& operator=(Loan&&) = delete;
-  ~Loan() {
-    if (count_ > 0) dds_return_loan(reader_, samples_, count_);
-  }
-
-  [[nodiscard]] std::uint32_t size() const { return count_ > 0 ? static_cast<std::uint32_t>(count_) : 0; }
-  /// Null for a sample that only tells that its instance was disposed of or lost its writer.
-  [[nodiscard]] const void* data(std::uint32_t i) const {
-    return infos_[i].valid_data ? samples_[i] : nullptr;
-  }
-  [[nodiscard]] dds_instance_handle_t writer(std::uint32_t i) const { return infos_[i].publication_handle; }
-
- private:
-  dds_entity_t reader_;
-  void* samples_[kBatch] = {};
-  dds_sample_info_t infos_[kBatch] = {};
-  dds_return_t count_;
-};
 
 }  // namespace tandem::transport::dds

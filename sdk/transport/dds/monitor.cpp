@@ -27,7 +27,7 @@ class DdsMonitor final : public Monitor {
     statuses.clear();
   }
   void take(std::vector<Received<ClientStatusMessage>>& out) override {
-    endpoints_.clients.take(Limits{}, dropped_, out);
+    endpoints_.clients.take(dropped_, out);
   }
   void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
 

@@ -100,16 +100,6 @@ Result<Entity> Node::make_topic(const dds_topic_descriptor_t& descriptor, const 
              std::string("the topic ") + name);
 }
 
-Result<void> Node::watch(dds_entity_t reader) {
-  // The condition is the reader's child: it goes with it, and so leaves the waitset.
-  const dds_entity_t condition = dds_create_readcondition(reader, DDS_ANY_STATE);
-  if (condition < 0) return dds_failure("creating a read condition", condition);
-  if (const auto code = dds_waitset_attach(waitset_.get(), condition, 0); code != DDS_RETCODE_OK) {
-    return dds_failure("attaching a read condition", code);
-  }
-  return {};
-}
-
 void Node::wait(std::chrono::nanoseconds timeout) {
   const dds_duration_t duration = std::max<dds_duration_t>(0, timeout.count());
   if (dds_waitset_wait(waitset_.get(), nullptr, 0, duration) > 0) {

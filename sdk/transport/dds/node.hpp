@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/transport/dds/arrivals.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
 #include "sdk/transport/dds/live_writers.hpp"
@@ -53,36 +54,32 @@ class Writer {
 template <class M>
 class Reader {
  public:
-  /// `subscriber`: the reader's own, if it has one.
-  Reader(Entity topic, Entity subscriber, Entity entity, std::unique_ptr<LiveWriters> writers)
-      : writers_(std::move(writers)),
+  /// `subscriber`: the reader's own, if it has one. `arrivals` and `writers` are what its listener calls.
+  Reader(std::unique_ptr<Arrivals<M>> arrivals, std::unique_ptr<LiveWriters> writers, Entity topic,
+         Entity subscriber, Entity entity)
+      : arrivals_(std::move(arrivals)),
+        writers_(std::move(writers)),
         topic_(std::move(topic)),
         subscriber_(std::move(subscriber)),
         entity_(std::move(entity)) {}
 
-  /// Calls `sink(writer, Received<M>&&)` for each sample in order; counts in `dropped` what breaks a limit.
+  /// Of what arrives from now on; at first the fixed maximum.
+  void set_limits(const Limits& limits) { arrivals_->set_limits(limits); }
+
+  /// Calls `sink(writer, Received<M>&&)` for each sample in order; counts in `dropped` what broke a limit.
   /// A sample whose writer has left the participant's endpoints in between cannot be attributed and is passed
   /// over.
   template <class Sink>
-  void take(const Limits& limits, std::atomic<std::uint64_t>& dropped, Sink&& sink) {
-    for (;;) {
-      const Loan loan(entity_.get());
-      for (std::uint32_t i = 0; i < loan.size(); ++i) {
-        if (loan.data(i) == nullptr) continue;
-        const auto from = participants_.of_writer(entity_.get(), loan.writer(i));
-        if (!from) continue;
-        M message = to_message(*static_cast<const typename Topic<M>::Wire*>(loan.data(i)));
-        if (within_limits(message, limits)) {
-          sink(loan.writer(i), Received<M>{std::move(message), *from});
-        } else {
-          ++dropped;
-        }
-      }
-      if (loan.size() < Loan::kBatch) return;
+  void take(std::atomic<std::uint64_t>& dropped, Sink&& sink) {
+    std::uint64_t broke_limits = 0;
+    for (auto& arrival : arrivals_->take(broke_limits)) {
+      const auto from = participants_.of_writer(entity_.get(), arrival.writer);
+      if (from) sink(arrival.writer, Received<M>{std::move(arrival.message), *from});
     }
+    dropped += broke_limits;
   }
-  void take(const Limits& limits, std::atomic<std::uint64_t>& dropped, std::vector<Received<M>>& out) {
-    take(limits, dropped, [&out](dds_instance_handle_t, Received<M>&& r) { out.push_back(std::move(r)); });
+  void take(std::atomic<std::uint64_t>& dropped, std::vector<Received<M>>& out) {
+    take(dropped, [&out](dds_instance_handle_t, Received<M>&& r) { out.push_back(std::move(r)); });
   }
 
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const { return writers_->state(writer); }
@@ -95,7 +92,9 @@ class Reader {
   }
 
  private:
-  std::unique_ptr<LiveWriters> writers_;  // its listener runs until the entity is gone, so it comes first
+  // The listener runs until the entity is gone, so what it calls comes first.
+  std::unique_ptr<Arrivals<M>> arrivals_;
+  std::unique_ptr<LiveWriters> writers_;
   Entity topic_;
   Entity subscriber_;
   Entity entity_;
@@ -104,9 +103,9 @@ class Reader {
 
 /// How a reader differs from its topic's.
 struct ReaderOptions {
-  std::optional<std::int32_t> depth = {};
-  bool ignore_own = false;  ///< not what its own participant writes
-  bool watched = true;      ///< what comes ends Node::wait(); whoever watches it has to take it
+  std::optional<std::int32_t> depth = {};    ///< of its history, and what is kept of each writer
+  bool ignore_own = false;                   ///< not what its own participant writes
+  bool watched = true;                       ///< what comes ends Node::wait()
   std::vector<std::string> partitions = {};  ///< through a subscriber of its own; none: the node's
 };
 
@@ -147,18 +146,19 @@ class Node {
         make_qos(Topic<M>::kQos, options.depth.value_or(Topic<M>::kQos.reader_depth), DDS_INFINITY);
     dds_qset_entity_name(qos.get(), name.c_str());
     if (options.ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+    const auto kept = static_cast<std::size_t>(options.depth.value_or(Topic<M>::kQos.kept));
+    auto arrivals = std::make_unique<Arrivals<M>>(kept, options.watched ? guard_.get() : 0);
     auto writers = std::make_unique<LiveWriters>();
+    writers->also_on_data(&Arrivals<M>::on_data, arrivals.get());
     auto entity = own(dds_create_reader(parent.get(), topic->get(), qos.get(), writers->listener()),
                       std::string("the reader of ") + M::kTopic);
     if (!entity) return tl::unexpected(entity.error());
-    if (options.watched) {
-      if (auto watched = watch(entity->get()); !watched) return tl::unexpected(watched.error());
-    }
-    return Reader<M>(std::move(*topic), std::move(*subscriber), std::move(*entity), std::move(writers));
+    return Reader<M>(std::move(arrivals), std::move(writers), std::move(*topic), std::move(*subscriber),
+                     std::move(*entity));
   }
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
-  /// Until a watched reader created here has something to take, wake() was called, or the timeout.
+  /// Until something arrived at a watched reader created here, wake() was called, or the timeout.
   void wait(std::chrono::nanoseconds timeout);
   void wake();
 
@@ -167,7 +167,6 @@ class Node {
   [[nodiscard]] Result<Entity> make_publisher(const std::vector<std::string>& partitions) const;
   [[nodiscard]] Result<Entity> make_subscriber(const std::vector<std::string>& partitions) const;
   Result<Entity> make_topic(const dds_topic_descriptor_t& descriptor, const char* name);
-  Result<void> watch(dds_entity_t reader);
 
   // Destroyed in reverse: children before the participant, the participant before the domain.
   DomainUse domain_;
@@ -177,7 +176,7 @@ class Node {
   Entity publisher_;
   Entity subscriber_;
   Entity waitset_;
-  Entity guard_;
+  Entity guard_;  // what arrives triggers it, and wake()
   ParticipantId self_;
 };
 

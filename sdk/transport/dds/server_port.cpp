@@ -64,10 +64,8 @@ class DdsServerPort final : public ServerPort {
   }
   void close_replies(ClientId client) override { replies_.erase(client); }
 
-  void take(std::vector<Received<InputMessage>>& out) override {
-    endpoints_.input.take(limits_, dropped_, out);
-  }
-  void take(std::vector<Received<AckMessage>>& out) override { endpoints_.ack.take(limits_, dropped_, out); }
+  void take(std::vector<Received<InputMessage>>& out) override { endpoints_.input.take(dropped_, out); }
+  void take(std::vector<Received<AckMessage>>& out) override { endpoints_.ack.take(dropped_, out); }
 
   [[nodiscard]] bool joined(const ParticipantId& participant) override {
     return reads(endpoints_.delta.get(), participant) && reads(endpoints_.scheduled.get(), participant) &&
@@ -122,7 +120,6 @@ class DdsServerPort final : public ServerPort {
   // Of the writing thread.
   std::map<ClientId, Writer<ReplyMessage>> replies_;
   std::deque<ClientId> strangers_;
-  Limits limits_;
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 

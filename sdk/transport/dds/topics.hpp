@@ -16,6 +16,7 @@ struct TopicQos {
   bool transient_local = false;
   std::int32_t writer_depth = 1;
   std::int32_t reader_depth = 1;  ///< per instance
+  std::int32_t kept = 1;          ///< of one writer until they are taken from a reader: see Arrivals
 };
 
 template <class M>
@@ -23,60 +24,49 @@ struct Topic;
 
 template <>
 struct Topic<SessionMessage> {
-  using Wire = tandem_TandemSession;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSession_desc; }
   // Two servers that start at once share the instance; a reader must see both.
-  static constexpr TopicQos kQos{true, true, 1, 8};
+  static constexpr TopicQos kQos{true, true, 1, 8, 8};
 };
 template <>
 struct Topic<DeltaMessage> {
-  using Wire = tandem_TandemDelta;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemDelta_desc; }
-  static constexpr TopicQos kQos{true, false, 64, 64};  // the options say how deep
+  static constexpr TopicQos kQos{true, false, 64, 64, 64};  // the options say how deep
 };
 template <>
 struct Topic<ScheduledInputMessage> {
-  using Wire = tandem_TandemScheduledInput;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemScheduledInput_desc; }
-  static constexpr TopicQos kQos{true, true, 256, 256};
+  static constexpr TopicQos kQos{true, true, 256, 256, 256};
 };
 template <>
 struct Topic<SnapshotMessage> {
-  using Wire = tandem_TandemSnapshot;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
-  static constexpr TopicQos kQos{true, false, 64, 1200};
+  static constexpr TopicQos kQos{true, false, 64, 1200, 1200};
 };
 template <>
 struct Topic<ReplyMessage> {
-  using Wire = tandem_TandemReply;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemReply_desc; }
-  static constexpr TopicQos kQos{true, true, 1, 1};
+  static constexpr TopicQos kQos{true, true, 1, 1, 64};
 };
 template <>
 struct Topic<InputMessage> {
-  using Wire = tandem_TandemInput;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemInput_desc; }
-  static constexpr TopicQos kQos{true, false, 64, 64};
+  static constexpr TopicQos kQos{true, false, 64, 64, 64};
 };
 template <>
 struct Topic<AckMessage> {
-  using Wire = tandem_TandemAck;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemAck_desc; }
-  // A participant that writes another's client id must not displace the owner's sample before the server sees
-  // it.
-  static constexpr TopicQos kQos{true, false, 1, 16};
+  static constexpr TopicQos kQos{true, false, 1, 16, 16};
 };
 template <>
 struct Topic<ServerStatusMessage> {
-  using Wire = tandem_TandemServerStatus;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemServerStatus_desc; }
-  static constexpr TopicQos kQos{false, false, 1, 1};
+  static constexpr TopicQos kQos{false, false, 1, 1, 8};
 };
 template <>
 struct Topic<ClientStatusMessage> {
-  using Wire = tandem_TandemClientStatus;
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemClientStatus_desc; }
-  static constexpr TopicQos kQos{false, false, 1, 1};
+  static constexpr TopicQos kQos{false, false, 1, 1, 8};
 };
 
 /// QoS of a writer (`depth` samples of history) or of a reader; a reader leaves `lease` infinite and so

@@ -273,14 +273,18 @@ bool Fabric::settle_front(Pair& pair, Index index) {
 
 void Fabric::deliver(const Pair& pair, const Sample& sample) {
   Reader& reader = readers_[pair.reader];
-  const auto same_key = [&](const Arrived& arrived) { return arrived.key == sample.key; };
+  // By writer, as the DDS port keeps them, so that nobody pushes out the samples of others.
+  const Index from = writers_[pair.writer].participant;
+  const auto same_key = [&](const Arrived& arrived) {
+    return arrived.from == from && arrived.key == sample.key;
+  };
   if (reader.arrived.size() >= reader.depth &&
       std::count_if(reader.arrived.begin(), reader.arrived.end(), same_key) >=
           static_cast<std::ptrdiff_t>(reader.depth)) {
     reader.arrived.erase(std::find_if(reader.arrived.begin(), reader.arrived.end(), same_key));
     ++counts_.pushed_out;
   }
-  reader.arrived.push_back(Arrived{writers_[pair.writer].participant, sample.key, sample.message});
+  reader.arrived.push_back(Arrived{from, sample.key, sample.message});
   ++counts_.delivered;
 }
 

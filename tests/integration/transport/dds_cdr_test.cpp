@@ -50,12 +50,12 @@ class DdsCdr : public ::testing::Test {
   M reread() {
     EXPECT_NE(reread_, nullptr) << "Cyclone DDS refuses our bytes";
     if (reread_ == nullptr) return {};
-    typename dds::Topic<M>::Wire wire{};
-    EXPECT_TRUE(ddsi_serdata_to_sample(reread_, &wire, nullptr, nullptr));
+    Bytes bytes(ddsi_serdata_size(reread_));
+    ddsi_serdata_to_ser(reread_, 0, bytes.size(), bytes.data());
     ddsi_serdata_unref(std::exchange(reread_, nullptr));
-    M message = dds::to_message(wire);
-    dds_sample_free(&wire, &dds::Topic<M>::descriptor(), DDS_FREE_CONTENTS);
-    return message;
+    const auto message = read_cdr<M>(bytes, Padding::kAny);
+    EXPECT_TRUE(message);
+    return message ? *message : M{};
   }
 
  private:

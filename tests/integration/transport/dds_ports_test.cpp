@@ -268,6 +268,48 @@ TEST_F(DdsPorts, TheSameClientIdFromTwoParticipantsIsToldApart) {
   EXPECT_EQ(receive<AckMessage>(*server, 1)[0].from, second->self());
 }
 
+TEST_F(DdsPorts, AFloodUnderAClientsIdPushesOutNoInputOfThatClient) {
+  const auto server = this->server();
+  const auto owner = this->client();
+  const auto flooder = this->client();
+  ASSERT_TRUE(eventually([&] { return server->alive(owner->self()) && server->alive(flooder->self()); }));
+  InputMessage input;
+  input.client = kClient;
+  input.epoch = kEpoch;
+  for (int i = 0; i < 50; ++i) {
+    ++input.number;
+    ASSERT_TRUE(owner->write(input));
+    for (int flood = 0; flood < 100; ++flood) ASSERT_TRUE(flooder->write(input));
+  }
+  std::size_t of_owner = 0, of_flooder = 0;
+  std::vector<Received<InputMessage>> inputs;
+  EXPECT_TRUE(eventually([&] {
+    inputs.clear();
+    usleep(50'000);  // as a server does that steps meanwhile
+    server->take(inputs);
+    for (const auto& received : inputs) ++(received.from == owner->self() ? of_owner : of_flooder);
+    return of_owner >= 50;
+  }));
+  EXPECT_EQ(of_owner, 50U);
+}
+
+TEST_F(DdsPorts, AnInputThatIsFarTooLargeIsDroppedBeforeItIsRead) {
+  const auto server = this->server();
+  const auto client = this->client();
+  ASSERT_TRUE(eventually([&] { return server->alive(client->self()); }));
+  InputMessage input;
+  input.client = kClient;
+  input.epoch = kEpoch;
+  input.number = 1;
+  input.bytes.resize(20'000'000);
+  ASSERT_TRUE(client->write(input));
+  input.bytes.clear();
+  input.number = 2;
+  ASSERT_TRUE(client->write(input));
+  EXPECT_EQ(receive<InputMessage>(*server, 1).at(0).message.number, 2U);
+  EXPECT_EQ(server->dropped(), 1U);
+}
+
 TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   const auto server = this->server();
   auto client = this->client();

@@ -1,0 +1,136 @@
+#pragma once
+// Samples between DDS and whoever takes them, kept apart by writer.
+
+#include <dds/dds.h>
+#include <dds/ddsi/ddsi_serdata.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
+
+#include "sdk/transport/cdr.hpp"
+#include "sdk/transport/limits.hpp"
+
+namespace tandem::transport::dds {
+
+/// A sample has no more bytes than this, with its header, if it keeps to `limits`.
+template <class M>
+[[nodiscard]] std::size_t most_bytes(const Limits& limits) {
+  constexpr std::size_t kFieldBytes = 2048;  // without a payload; several times what there is
+  if constexpr (std::is_same_v<M, SessionMessage>) return kMaxSampleBytes;
+  if constexpr (std::is_same_v<M, DeltaMessage>) return kFieldBytes + limits.max_delta_bytes;
+  if constexpr (std::is_same_v<M, SnapshotMessage>) return kFieldBytes + limits.max_snapshot_bytes;
+  return kFieldBytes;
+}
+
+/// Takes every sample of a reader as it arrives, in a thread of Cyclone DDS. The history of a DDS reader is
+/// shared by all who write a key, so that one of them can push out the samples of the others; here a writer
+/// can push out its own only. What is larger than its topic allows is dropped before it is copied.
+/// Thread-safe.
+template <class M>
+class Arrivals {
+ public:
+  struct Arrival {
+    dds_instance_handle_t writer = 0;
+    std::size_t bytes = 0;
+    M message;
+  };
+
+  /// Keeps `of_writer` samples of each writer. `guard`: a guard condition that each arrival triggers; 0:
+  /// none.
+  Arrivals(std::size_t of_writer, dds_entity_t guard) : of_writer_(of_writer), guard_(guard) {}
+
+  void set_limits(const Limits& limits) {
+    const std::lock_guard lock(mutex_);
+    limits_ = limits;
+  }
+
+  /// A DDS listener's on_data_available, with this as its argument.
+  static void on_data(dds_entity_t reader, void* self) { static_cast<Arrivals*>(self)->collect(reader); }
+
+  /// All that came since the last call, oldest first. `dropped` grows by what broke a limit.
+  [[nodiscard]] std::deque<Arrival> take(std::uint64_t& dropped) {
+    const std::lock_guard lock(mutex_);
+    dropped += std::exchange(dropped_, 0);
+    held_.clear();
+    bytes_ = 0;
+    return std::exchange(arrivals_, {});
+  }
+
+ private:
+  struct Held {
+    std::size_t samples = 0, bytes = 0;
+  };
+  // Of all writers together; beyond it the one that holds the most makes room.
+  static constexpr std::size_t kMostSamples = 4096;
+  static constexpr std::size_t kMostBytes = 256U << 20U;
+
+  void collect(dds_entity_t reader) {
+    constexpr std::uint32_t kBatch = 16;
+    for (;;) {
+      std::array<ddsi_serdata*, kBatch> samples{};
+      std::array<dds_sample_info_t, kBatch> infos{};
+      const dds_return_t count = dds_takecdr(reader, samples.data(), kBatch, infos.data(), DDS_ANY_STATE);
+      if (count <= 0) break;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+        // A sample without data only tells that its instance was disposed of or lost its writer.
+        if (infos[i].valid_data) accept(infos[i].publication_handle, *samples[i]);
+        ddsi_serdata_unref(samples[i]);
+      }
+    }
+    if (guard_ != 0) (void)dds_set_guardcondition(guard_, true);
+  }
+
+  void accept(dds_instance_handle_t writer, ddsi_serdata& sample) {
+    const std::lock_guard lock(mutex_);
+    const std::size_t size = ddsi_serdata_size(&sample);
+    if (size > most_bytes<M>(limits_)) {
+      ++dropped_;
+      return;
+    }
+    ddsrt_iovec_t bytes{};
+    ddsi_serdata* const held = ddsi_serdata_to_ser_ref(&sample, 0, size, &bytes);
+    // Not every DDS announces the bytes with which it fills up the last word.
+    auto message = read_cdr<M>({static_cast<const std::byte*>(bytes.iov_base), bytes.iov_len}, Padding::kAny);
+    ddsi_serdata_to_ser_unref(held, &bytes);
+    if (!message || !within_limits(*message, limits_)) {
+      ++dropped_;
+      return;
+    }
+    if (held_[writer].samples >= of_writer_) drop_oldest_of(writer);
+    held_[writer].samples += 1;
+    held_[writer].bytes += size;
+    bytes_ += size;
+    arrivals_.push_back({writer, size, std::move(*message)});
+    while (arrivals_.size() > std::max(kMostSamples, 2 * of_writer_) || bytes_ > kMostBytes) {
+      const auto less = [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; };
+      drop_oldest_of(std::max_element(held_.begin(), held_.end(), less)->first);
+    }
+  }
+
+  void drop_oldest_of(dds_instance_handle_t writer) {
+    const auto oldest = std::find_if(arrivals_.begin(), arrivals_.end(),
+                                     [writer](const Arrival& arrival) { return arrival.writer == writer; });
+    held_[writer].samples -= 1;
+    held_[writer].bytes -= oldest->bytes;
+    bytes_ -= oldest->bytes;
+    arrivals_.erase(oldest);
+  }
+
+  const std::size_t of_writer_;
+  const dds_entity_t guard_;
+  std::mutex mutex_;
+  Limits limits_;
+  std::deque<Arrival> arrivals_;
+  std::unordered_map<dds_instance_handle_t, Held> held_;  // of each writer
+  std::size_t bytes_ = 0;                                 // of all
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace tandem::transport::dds
