@@ -156,7 +156,10 @@ class Blocks(RefusalCase):
         self.assertEqual((after.models.p[45], after.models.weight[45]), ((4096 + 2 * 65536) // 3, 2))
         one = payload.apply_delta(world, of, sections[1])
         self.assertEqual((one.models.weight[45], one.state.codec[0, 0]), (1, 1))
-        self.refused("order", payload.apply_delta, world, of, sections[1] + sections[0])
+        self.refused("stream", payload.apply_delta, world, of, sections[1] + sections[0])
+        last = writer.section(0x83, b"\1" + sections[1][1:])
+        self.assertEqual(payload.apply_delta(world, of, last).state.hash(), one.state.hash())
+        self.refused("order", payload.apply_delta, world, of, last + sections[0])
 
 
 if __name__ == "__main__":

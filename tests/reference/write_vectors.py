@@ -257,8 +257,11 @@ def tracker_refused():
         ("more than 2^31 - 1 steps", "83020001"),
     ):
         vector.refuse(bytes.fromhex(data), why)
-    vector.say("one step down z")
+    vector.refuse(bytes.fromhex("86"), "an empty code stream without length and block")
+    vector.refuse(bytes.fromhex("8302000d860d"), "the same block twice")
+    vector.say("one step down z, and again as a section without length and block")
     vector.delta(bytes.fromhex("8302000d"))
+    vector.track({0: [0, 0, -1]})
     return vector
 
 
@@ -309,6 +312,9 @@ def sections():
     vector.delta(writer.section(0x82, writer.parameters({4: 65535})))
     vector.say("unknown sections, before, between and behind")
     vector.delta(bytes.fromhex("0103aabbcc 8202 0400 7f00") + correct + bytes.fromhex("0200"))
+    vector.say("corrections of the last block, without length and block")
+    vector.delta(bytes.fromhex("86 02") + bytes([1, 2, 3, 4, 5, 6] * 2))
+    vector.refuse(bytes.fromhex("86 02") + bytes([1, 2, 3, 4, 5, 6] * 2) + bytes.fromhex("0200"), "nothing may follow them")
     vector.refuse(bytes.fromhex("8400"), "an unknown critical section")
     vector.refuse(correct + bytes.fromhex("82020400"), "parameters behind corrections")
     vector.refuse(bytes.fromhex("8204 04000202"), "parameters that do not ascend")

@@ -157,6 +157,8 @@ def tracker_section(world, threshold, steps, renewed=None, block=0):
             encoder.decide(int(contexts.flag[slot]), slot in steps)
     for slot in sorted(steps):
         write_steps(encoder, contexts, slot, steps[slot])
+    if block == state.blocks() - 1:
+        return b"\x86" + encoder.finish(1)
     return section(0x83, leb128(block) + encoder.finish(1))
 
 

@@ -30,8 +30,11 @@ struct CodecFrame {
   const CodecParameters& parameters;
 };
 
-/// The body of one corrections section.
-using Section = std::span<const std::byte>;
+/// One corrections section: a block that exists, and what the codec says of it.
+struct Section {
+  std::uint32_t block = 0;
+  std::span<const std::byte> body;
+};
 
 /// Which bodies a delta corrects; by how much stands in the codec until its next encode() or decode(), and so
 /// do the spans.
@@ -59,8 +62,8 @@ class Codec {
   virtual Corrections encode(const CodecFrame& frame, const State& target, std::size_t budget,
                              ByteWriter& out, EncodeObserver* observer) = 0;
 
-  /// Validates all corrections sections of a delta, in their order; changes no state yet. Errors: kMalformed
-  /// with the reason.
+  /// Validates all corrections sections of a delta, whose blocks ascend; changes no state yet. Errors:
+  /// kMalformed with the reason.
   virtual Result<Corrections> decode(const CodecFrame& frame, std::span<const Section> sections) = 0;
 
   /// Does what the last encode() or decode() returned to the frame's state, lifecycle records applied. Once a

@@ -70,11 +70,21 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
       return {};
     }
     case SectionType::kCorrections:
+    case SectionType::kLastCorrections: {
       if (!enter(3)) break;
-      if (sections.size() == block_count(capacity))
-        return fail(ErrorCode::kMalformed, "more corrections sections than blocks");
-      sections.push_back(body);
+      ByteReader in(body);
+      Section section{block_count(capacity) - 1, {}};
+      if (static_cast<SectionType>(type) == SectionType::kCorrections)
+        section.block = static_cast<std::uint32_t>(in.get_leb128(kMostBlockNumberBytes));
+      section.body = in.get_bytes(in.remaining());
+      if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
+      if (section.block >= block_count(capacity))
+        return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
+      if (!sections.empty() && section.block <= sections.back().block)
+        return fail(ErrorCode::kMalformed, "blocks do not ascend");
+      sections.push_back(section);
       return {};
+    }
     default:
       return skip_section(type);
   }

@@ -19,6 +19,7 @@ enum class SectionType : std::uint8_t {
   kCorrections = 0x83,
   kInputs = 0x84,  ///< snapshots only, as regions
   kRegion = 0x85,
+  kLastCorrections = 0x86,  ///< has no length: its body goes on to the payload's end
 };
 inline constexpr std::size_t kMostSectionLengthBytes = 4;
 /// Most bytes before a section's body.
@@ -42,6 +43,10 @@ struct TypedSection {
 [[nodiscard]] inline Result<TypedSection> next_section(ByteReader& in) {
   TypedSection section;
   section.type = in.get<std::uint8_t>();
+  if (section.type == static_cast<std::uint8_t>(SectionType::kLastCorrections)) {
+    section.body = in.get_bytes(in.remaining());
+    return section;
+  }
   section.body = in.get_bytes(static_cast<std::size_t>(in.get_leb128(kMostSectionLengthBytes)));
   if (!in.ok()) return fail(ErrorCode::kMalformed, "section that is truncated or whose length is not LEB128");
   return section;

@@ -9,7 +9,7 @@ from .errors import require
 from .reader import Reader
 from .state import MOST_P, MOST_V
 
-LIFECYCLE, PARAMETERS, CORRECTIONS = 0x81, 0x82, 0x83
+LIFECYCLE, PARAMETERS, CORRECTIONS, LAST_CORRECTIONS = 0x81, 0x82, 0x83, 0x86
 DESPAWN, SPAWN, TELEPORT, TYPE_CHANGE = range(4)
 
 
@@ -57,7 +57,8 @@ def sections(reader, known):
     """(type, Reader of the body) of every section with a known type; the others are skipped or refused."""
     while reader.left():
         kind = reader.u8()
-        body = reader.take(reader.leb128(4))
+        goes_on = kind == LAST_CORRECTIONS and kind in known
+        body = reader.rest() if goes_on else reader.take(reader.leb128(4))
         if kind in known:
             yield kind, Reader(body, known[kind])
         else:
@@ -67,6 +68,7 @@ def sections(reader, known):
 def parse(data, state):
     """The known sections of a payload, in the order that the protocol asks for."""
     known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", CORRECTIONS: "corrections"}
+    known[LAST_CORRECTIONS] = "corrections of the last block"
     parsed = Parsed([], {}, [])
     before = 0
     for kind, body in sections(Reader(data, "payload"), known):
@@ -77,7 +79,7 @@ def parse(data, state):
         elif kind == PARAMETERS:
             parsed.parameters = parameters.read(body)
         else:
-            block = body.leb128(4)
+            block = body.leb128(4) if kind == CORRECTIONS else state.blocks() - 1
             require(block < state.blocks(), "corrections", f"block {block} does not exist")
             if parsed.corrections:
                 require(block > parsed.corrections[-1][0], "order", "blocks that do not ascend")

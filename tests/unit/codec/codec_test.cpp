@@ -187,14 +187,13 @@ TEST(Codec, LimitedHoldsThePaperBudgetAndUsesNearlyAllOfIt) {
 
 TEST(Codec, AValueBeyondTheLatticeIsRefused) {
   const auto codec = codec_of("selective", 1);
-  std::vector<std::byte> memory(26);
+  std::vector<std::byte> memory(25);
   ByteWriter out(memory);
-  out.put(std::uint8_t{0});
   out.put(std::uint8_t{2});
   out.put(kPositionLimit + 1);
   for (int i = 0; i < 5; ++i) out.put(std::int32_t{0});
   const State state = bodies_at_rest(1);
-  const Section section(memory);
+  const Section section{0, memory};
   EXPECT_FALSE(codec->decode({state, state.alive(), {}, kParameters}, std::span(&section, 1)));
 }
 

@@ -241,9 +241,11 @@ TEST(Tracker, CorrectionsBeyondTheCapacityRepeatedOrEmptyAreRefused) {
     return !synthetic::receive(client, state, payload);
   };
   EXPECT_TRUE(refused({0x83, 0}));                  // no block
+  EXPECT_TRUE(refused({0x86}));                     // nothing
   EXPECT_TRUE(refused({0x83, 1, 1}));               // block 1 of 1
   EXPECT_TRUE(refused({0x83, 4, 0, 255, 255, 0}));  // a zero that nobody writes
   EXPECT_TRUE(refused({0x83, 11, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255}));
+  EXPECT_TRUE(refused({0x86, 255, 255, 0}));
 }
 
 }  // namespace

@@ -70,9 +70,8 @@ class BlockCodec final : public Codec {
     TANDEM_ASSERT(frame.alive.size() == capacity_);
     coding_.begin();
     std::size_t count = 0;
-    std::uint32_t next_block = 0;
     for (const Section& section : sections) {
-      auto parsed = parse(section, frame.alive, next_block, count);
+      auto parsed = parse(section, frame.alive, count);
       if (!parsed) return tl::unexpected<Error>(parsed.error());
       count += *parsed;
     }
@@ -111,17 +110,12 @@ class BlockCodec final : public Codec {
 
   // Bodies of one section, the first of which is the `first`-th of the delta.
   Result<std::uint32_t> parse(const Section& section, std::span<const std::uint8_t> alive,
-                              std::uint32_t& next_block, std::size_t first) {
-    ByteReader in(section);
-    const auto index = static_cast<std::uint32_t>(in.get_leb128(kMostBlockNumberBytes));
+                              std::size_t first) {
+    ByteReader in(section.body);
     const auto form = static_cast<SelectionForm>(in.get<std::uint8_t>());
     if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
-    if (index >= block_count(capacity_))
-      return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
-    if (index < next_block) return fail(ErrorCode::kMalformed, "blocks do not ascend");
-    next_block = index + 1;
-    const auto chosen =
-        parse_selection(form, block_at(index, capacity_), alive, in, std::span(corrected_).subspan(first));
+    const auto chosen = parse_selection(form, block_at(section.block, capacity_), alive, in,
+                                        std::span(corrected_).subspan(first));
     if (!chosen) return chosen;
     const std::span<const Slot> slots = std::span<const Slot>(corrected_).subspan(first, *chosen);
     auto values = coding_.parse(in.get_bytes(in.remaining()), slots, first);

@@ -43,27 +43,13 @@ const char* decode_block(const TrackerFrame& frame, const Block& block, std::spa
 
 }  // namespace
 
-Result<void> TrackerDecoder::assign(std::span<const Section> sections) {
-  for (Part& part : parts_) part = {};
-  std::uint32_t next_block = 0;
-  for (const Section& section : sections) {
-    ByteReader in(section);
-    const auto index = static_cast<std::uint32_t>(in.get_leb128(kMostBlockNumberBytes));
-    if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
-    if (index >= parts_.size())
-      return fail(ErrorCode::kMalformed, "corrections of a block beyond the capacity");
-    if (index < next_block) return fail(ErrorCode::kMalformed, "blocks do not ascend");
-    next_block = index + 1;
-    Part& part = parts_[index];
-    part.stream = in.get_bytes(in.remaining());
-    if (part.stream.empty()) return fail(ErrorCode::kMalformed, "corrections section without a body");
-  }
-  return {};
-}
-
 Result<std::span<const Slot>> TrackerDecoder::decode(const TrackerFrame& frame,
                                                      std::span<const Section> sections) {
-  if (auto assigned = assign(sections); !assigned) return tl::unexpected<Error>(assigned.error());
+  for (Part& part : parts_) part = {};
+  for (const Section& section : sections) {
+    if (section.body.empty()) return fail(ErrorCode::kMalformed, "corrections section without a body");
+    parts_[section.block].stream = section.body;
+  }
   frame.for_each_block([&](const Block& block) {
     Part& part = parts_[block.index];
     frame.delta.blocks[block.index].corrected = 0;

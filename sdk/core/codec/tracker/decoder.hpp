@@ -22,8 +22,6 @@ class TrackerDecoder {
     std::span<const std::byte> stream;  // of the block's section; empty: it has none
     const char* broken = nullptr;       // why the stream is none
   };
-  [[nodiscard]] Result<void> assign(std::span<const Section> sections);
-
   std::vector<Part> parts_;  // by block
 };
 

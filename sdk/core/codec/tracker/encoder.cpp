@@ -55,9 +55,13 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
       (is_enough && write(frame, true) <= budget) || write_most_urgent(frame, target, budget);
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     if (frame.delta.blocks[b].corrected == 0) continue;
-    out.put(static_cast<std::uint8_t>(SectionType::kCorrections));
-    out.put_leb128(leb128_bytes(b) + parts_[b].coded_bytes);
-    out.put_leb128(b);
+    if (b + 1 == parts_.size()) {
+      out.put(static_cast<std::uint8_t>(SectionType::kLastCorrections));
+    } else {
+      out.put(static_cast<std::uint8_t>(SectionType::kCorrections));
+      out.put_leb128(leb128_bytes(b) + parts_[b].coded_bytes);
+      out.put_leb128(b);
+    }
     out.put_bytes(std::span(bytes_).subspan(parts_[b].first_byte, parts_[b].coded_bytes));
   }
   if (!all_fit || some_wait_) remember_waiting(frame);
@@ -232,8 +236,10 @@ std::size_t TrackerEncoder::write(const TrackerFrame& frame, bool all) {
   bool fits = true;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     fits = fits && parts_[b].fits;
-    if (frame.delta.blocks[b].corrected != 0)
-      size_bytes += section_bytes(leb128_bytes(b) + parts_[b].coded_bytes);
+    if (frame.delta.blocks[b].corrected == 0) continue;
+    const bool is_last = b + 1 == parts_.size();
+    size_bytes +=
+        is_last ? 1 + parts_[b].coded_bytes : section_bytes(leb128_bytes(b) + parts_[b].coded_bytes);
   }
   return fits ? size_bytes : kTooLarge;
 }
