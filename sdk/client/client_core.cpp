@@ -13,7 +13,8 @@ namespace tandem::client {
 namespace {
 
 // An acknowledgement is repeated after this, so that the server hears from a client even when no frame comes.
-constexpr std::int64_t kAckRepeatNs = 250 * kMillisecond;
+constexpr std::int64_t kJoiningRepeatNs = 250 * kMillisecond;
+constexpr std::int64_t kPlayingRepeatNs = kSecond;
 // Longest that poll() asks to sleep.
 constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
 // A server from which nothing comes for so long while it is joined makes room for another, if there is one.
@@ -22,7 +23,10 @@ constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
 }  // namespace
 
 ClientCore::ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener)
-    : options_(std::move(options)), port_(port), listener_(listener != nullptr ? *listener : silent_) {}
+    : options_(std::move(options)),
+      port_(port),
+      listener_(listener != nullptr ? *listener : silent_),
+      status_report_(options_.role == transport::Role::kObserver ? 2 * kSecond : kSecond) {}
 
 std::int64_t ClientCore::poll(Now now) {
   // After a pause of the process itself, what is late may be waiting outside: count it as one short wait.
@@ -43,7 +47,7 @@ std::int64_t ClientCore::poll(Now now) {
     if (!epoch_->joining) play(now, since_ns);
     if (epoch_->joining) join(now);
     epoch_->pictures.on_clock(epoch_->pacer);
-    if (ack_due_ || now.steady_ns - last_ack_ns_ >= kAckRepeatNs) send_ack(now);
+    if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
   }
   report_outcomes();
   if (now.steady_ns >= status_report_.due_ns()) send_status(now);
@@ -53,7 +57,7 @@ std::int64_t ClientCore::poll(Now now) {
 std::int64_t ClientCore::next_due_ns(Now now) const {
   std::int64_t due = std::min(now.steady_ns + kMaxSleepNs, status_report_.due_ns());
   if (epoch_ != nullptr) {
-    due = std::min(due, last_ack_ns_ + kAckRepeatNs);
+    due = std::min(due, next_ack_ns());
     if (epoch_->joining) {
       due = std::min(due, epoch_->joiner.next_due_ns());
     } else if (epoch_->pacer.known() && epoch_->timeline.now() < epoch_->timeline.applied() + epoch_->lead) {
@@ -62,6 +66,22 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
   }
   // Never in the past and never a busy loop, whatever the estimates say.
   return std::max(due, now.steady_ns + kMillisecond / 2);
+}
+
+// Acknowledgements are rare where nobody waits for them (idl/STATES.md, "Acknowledgements"): each costs more
+// bytes than many a delta.
+std::int64_t ClientCore::next_ack_ns() const {
+  const EpochState& e = *epoch_;
+  if (e.joining) return last_ack_ns_ + (e.part_unacknowledged ? EpochState::kPartAckNs : kJoiningRepeatNs);
+  if (options_.role == transport::Role::kObserver) return last_ack_ns_ + 2 * kPlayingRepeatNs;
+  const std::int64_t repeat_ns = last_ack_ns_ + kPlayingRepeatNs;
+  if (e.timeline.applied() == acknowledged_) return repeat_ns;
+  const double period_ns = 1e9 / e.session.frame_rate_hz;
+  if (e.timeline.applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))
+    return last_ack_ns_;
+  // Without a further delta the server may be waiting.
+  const auto quiet_ns = statistics_.last_applied_ns + static_cast<std::int64_t>(1.25 * period_ns);
+  return std::min({repeat_ns, last_ack_ns_ + transport::kAckSpacingNs, quiet_ns});
 }
 
 void ClientCore::take_sessions(Now now) {
@@ -152,11 +172,12 @@ void ClientCore::send_ack(Now now) {
   ack.stream = epoch_->stream.id;
   ack.phase = epoch_->joining ? transport::Phase::kJoining : transport::Phase::kPlaying;
   if (epoch_->joining) {
+    epoch_->part_unacknowledged = false;
     ack.snapshot_frame = epoch_->snapshot.frame();
     ack.snapshot_parts = epoch_->snapshot.parts();
     ack.missing = epoch_->snapshot.missing();
   } else {
-    ack.applied = epoch_->timeline.applied();
+    ack.applied = acknowledged_ = epoch_->timeline.applied();
     ack.simulated = epoch_->timeline.now();
   }
   ack.role_wanted = options_.role;

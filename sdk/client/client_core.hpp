@@ -105,6 +105,7 @@ class ClientCore {
   void take_replies(Now now);
   void report_outcomes();
   void send_ack(Now now);
+  [[nodiscard]] std::int64_t next_ack_ns() const;
   void send_status(Now now);
   [[nodiscard]] std::int64_t next_due_ns(Now now) const;
 
@@ -168,6 +169,7 @@ class ClientCore {
   bool server_alive_ = false;
   bool ack_due_ = false;
   std::int64_t last_ack_ns_ = 0;
+  Frame acknowledged_ = 0;  ///< `applied` of the last acknowledgement
   std::int64_t last_poll_ns_ = 0;
   std::int64_t poll_began_ns_ = 0;  ///< by options_.measure_ns
 };

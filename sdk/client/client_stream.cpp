@@ -11,8 +11,6 @@ namespace {
 
 // A scheduled input that a delta promised may be this late before the client joins again.
 constexpr std::int64_t kInputPatienceNs = 250 * kMillisecond;
-// Between acknowledgements while a snapshot comes in, at least.
-constexpr std::int64_t kPartAckNs = 20 * kMillisecond;
 
 // A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
@@ -87,8 +85,9 @@ void ClientCore::take_snapshots(Now now) {
     if (outcome == Outcome::kRefused) ++statistics_.refused_messages;
     if (outcome != Outcome::kStored) continue;
     epoch_->joiner.progress(now.steady_ns);
-    // Tells the server early what came, so that it can go on, and what did not.
-    if (now.steady_ns - last_ack_ns_ >= kPartAckNs) ack_due_ = true;
+    // Tells the server early what came and what did not, and how long parts take.
+    epoch_->part_unacknowledged = true;
+    if (now.steady_ns - last_ack_ns_ >= EpochState::kPartAckNs) ack_due_ = true;
     if (auto whole = epoch_->snapshot.take()) epoch_->joiner.offer(std::move(*whole));
   }
 }
@@ -198,7 +197,6 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
     statistics_.last_applied_ns = now.steady_ns;
     sent_.on_applied(delta->frame, now.steady_ns, outcomes_);
     listener_.on_applied(e.session.epoch, *delta);
-    ack_due_ = true;
     e.assembly.pop();
     play_ahead(now);
   }

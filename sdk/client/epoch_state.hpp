@@ -36,6 +36,9 @@ struct EpochState {
   std::uint32_t lead;  ///< in force: not above the session's
   DeltaAssembly assembly;
   SnapshotAssembly snapshot;  ///< coming in
+  /// Acknowledgements of its parts are this far apart at least.
+  static constexpr std::int64_t kPartAckNs = 20'000'000;
+  bool part_unacknowledged = false;
   ScheduledInputs scheduled;
   Joiner joiner;
   Pacer pacer;

@@ -48,6 +48,12 @@ struct Limits {
 /// receive it only count. Errors: kInvalidArgument.
 [[nodiscard]] Result<void> check_announcement(const SessionMessage& message);
 
+/// A participant acknowledges at least as often as the smaller of these: frames, and time.
+[[nodiscard]] constexpr std::uint32_t ack_spacing(std::uint32_t window_ceiling) {
+  return window_ceiling < 8 ? 1 : window_ceiling / 4;
+}
+inline constexpr std::int64_t kAckSpacingNs = 200'000'000;
+
 /// Payloads and snapshots are cut into parts of at most so many bytes; a reader takes parts of any size.
 inline constexpr std::size_t kPartBytes = 60'000;
 /// So long a link may be lost without a snapshot being needed. The lease of participants outlasts it.

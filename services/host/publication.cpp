@@ -17,7 +17,7 @@ transport::SessionMessage session_message(const HostConfig& config, const Stream
   session.frame_rate_hz = config.frame_rate_hz;
   session.lattice_unit = of_stream.lattice.unit;
   session.lead = layout.lead;
-  session.window_ceiling = config.window_ceiling;
+  session.window_ceiling = config.window.value_or(config.window_ceiling);
   session.scene = config.scene;
   session.scene_description = config.scene_description;
   session.types = config.types;

@@ -16,6 +16,14 @@ bool elapsed(std::int64_t last_ns, std::int64_t now_ns, std::int64_t gap_ns) {
   return last_ns == INT64_MIN || now_ns - last_ns >= gap_ns;
 }
 
+std::vector<transport::ReplyEntry> told(const InputAccount& inputs, std::int64_t now_ns) {
+  std::vector<transport::ReplyEntry> entries;
+  for (const Outcome& outcome : inputs.outcomes) {
+    if (now_ns - outcome.at_ns <= ReplyDesk::kToldNs) entries.push_back(outcome.entry);
+  }
+  return entries;
+}
+
 }  // namespace
 
 // False while there is no room: a writer has to end before its client's next one is opened.
@@ -32,9 +40,12 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
   if (!close_forgotten(roster)) return;
   for (auto& [id, account] : roster.accounts()) {
     ReplyAccount& reply = account.reply;
+    const std::int64_t echo_ns = account.role() == transport::Role::kObserver ? 2 * kEchoNs : kEchoNs;
     const bool change = reply.due && elapsed(reply.last_ns, now_ns, kChangeNs);
-    const bool echo = reply.clock_moved && elapsed(reply.last_ns, now_ns, kEchoNs);
-    if (!account.present || !(change || echo)) continue;
+    const bool outcomes =
+        reply.outcomes_due && elapsed(reply.last_ns, now_ns, kChangeNs) && reply.outcomes.take(now_ns);
+    const bool echo = reply.clock_moved && elapsed(reply.last_ns, now_ns, echo_ns);
+    if (!account.present || !(change || outcomes || echo)) continue;
     if (!reply.open && !outbox_->push(OpenReplies{id})) return;
     reply.open = true;
     const bool queued =
@@ -46,9 +57,11 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
                                               .highest_input = account.inputs.highest,
                                               .client_clock_ns = account.clock_ns,
                                               .server_time_ns = wall_ns,
-                                              .entries = account.inputs.outcomes});
+                                              .entries = told(account.inputs, now_ns)});
     if (!queued) return;
-    reply = {.open = true, .due = false, .clock_moved = false, .once = Reason::kNone, .last_ns = now_ns};
+    reply.due = reply.outcomes_due = reply.clock_moved = false;
+    reply.once = Reason::kNone;
+    reply.last_ns = now_ns;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/roster.hpp"
 #include "services/host/token_bucket.hpp"
@@ -16,9 +17,13 @@ namespace tandem::host {
 /// A client with an account is answered through a writer of its own, opened with its first reply.
 class ReplyDesk {
  public:
-  static constexpr std::int64_t kEchoNs = 500'000'000;   ///< between replies that only echo the clock
-  static constexpr std::int64_t kChangeNs = 10'000'000;  ///< between replies to one client at all
-  static constexpr double kStrangersPerSecond = 20;      ///< and as many at once
+  static constexpr std::int64_t kEchoNs =
+      kSecond;  ///< between replies that only echo the clock; twice for observers
+  static constexpr std::int64_t kChangeNs = 10 * kMillisecond;  ///< between replies to one client at all
+  /// An outcome is told for so long; the topic is reliable, so the newest reply is what may be lost with a
+  /// link.
+  static constexpr std::int64_t kToldNs = 5 * kSecond;
+  static constexpr double kStrangersPerSecond = 20;  ///< and as many at once
 
   ReplyDesk(Epoch epoch, Outbox& outbox) : epoch_(epoch), outbox_(&outbox) {}
 

@@ -73,10 +73,14 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (account->phase != ack.phase || account->wanted != ack.role_wanted) account->reply.due = true;
   if (plays && starts_over) {
     account->timed_from = now.frame;
+    const std::int64_t frames = transport::ack_spacing(rules_.fixed_window.value_or(rules_.window_ceiling));
+    if (frames > 1) account->round_trip.expect(std::min(frames * now.period_ns, transport::kAckSpacingNs));
     note(*account, ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer",
          now.ns);
   } else if (plays && ack.applied > account->applied && ack.applied > account->timed_from) {
-    if (const auto at_ns = times.of(ack.applied)) account->round_trip.measured(now.ns - *at_ns);
+    // The frame that has waited longest for this acknowledgement, as they are not sent for each.
+    if (const auto at_ns = times.of(std::max(account->applied, account->timed_from) + 1))
+      account->round_trip.measured(now.ns - *at_ns);
   }
   // A joiner, also one whose `joining` was overwritten by its `playing`, counts only once it has caught up
   // again.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sdk/transport/limits.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/notices.hpp"
 #include "services/host/stall_meter.hpp"
@@ -19,10 +20,16 @@ namespace tandem::host {
 inline constexpr double kInputsPerSecond = 60;  ///< per client, on average
 inline constexpr double kInputBurst = 60;       ///< per client, at once
 
+/// What became of an input, and when that was decided.
+struct Outcome {
+  transport::ReplyEntry entry;
+  std::int64_t at_ns = 0;
+};
+
 /// The last outcomes of a client's inputs, oldest first, and how fast it may send.
 struct InputAccount {
   std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
-  std::vector<transport::ReplyEntry> outcomes;
+  std::vector<Outcome> outcomes;
   TokenBucket rate{kInputsPerSecond, kInputBurst};
 };
 
@@ -32,8 +39,10 @@ struct JoinAccount {
 };
 
 struct ReplyAccount {
-  bool open = false;                                  ///< the client has a reply writer of its own
-  bool due = true;                                    ///< something changed
+  bool open = false;          ///< the client has a reply writer of its own
+  bool due = true;            ///< something changed
+  bool outcomes_due = false;  ///< only outcomes of inputs are new
+  TokenBucket outcomes{5, 4};
   bool clock_moved = false;                           ///< only the echo of the client's clock is new
   transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
   std::int64_t last_ns = INT64_MIN;
@@ -141,8 +150,13 @@ class Roster {
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
     return account.applied + window_ >= now.frame + 1;
   }
+  // While the server waits, whoever lives and lacks nothing says so; not to wait for the silent one by one.
+  [[nodiscard]] static bool silent(const Account& account, const Now& now) {
+    return now.ns - account.heard_ns > transport::kAckSpacingNs + account.round_trip.high_ns();
+  }
   [[nodiscard]] bool blamed(const Account& account, const Now& now) const {
-    return account.counted && !keeps_up(account, now) && account.applied < now.written;
+    return account.counted && account.applied < now.written &&
+           (!keeps_up(account, now) || silent(account, now));
   }
 
   Rules rules_;

@@ -76,7 +76,7 @@ void SnapshotTransfer::acknowledged(const transport::AckMessage& ack, std::int64
 
 void SnapshotTransfer::received(std::size_t part, std::int64_t now_ns) {
   Part& p = parts_[part];
-  if (--p.lacking == 0 && p.sent_ns && !p.again) window_.arrived(size_of(part), now_ns - *p.sent_ns, now_ns);
+  if (--p.lacking == 0 && p.sent_ns && !p.again) window_.arrived(now_ns - *p.sent_ns, now_ns);
 }
 
 void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns) {

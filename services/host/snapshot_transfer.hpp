@@ -20,7 +20,7 @@ namespace tandem::host {
 class SnapshotTransfer {
  public:
   /// Of a part, unless there would be more than kMostParts.
-  static constexpr std::size_t kLeastPartBytes = 2'600;
+  static constexpr std::size_t kLeastPartBytes = 1'300;
   static constexpr std::size_t kMostParts = 1'024;
   /// The writer keeps 64 samples for repairs.
   static constexpr std::size_t kMostInFlight = 48;

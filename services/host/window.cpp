@@ -14,6 +14,13 @@ std::optional<std::int64_t> PublishTimes::of(Frame frame) const {
   return entry.at_ns;
 }
 
+void RoundTrip::expect(std::int64_t duration_ns) {
+  if (known_) return;
+  known_ = true;
+  smoothed_ = duration_ns;
+  deviation_ = duration_ns / 4;
+}
+
 void RoundTrip::measured(std::int64_t duration_ns) {
   if (!known_) {
     known_ = true;

@@ -25,11 +25,14 @@ class PublishTimes {
   std::array<Entry, kFrames> entries_{};  // frame 0 is never published, so a zero entry matches nothing
 };
 
-/// Smoothed publish-to-acknowledgement time of one client and its deviation, estimated as TCP does (Jacobson
+/// Smoothed time from publishing a frame to the first acknowledgement that covers it, of one client, and its
+/// deviation, estimated as TCP does (Jacobson
 /// 1988).
 class RoundTrip {
  public:
   void measured(std::int64_t duration_ns);
+  /// Before the first measurement: what to expect.
+  void expect(std::int64_t duration_ns);
   /// Smoothed + 4 deviations; 0 before the first measurement.
   [[nodiscard]] std::int64_t high_ns() const { return known_ ? smoothed_ + 4 * deviation_ : 0; }
 

@@ -58,6 +58,7 @@ Result<void> HeadlessClient::open() {
   dds.domain = options_.domain;
   dds.session = options_.session;
   dds.client = core.id;
+  if (options_.observe) dds.lease = transport::DdsOptions::kObserverLease;
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());
   port_ = std::move(*port);

@@ -88,6 +88,7 @@ Result<Client> Client::connect(const ClientOptions& options) {
   dds.domain = options.domain;
   dds.session = options.session;
   dds.client = core.id;
+  if (options.role == ClientRole::kObserver) dds.lease = transport::DdsOptions::kObserverLease;
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());
   auto impl = std::make_unique<Impl>(std::move(core), std::move(*port));

@@ -25,6 +25,8 @@ struct DdsOptions {
   /// A peer that shows no sign of life for this long counts as dead. Shorter gives false alarms on busy
   /// machines.
   std::chrono::nanoseconds lease = std::chrono::seconds(1);
+  /// For clients that nobody waits for: their signs of life would be most of what they send.
+  static constexpr std::chrono::nanoseconds kObserverLease = std::chrono::seconds(20);
   /// How long one write is repeated while the middleware cannot take it, before kTimeout.
   std::chrono::nanoseconds write_timeout = std::chrono::seconds(2);
   /// When not null and set, writes stop repeating. Must outlive the port.

@@ -32,7 +32,7 @@ Domains& domains() {
 std::string defaults() {
   return "<CycloneDDS><Domain id=\"any\"><Discovery>"
          "<LeaseDuration>45s</LeaseDuration>"
-         "<SPDPInterval>1s</SPDPInterval>"
+         "<SPDPInterval>3s</SPDPInterval>"
          "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
          "</Discovery><Internal>"
          "<NackDelay>10ms</NackDelay>"

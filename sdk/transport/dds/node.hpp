@@ -124,9 +124,9 @@ class Node {
     auto publisher = partition.empty() ? Result<Entity>() : make_publisher({partition});
     if (!publisher) return tl::unexpected(publisher.error());
     const Entity& parent = *publisher ? *publisher : publisher_;
-    // The status writer's short lease only paces the liveliness messages of its participant: at 0.4 s, two of
-    // them may be late before the other writers' lease runs out.
-    const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ * 2 / 5;
+    // The status writer's short lease only paces the liveliness messages of its participant, at 0.8 of it: one
+    // of them may be lost before the other writers' lease runs out.
+    const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ / 2;
     const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
     dds_qset_entity_name(qos.get(), name.c_str());
     auto entity = own(dds_create_writer(parent.get(), topic->get(), qos.get(), nullptr),

@@ -12,7 +12,10 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -129,6 +132,7 @@ class Stage:
     def __init__(self, options):
         self.options = options
         self.running = []
+        self.folder = tempfile.mkdtemp()
 
     def start(self, *command):
         self.running.append(Process(*command))
@@ -150,15 +154,17 @@ class Stage:
             if each.process.poll() is None:
                 each.process.kill()
             each.process.wait()
+        shutil.rmtree(self.folder)
 
 
 def snapshots(server_report):
     return server_report["snapshots"], server_report["snapshot_bytes"]
 
 
-def join(stage, bodies, kbit, *more):
-    """A participant joins over a thin link: one snapshot, at about the rate of the link."""
+def join(stage, bodies, kbit, *more, settle=0):
+    """A participant joins over a thin link, of which the stream takes a quarter at most: one snapshot, at its rate."""
     server = stage.server(bodies, *more)
+    time.sleep(settle)
     link(kbit)
     client = stage.client()
     at = client.wait_for("playing from frame", 45)
@@ -246,15 +252,93 @@ def lost(stage, seconds, limit):
         raise Failed("not caught up in time")
 
 
+class Sniffer:
+    """Bytes on loopback since it was made, headers and all: of datagrams with a delta, and of all others."""
+
+    ETHERTYPE_ALL, OUTGOING, ETHERNET_BYTES, IP_BYTES, UDP_BYTES = 3, 4, 14, 20, 8
+
+    def __init__(self):
+        self.deltas = self.others = 0
+        self.socket = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(self.ETHERTYPE_ALL))
+        self.socket.bind(("lo", 0))
+        self.socket.settimeout(0.2)
+        self.ended = False
+        self.thread = threading.Thread(target=self.read, daemon=True)
+        self.thread.start()
+
+    def read(self):
+        while not self.ended:
+            try:
+                frame, address = self.socket.recvfrom(65536)
+            except TimeoutError:
+                continue
+            if address[2] != self.OUTGOING:
+                continue
+            if self.is_delta(frame):
+                self.deltas += len(frame) - self.ETHERNET_BYTES
+            else:
+                self.others += len(frame) - self.ETHERNET_BYTES
+
+    def is_delta(self, frame):
+        """A user's writer without a key (entity kind 0x03) sends DATA: deltas, scheduled inputs, snapshots."""
+        rtps = frame[self.ETHERNET_BYTES + self.IP_BYTES + self.UDP_BYTES :]
+        if rtps[:4] != b"RTPS":
+            return False
+        at = 20
+        while at + 16 <= len(rtps):
+            kind, size = rtps[at], struct.unpack_from("<H", rtps, at + 2)[0]
+            if kind in (0x15, 0x16) and rtps[at + 15] == 0x03:
+                return True
+            if size == 0:
+                break
+            at += 4 + size
+        return False
+
+    def stop(self):
+        self.ended = True
+        self.thread.join()
+        return self.deltas, self.others
+
+
+def traffic(stage, role, count, limit, script=None):
+    """What clients cost besides deltas, on loopback counters, per client."""
+    stage.server(1_000)
+    more = ["--observe"] if role == "observer" else []
+    if script:
+        more += ["--input-script", script]
+    clients = stage.client("--count", count, *more)
+    clients.wait_for("playing from frame", 60)
+    time.sleep(8)
+    sniffer, begun = Sniffer(), time.monotonic()
+    time.sleep(10)
+    seconds = time.monotonic() - begun
+    deltas, others = (total * 8 / 1000 / seconds for total in sniffer.stop())
+    print(f"  {count} {role}s: deltas {deltas:.1f} kbit/s, everything else {others / count:.1f} kbit/s each (aim {limit})")
+    if clients.stop()["clients"][0]["hash_mismatches"]:
+        raise Failed("hash mismatch")
+
+
+def busy(stage):
+    """20 inputs a second in all, by ten participants."""
+    path = pathlib.Path(stage.folder) / "script.textproto"
+    with open(path, "w", encoding="ascii") as out:
+        for i in range(80):
+            out.write(f"inputs {{ time_s: {0.5 + i * 0.5:.2f} gravity {{ x: {i % 5} y: 0 z: -9 }} }}\n")
+    traffic(stage, "participant", 10, 40, path)
+
+
 CASES = {
     "join_10000_at_512": lambda stage: join(stage, 10_000, 512),
-    "join_10000_at_256": lambda stage: join(stage, 10_000, 256),
-    "join_20000_at_1000": lambda stage: join(stage, 20_000, 1000),
-    "join_65536_at_4000": lambda stage: join(stage, 65_536, 4000, "--predictor", "field"),
+    "join_10000_at_256": lambda stage: join(stage, 10_000, 256, settle=20),
+    "join_20000_at_1000": lambda stage: join(stage, 20_000, 1000, settle=20),
+    "join_65536_at_4000": lambda stage: join(stage, 65_536, 4000, "--predictor", "field", settle=20),
     "stopped_25_s": stopped,
     "lost_0.5_s": lambda stage: lost(stage, 0.5, 1),
     "lost_5_s": lambda stage: lost(stage, 5, 2),
     "lost_20_s": lambda stage: lost(stage, 20, 4),
+    "traffic_observers": lambda stage: traffic(stage, "observer", 10, 5),
+    "traffic_participants": lambda stage: traffic(stage, "participant", 10, 20),
+    "traffic_inputs": busy,
 }
 
 

@@ -11,9 +11,38 @@ TEST_F(PlayTest, EveryFrameIsAppliedAndAcknowledgedWithTheServersHash) {
   for (int i = 0; i < 200; ++i) frame();
   EXPECT_EQ(core->timeline()->applied(), 201U);
   EXPECT_EQ(figures().frames_applied, 200U);
-  EXPECT_EQ(port.acks.size(), 200U);
-  EXPECT_EQ(port.acks.back().applied, 201U);
   expect_agreed();
+}
+
+TEST_F(PlayTest, AQuarterOfTheWindowIsAcknowledgedAtOnce) {
+  join();
+  port.acks.clear();
+  for (int i = 0; i < 60; ++i) frame();
+  EXPECT_EQ(port.acks.size(), 10U) << "a ceiling of 24";
+  EXPECT_EQ(port.acks.back().applied, 61U);
+  frame();
+  EXPECT_EQ(port.acks.size(), 10U);
+  for (int i = 0; i < 25; ++i) poll(2 * kMs);
+  ASSERT_EQ(port.acks.size(), 11U) << "no further delta: the server may be waiting";
+  EXPECT_EQ(port.acks.back().applied, 62U);
+}
+
+TEST_F(PlayTest, EachFrameIsAcknowledgedWhereTheWindowIsSmall) {
+  server.session.window_ceiling = 2;
+  join();
+  port.acks.clear();
+  for (int i = 0; i < 20; ++i) frame();
+  EXPECT_EQ(port.acks.size(), 20U);
+}
+
+TEST_F(PlayTest, AnObserverAcknowledgesEveryTwoSeconds) {
+  start(1, transport::Role::kObserver);
+  join();
+  port.acks.clear();
+  port.statuses.clear();
+  for (int i = 0; i < 300; ++i) frame();
+  EXPECT_NEAR(static_cast<double>(port.acks.size()), 5, 1);
+  EXPECT_NEAR(static_cast<double>(port.statuses.size()), 5, 1);
 }
 
 TEST_F(PlayTest, DeltasInPartsAreApplied) {
@@ -156,7 +185,7 @@ TEST_F(PlayTest, PollAsksToBeCalledWhenTheNextFrameIsDue) {
 TEST_F(PlayTest, TheAcknowledgementIsRepeatedWhenNoFrameComes) {
   join();
   port.acks.clear();
-  for (int i = 0; i < 20; ++i) poll(50 * kMs);
+  for (int i = 0; i < 80; ++i) poll(50 * kMs);
   EXPECT_GE(port.acks.size(), 3U);
   EXPECT_LE(port.acks.size(), 5U);
 }

@@ -170,7 +170,7 @@ TEST_F(InputTest, GapsInNumbersAreLegalAndLowerNumbersAreDuplicates) {
   send(bench.push(1, 7));
   send(bench.push(1, 9));
   send(bench.push(1, 0));
-  bench.run_ms(100);
+  bench.run_ms(300);
   EXPECT_EQ(bench.simulation.applied.size(), 2U);
   EXPECT_EQ(bench.refusal(1, 7), Reason::kDuplicate);
   EXPECT_EQ(bench.refusal(1, 0), Reason::kDuplicate);
@@ -198,6 +198,7 @@ TEST_F(InputTest, WhatIsNotFiniteOrOutOfRangeIsRefusedAsInvalid) {
   std::uint64_t number = 0;
   for (const double value : bad) {
     send(bench.gravity(1, ++number, value));
+    bench.run_ms(250);
     EXPECT_EQ(bench.refusal(1, number), Reason::kInvalid) << value;
   }
   auto push = bench.push(1, ++number);

@@ -157,7 +157,7 @@ TEST_F(JoinTest, ButNotForOneThatReceivesNothing) {
 
 TEST_F(JoinTest, AJoinerIsServedWhileTheServerIsSuspended) {
   bench.enter(2);
-  bench.run_ms(300);  // suspended: client 2 is silent
+  bench.run_ms(600);  // suspended: client 2 is silent
   const Frame held = bench.host->frame();
   bench.joining(1);
   bench.run_ms(110);
@@ -177,14 +177,13 @@ TEST_F(JoinTest, ARoleAndPhaseAreConfirmedByReplies) {
   EXPECT_EQ(bench.last_reply(1)->phase, Phase::kPlaying);
 }
 
-TEST_F(JoinTest, WithoutAChangeRepliesGoOutAtTwoHertzAtMostAndEchoTheClock) {
+TEST_F(JoinTest, WithoutAChangeARoundOfRepliesGoesOutOnceASecondAndEchoesTheClock) {
   bench.enter(1);
   bench.on_ms = [this] { bench.playing(1, bench.host->frame()); };
   bench.run_ms(100);
   const std::size_t before = bench.port.replies.size();
   bench.run_ms(10'000);
-  EXPECT_GE(bench.port.replies.size() - before, 18U);
-  EXPECT_LE(bench.port.replies.size() - before, 20U);
+  EXPECT_NEAR(static_cast<double>(bench.port.replies.size() - before), 10, 1);
   const auto& reply = bench.port.replies.back();
   EXPECT_LT(bench.now - reply.client_clock_ns, kSecond);
   EXPECT_EQ(reply.server_time_ns - Bench::kWallStart, reply.client_clock_ns)
