@@ -20,8 +20,8 @@ namespace tandem::client {
 /// thread-safe.
 class ScheduledInputs {
  public:
-  /// For a client that is 1,024 frames behind, with two inputs a frame.
-  static constexpr std::size_t kKept = 2048;
+  /// As many as the server's writer keeps for a client whose link is lost for a while.
+  static constexpr std::size_t kKept = 4096;
 
   void add(const ScheduledDrive& input) {
     held_.emplace(input.number, input);

@@ -15,8 +15,9 @@ struct TopicQos {
   bool reliable = true;
   bool transient_local = false;
   std::int32_t writer_depth = 1;
-  std::int32_t reader_depth = 1;  ///< per instance
-  std::int32_t kept = 1;          ///< of one writer until they are taken from a reader: see Arrivals
+  std::int32_t reader_depth = 1;   ///< per instance
+  std::int32_t kept = 1;           ///< of one writer until they are taken from a reader: see Arrivals
+  std::int32_t durable_depth = 0;  ///< of the writer's history, what late readers get; 0: all of it
 };
 
 template <class M>
@@ -36,7 +37,7 @@ struct Topic<DeltaMessage> {
 template <>
 struct Topic<ScheduledInputMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemScheduledInput_desc; }
-  static constexpr TopicQos kQos{true, true, 256, 256, 256};
+  static constexpr TopicQos kQos{true, true, 4096, 4096, 4096, 256};
 };
 template <>
 struct Topic<SnapshotMessage> {

@@ -9,18 +9,19 @@ namespace {
 struct TopicRules {
   bool reliable = true;
   bool transient_local = false;
+  std::size_t durable_depth = SIZE_MAX;  // of each key's history, what late readers get
 };
 // In the order of AnyMessage; the same QoS as in dds/topics.hpp.
 constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
-    {true, true},    // session
-    {true, false},   // delta
-    {true, true},    // scheduled input
-    {true, false},   // snapshot
-    {true, true},    // reply
-    {true, false},   // input
-    {true, false},   // acknowledgement
-    {false, false},  // server status
-    {false, false},  // client status
+    {true, true},       // session
+    {true, false},      // delta
+    {true, true, 256},  // scheduled input
+    {true, false},      // snapshot
+    {true, true},       // reply
+    {true, false},      // input
+    {true, false},      // acknowledgement
+    {false, false},     // server status
+    {false, false},     // client status
 }};
 
 // About what DDS puts around a sample: headers of IP, UDP and RTPS, and its fields besides the payload.
@@ -233,7 +234,10 @@ void Fabric::process(Index pair) {
     way.matched = true;
     if (!kRules[writer.topic].transient_local) return;
     std::vector<Sample> kept;
-    for (const auto& [key, samples] : writer.history) kept.insert(kept.end(), samples.begin(), samples.end());
+    for (const auto& [key, samples] : writer.history) {
+      const auto late = std::min(samples.size(), kRules[writer.topic].durable_depth);
+      kept.insert(kept.end(), samples.end() - static_cast<std::ptrdiff_t>(late), samples.end());
+    }
     std::sort(kept.begin(), kept.end(),
               [](const Sample& a, const Sample& b) { return a.sequence < b.sequence; });
     for (const Sample& sample : kept) send(pair, sample);

@@ -12,7 +12,7 @@ namespace tandem::transport::simulated {
 namespace {
 
 constexpr std::uint32_t kSessionReaderDepth = 8;
-constexpr std::uint32_t kScheduledDepth = 256;
+constexpr std::uint32_t kScheduledDepth = 4096;
 constexpr std::uint32_t kInputDepth = 64;
 constexpr std::uint32_t kSnapshotWriterDepth = 64;
 constexpr std::uint32_t kSnapshotReaderDepth = 1200;

@@ -149,6 +149,19 @@ TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
   EXPECT_TRUE(take<SnapshotMessage>(*client).empty()) << "snapshots are volatile";
 }
 
+TEST(Simulated, ACutLinkLosesNoScheduledInputThatIsStillKept) {
+  Network network(NetworkOptions{});
+  const auto server = std::move(*network.make_server("s"));
+  const auto client = std::move(*network.make_client("s"));
+  ASSERT_TRUE(open_stream(*client));
+  network.advance_to(100 * kMs);
+  network.set_cut(server->self(), client->self(), true);
+  for (std::uint64_t number = 1; number <= 4096; ++number) ASSERT_TRUE(server->write(scheduled(number)));
+  network.set_cut(server->self(), client->self(), false);
+  network.advance_to(2000 * kMs);
+  EXPECT_EQ(take<ScheduledInputMessage>(*client).size(), 4096U);
+}
+
 TEST(Simulated, LostSamplesAreRepairedInOrderWhateverTheSeed) {
   std::uint64_t repaired = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
