@@ -104,6 +104,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   port_.close_stream();
   epoch_.reset();
   pictures_.clear();
+  join_attempts_ = join_attempt();
   sent_.clear(outcomes_);
   session_ = announcement.message;
   session_from_ = announcement.from;
@@ -117,7 +118,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
     return;
   }
   epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*playable), options_.lead,
-                                        pictures_);
+                                        join_attempts_, pictures_);
   epoch_->join_began_ns = now.steady_ns;
   epoch_->joiner.start(now.steady_ns);
   ++statistics_.epochs;
@@ -250,7 +251,7 @@ const transport::SessionMessage* ClientCore::session() const { return session_ ?
 const ClientTimeline* ClientCore::timeline() const {
   return phase() == ClientPhase::kPlaying ? &epoch_->timeline : nullptr;
 }
-std::uint32_t ClientCore::join_attempt() const { return epoch_ ? epoch_->joiner.attempt() : 0; }
+std::uint32_t ClientCore::join_attempt() const { return epoch_ ? epoch_->joiner.attempt() : join_attempts_; }
 
 ClientStatus ClientCore::status() const {
   ClientStatus out = figures(statistics_);

@@ -165,6 +165,7 @@ class ClientCore {
   transport::ParticipantId session_from_;
   std::string refusal_;                ///< why it is not
   std::unique_ptr<EpochState> epoch_;  ///< null while there is no playable session
+  std::uint32_t join_attempts_ = 0;    ///< of the epochs before it
 
   bool server_alive_ = false;
   bool ack_due_ = false;

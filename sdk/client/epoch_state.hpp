@@ -18,7 +18,8 @@ namespace tandem::client {
 
 struct EpochState {
   EpochState(transport::SessionMessage announced, const transport::ParticipantId& announced_by,
-             Playable playable, std::uint32_t wanted_lead, PictureExchange& exchange)
+             Playable playable, std::uint32_t wanted_lead, std::uint32_t join_attempts,
+             PictureExchange& exchange)
       : session(std::move(announced)),
         stream(session.streams[playable.stream]),
         server(announced_by),
@@ -27,6 +28,7 @@ struct EpochState {
         assembly({.delta_bytes = stream.max_delta_bytes}),
         snapshot(stream.max_snapshot_bytes),
         pacer(session.frame_rate_hz),
+        joiner(join_attempts),
         pictures(exchange, session) {}
 
   transport::SessionMessage session;

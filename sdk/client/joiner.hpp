@@ -21,6 +21,10 @@ class Joiner {
   static constexpr std::int64_t kPatienceNs = 1'000'000'000;
   static constexpr std::int64_t kMaxPatienceNs = 5'000'000'000;
 
+  /// `attempts`: those of earlier epochs. Numbers go on, as a server that comes back remembers those it
+  /// served.
+  explicit Joiner(std::uint32_t attempts = 0) : attempt_(attempts) {}
+
   /// Begins a join. `attempt()` counts up when it is time to ask, so that it is a new question to the server.
   void start(std::int64_t now_ns);
   /// A snapshot could not be used: ask again after a quarter of the patience.
@@ -45,7 +49,7 @@ class Joiner {
   [[nodiscard]] std::int64_t next_due_ns() const;
 
  private:
-  std::uint32_t attempt_ = 0;
+  std::uint32_t attempt_;
   bool asked_ = false;
   std::int64_t asked_ns_ = 0;
   std::int64_t ask_due_ns_ = 0;

@@ -189,6 +189,24 @@ TEST_F(SessionTest, AServerFromWhichNothingComesMakesRoomForAnother) {
   EXPECT_EQ(core->phase(), ClientPhase::kJoining);
 }
 
+TEST_F(SessionTest, JoinAttemptsGoOnOverServersSoThatNoneTakesOneForServed) {
+  join();
+  EXPECT_EQ(core->join_attempt(), 1U);
+  FakeServer other(2000);
+  std::swap(server, other);
+  auto unplayable = server.session;
+  unplayable.epoch = 1500;
+  unplayable.streams[0].layout.codec = "unknown";
+  port.sessions.push_back(from_server(unplayable));
+  poll();
+  join();
+  EXPECT_EQ(core->join_attempt(), 2U);
+  std::swap(server, other);
+  join();
+  EXPECT_EQ(core->join_attempt(), 3U);
+  EXPECT_EQ(port.acks.back().join_attempt, 3U);
+}
+
 TEST_F(SessionTest, TheSameAnnouncementAgainChangesNothing) {
   join();
   port.sessions.push_back(from_server(server.session));
