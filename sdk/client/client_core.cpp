@@ -60,6 +60,8 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
     due = std::min(due, next_ack_ns());
     if (epoch_->joining) {
       due = std::min(due, epoch_->joiner.next_due_ns());
+    } else if (epoch_->assembly.front() != nullptr && !epoch_->input_missing_ns) {
+      due = now.steady_ns;  // more than one poll applies
     } else if (epoch_->pacer.known() && epoch_->timeline.now() < epoch_->timeline.applied() + epoch_->lead) {
       due = std::min(due, epoch_->pacer.due_ns(epoch_->timeline.now() + 1));
     }
@@ -102,9 +104,9 @@ void ClientCore::take_sessions(Now now) {
 // A new epoch: everything of the old one is dropped, unseen.
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
   port_.close_stream();
+  join_attempts_ = join_attempt();
   epoch_.reset();
   pictures_.clear();
-  join_attempts_ = join_attempt();
   sent_.clear(outcomes_);
   session_ = announcement.message;
   session_from_ = announcement.from;

@@ -11,6 +11,8 @@ namespace {
 
 // A scheduled input that a delta promised may be this late before the client joins again.
 constexpr std::int64_t kInputPatienceNs = 250 * kMillisecond;
+// A client that is far behind does what else is due, and lets others call it, after so many frames.
+constexpr int kFramesPerPoll = 64;
 
 // A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
@@ -152,11 +154,13 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
 void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
   EpochState& e = *epoch_;
   play_ahead(now);
-  while (const CompleteDelta* delta = e.assembly.front()) {
-    if (delta->frame <= e.timeline.applied()) {
-      e.assembly.pop();
-      continue;
-    }
+  e.assembly.drop_through(e.timeline.applied());
+  if (e.lag.exceeded(e.assembly.size(), now.steady_ns)) {
+    rejoin(ResyncReason::kLag, std::to_string(e.assembly.size()) + " frames behind and not catching up", now);
+    return;
+  }
+  for (int i = 0; i < kFramesPerPoll && e.assembly.front() != nullptr; ++i) {
+    const CompleteDelta* delta = e.assembly.front();
     if (delta->frame != e.timeline.applied() + 1) {
       rejoin(ResyncReason::kGap, "gap before frame " + std::to_string(delta->frame), now);
       return;
@@ -224,10 +228,13 @@ void ClientCore::rejoin(ResyncReason reason, const std::string& why, Now now) {
   }
   ++statistics_.resyncs;
   ++statistics_.resyncs_by_reason[static_cast<std::size_t>(reason)];
-  log(LogLevel::kWarning, "joining again: " + why);
+  if (reason != ResyncReason::kLag || !std::exchange(e.told_lag, true)) {
+    log(LogLevel::kWarning, "joining again: " + why);
+  }
   e.joining = true;
   e.join_began_ns = now.steady_ns;
   e.input_missing_ns.reset();
+  e.lag.reset();
   e.joiner.start(now.steady_ns);
 }
 

@@ -6,6 +6,7 @@
 
 #include "sdk/client/delta_assembly.hpp"
 #include "sdk/client/joiner.hpp"
+#include "sdk/client/lag_limit.hpp"
 #include "sdk/client/picture_writer.hpp"
 #include "sdk/client/scheduled_inputs.hpp"
 #include "sdk/client/server_clock.hpp"
@@ -27,8 +28,9 @@ struct EpochState {
         lead(std::min(wanted_lead, session.lead)),
         assembly({.delta_bytes = stream.max_delta_bytes}),
         snapshot(stream.max_snapshot_bytes),
-        pacer(session.frame_rate_hz),
         joiner(join_attempts),
+        lag(session.frame_rate_hz),
+        pacer(session.frame_rate_hz),
         pictures(exchange, session) {}
 
   transport::SessionMessage session;
@@ -43,6 +45,7 @@ struct EpochState {
   bool part_unacknowledged = false;
   ScheduledInputs scheduled;
   Joiner joiner;
+  LagLimit lag;
   Pacer pacer;
   PictureWriter pictures;
 
@@ -54,7 +57,7 @@ struct EpochState {
   /// How long the front delta has waited for a scheduled input.
   std::optional<std::int64_t> input_missing_ns;
   std::int64_t frame_cost_ns = 0;  ///< simulation since the last applied delta
-  bool told_too_slow = false;
+  bool told_too_slow = false, told_lag = false;
   std::optional<transport::ReplyMessage> reply;  ///< newest
 };
 

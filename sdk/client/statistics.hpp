@@ -19,8 +19,9 @@ enum class ResyncReason : std::uint8_t {
   kMismatch = 3,      ///< the state hash differed from the server's
   kRefused = 4,       ///< bytes that broke a rule of the format
   kOverflow = 5,      ///< more deltas waited than the buffer holds
+  kLag = 6,           ///< too far behind for too long
 };
-inline constexpr std::size_t kResyncReasons = 6;
+inline constexpr std::size_t kResyncReasons = 7;
 
 /// Counts since the client was made; they survive rejoins and epochs.
 struct Statistics {

@@ -149,7 +149,7 @@ TEST_F(JoinTest, MoreScheduledInputsThanMayWaitAtOnceCanComeWhileJoining) {
   }
   poll();
   port.snapshots.push_back(from_server(snapshot));
-  poll();
+  for (int i = 0; i < 5; ++i) poll();
   EXPECT_EQ(figures().refused_messages, 0U);
   ASSERT_EQ(core->phase(), ClientPhase::kPlaying);
   EXPECT_EQ(core->timeline()->applied(), 301U);
