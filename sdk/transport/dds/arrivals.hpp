@@ -5,7 +5,6 @@
 #include <dds/ddsi/ddsi_serdata.h>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -15,6 +14,7 @@
 #include <utility>
 
 #include "sdk/transport/cdr.hpp"
+#include "sdk/transport/dds/history_cache.hpp"
 #include "sdk/transport/limits.hpp"
 
 namespace tandem::transport::dds {
@@ -29,10 +29,8 @@ template <class M>
   return kFieldBytes;
 }
 
-/// Takes every sample of a reader as it arrives, in a thread of Cyclone DDS. The history of a DDS reader is
-/// shared by all who write a key, so that one of them can push out the samples of the others; here a writer
-/// can push out its own only. What is larger than its topic allows is dropped before it is copied.
-/// Thread-safe.
+/// Takes every sample of a reader as it arrives, in a thread of Cyclone DDS. A writer can push out its own
+/// samples only. What is larger than its topic allows is dropped before it is copied. Thread-safe.
 template <class M>
 class Arrivals {
  public:
@@ -51,8 +49,8 @@ class Arrivals {
     limits_ = limits;
   }
 
-  /// A DDS listener's on_data_available, with this as its argument.
-  static void on_data(dds_entity_t reader, void* self) { static_cast<Arrivals*>(self)->collect(reader); }
+  /// For the creation of the reader, which must not outlive this object.
+  [[nodiscard]] dds_rhc* cache() { return &cache_; }
 
   /// All that came since the last call, oldest first. `dropped` grows by what broke a limit.
   [[nodiscard]] std::deque<Arrival> take(std::uint64_t& dropped) {
@@ -71,20 +69,10 @@ class Arrivals {
   static constexpr std::size_t kMostSamples = 4096;
   static constexpr std::size_t kMostBytes = 256U << 20U;
 
-  void collect(dds_entity_t reader) {
-    constexpr std::uint32_t kBatch = 16;
-    for (;;) {
-      std::array<ddsi_serdata*, kBatch> samples{};
-      std::array<dds_sample_info_t, kBatch> infos{};
-      const dds_return_t count = dds_takecdr(reader, samples.data(), kBatch, infos.data(), DDS_ANY_STATE);
-      if (count <= 0) break;
-      for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-        // A sample without data only tells that its instance was disposed of or lost its writer.
-        if (infos[i].valid_data) accept(infos[i].publication_handle, *samples[i]);
-        ddsi_serdata_unref(samples[i]);
-      }
-    }
-    if (guard_ != 0) (void)dds_set_guardcondition(guard_, true);
+  static void on_sample(void* self, dds_instance_handle_t writer, ddsi_serdata& sample) {
+    auto& arrivals = *static_cast<Arrivals*>(self);
+    arrivals.accept(writer, sample);
+    if (arrivals.guard_ != 0) (void)dds_set_guardcondition(arrivals.guard_, true);
   }
 
   void accept(dds_instance_handle_t writer, ddsi_serdata& sample) {
@@ -123,6 +111,7 @@ class Arrivals {
     arrivals_.erase(oldest);
   }
 
+  HistoryCache cache_{&on_sample, this};
   const std::size_t of_writer_;
   const dds_entity_t guard_;
   std::mutex mutex_;

@@ -27,10 +27,6 @@ class LiveWriters {
   LiveWriters& operator=(LiveWriters&&) = delete;
   ~LiveWriters() = default;
 
-  /// Also tells `call(reader, argument)` of data; before the reader is created.
-  void also_on_data(dds_on_data_available_fn call, void* argument) {
-    dds_lset_data_available_arg(listener_.get(), call, argument, true);
-  }
   /// For the creation of the reader, which must not outlive this object.
   [[nodiscard]] const dds_listener_t* listener() const { return listener_.get(); }
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const;

@@ -54,7 +54,7 @@ class Writer {
 template <class M>
 class Reader {
  public:
-  /// `subscriber`: the reader's own, if it has one. `arrivals` and `writers` are what its listener calls.
+  /// `subscriber`: the reader's own, if it has one. `arrivals` and `writers` are what it calls.
   Reader(std::unique_ptr<Arrivals<M>> arrivals, std::unique_ptr<LiveWriters> writers, Entity topic,
          Entity subscriber, Entity entity)
       : arrivals_(std::move(arrivals)),
@@ -92,7 +92,7 @@ class Reader {
   }
 
  private:
-  // The listener runs until the entity is gone, so what it calls comes first.
+  // The entity calls these until it is gone.
   std::unique_ptr<Arrivals<M>> arrivals_;
   std::unique_ptr<LiveWriters> writers_;
   Entity topic_;
@@ -149,9 +149,9 @@ class Node {
     const auto kept = static_cast<std::size_t>(options.depth.value_or(Topic<M>::kQos.kept));
     auto arrivals = std::make_unique<Arrivals<M>>(kept, options.watched ? guard_.get() : 0);
     auto writers = std::make_unique<LiveWriters>();
-    writers->also_on_data(&Arrivals<M>::on_data, arrivals.get());
-    auto entity = own(dds_create_reader(parent.get(), topic->get(), qos.get(), writers->listener()),
-                      std::string("the reader of ") + M::kTopic);
+    auto entity = own(
+        dds_create_reader_rhc(parent.get(), topic->get(), qos.get(), writers->listener(), arrivals->cache()),
+        std::string("the reader of ") + M::kTopic);
     if (!entity) return tl::unexpected(entity.error());
     return Reader<M>(std::move(arrivals), std::move(writers), std::move(*topic), std::move(*subscriber),
                      std::move(*entity));

@@ -1,0 +1,34 @@
+#pragma once
+// A reader's history cache that keeps nothing.
+
+#include <dds/dds.h>
+#include <dds/ddsc/dds_rhc.h>
+#include <dds/ddsi/ddsi_serdata.h>
+
+namespace tandem::transport::dds {
+
+/// Hands on every sample with data as it arrives. The cache that Cyclone DDS makes by itself shares a history
+/// among all who write a key, so that one of them can push out the samples of the others, and remembers every
+/// key for as long as its writer lives: half a kilobyte for each number that a stranger makes up.
+class HistoryCache : public dds_rhc {
+ public:
+  /// Called in threads of Cyclone DDS, several at once.
+  using OnSample = void (*)(void* argument, dds_instance_handle_t writer, ddsi_serdata& sample);
+
+  HistoryCache(OnSample call, void* argument);
+  HistoryCache(const HistoryCache&) = delete;
+  HistoryCache& operator=(const HistoryCache&) = delete;
+  HistoryCache(HistoryCache&&) = delete;
+  HistoryCache& operator=(HistoryCache&&) = delete;
+  ~HistoryCache() = default;
+
+ private:
+  static bool store(ddsi_rhc* self, const ddsi_writer_info* writer, ddsi_serdata* sample,
+                    ddsi_tkmap_instance* instance);
+  static const dds_rhc_ops kOps;
+
+  OnSample call_;
+  void* argument_;
+};
+
+}  // namespace tandem::transport::dds
