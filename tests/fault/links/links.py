@@ -3,158 +3,20 @@
 
 links.py --tandemd PATH --tandem PATH [--list | --short | CASE ...]
 
-Without CASE all run, some five minutes; with --short two of them, in twenty seconds. Exit 0 passed, 1 failed, 77 not run: namespaces are not allowed here.
+Without CASE all run, some ten minutes; with --short two of them, in twenty seconds. Exit 0 passed, 1 failed, 77 not run:
+namespaces are not allowed here.
 """
 
-import argparse
-import ctypes
-import json
-import os
 import pathlib
-import re
-import shutil
 import signal
 import socket
 import struct
-import subprocess
 import sys
-import tempfile
 import threading
 import time
 
-NOT_RUN = 77
-HERE = pathlib.Path(__file__).resolve()
-QUEUE_MS = 400  # what a router keeps before it drops
-SEED = 1
-URI = (
-    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
-    "</General></Domain></CycloneDDS>"
-)
-CLONE_NEWNET = 0x40000000
-
-
-class Failed(Exception):
-    """What was measured is not what it must be."""
-
-
-def shell(*words):
-    subprocess.run(words, check=True, capture_output=True, text=True)
-
-
-def enter_namespace():
-    """A network of our own, gone with this process. As root directly, otherwise through a user namespace."""
-    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
-        if os.environ.get("TANDEM_LINKS_INNER"):
-            return False
-        os.environ["TANDEM_LINKS_INNER"] = "1"
-        try:
-            os.execvp("unshare", ["unshare", "--user", "--map-root-user", sys.executable, "-B", *sys.argv])
-        except OSError:
-            return False
-    try:
-        shell("ip", "link", "set", "lo", "mtu", "1500", "up")
-        shell("ip", "link", "set", "lo", "multicast", "on")
-        shell("ip", "route", "add", "224.0.0.0/4", "dev", "lo")
-        shell("tc", "qdisc", "add", "dev", "lo", "root", "tbf", "rate", "1gbit", "burst", "1mb", "latency", "400ms")
-    except (OSError, subprocess.CalledProcessError):
-        return False
-    return True
-
-
-def link(kbit):
-    """The rate of everything that goes through loopback from now on."""
-    burst = max(4000, kbit * 1000 // 8 // 100)
-    shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", f"{kbit}kbit", "burst", str(burst),
-          "latency", f"{QUEUE_MS}ms")  # fmt: skip
-
-
-def fast_link():
-    shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", "1gbit", "burst", "1mb", "latency", "400ms")
-
-
-def cut_link():
-    """Every packet is larger than the bucket, and so dropped."""
-    shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", "8kbit", "burst", "20", "limit", "20")
-
-
-def loopback_bytes():
-    """Received so far by loopback, which is all that was sent and not dropped, headers and all."""
-    return int(re.search(r"^\s*lo:\s*(\d+)", pathlib.Path("/proc/self/net/dev").read_text(), re.M)[1])
-
-
-class Process:
-    """A program whose stderr is read line by line, with the time of each."""
-
-    def __init__(self, *command):
-        self.started = time.monotonic()
-        self.lines = []
-        self.process = subprocess.Popen(
-            [str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, env={**os.environ, "CYCLONEDDS_URI": URI},
-        )  # fmt: skip
-        threading.Thread(target=self.read, daemon=True).start()
-
-    def read(self):
-        for line in self.process.stderr:
-            self.lines.append((time.monotonic(), line.rstrip()))
-
-    def first(self, text, after=0.0):
-        """When a line with that text came, or None."""
-        return next((at for at, line in list(self.lines) if at >= after and text in line), None)
-
-    def wait_for(self, text, seconds, after=0.0):
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            if (at := self.first(text, after)) is not None:
-                return at
-            if self.process.poll() is not None:
-                break
-            time.sleep(0.01)
-        tail = "\n".join(line for _, line in self.lines[-8:])
-        raise Failed(f"waited {seconds:.0f} s for '{text}'; it said last:\n{tail}")
-
-    def live(self):
-        """The live lines of a client, with the time of each."""
-        return [(at, json.loads(line)) for at, line in list(self.lines) if line.startswith("{")]
-
-    def stop(self):
-        self.process.send_signal(signal.SIGCONT)
-        self.process.send_signal(signal.SIGINT)
-        try:
-            out = self.process.stdout.read()
-            self.process.wait(30)
-        finally:
-            self.process.kill()
-        return json.loads(out) if out.strip().startswith("{") else {}
-
-
-class Stage:
-    def __init__(self, options):
-        self.options = options
-        self.running = []
-        self.folder = tempfile.mkdtemp()
-
-    def start(self, *command):
-        self.running.append(Process(*command))
-        return self.running[-1]
-
-    def server(self, bodies, *more, scene="half_pipe"):
-        server = self.start(
-            self.options.tandemd, "--scene", scene, "--bodies", bodies, "--seed", SEED, "--json", *more
-        )  # fmt: skip
-        server.wait_for("session 'default'", 60)
-        time.sleep(2.0)  # the claim of the name, and some frames
-        return server
-
-    def client(self, *more):
-        return self.start(self.options.tandem, "join", "--json", "--live", *more)
-
-    def end(self):
-        for each in self.running:
-            if each.process.poll() is None:
-                each.process.kill()
-            each.process.wait()
-        shutil.rmtree(self.folder)
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent))
+from stage import Failed, arguments, cut_link, fast_link, link, run  # noqa: E402
 
 
 def snapshots(server_report):
@@ -220,9 +82,9 @@ def stopped(stage):
         raise Failed("hash mismatch")
 
 
-def lost(stage, seconds, limit):
+def lost(stage, seconds, limit, *more):
     """The link is gone for a while: no snapshot, and soon caught up."""
-    server = stage.server(10_000, "--predictor", "field")
+    server = stage.server(10_000, "--predictor", "field", *more)
     client = stage.client()
     client.wait_for("playing from frame", 60)
     time.sleep(4)
@@ -336,6 +198,8 @@ CASES = {
     "lost_0.5_s": lambda stage: lost(stage, 0.5, 1),
     "lost_5_s": lambda stage: lost(stage, 5, 2),
     "lost_20_s": lambda stage: lost(stage, 20, 4),
+    # Of users who send far more inputs than a late joiner is handed.
+    "lost_20_s_with_inputs": lambda stage: lost(stage, 20, 4, "--scripted", "--users", 256),
     "traffic_observers": lambda stage: traffic(stage, "observer", 10, 5),
     "traffic_participants": lambda stage: traffic(stage, "participant", 10, 20),
     "traffic_inputs": busy,
@@ -346,39 +210,9 @@ SHORT = ["join_10000_at_512", "lost_0.5_s"]
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tandemd", type=pathlib.Path, required=True)
-    parser.add_argument("--tandem", type=pathlib.Path, required=True)
-    parser.add_argument("--list", action="store_true", help="the names of all cases")
-    parser.add_argument("--short", action="store_true", help="a thin and a lost link alone")
-    parser.add_argument("cases", nargs="*", metavar="CASE")
+    parser = arguments(__doc__, "a thin and a lost link alone")
     options = parser.parse_args()
-    if options.list:
-        print("\n".join(CASES))
-        return 0
-    if options.short:
-        options.cases = SHORT
-    unknown = [case for case in options.cases if case not in CASES]
-    if unknown:
-        parser.error(f"no case {unknown[0]}; --list says which there are")
-    if not enter_namespace():
-        print("not run: network namespaces or tc are not allowed here")
-        return NOT_RUN
-    failures = 0
-    for name in options.cases or CASES:
-        print(f"{name}:", flush=True)
-        fast_link()
-        stage = Stage(options)
-        try:
-            CASES[name](stage)
-        except Failed as failure:
-            failures += 1
-            print(f"  FAILED: {failure}", flush=True)
-        finally:
-            fast_link()
-            stage.end()
-    print(f"{failures} failed" if failures else "passed")
-    return 1 if failures else 0
+    return run(CASES, SHORT if options.short else options.cases, parser, options)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,194 @@
+"""Real programs on a network of their own: a namespace, whose loopback can be shaped."""
+
+import argparse
+import ctypes
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+NOT_RUN = 77
+QUEUE_MS = 400  # what a router keeps before it drops
+SEED = 1
+URI = (
+    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
+    "</General></Domain></CycloneDDS>"
+)
+CLONE_NEWNET = 0x40000000
+
+
+class Failed(Exception):
+    """What was measured is not what it must be."""
+
+
+def shell(*words):
+    subprocess.run(words, check=True, capture_output=True, text=True)
+
+
+def enter_namespace():
+    """A network of our own, gone with this process. As root directly, otherwise through a user namespace."""
+    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
+        if os.environ.get("TANDEM_STAGE_INNER"):
+            return False
+        os.environ["TANDEM_STAGE_INNER"] = "1"
+        try:
+            os.execvp("unshare", ["unshare", "--user", "--map-root-user", sys.executable, "-B", *sys.argv])
+        except OSError:
+            return False
+    try:
+        shell("ip", "link", "set", "lo", "mtu", "1500", "up")
+        shell("ip", "link", "set", "lo", "multicast", "on")
+        shell("ip", "route", "add", "224.0.0.0/4", "dev", "lo")
+        shell("tc", "qdisc", "add", "dev", "lo", "root", "tbf", "rate", "1gbit", "burst", "1mb", "latency", "400ms")
+    except (OSError, subprocess.CalledProcessError):
+        return False
+    return True
+
+
+def link(kbit):
+    """The rate of everything that goes through loopback from now on."""
+    burst = max(4000, kbit * 1000 // 8 // 100)
+    shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", f"{kbit}kbit", "burst", str(burst),
+          "latency", f"{QUEUE_MS}ms")  # fmt: skip
+
+
+def fast_link():
+    shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", "1gbit", "burst", "1mb", "latency", "400ms")
+
+
+def cut_link():
+    """Every packet is larger than the bucket, and so dropped."""
+    shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", "8kbit", "burst", "20", "limit", "20")
+
+
+class Process:
+    """A program whose stderr is read line by line, with the time of each."""
+
+    def __init__(self, *command):
+        self.started = time.monotonic()
+        self.lines = []
+        self.process = subprocess.Popen(
+            [str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, env={**os.environ, "CYCLONEDDS_URI": URI},
+        )  # fmt: skip
+        threading.Thread(target=self.read, daemon=True).start()
+
+    def read(self):
+        for line in self.process.stderr:
+            self.lines.append((time.monotonic(), line.rstrip()))
+
+    def first(self, text, after=0.0):
+        """When a line with that text came, or None."""
+        return next((at for at, line in list(self.lines) if at >= after and text in line), None)
+
+    def wait_for(self, text, seconds, after=0.0):
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            if (at := self.first(text, after)) is not None:
+                return at
+            if self.process.poll() is not None:
+                break
+            time.sleep(0.01)
+        tail = "\n".join(line for _, line in self.lines[-8:])
+        raise Failed(f"waited {seconds:.0f} s for '{text}'; it said last:\n{tail}")
+
+    def resident_kb(self):
+        """Of its memory, what is in RAM."""
+        status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(re.search(r"VmRSS:\s*(\d+)", status)[1])
+
+    def log_bytes(self):
+        """What it wrote for people, which live lines are not."""
+        return sum(len(line) + 1 for _, line in list(self.lines) if not line.startswith("{"))
+
+    def live(self):
+        """The live lines of a client, with the time of each."""
+        return [(at, json.loads(line)) for at, line in list(self.lines) if line.startswith("{")]
+
+    def output(self, seconds):
+        """What it prints until it ends by itself: a JSON object, or {}."""
+        try:
+            out = self.process.stdout.read()
+            self.process.wait(seconds)
+        finally:
+            self.process.kill()
+        return json.loads(out) if out.strip().startswith("{") else {}
+
+    def stop(self):
+        self.process.send_signal(signal.SIGCONT)
+        self.process.send_signal(signal.SIGINT)
+        return self.output(30)
+
+
+class Stage:
+    def __init__(self, options):
+        self.options = options
+        self.running = []
+        self.folder = tempfile.mkdtemp()
+
+    def start(self, *command):
+        self.running.append(Process(*command))
+        return self.running[-1]
+
+    def server(self, bodies, *more, scene="half_pipe"):
+        server = self.start(
+            self.options.tandemd, "--scene", scene, "--bodies", bodies, "--seed", SEED, "--json", *more
+        )  # fmt: skip
+        server.wait_for("session 'default'", 60)
+        time.sleep(2.0)  # the claim of the name, and some frames
+        return server
+
+    def client(self, *more):
+        return self.start(self.options.tandem, "join", "--json", "--live", *more)
+
+    def end(self):
+        for each in self.running:
+            if each.process.poll() is None:
+                each.process.kill()
+            each.process.wait()
+        shutil.rmtree(self.folder)
+
+
+def arguments(documentation, short_help):
+    parser = argparse.ArgumentParser(description=documentation, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tandemd", type=pathlib.Path, required=True)
+    parser.add_argument("--tandem", type=pathlib.Path, required=True)
+    parser.add_argument("--list", action="store_true", help="the names of all cases")
+    parser.add_argument("--short", action="store_true", help=short_help)
+    parser.add_argument("cases", nargs="*", metavar="CASE")
+    return parser
+
+
+def run(cases, chosen, parser, options):
+    """Runs the chosen cases, all without any; returns the exit code."""
+    if options.list:
+        print("\n".join(cases))
+        return 0
+    unknown = [case for case in chosen if case not in cases]
+    if unknown:
+        parser.error(f"no case {unknown[0]}; --list says which there are")
+    if not enter_namespace():
+        print("not run: network namespaces or tc are not allowed here")
+        return NOT_RUN
+    failures = 0
+    for name in chosen or cases:
+        print(f"{name}:", flush=True)
+        fast_link()
+        stage = Stage(options)
+        try:
+            cases[name](stage)
+        except Failed as failure:
+            failures += 1
+            print(f"  FAILED: {failure}", flush=True)
+        finally:
+            fast_link()
+            stage.end()
+    print(f"{failures} failed" if failures else "passed")
+    return 1 if failures else 0
