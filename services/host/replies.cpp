@@ -40,12 +40,11 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
   if (!close_forgotten(roster)) return;
   for (auto& [id, account] : roster.accounts()) {
     ReplyAccount& reply = account.reply;
+    if (!account.present || !elapsed(reply.last_ns, now_ns, kChangeNs)) continue;
     const std::int64_t echo_ns = account.role() == transport::Role::kObserver ? 2 * kEchoNs : kEchoNs;
-    const bool change = reply.due && elapsed(reply.last_ns, now_ns, kChangeNs);
-    const bool outcomes =
-        reply.outcomes_due && elapsed(reply.last_ns, now_ns, kChangeNs) && reply.outcomes.take(now_ns);
     const bool echo = reply.clock_moved && elapsed(reply.last_ns, now_ns, echo_ns);
-    if (!account.present || !(change || outcomes || echo)) continue;
+    // Only a reply that goes out for nothing but outcomes spends of their rate.
+    if (!reply.due && !echo && !(reply.outcomes_due && reply.outcomes.take(now_ns))) continue;
     if (!reply.open && !outbox_->push(OpenReplies{id})) return;
     reply.open = true;
     const bool queued =

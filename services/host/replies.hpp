@@ -13,7 +13,7 @@
 
 namespace tandem::host {
 
-/// Queues replies: on a change, otherwise at most twice a second. A reply that finds no room is tried again.
+/// Queues replies: on a change, otherwise once a second at most. A reply that finds no room is tried again.
 /// A client with an account is answered through a writer of its own, opened with its first reply.
 class ReplyDesk {
  public:
@@ -28,7 +28,7 @@ class ReplyDesk {
   ReplyDesk(Epoch epoch, Outbox& outbox) : epoch_(epoch), outbox_(&outbox) {}
 
   void send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns);
-  /// Answers somebody without an account, at most twice a second each, and 20 a second all together: every
+  /// Answers somebody without an account, at most once a second each, and 20 a second all together: every
   /// client reads it.
   void refuse(transport::ClientId client, transport::Reason reason, std::int64_t now_ns,
               std::int64_t wall_ns);

@@ -89,22 +89,23 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
   std::size_t flying = 0;
   std::size_t bytes = in_flight(now_ns, flying);
   for (std::size_t i = 0; i < parts_.size() && flying < kMostInFlight; ++i) {
-    Part& part = parts_[i];
-    const bool late = part.sent_ns && now_ns - *part.sent_ns >= window_.patience_ns();
-    if (part.lacking == 0 || (part.sent_ns && !late)) continue;
+    if (parts_[i].lacking == 0 || on_its_way(parts_[i], now_ns)) continue;
     if (bytes > 0 && bytes + size_of(i) > window_.bytes()) return;
-    if (late) window_.lost(now_ns);
+    if (parts_[i].sent_ns) window_.lost(now_ns);
     if (!queue(i, now_ns)) return;
     bytes += size_of(i);
     ++flying;
   }
 }
 
+bool SnapshotTransfer::on_its_way(const Part& part, std::int64_t now_ns) const {
+  return part.sent_ns && now_ns - *part.sent_ns < window_.patience_ns();
+}
+
 std::size_t SnapshotTransfer::in_flight(std::int64_t now_ns, std::size_t& parts) const {
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const Part& part = parts_[i];
-    if (part.lacking == 0 || !part.sent_ns || now_ns - *part.sent_ns >= window_.patience_ns()) continue;
+    if (parts_[i].lacking == 0 || !on_its_way(parts_[i], now_ns)) continue;
     bytes += size_of(i);
     ++parts;
   }

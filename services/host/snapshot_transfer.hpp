@@ -62,6 +62,8 @@ class SnapshotTransfer {
   void admit(transport::ClientId client, std::int64_t now_ns);
   void dismiss(transport::ClientId client);
   void received(std::size_t part, std::int64_t now_ns);
+  // Sent, and not yet late; whether it has arrived is another question.
+  [[nodiscard]] bool on_its_way(const Part& part, std::int64_t now_ns) const;
   [[nodiscard]] std::size_t in_flight(std::int64_t now_ns, std::size_t& parts) const;
   [[nodiscard]] bool queue(std::size_t part, std::int64_t now_ns);
 
