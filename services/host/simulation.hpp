@@ -15,8 +15,11 @@ using Vec3 = std::array<double, 3>;
 inline constexpr std::uint32_t kMaxBodies = 1U << 20U;  ///< of a simulation
 
 enum class InputKind : std::uint32_t {
-  kGravity = 1,       ///< values: x, y, z in scene units / s^2; changes the predicted step too
-  kPush = 2,          ///< values: centre x, y, z; radius; velocity change x, y, z
+  kGravity = 1,  ///< values: x, y, z in scene units / s^2; changes the predicted step too
+  /// values: centre x, y, z; radius; velocity change x, y, z. Acts on bodies whose centre is within the
+  /// radius. Where bodies turn it is an impulse, mass times velocity change, at the point of the body's
+  /// surface that is nearest to the centre, so that a push off the middle turns the body too.
+  kPush = 2,
   kApplication = 16,  ///< bytes whose meaning only the engine knows
 };
 
@@ -36,13 +39,21 @@ struct Classification {
 };
 
 /// The bodies after a step, in slot order, structure of arrays, each `capacity` long; scene units and per
-/// second. Valid until the next step(). Values of dead slots are unspecified.
+/// second. Valid until the next step(). Values of dead slots are unspecified. Either both of the optional
+/// groups are there or none, in every frame the same.
 struct Bodies {
   std::array<std::span<const float>, 3> position;
   std::array<std::span<const float>, 3> velocity;
   std::span<const std::uint8_t> alive;
   std::span<const std::uint16_t> type;
+  /// Optional, empty: bodies do not turn. Quaternion x, y, z, w from body to world, norm within 1e-3 of 1.
+  std::array<std::span<const float>, 4> orientation{};
+  /// Optional, with orientation. World frame, rad / s; at most kMaxTurn in a step.
+  std::array<std::span<const float>, 3> angular_velocity{};
 };
+
+/// Most that a body may turn in a step, rad; engines clamp what is faster.
+inline constexpr double kMaxTurn = 2;
 
 /// A change of a slot in the last step, ascending by slot; for one slot, despawned before spawned.
 struct Event {
@@ -76,7 +87,10 @@ class Simulation {
   [[nodiscard]] virtual std::uint32_t colliding() const = 0;
 
   /// Checkpoint: everything that decides the following steps. load() returns false and changes nothing when
-  /// the bytes are not a checkpoint of this simulation.
+  /// the bytes are not a checkpoint of this simulation. After it, bodies(), gravity and waiting inputs are
+  /// what they were at save(). The steps that follow are valid, but an engine that keeps caches from step to
+  /// step (contact points, impulses to start from) may rebuild them, so that its bits need not be those of
+  /// the run that saved; two loads of the same bytes go on alike.
   virtual void save(std::vector<std::byte>& out) const = 0;
   [[nodiscard]] virtual bool load(std::span<const std::byte> bytes) = 0;
 };
