@@ -91,6 +91,10 @@ struct Host::Impl {
             .written = stream.frame() - std::min(stream.frame(), unwritten),
             .period_ns = pacing.period_ns()};
   }
+  // A snapshot waits for a frame, which is rounded for it; not while the session is suspended.
+  [[nodiscard]] std::int64_t frame_awaited_until_ns() const {
+    return state == State::kRunning ? pacing.suspended_from_ns() + pacing.period_ns() : INT64_MIN;
+  }
   [[nodiscard]] std::int64_t clock() const { return config.clock_ns == nullptr ? 0 : config.clock_ns(); }
 
   // --- One poll, in this order ---
@@ -99,14 +103,14 @@ struct Host::Impl {
   void charge_waiting();
   void receive();
   void look_around();
-  bool advance_if_due();
-  void serve_joiners();
+  bool advance_if_due(bool snapshot_due);
+  void make_snapshot();
   void publish_status();
   void plan_wake();
 
   void digest(const transport::Received<transport::AckMessage>& ack);
   void digest(const transport::Received<transport::InputMessage>& input);
-  void produce_frame();
+  void produce_frame(bool snapshot_due);
   [[nodiscard]] HostTotals totals_now() const;
   void note(std::string notice);
   void note_foreigner(transport::ClientId client);
@@ -161,8 +165,10 @@ bool Host::Impl::poll() {
     receive();
     look_around();
     roster.refresh(moment());
-    produced = advance_if_due();
-    serve_joiners();
+    const bool snapshot_due = joins.due(roster, *port, transfer, now_ns);
+    produced = advance_if_due(snapshot_due);
+    if (snapshot_due && (produced || now_ns >= frame_awaited_until_ns())) make_snapshot();
+    transfer.send(roster.accounts(), now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
   }
@@ -263,7 +269,7 @@ void Host::Impl::look_around() {
   if (error) state = State::kRefused;
 }
 
-bool Host::Impl::advance_if_due() {
+bool Host::Impl::advance_if_due(bool snapshot_due) {
   if (state == State::kWaiting && roster.counted() >= config.wait_for) {
     state = State::kRunning;
     pacing.start(now_ns);
@@ -281,18 +287,19 @@ bool Host::Impl::advance_if_due() {
   pacing.frame_started(now_ns, config.free_rate ? stalled : held);
   held = false;
   stalled = false;
-  produce_frame();
+  produce_frame(snapshot_due);
   return true;
 }
 
 // One stream so far. A second one would be produced from the same step, side by side with the first.
-void Host::Impl::produce_frame() {
+void Host::Impl::produce_frame(bool snapshot_due) {
   roster.frame_starts(moment());
   const std::int64_t start = clock();
   inputs.apply(stream.frame() + 1);
   simulation->step();
   const std::int64_t stepped = clock();
   const bool was_out_of_reach = stream.target_out_of_reach();
+  if (snapshot_due) stream.round_next();
   const Stream::FrameResult frame = stream.produce(simulation->bodies(), simulation->events());
   const std::int64_t produced = clock();
   push_delta(outbox, config.epoch, frame, wall_ns + (produced - start));
@@ -311,14 +318,11 @@ void Host::Impl::produce_frame() {
   status.frame_took(produced - start);
 }
 
-void Host::Impl::serve_joiners() {
-  if (joins.due(roster, *port, transfer, now_ns)) {
-    stream.snapshot(snapshot);
-    transfer.start(config.epoch, {}, stream.frame(), snapshot, joins.ready(), now_ns);
-    joins.served(roster, now_ns);
-    ++totals.snapshots;
-  }
-  transfer.send(roster.accounts(), now_ns);
+void Host::Impl::make_snapshot() {
+  stream.snapshot(snapshot);
+  transfer.start(config.epoch, {}, stream.frame(), snapshot, joins.ready(), now_ns);
+  joins.served(roster, now_ns);
+  ++totals.snapshots;
 }
 
 HostTotals Host::Impl::totals_now() const {
@@ -362,7 +366,8 @@ void Host::Impl::plan_wake() {
       at(std::max(now_ns, pacing.suspended_from_ns()) + *left + kMillisecond);
     }
   }
-  if (const auto due = joins.due_ns(transfer, now_ns)) at(*due);
+  if (const auto due = joins.due_ns(transfer, now_ns))
+    at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
   for (const auto& [id, account] : roster.accounts()) {
     const bool unmatched = account.present && account.phase == transport::Phase::kJoining;
     if (unmatched || account.reply.due) at(now_ns + kShortWakeNs);

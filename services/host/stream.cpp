@@ -155,6 +155,9 @@ std::uint32_t Stream::measure_client_cost() const {
 }
 
 Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timeline.schedule(input); }
+void Stream::round_next() {
+  if (codec_traits(impl_->config.layout.codec)->keeps_rounding) impl_->timeline.round_next();
+}
 void Stream::snapshot(std::vector<std::byte>& out) { impl_->timeline.snapshot(out); }
 const StreamParameters& Stream::parameters() const { return impl_->parameters; }
 double Stream::threshold_m() const { return impl_->parameters.codec.threshold * impl_->config.lattice.unit; }

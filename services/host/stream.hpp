@@ -63,6 +63,9 @@ class Stream {
   FrameResult produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
                       EncodeObserver* observer = nullptr);
 
+  /// The next frame is rounded, so that a snapshot cut right after it is smaller. Does nothing with
+  /// codecs whose corrections would leave few bodies round: CodecTraits::keeps_rounding.
+  void round_next();
   /// One cut right after frame(), for joiners. Replaces the content of `out`.
   void snapshot(std::vector<std::byte>& out);
 

@@ -173,8 +173,28 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   return {};
 }
 
-/// What a lane measured over `frames` frames.
-BandwidthRow row_of(Lane& lane, double frames) {
+/// What a joiner would be sent after the last frame: a snapshot of one frame more, which is rounded for it,
+/// in which bodies go on as they move.
+std::size_t snapshot_bytes(host::Stream& stream, const engine::Bodies& last) {
+  std::array<std::vector<float>, 3> position;
+  engine::Bodies bodies = last;
+  for (std::size_t axis = 0; axis < position.size(); ++axis) {
+    position[axis].resize(last.alive.size());
+    std::transform(last.position[axis].begin(), last.position[axis].end(), last.velocity[axis].begin(),
+                   position[axis].begin(), [&](float p, float v) {
+                     return p + v * static_cast<float>(stream.config().lattice.dt_s);
+                   });
+    bodies.position[axis] = position[axis];
+  }
+  stream.round_next();
+  stream.produce(bodies, {});
+  std::vector<std::byte> snapshot;
+  stream.snapshot(snapshot);
+  return snapshot.size();
+}
+
+/// What a lane measured over `frames` frames, the last of which left `bodies`.
+BandwidthRow row_of(Lane& lane, double frames, const engine::Bodies& bodies) {
   const host::StreamConfig& stream = lane.stream.config();
   BandwidthRow row;
   row.codec = stream.layout.codec;
@@ -187,10 +207,8 @@ BandwidthRow row_of(Lane& lane, double frames) {
   lane.errors.fill(row);
   lane.snaps.fill(row, stream.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
-  std::vector<std::byte> snapshot;
-  lane.stream.snapshot(snapshot);
-  row.snapshot_bytes_per_body =
-      static_cast<double>(snapshot.size()) / std::max(1U, lane.stream.agreed().alive_count());
+  row.snapshot_bytes_per_body = static_cast<double>(snapshot_bytes(lane.stream, bodies)) /
+                                std::max(1U, lane.stream.agreed().alive_count());
   row.predict_ms = lane.predict.quantile_ms(0.5);
   row.encode_ms = lane.encode.quantile_ms(0.5);
   row.decode_ms = lane.decode.quantile_ms(0.5);
@@ -300,7 +318,8 @@ Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
   const double step_ms = step.quantile_ms(0.5);
   std::vector<BandwidthRow> rows;
   rows.reserve(lanes.size() + peers.size());
-  for (Lane& lane : lanes) rows.push_back(row_of(lane, static_cast<double>(frames)));
+  for (Lane& lane : lanes)
+    rows.push_back(row_of(lane, static_cast<double>(frames), replay.simulation().bodies()));
   for (PeerLane& peer : peers) rows.push_back(row_of(peer, dt_s));
   const auto contacts = std::accumulate(colliding.begin(), colliding.end(), std::uint64_t{0});
   for (BandwidthRow& row : rows) {

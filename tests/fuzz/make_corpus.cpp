@@ -35,6 +35,7 @@ bool write_deltas(const std::filesystem::path& folder) {
         if (lively) lifecycle = synthetic::random_lifecycle(random, state, target, 4);
         DeltaCodec delta = synthetic::make_delta(codec_names()[codec], kCapacity, kParameters);
         if (lively) delta.set_parameters({{100, 8, 32, 30000, 5000}, {900}});
+        if (lively) delta.round_next();
         std::vector<std::byte> bytes(1 + delta.bound());
         bytes[0] = static_cast<std::byte>(codec);
         const auto encoded = delta.encode(state, target, lifecycle, kNoBudget, std::span(bytes).subspan(1));
@@ -83,6 +84,7 @@ bool write_streams(const std::filesystem::path& folder) {
         target.set_body(slot, body);
       }
       if (frame == 2) delta.set_parameters({{100, 16, 64, 30000, 5000}, {900}});
+      if (frame == 3) delta.round_next();
       const auto size = delta.encode(state, target, {}, kNoBudget, payload).size_bytes;
       if (size >= 128) return false;
       stream.push_back(static_cast<std::byte>(size));

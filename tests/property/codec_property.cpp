@@ -35,6 +35,7 @@ RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
   State held = agreed;
   for (int frame = 0; frame < 4; ++frame) {
     if (random.one_in(3)) server.set_parameters(random_parameters(random));
+    if (random.one_in(3)) server.round_next();
     State target = synthetic::random_target(random, agreed, session.moved_one_in);
     const auto lifecycle =
         synthetic::random_lifecycle(random, agreed, target, 1 + random.below(session.capacity));

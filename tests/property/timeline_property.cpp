@@ -118,6 +118,7 @@ class Scenario {
       parameters.codec.acceleration_gain = share();
       server_->set_parameters(parameters);
     }
+    if (random_.one_in(6)) server_->round_next();
     const auto frame =
         server_->advance(target, lifecycle, random_.one_in(2) ? kNoBudget : random_.below(400));
     deltas_.push_back(

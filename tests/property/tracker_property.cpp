@@ -41,8 +41,21 @@ State target_of(Random& random, const State& state, Mood mood, std::int32_t thre
   return target;
 }
 
+bool is_rounded(const State& state, const Rounding& rounding) {
+  const auto is_multiple = [](std::span<const std::int32_t> column, unsigned bits) {
+    return std::ranges::all_of(column, [bits](std::int32_t x) { return (x >> bits) << bits == x; });
+  };
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    if (!is_multiple(state.p(i), rounding.p) || !is_multiple(state.v(i), rounding.v) ||
+        !is_multiple(state.c(i), rounding.c))
+      return false;
+  }
+  return true;
+}
+
 Bytes saved(const DeltaCodec& codec) { return synthetic::coder_state(codec.codec()); }
 
+// Rounded or not, no body is further off than the threshold.
 // Also that a decoder which loads the coder state in mid-stream goes on like one that was there from the
 // start.
 RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
@@ -53,6 +66,7 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
   const auto joins_at = *rc::gen::inRange(1, 8);
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
   Random random(seed);
+  Random roundings(~seed);
   StreamParameters parameters{{threshold, 1, 1}};
   DeltaCodec server = synthetic::make_delta("tracker", capacity, parameters);
   DeltaCodec client = synthetic::make_delta("tracker", capacity, parameters);
@@ -74,6 +88,8 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
       parameters.codec.acceleration_gain = static_cast<std::uint16_t>(random.below(65536));
       server.set_parameters(parameters);
     }
+    const bool rounds = roundings.one_in(3);
+    if (rounds) server.round_next();
     const std::size_t budget = random.one_in(3) ? random.below(4 * capacity + 20) : kNoBudget;
     const auto encoded = server.encode(agreed, target, {}, budget, out);
     RC_ASSERT(encoded.correction_bytes <= budget);
@@ -84,6 +100,7 @@ RC_GTEST_PROP(Tracker, FollowsStatesThatAreChosenToHurtIt, ()) {
         RC_ASSERT(agreed.alive()[slot] == 0 || error_squared(agreed, target, slot) <= limit * limit);
       }
     }
+    if (rounds) RC_ASSERT(is_rounded(agreed, rounding_for(threshold)));
     const auto payload = std::span(out).first(encoded.size_bytes);
     RC_ASSERT(synthetic::receive(client, held, payload).has_value());
     RC_ASSERT(held == agreed);

@@ -52,6 +52,11 @@ class Lifecycle(RefusalCase):
         self.assertEqual(self.slot(state, 2), (1, 41, 1, 0, list(P), list(V), [0, 0, 0]))
         self.assertFalse(state.alive[5])
 
+    def test_rounding_goes_to_the_nearest_multiple_and_leaves_rest_alone(self):
+        state = self.apply(writer.section(0x87, bytes([2, 2, 1])))
+        self.assertEqual(self.slot(state, 2), (1, 40, 0, 1, [8, 8, 8], [8, 8, 8], [1, 2, 3]))
+        self.assertEqual(self.slot(state, 5), (1, 0, 0, 0, [8, 8, 8], [8, 8, 8], [0, 0, 0]))
+
     def test_what_is_refused(self):
         far = writer.position((2**30 + 1, 0, 0), V)
         despawn = writer.record(2, 0)

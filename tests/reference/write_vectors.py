@@ -71,14 +71,14 @@ class Vector:
         self.out += ["delta", *hex_lines(data)]
         self.hash()
 
-    def track(self, steps, before=b"", renewed=()):
-        """A delta of tracker corrections, behind other sections."""
+    def track(self, steps, before=b"", renewed=(), rounding=b""):
+        """A delta of tracker corrections, behind other sections; contexts know nothing of a rounding."""
         between = payload.apply_delta(self.line.world, self.line.stream, before)
         between.models = self.line.world.models
         between.state.codec[:] = self.line.world.state.codec
         between.state.codec[:, list(renewed)] = 0
         flags = np.isin(np.arange(between.state.capacity), list(renewed))
-        data = before
+        data = before + rounding
         for block in range(between.state.blocks()):
             first, end = between.state.block_slots(block)
             here = {slot: value for slot, value in steps.items() if first <= slot < end}
@@ -265,6 +265,42 @@ def tracker_refused():
     return vector
 
 
+def rounding():
+    """Whole states that are rounded."""
+    slots = [slot for slot in range(12) if slot != 4]
+    line = scattered("tracker", "ballistic", slots, 12, b"", 8)
+    state = line.world.state
+    state.rest[:2], state.c[1, :2] = 1, 3000
+    state.p[:, 11], state.v[:, 11] = (2**30, -(2**30), 2**30 - 1), (2**28, -(2**28), 1 - 2**28)
+    vector = Vector("rounding, of bodies at rest (0 and 1) and at the limits (11) too", line)
+    place = writer.position((555, -555, 555), (777, -777, 777))
+    born = writer.section(0x81, writer.record(3, 2, b"\1", place) + writer.record(1, 1, b"\1\1", place))
+    vector.predict()
+    vector.say("nothing else")
+    vector.delta(writer.section(0x87, bytes([2, 6, 3])))
+    vector.predict()
+    vector.say("by no bits, which changes nothing")
+    vector.delta(writer.section(0x87, bytes(3)))
+    vector.say("and corrections: 0 wakes")
+    steps = {0: [1, 0, 0], 2: [0, 1, -1], 5: [1, 1, 1], 7: [-2, 300, 0], 11: [9, -9, 0]}
+    vector.track(steps, rounding=writer.section(0x87, bytes([3, 7, 4])))
+    vector.predict(2)
+    vector.say("3 teleported, 4 spawned and corrected, a new threshold")
+    changed = born + writer.section(0x82, writer.parameters({1: 4000}))
+    vector.track({4: [1, 0, 0], 6: [0, 0, -3]}, changed, (3, 4), writer.section(0x87, bytes([7, 11, 8])))
+    vector.predict(2)
+    vector.say("by more than a step is worth")
+    vector.track({8: [1, 0, 0], 9: [2, -1, 0]}, rounding=writer.section(0x87, bytes([24, 24, 24])))
+    vector.predict()
+    vector.refuse(writer.section(0x87, bytes([25, 0, 0])), "by too many bits")
+    vector.refuse(writer.section(0x87, bytes([1, 1])), "too short")
+    vector.refuse(writer.section(0x87, bytes(4)), "too long")
+    vector.refuse(2 * writer.section(0x87, bytes(3)), "twice")
+    vector.refuse(writer.section(0x87, bytes(3)) + writer.section(0x82, writer.parameters({1: 9})), "before parameters")
+    vector.refuse(writer.section(0x83, b"\0\x0d") + writer.section(0x87, bytes(3)), "behind corrections")
+    return vector
+
+
 def lifecycle():
     """Records of every kind."""
     line = scattered("none", "ballistic", (0, 2, 5), 8)
@@ -404,6 +440,7 @@ def main(folder):
         "tracker_snapshot": tracker_snapshot(),
         "tracker_blocks": tracker_blocks(),
         "tracker_refused": tracker_refused(),
+        "rounding": rounding(),
         "lifecycle": lifecycle(),
         "sections": sections(),
         "snapshot": snapshots(),

@@ -27,7 +27,8 @@ constexpr std::array<KnownCodec, 6> kKnown{
        .takes_tables = true,
        .takes_budget = true,
        .usual_budget = kPaperBudgetBytes}},
-     {"tracker", {.reads_threshold = true, .reads_gains = true, .takes_budget = true}}}};
+     {"tracker",
+      {.reads_threshold = true, .reads_gains = true, .keeps_rounding = true, .takes_budget = true}}}};
 constexpr auto kNames = [] {
   std::array<std::string_view, kKnown.size()> names{};
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kKnown[i].name;

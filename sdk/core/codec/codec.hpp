@@ -28,6 +28,7 @@ struct CodecFrame {
   std::span<const std::uint8_t> alive;  ///< the column after the records
   std::span<const Slot> renewed;        ///< spawned, despawned or teleported by them; ascending, each once
   const CodecParameters& parameters;
+  unsigned position_bits = 0;  ///< rounded to multiples of 2^n: an encoder's p are, and `tracker` keeps it so
 };
 
 /// One corrections section: a block that exists, and what the codec says of it.
@@ -42,6 +43,7 @@ struct Corrections {
   std::span<const Slot> slots;    ///< each once, ascending
   std::span<const Slot> renewed;  ///< as in the frame
   CodecParameters parameters;     ///< as in the frame
+  unsigned position_bits = 0;     ///< as in the frame
 };
 
 /// The corrections part of a delta: one implementation a codec name (paper, sections 3.3.1 and 3.3.2).
@@ -95,6 +97,7 @@ struct CodecTraits {
   bool reads_steps = false;      ///< quantisation steps
   bool reads_gains = false;      ///< and the decay that goes with them
   bool takes_tables = false;     ///< 512 code lengths (code_tables.hpp)
+  bool keeps_rounding = false;   ///< corrected bodies stay round: CodecFrame::position_bits
   bool takes_budget = false;     ///< is meant to have one; any codec obeys it
   std::size_t usual_budget = kNoBudget;  ///< bytes a frame
 };

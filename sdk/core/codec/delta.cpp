@@ -1,7 +1,9 @@
 #include "sdk/core/codec/delta.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include "sdk/core/codec/lifecycle.hpp"
 #include "sdk/core/lattice/assert.hpp"
@@ -13,6 +15,7 @@ struct DeltaCodec::Impl {
   TypeId type_count = 0;
   StreamParameters parameters;  // in force
   StreamParameters next;        // server: from the next encode() on
+  bool round_next = false;      // server: in the next encode()
   // Of the delta at hand.
   std::vector<LifecycleRecord> lifecycle;
   std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
@@ -20,12 +23,14 @@ struct DeltaCodec::Impl {
   std::vector<Section> sections;
   // Of the last one that was applied.
   std::span<const LifecycleRecord> applied;
-  std::vector<Slot> merged;  // touched slots; used only where lifecycle adds to the corrected ones
+  std::vector<Slot>
+      merged;  // touched slots; used only where lifecycle or rounding adds to the corrected ones
   std::span<const Slot> touched;
 
   struct Parsed {
-    int stage = 0;  // where a section belongs among the others: lifecycle, parameters, corrections
+    int stage = 0;  // where a section belongs among the others: lifecycle, parameters, rounding, corrections
     StreamParameters parameters;
+    std::optional<Rounding> rounding;
     std::span<const std::uint8_t> alive;
   };
   Result<void> parse(std::span<const std::byte> payload, const State& predicted, Parsed& parsed);
@@ -47,7 +52,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
                                              const State& predicted, Parsed& parsed) {
   const auto enter = [&parsed](int stage) {
     // Corrections may repeat (one section a block), the others may not.
-    if (stage < parsed.stage || (stage == parsed.stage && stage != 3)) return false;
+    if (stage < parsed.stage || (stage == parsed.stage && stage != 4)) return false;
     parsed.stage = stage;
     return true;
   };
@@ -69,9 +74,16 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
       if (*named == 0) return fail(ErrorCode::kMalformed, "parameters section that names none");
       return {};
     }
+    case SectionType::kRounding: {
+      if (!enter(3)) break;
+      const auto rounding = read_rounding(body);
+      if (!rounding) return tl::unexpected<Error>(rounding.error());
+      parsed.rounding = *rounding;
+      return {};
+    }
     case SectionType::kCorrections:
     case SectionType::kLastCorrections: {
-      if (!enter(3)) break;
+      if (!enter(4)) break;
       ByteReader in(body);
       Section section{block_count(capacity) - 1, {}};
       if (static_cast<SectionType>(type) == SectionType::kCorrections)
@@ -94,6 +106,12 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
 void DeltaCodec::Impl::remember(const Delta& delta) {
   applied = delta.lifecycle;
   touched = delta.corrections.slots;
+  if (delta.rounding) {
+    merged.resize(capacity);
+    std::iota(merged.begin(), merged.end(), 0U);
+    touched = merged;
+    return;
+  }
   if (applied.empty()) return;
   merged.clear();
   auto corrected = touched.begin();
@@ -127,8 +145,8 @@ DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
 DeltaCodec::~DeltaCodec() = default;
 
 std::size_t DeltaCodec::bound() const {
-  return 2 * kMostSectionHeaderBytes + impl_->capacity * kMostLifecycleBytesPerSlot + kMostParametersBytes +
-         impl_->codec->bound();
+  return 3 * kMostSectionHeaderBytes + impl_->capacity * kMostLifecycleBytesPerSlot + kMostParametersBytes +
+         kRoundingBytes + impl_->codec->bound();
 }
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
@@ -151,6 +169,12 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
                 [&](ByteWriter& body) { write_parameters(impl_->next, &impl_->parameters, body); });
     impl_->parameters = impl_->next;
   }
+  std::optional<Rounding> rounding;
+  if (std::exchange(impl_->round_next, false)) {
+    rounding = rounding_for(impl_->parameters.codec.threshold);
+    put_section(SectionType::kRounding, writer, [&](ByteWriter& body) { write_rounding(*rounding, body); });
+    round_positions(*rounding, state);
+  }
   TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
   if (observer != nullptr) observer->frame(state, target, impl_->parameters.codec);
   Encoded encoded;
@@ -158,13 +182,15 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   const std::size_t left = budget - std::min(budget, before);
   impl_->list_renewed();
   const Corrections corrections = impl_->codec->encode(
-      {state, state.alive(), impl_->renewed, impl_->parameters.codec}, target, left, writer, observer);
+      {state, state.alive(), impl_->renewed, impl_->parameters.codec, rounding ? rounding->p : 0U}, target,
+      left, writer, observer);
   TANDEM_ASSERT(!writer.overflow());
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
   encoded.corrected = static_cast<std::uint32_t>(corrections.slots.size());
   impl_->codec->apply(corrections, state);
-  impl_->remember({impl_->lifecycle, impl_->parameters, corrections});
+  if (rounding) round_motion(*rounding, state);
+  impl_->remember({impl_->lifecycle, impl_->parameters, rounding, corrections});
   return encoded;
 }
 
@@ -172,6 +198,7 @@ void DeltaCodec::set_parameters(const StreamParameters& parameters) {
   TANDEM_ASSERT(valid_parameters(parameters.codec));
   impl_->next = parameters;
 }
+void DeltaCodec::round_next() { impl_->round_next = true; }
 const StreamParameters& DeltaCodec::parameters() const { return impl_->parameters; }
 void DeltaCodec::restore_parameters(const StreamParameters& parameters) {
   set_parameters(parameters);
@@ -194,20 +221,24 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
   impl_->lifecycle.clear();
   impl_->sections.clear();
   impl_->remember({});
-  Impl::Parsed parsed{0, impl_->parameters, predicted.alive()};
+  Impl::Parsed parsed{0, impl_->parameters, std::nullopt, predicted.alive()};
   if (auto result = impl_->parse(payload, predicted, parsed); !result)
     return tl::unexpected<Error>(result.error());
   impl_->list_renewed();
-  const auto corrections = impl_->codec->decode(
-      {predicted, parsed.alive, impl_->renewed, parsed.parameters.codec}, impl_->sections);
+  const auto corrections =
+      impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters.codec,
+                            parsed.rounding ? parsed.rounding->p : 0U},
+                           impl_->sections);
   if (!corrections) return tl::unexpected<Error>(corrections.error());
-  return Delta{impl_->lifecycle, parsed.parameters, *corrections};
+  return Delta{impl_->lifecycle, parsed.parameters, parsed.rounding, *corrections};
 }
 
 void DeltaCodec::apply(const Delta& delta, State& state) {
   impl_->parameters = impl_->next = delta.parameters;
   apply_lifecycle(delta.lifecycle, state);
+  if (delta.rounding) round_positions(*delta.rounding, state);
   impl_->codec->apply(delta.corrections, state);
+  if (delta.rounding) round_motion(*delta.rounding, state);
   impl_->remember(delta);
 }
 

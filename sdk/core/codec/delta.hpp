@@ -1,12 +1,15 @@
 #pragma once
-// A delta's payload: typed sections. Lifecycle records first, then parameters in force, then corrections.
+// A delta's payload: typed sections. Lifecycle records first, then parameters in force, rounding,
+// corrections.
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/codec/rounding.hpp"
 #include "sdk/core/layout/sections.hpp"
 
 namespace tandem {
@@ -27,6 +30,7 @@ struct LifecycleRecord {
 struct Delta {
   std::span<const LifecycleRecord> lifecycle;
   StreamParameters parameters;  ///< in force from this delta on
+  std::optional<Rounding> rounding;
   Corrections corrections;
 };
 
@@ -52,15 +56,18 @@ class DeltaCodec {
     std::size_t correction_bytes = 0;  ///< of the correction sections, headers included
     std::uint32_t corrected = 0;       ///< bodies
   };
-  /// Server side: applies `lifecycle` and corrections to `state` (predicted) and writes them to `out`, which
-  /// holds at least bound() bytes. `target` is the full simulation on the lattice. No more than `budget`
-  /// bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
+  /// Server side: applies `lifecycle`, rounding and corrections to `state` (predicted) and writes them to
+  /// `out`, which holds at least bound() bytes. `target` is the full simulation on the lattice. No more than
+  /// `budget` bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
                  std::size_t budget, std::span<std::byte> out, EncodeObserver* observer = nullptr);
 
   /// Server side: parameters from the next encode() on; sent in that delta.
   void set_parameters(const StreamParameters& parameters);
   [[nodiscard]] const StreamParameters& parameters() const;
+  /// Server side: the next encode() also rounds every body, as far as its threshold permits. What is encoded
+  /// still holds the threshold.
+  void round_next();
   /// Client side, from a snapshot: parameters in force, nothing is sent.
   void restore_parameters(const StreamParameters& parameters);
 
@@ -70,8 +77,8 @@ class DeltaCodec {
   /// Client side: does what the last decode() returned to the state that it saw.
   void apply(const Delta& delta, State& state);
 
-  /// Of the last encode() or apply(), none since a decode(): slots that records or corrections named, each
-  /// once, ascending; the records.
+  /// Of the last encode() or apply(), none since a decode(): slots that records or corrections named, or all
+  /// where it rounded, each once, ascending; the records.
   [[nodiscard]] std::span<const Slot> touched() const;
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;
   [[nodiscard]] Codec& codec();

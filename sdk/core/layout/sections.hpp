@@ -20,6 +20,7 @@ enum class SectionType : std::uint8_t {
   kInputs = 0x84,  ///< snapshots only, as regions
   kRegion = 0x85,
   kLastCorrections = 0x86,  ///< has no length: its body goes on to the payload's end
+  kRounding = 0x87,
 };
 inline constexpr std::size_t kMostSectionLengthBytes = 4;
 /// Most bytes before a section's body.

@@ -99,6 +99,7 @@ void ServerTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns
 void ServerTimeline::set_parameters(const StreamParameters& parameters) {
   impl_->parts.delta.set_parameters(parameters);
 }
+void ServerTimeline::round_next() { impl_->parts.delta.round_next(); }
 Frame ServerTimeline::frame() const { return impl_->frame; }
 const State& ServerTimeline::state() const { return impl_->state; }
 const Drive& ServerTimeline::drive() const { return impl_->drive; }

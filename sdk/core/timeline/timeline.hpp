@@ -72,6 +72,10 @@ class ServerTimeline {
   /// In force from the next advance() on; travels in that delta.
   void set_parameters(const StreamParameters& parameters);
 
+  /// The next advance() rounds every body, on both sides, so that a snapshot cut right after it is smaller.
+  /// No body gets further from `target` than without; see idl/PROTOCOL.md, "Rounding".
+  void round_next();
+
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] const State& state() const;
   [[nodiscard]] const Drive& drive() const;                  ///< in force at frame()

@@ -9,7 +9,8 @@ from .errors import require
 from .reader import Reader
 from .state import MOST_P, MOST_V
 
-LIFECYCLE, PARAMETERS, CORRECTIONS, LAST_CORRECTIONS = 0x81, 0x82, 0x83, 0x86
+LIFECYCLE, PARAMETERS, CORRECTIONS, LAST_CORRECTIONS, ROUNDING = 0x81, 0x82, 0x83, 0x86, 0x87
+ORDER = LIFECYCLE, PARAMETERS, ROUNDING, CORRECTIONS, LAST_CORRECTIONS
 DESPAWN, SPAWN, TELEPORT, TYPE_CHANGE = range(4)
 
 
@@ -50,6 +51,7 @@ class Parsed:
 
     records: list
     parameters: dict
+    rounding: tuple  # bits of p, v and c
     corrections: list  # (block, Reader at what the codec says)
 
 
@@ -67,17 +69,20 @@ def sections(reader, known):
 
 def parse(data, state):
     """The known sections of a payload, in the order that the protocol asks for."""
-    known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", CORRECTIONS: "corrections"}
+    known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", ROUNDING: "rounding", CORRECTIONS: "corrections"}
     known[LAST_CORRECTIONS] = "corrections of the last block"
-    parsed = Parsed([], {}, [])
-    before = 0
+    parsed = Parsed([], {}, (0, 0, 0), [])
+    before = None
     for kind, body in sections(Reader(data, "payload"), known):
-        require(kind > before or kind == before == CORRECTIONS, "order", f"{known[kind]} behind section 0x{before:02x}")
+        ascends = before is None or ORDER.index(kind) > ORDER.index(before)
+        require(ascends or kind == before == CORRECTIONS, "order", f"{known[kind]} behind section 0x{before or 0:02x}")
         before = kind
         if kind == LIFECYCLE:
             parsed.records = read_records(body)
         elif kind == PARAMETERS:
             parsed.parameters = parameters.read(body)
+        elif kind == ROUNDING:
+            parsed.rounding = read_rounding(body)
         else:
             block = body.leb128(4) if kind == CORRECTIONS else state.blocks() - 1
             require(block < state.blocks(), "corrections", f"block {block} does not exist")
@@ -85,6 +90,19 @@ def parse(data, state):
                 require(block > parsed.corrections[-1][0], "order", "blocks that do not ascend")
             parsed.corrections.append((block, body))
     return parsed
+
+
+def read_rounding(body):
+    """How many bits of p, v and c are rounded away."""
+    bits = body.u8(), body.u8(), body.u8()
+    require(not body.left(), "length", "bytes behind a rounding")
+    require(max(bits) <= 24, "rounding", f"rounding by {bits} bits")
+    return bits
+
+
+def rounded(columns, bits):
+    """The nearest multiples of 2^bits, halves up."""
+    return ((columns + (1 << bits >> 1)) >> bits) << bits
 
 
 def read_position(body):
@@ -150,9 +168,15 @@ def apply_delta(world, stream, data):
     parsed = parse(data, world.state)
     after = world.copy()
     after.parameters.update(parsed.parameters)
-    renewed = apply_records(after.state, parsed.records, stream.types)
+    state = after.state
+    renewed = apply_records(state, parsed.records, stream.types)
+    for_p, for_v, for_c = parsed.rounding
+    state.p[:] = rounded(state.p, for_p)
     if stream.codec == "tracker":
-        tracker.apply_corrections(after, stream, parsed.corrections, renewed)
+        tracker.apply_corrections(after, stream, parsed.corrections, renewed, for_p)
     else:
         codecs.apply_corrections(after, stream, parsed.corrections)
+    awake = state.rest == 0
+    state.v[:, awake] = rounded(state.v[:, awake], for_v)
+    state.c[:, awake] = rounded(state.c[:, awake], for_c)
     return after

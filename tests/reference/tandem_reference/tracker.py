@@ -112,7 +112,7 @@ def read_size(decoder, magnitude):
     return number + 14
 
 
-def apply_corrections(world, stream, corrections, renewed):
+def apply_corrections(world, stream, corrections, renewed, rounding):
     """Decode and apply the sections of all blocks, let the models learn and the ages grow."""
     state, models, values = world.state, world.models, parameters.named(world.parameters)
     contexts = Contexts(state, renewed, values["threshold"])
@@ -136,7 +136,7 @@ def apply_corrections(world, stream, corrections, renewed):
     grows[slots] = False
     state.codec[AGE, grows] = np.minimum(state.codec[AGE, grows] + 1, 254)
     if len(slots):
-        correct(state, slots, np.array(steps, np.int64).T, values, stream.predictor == "ballistic")
+        correct(state, slots, np.array(steps, np.int64).T, values, stream.predictor == "ballistic", rounding)
 
 
 def by_axes(steps, long, one, two, three):
@@ -146,12 +146,12 @@ def by_axes(steps, long, one, two, three):
     return np.where(np.abs(steps).max(axis=0) > 1, long, short)
 
 
-def correct(state, slots, steps, values, ballistic):
-    """Move bodies by steps, and adjust their velocity, acceleration and columns."""
+def correct(state, slots, steps, values, ballistic, rounding):
+    """Move bodies by steps worth multiples of 2^rounding, and adjust their velocity, acceleration and columns."""
     threshold = values["threshold"]
     now, last = state.codec[AGE, slots] + 1, state.codec[LAST, slots]
     share = by_axes(steps, 62259, 60293, 45220, 38666)
-    unit = np.maximum(1, (threshold * share) >> 16)
+    unit = np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
 
     kept = clamp(steps, 127)
     before = last * by_axes(last, 243, 235, 176, 151)

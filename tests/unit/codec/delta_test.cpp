@@ -216,6 +216,54 @@ TEST(DeltaCodec, SectionsOutOfOrderOrRepeatedAreRefused) {
       decode(Payload().parameters({{1, 1, 1}}).record(LifecycleKind::kDespawn, 0).end_lifecycle().bytes()));
 }
 
+TEST(DeltaCodec, RoundsBeforeTheCorrections) {
+  // p of slot 1 is 1 and goes to 0, then by one position step of 10; v by a step of 20, and then to 24.
+  const Payload payload = Payload().section(0x87, {2, 3, 0}).section(0x83, {0, 1, 0x02, 1, 0, 0, 1, 0, 0});
+  const auto state = decode(payload.bytes());
+  ASSERT_TRUE(state) << state.error().message;
+  EXPECT_EQ(state->body(1), (BodyState{{10, 0, 0}, {24, 0, 0}}));
+  EXPECT_EQ(state->body(2), (BodyState{{4, 0, 0}, {}})) << "2 is half way, and goes up";
+}
+
+TEST(DeltaCodec, RoundingStandsBetweenParametersAndCorrectionsOnce) {
+  const StreamParameters some{{1, 1, 1}};
+  EXPECT_TRUE(decode(Payload().parameters(some).section(0x87, {1, 1, 1}).bytes()));
+  EXPECT_FALSE(decode(Payload().section(0x87, {1, 1, 1}).parameters(some).bytes()));
+  EXPECT_FALSE(decode(Payload().section(0x87, {1, 1, 1}).section(0x87, {1, 1, 1}).bytes()));
+  EXPECT_FALSE(
+      decode(Payload().section(0x83, {0, 1, 0x02, 1, 0, 0, 1, 0, 0}).section(0x87, {1, 1, 1}).bytes()));
+  EXPECT_FALSE(decode(Payload().section(0x87, {1, 1}).bytes())) << "truncated";
+  EXPECT_FALSE(decode(Payload().section(0x87, {25, 1, 1}).bytes())) << "too many bits";
+}
+
+TEST(DeltaCodec, RoundingIsAskedForOneFrameAndTouchesAllSlots) {
+  DeltaCodec server = make_delta("tracker", 4, kParameters);
+  DeltaCodec client = make_delta("tracker", 4, kParameters);
+  Bytes out(server.bound());
+  State agreed = three_of_four();
+  State held = agreed;
+  State target = agreed;
+  target.set_body(0, {{-1234, 777, 0}, {}});
+  server.round_next();
+  auto encoded = server.encode(agreed, target, {}, kNoBudget, out);
+  ASSERT_TRUE(synthetic::receive(client, held, std::span(out).first(encoded.size_bytes)));
+  EXPECT_EQ(held, agreed);
+  EXPECT_EQ(encoded.size_bytes - encoded.correction_bytes, 5U);
+  EXPECT_EQ(encoded.corrected, 1U);
+  for (Slot slot = 0; slot < 3; ++slot) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(agreed.p(i)[slot] % 8, 0) << "corrected bodies too";
+      EXPECT_EQ(agreed.v(i)[slot] % 128, 0);
+      EXPECT_EQ(agreed.c(i)[slot] % 16, 0);
+    }
+  }
+  EXPECT_EQ(server.touched().size(), 4U);
+  EXPECT_EQ(client.touched().size(), 4U);
+  target = agreed;
+  encoded = server.encode(agreed, target, {}, kNoBudget, out);
+  EXPECT_EQ(encoded.size_bytes, 0U) << "once only";
+}
+
 TEST(DeltaCodec, ABlockMayComeOnlyOnce) {
   DeltaCodec server = make_delta("quantized", 4, kParameters);
   Bytes out(server.bound());

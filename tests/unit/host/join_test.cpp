@@ -48,7 +48,7 @@ TEST_F(JoinTest, JoinersAreCollectedForATenthOfASecondAndShareOneSnapshot) {
   bench.joining(3);
   bench.run_ms(49);
   EXPECT_TRUE(bench.port.snapshots.empty());
-  bench.run_ms(3);
+  bench.run_ms(3 + 33);  // and the next frame
   EXPECT_EQ(bench.port.snapshots.size(), 1U);
   bench.run_ms(1000);
   EXPECT_EQ(bench.host->totals().snapshots, 1U) << "all three are served";
@@ -60,6 +60,24 @@ TEST_F(JoinTest, TheSnapshotIsCutRightAfterADeltaAndLeavesBehindIt) {
   const auto snapshot = std::ranges::find(bench.port.order, "snapshot");
   const auto deltas_before = std::count(bench.port.order.begin(), snapshot, "delta");
   EXPECT_EQ(bench.port.snapshots[0].frame, static_cast<Frame>(deltas_before));
+}
+
+TEST_F(JoinTest, TheFrameThatASnapshotIsCutAfterIsRoundedForItAndNoOther) {
+  HostConfig config = test_config();
+  config.stream.layout.codec = "tracker";
+  Bench rounding(config);
+  rounding.poll();
+  rounding.run_to(10);
+  rounding.joining(1);
+  for (int ms = 0; ms < 150; ++ms) {
+    rounding.run_ms(1);
+    EXPECT_GT(rounding.host->next_wake_ns(), rounding.now) << "waiting for the frame takes no time";
+  }
+  ASSERT_EQ(rounding.port.snapshots.size(), 1U);
+  for (const auto& delta : rounding.port.deltas) {
+    const bool rounds = !delta.payload.empty() && delta.payload[0] == std::byte{0x87};
+    EXPECT_EQ(rounds, delta.frame == rounding.port.snapshots[0].frame) << delta.frame;
+  }
 }
 
 TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {

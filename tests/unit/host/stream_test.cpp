@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
+#include "tests/property/synthetic.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
@@ -45,6 +48,22 @@ TEST(Stream, ProducesWhatAHostPublishes) {
   EXPECT_EQ(stream.parameters(), bench.host->parameters());
   EXPECT_NE(stream.parameters(), config.stream.layout.parameters) << "something was chosen";
   EXPECT_EQ(stream.bodies(), stream.agreed().alive_count());
+}
+
+TEST(Stream, RoundsOnlyWhereCorrectionsKeepIt) {
+  for (const std::string_view codec : codec_names()) {
+    SCOPED_TRACE(codec);
+    HostConfig config = test_config();
+    config.stream.layout.codec = codec;
+    config.stream.layout.codec_tables = synthetic::tables_for(codec);
+    FakeSimulation simulation(4);
+    for (auto& column : simulation.position) std::iota(column.begin(), column.end(), 0.12345F);
+    Stream stream = Stream::create(config.stream, start_of(simulation, config)).value();
+    const State before = stream.agreed();
+    stream.round_next();
+    stream.produce(simulation.bodies(), {});
+    EXPECT_EQ(stream.agreed() == before, codec != "tracker");
+  }
 }
 
 TEST(Stream, CanBeMovedWhileItsParametersAreChosen) {

@@ -51,6 +51,7 @@ TEST(Allocations, NoneInAFrameOfServerOrClientAfterTheFirst) {
       const std::size_t budget = random.one_in(2) ? kNoBudget : kPaperBudgetBytes;
       const ScheduledDrive input{frame, frame + 1, Drive{{0, static_cast<std::int32_t>(frame), 0}, 10}};
 
+      if (random.one_in(10)) server.round_next();
       std::uint64_t before = allocations;
       const bool scheduled = server.schedule(input).has_value();
       const auto delta = server.advance(target, lifecycle, budget);

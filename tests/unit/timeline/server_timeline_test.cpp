@@ -28,6 +28,37 @@ TEST(ServerTimeline, RefusesConfigurationsThatMakeNoSession) {
   EXPECT_EQ(code(layout), ErrorCode::kInvalidArgument);
 }
 
+TEST(ServerTimeline, ASnapshotAfterARoundedFrameIsSmallerAndAClientFollowsFromIt) {
+  Random random(3);
+  Layout layout = layout_for("tracker", 1000);
+  layout.parameters.codec.threshold = 4096;
+  auto server = server_of(layout);
+  auto rounded = server_of(layout);
+  auto client = client_of(layout);
+  const State start = random_state(random, 1000);
+  const Drive drive{{0, -640, 0}, 10};
+  server.start(7, start, drive);
+  rounded.start(7, start, drive);
+  ASSERT_TRUE(client.load(snapshot_of(rounded), kEpoch));
+  client.step(1);
+  State target = random_target(random, start, 3);
+  server.advance(target, {});
+  rounded.round_next();
+  ASSERT_TRUE(apply(client, rounded.advance(target, {})));
+  EXPECT_EQ(client.state(8), rounded.state());
+  // 9, 13 and 10 bits on each axis; of c most are 0.
+  EXPECT_LT(snapshot_of(rounded).size() + rounded.state().alive_count() * 3 * 22 / 8 * 9 / 10,
+            snapshot_of(server).size());
+  auto late = client_of(layout);
+  ASSERT_TRUE(late.load(snapshot_of(rounded), kEpoch));
+  client.step(1);
+  late.step(1);
+  const auto next = rounded.advance(target, {});
+  EXPECT_TRUE(apply(client, next));
+  EXPECT_TRUE(apply(late, next));
+  EXPECT_EQ(late.state(9), client.state(9));
+}
+
 TEST(ServerTimeline, AFrameThatTheTargetPredictsCostsNothing) {
   Random random(1);
   const State start = random_state(random, 50);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "sdk/core/codec/rounding.hpp"
 #include "sdk/core/codec/tracker/steps.hpp"
 
 namespace tandem {
@@ -102,11 +103,20 @@ TEST(TrackerFilter, SmallStepsAreShorterTheMoreAxesMove) {
   EXPECT_EQ(steppings.unit_for({2, 1, 0}), 949);
 }
 
+TEST(TrackerFilter, StepsAreMultiplesOfWhatPositionsAreRoundedTo) {
+  const TrackerSteppings steppings(1000, 5);
+  EXPECT_EQ(steppings.unit_for({1, 0, 0}), 896);
+  EXPECT_EQ(steppings.unit_for({0, -1, 1}), 672);
+  EXPECT_EQ(steppings.unit_for({1, 1, -1}), 576);
+  EXPECT_EQ(steppings.unit_for({2, 1, 0}), 928);
+  EXPECT_EQ(TrackerSteppings(100, 24).unit_for({1, 0, 0}), 1 << 24) << "whatever another writer asks for";
+}
+
 TEST(TrackerSteps, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
   TrackerCosts costs;
   costs.learn(TrackerModels());
-  for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11}) {
-    const TrackerSteppings steppings(threshold);
+  for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11, 16, 17, 31}) {
+    const TrackerSteppings steppings(threshold, rounding_for(threshold).p);
     const ErrorWorth worth(threshold);
     const std::int32_t reach = 3 * threshold + 2;
     for (std::int32_t x = -reach; x <= reach; ++x) {

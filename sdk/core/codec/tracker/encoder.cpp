@@ -91,8 +91,8 @@ void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, cons
                             Candidate& candidate) {
   const Slot slot = candidate.slot;
   const bool inside = choose_steps(position(frame.at.predicted, slot), position(target, slot),
-                                   TrackerSteppings(frame.at.parameters.threshold), worth, costs_,
-                                   frame.scratch.contexts.of(slot), candidate.steps);
+                                   TrackerSteppings(frame.at.parameters.threshold, frame.at.position_bits),
+                                   worth, costs_, frame.scratch.contexts.of(slot), candidate.steps);
   const bool is_of_use = inside || (candidate.must && candidate.steps != TrackerSteps{});
   candidate.state = is_of_use ? Candidate::Steps::kFound : Candidate::Steps::kUseless;
 }

@@ -56,9 +56,11 @@ class TrackerSteppings {
   /// No correction is longer than this along an axis.
   static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
 
-  explicit TrackerSteppings(std::int32_t threshold) {
-    const auto share = [threshold](std::int64_t of_65536) {
-      return static_cast<std::int32_t>(std::max<std::int64_t>(1, (threshold * of_65536) >> 16));
+  /// Steps are worth multiples of 2^position_bits, so that rounded positions stay round; at most 2^24.
+  explicit TrackerSteppings(std::int32_t threshold, unsigned position_bits = 0) {
+    const auto share = [threshold, position_bits](std::int64_t of_65536) {
+      const std::int64_t whole = ((threshold * of_65536) >> 16) >> position_bits << position_bits;
+      return static_cast<std::int32_t>(std::max(std::int64_t{1} << position_bits, whole));
     };
     for (std::size_t i = 0; i < kUnits.size(); ++i) units_[i] = share(kUnits[i]);
   }

@@ -78,7 +78,7 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block,
                           State& state) {
   const std::int32_t threshold = corrections.parameters.threshold;
-  const TrackerSteppings steppings(threshold);
+  const TrackerSteppings steppings(threshold, corrections.position_bits);
   // Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
   constexpr std::byte kYoungest{0xFF};
   std::byte* const age = columns_.data();
