@@ -51,6 +51,8 @@ class ServerPort {
   [[nodiscard]] virtual bool joined(const ParticipantId& participant) = 0;
   /// The participant still has a live acknowledgement writer.
   [[nodiscard]] virtual bool alive(const ParticipantId& participant) = 0;
+  /// Nothing is left of the participant: it said so itself, or was silent for longer than its lease.
+  [[nodiscard]] virtual bool ended(const ParticipantId& participant) = 0;
   /// Samples refused for their size or shape since the start.
   [[nodiscard]] virtual std::uint64_t dropped() const = 0;
   /// Blocks until something may be there to take, or the timeout. Spurious returns are allowed.

@@ -14,7 +14,7 @@ using transport::Role;
 
 constexpr std::int64_t kReturnNs = 10'000'000'000;   // a demoted client must keep up this long
 constexpr std::int64_t kSilenceNs = 30'000'000'000;  // without an acknowledgement a client is taken for gone
-constexpr std::int64_t kForgetNs = 60'000'000'000;   // and its account deleted
+constexpr std::int64_t kForgetNs = 60'000'000'000;   // and its account deleted, if not before
 
 }  // namespace
 
@@ -119,7 +119,8 @@ void Roster::look_for_dead(transport::ServerPort& port, const Now& now) {
       account.counted = false;
       note(account, "is gone", now.ns);
     }
-    it = !account.present && silence_ns > kForgetNs ? forget(it) : std::next(it);
+    const bool returns = silence_ns <= kForgetNs && !port.ended(account.from);
+    it = account.present || returns ? std::next(it) : forget(it);
   }
 }
 

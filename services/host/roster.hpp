@@ -48,7 +48,8 @@ struct ReplyAccount {
   std::int64_t last_ns = INT64_MIN;
 };
 
-/// One client id. Survives rejoins; forgotten a minute after the client was last heard of.
+/// One client id. Survives rejoins; forgotten with its DDS participant, or a minute after the client was last
+/// heard of.
 struct Account {
   transport::ClientId id = 0;
   transport::ParticipantId from;

@@ -41,13 +41,9 @@ WriterState LiveWriters::state(dds_instance_handle_t writer) const {
   return found->second ? WriterState::kLive : WriterState::kSilent;
 }
 
-std::set<dds_instance_handle_t> LiveWriters::live() const {
+std::map<dds_instance_handle_t, bool> LiveWriters::matched() const {
   const std::lock_guard lock(mutex_);
-  std::set<dds_instance_handle_t> writers;
-  for (const auto& [writer, is_live] : live_) {
-    if (is_live) writers.insert(writer);
-  }
-  return writers;
+  return live_;
 }
 
 std::optional<ParticipantId> Participants::of_writer(dds_entity_t reader, dds_instance_handle_t writer) {

@@ -6,7 +6,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <unordered_map>
 
 #include "sdk/transport/dds/entity.hpp"
@@ -30,7 +29,8 @@ class LiveWriters {
   /// For the creation of the reader, which must not outlive this object.
   [[nodiscard]] const dds_listener_t* listener() const { return listener_.get(); }
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const;
-  [[nodiscard]] std::set<dds_instance_handle_t> live() const;
+  /// All that are matched, and whether they live.
+  [[nodiscard]] std::map<dds_instance_handle_t, bool> matched() const;
 
  private:
   struct ListenerDeleter {

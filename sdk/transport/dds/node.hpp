@@ -83,12 +83,18 @@ class Reader {
   }
 
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const { return writers_->state(writer); }
-  /// True while a live writer of that participant is matched.
-  [[nodiscard]] bool alive(const ParticipantId& participant) {
-    for (const dds_instance_handle_t writer : writers_->live()) {
-      if (participants_.of_writer(entity_.get(), writer) == participant) return true;
+  /// Of that participant's writers together: live if one of them is, gone if none is matched.
+  [[nodiscard]] WriterState state_of(const ParticipantId& participant) {
+    WriterState state = WriterState::kGone;
+    for (const auto& [writer, live] : writers_->matched()) {
+      if (participants_.of_writer(entity_.get(), writer) != participant) continue;
+      if (live) return WriterState::kLive;
+      state = WriterState::kSilent;
     }
-    return false;
+    return state;
+  }
+  [[nodiscard]] bool alive(const ParticipantId& participant) {
+    return state_of(participant) == WriterState::kLive;
   }
 
  private:

@@ -74,6 +74,10 @@ class DdsServerPort final : public ServerPort {
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return endpoints_.ack.alive(participant) || endpoints_.input.alive(participant);
   }
+  [[nodiscard]] bool ended(const ParticipantId& participant) override {
+    return endpoints_.ack.state_of(participant) == WriterState::kGone &&
+           endpoints_.input.state_of(participant) == WriterState::kGone;
+  }
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
   void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
   void wake() override { endpoints_.node.wake(); }

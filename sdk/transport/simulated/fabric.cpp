@@ -327,6 +327,11 @@ bool Fabric::hears(Index reader, const ParticipantId& participant) const {
   });
 }
 
+bool Fabric::ended(const ParticipantId& participant) const {
+  const Index subject = find(participant);
+  return subject == participants_.size() || participants_[subject].closed;
+}
+
 Fabric::Index Fabric::find(const ParticipantId& participant) const {
   const auto found = std::find_if(participants_.begin(), participants_.end(),
                                   [&](const Participant& other) { return other.id == participant; });

@@ -76,6 +76,8 @@ class Fabric {
   [[nodiscard]] bool reaches(Index writer, const ParticipantId& participant) const;
   /// A live writer in `participant` has been matched.
   [[nodiscard]] bool hears(Index reader, const ParticipantId& participant) const;
+  /// It ended properly; whoever was killed is silent for ever.
+  [[nodiscard]] bool ended(const ParticipantId& participant) const;
 
   // What the network does.
   [[nodiscard]] std::int64_t now_ns() const { return now_ns_; }

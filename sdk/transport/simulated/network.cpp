@@ -137,6 +137,9 @@ class SimulatedServerPort final : public ServerPort {
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return member_.fabric().hears(ack_, participant);
   }
+  [[nodiscard]] bool ended(const ParticipantId& participant) override {
+    return member_.fabric().ended(participant);
+  }
   [[nodiscard]] std::uint64_t dropped() const override { return member_.dropped(); }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 

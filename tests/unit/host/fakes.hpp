@@ -100,13 +100,14 @@ class FakePort final : public transport::ServerPort {
   void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
   [[nodiscard]] bool joined(const transport::ParticipantId& id) override { return !unmatched.contains(id); }
   [[nodiscard]] bool alive(const transport::ParticipantId& id) override { return !dead.contains(id); }
+  [[nodiscard]] bool ended(const transport::ParticipantId& id) override { return gone.contains(id); }
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
   std::vector<transport::Received<transport::SessionMessage>> rivals;
   std::vector<transport::Received<transport::InputMessage>> inputs;
   std::vector<transport::Received<transport::AckMessage>> acks;
-  std::set<transport::ParticipantId> unmatched, dead;
+  std::set<transport::ParticipantId> unmatched, dead, gone;
   std::vector<transport::SessionMessage> sessions;
   std::vector<transport::DeltaMessage> deltas;
   std::vector<transport::ScheduledInputMessage> scheduled;

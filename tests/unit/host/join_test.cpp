@@ -230,6 +230,17 @@ TEST_F(JoinTest, AnAccountHasAReplyWriterOfItsOwnUntilItIsForgotten) {
   EXPECT_TRUE(bench.port.reply_writers.contains(1));
 }
 
+TEST_F(JoinTest, AnAccountIsForgottenAtOnceWhenNothingIsLeftOfItsParticipant) {
+  bench.joining(1);
+  bench.joining(2);
+  bench.run_ms(20);
+  bench.port.dead = {participant(1), participant(2)};
+  bench.port.gone.insert(participant(2));
+  bench.run_ms(500);
+  EXPECT_TRUE(bench.port.reply_writers.contains(1)) << "silent: it may come back";
+  EXPECT_FALSE(bench.port.reply_writers.contains(2));
+}
+
 TEST_F(JoinTest, StrangersAreAnsweredTwentyTimesASecondAllTogether) {
   bench.on_ms = [this, next = transport::ClientId{1000}]() mutable {
     auto ack = bench.ack(next++, Phase::kJoining, 0);
