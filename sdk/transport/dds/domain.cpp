@@ -32,9 +32,11 @@ Domains& domains() {
 std::string defaults() {
   return "<CycloneDDS><Domain id=\"any\"><Discovery>"
          "<LeaseDuration>45s</LeaseDuration>"
-         "<SPDPInterval>3s</SPDPInterval>"
+         "<SPDPInterval>5s</SPDPInterval>"
          "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
-         "</Discovery><Internal>"
+         "</Discovery>"
+         "<Sizing><ReceiveBufferSize>256 KiB</ReceiveBufferSize></Sizing>"
+         "<Internal>"
          "<NackDelay>10ms</NackDelay>"
          "<MaxSampleSize>" +
          std::to_string(kMaxSampleBytes + (1U << 20U)) +
