@@ -10,6 +10,7 @@
 #include <exception>
 #include <thread>
 
+#include "services/heap/heap.hpp"
 #include "services/tandemd/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
 
@@ -45,7 +46,8 @@ int main(int argc, char** argv) {
     spdlog::set_default_logger(spdlog::stderr_color_mt("tandemd"));
     const auto command = tandem::daemon::parse_command_line(argc, argv);
     if (!command.options) return command.exit_code;
-    const SignalWatch signals;
+    const SignalWatch signals;  // first: its mask holds for all threads
+    const tandem::HeapTrimmer trimmer;
     return tandem::daemon::run_daemon(*command.options, signals.stop());
   } catch (const std::exception& error) {
     spdlog::error("{}", error.what());

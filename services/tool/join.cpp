@@ -10,6 +10,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
+#include "services/heap/heap.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/headless_client.hpp"
 
@@ -34,6 +35,7 @@ std::string with_suffix(const std::string& path, std::uint32_t index) {
 int run_join(const JoinOptions& options) {
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
+  const HeapTrimmer trimmer;
   std::vector<std::unique_ptr<HeadlessClient>> clients;
   for (std::uint32_t i = 0; i < options.count; ++i) {
     HeadlessOptions one = options.client;

@@ -40,6 +40,7 @@ EDGES = {
     "sdk/client": TIMELINE + ["public", "sdk/statistics", "sdk/transport"],
     "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
     "sdk/examples": ["public"],
+    "services/heap": [],
     "services/workers": [],
     "services/host": TIMELINE + ["sdk/statistics", "sdk/transport", "services/workers"],
     "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
@@ -48,8 +49,10 @@ EDGES = {
     "services/tandemd": LAYOUT
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
+    "services/tandemd/main.cpp": ["services/tandemd", "services/heap"],
     "services/tool": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds", "services/scenes"],
+    + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
+    + ["services/heap", "services/scenes"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
