@@ -114,6 +114,7 @@ struct Host::Impl {
   [[nodiscard]] HostTotals totals_now() const;
   void note(std::string notice);
   void note_foreigner(transport::ClientId client);
+  void note_mishaps();
   void note_target();
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
@@ -139,6 +140,8 @@ struct Host::Impl {
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
   std::optional<std::int64_t> first_poll_ns;
   std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
+  std::int64_t last_mishap_note_ns = -kSecond;
+  engine::Mishaps noted_mishaps;
   Waiting waiting = Waiting::kNothing;  // what the due frame waits for, since the last poll
   Frame written_then = 0;               // at the last poll
   bool held = false;                    // the due frame had to wait
@@ -250,6 +253,15 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
   note(fmt::format("client {} is used by a second participant: refused", client_name(client)));
 }
 
+void Host::Impl::note_mishaps() {
+  const engine::Mishaps now = simulation->mishaps();
+  if (now == noted_mishaps || now_ns - last_mishap_note_ns < kSecond) return;
+  last_mishap_note_ns = now_ns;
+  noted_mishaps = now;
+  note(fmt::format("the simulation explodes: {} bodies removed and {} slowed down since its start",
+                   now.removed, now.clamped));
+}
+
 void Host::Impl::note_target() {
   const QualityGoal& goal = *config.stream.quality;
   if (!stream.target_out_of_reach()) {
@@ -305,6 +317,7 @@ void Host::Impl::produce_frame(bool snapshot_due) {
   push_delta(outbox, config.epoch, frame, wall_ns + (produced - start));
   times.published(frame.frame, now_ns);
   if (stream.target_out_of_reach() != was_out_of_reach) note_target();
+  note_mishaps();
   report = {.frame = frame.frame,
             .hash = frame.hash,
             .payload_bytes = frame.payload.size(),

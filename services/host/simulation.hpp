@@ -62,8 +62,18 @@ struct Event {
   std::uint32_t slot = 0;
 };
 
+/// Bodies that an engine mended since its start so that the session goes on: rigid bodies explode now and
+/// then.
+struct Mishaps {
+  std::uint64_t removed = 0;  ///< not a number any more, or out of the world
+  std::uint64_t clamped = 0;  ///< times one turned by more than kMaxTurn in a step
+
+  friend bool operator==(const Mishaps&, const Mishaps&) = default;
+};
+
 /// A full simulation. Deterministic: same inputs on the same frames give the same bodies to the last bit, on
-/// any number of threads. Called from one thread; it may use others inside step().
+/// any number of threads; an engine that promises this for one machine only says so. Called from one thread;
+/// it may use others inside step().
 class Simulation {
  public:
   virtual ~Simulation() = default;
@@ -85,6 +95,7 @@ class Simulation {
   [[nodiscard]] virtual std::span<const Event> events() const = 0;
   /// Bodies in contact (with another body or with the scene) in the last step, for the paper's tables.
   [[nodiscard]] virtual std::uint32_t colliding() const = 0;
+  [[nodiscard]] virtual Mishaps mishaps() const { return {}; }
 
   /// Checkpoint: everything that decides the following steps. load() returns false and changes nothing when
   /// the bytes are not a checkpoint of this simulation. After it, bodies(), gravity and waiting inputs are

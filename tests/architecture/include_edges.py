@@ -44,7 +44,10 @@ EDGES = {
     "services/workers": [],
     "services/host": TIMELINE + ["sdk/statistics", "sdk/transport", "services/workers"],
     "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
-    "services/scenes": ["public/result.hpp", "services/engine/particles"] + SIMULATION,
+    "services/engine/shape": ["public/result.hpp"],
+    "services/engine/bullet": ["public/result.hpp", "services/engine/particles", "services/engine/shape"] + SIMULATION,
+    "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/particles", "services/engine/shape"]
+    + SIMULATION,
     "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
     "services/tandemd": LAYOUT
     + CODEC
@@ -65,6 +68,7 @@ OWNERS = [
     (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
     (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
+    (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/lab", "services/tandemd"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services", "tests"]),

@@ -1,67 +1,13 @@
-#include <bit>
-#include <cstring>
-#include <type_traits>
-
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
+#include "services/engine/particles/checkpoint_bytes.hpp"
 #include "services/engine/particles/columns.hpp"
 
 namespace tandem::engine {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "checkpoints hold the machine's own layout");
-
 constexpr std::uint64_t kMagic = 0x31545250444E4154;  // "TANDPRT1"
 
-class Writer {
- public:
-  explicit Writer(std::vector<std::byte>& out) : out_(out) {}
-  template <class T>
-  void column(const std::vector<T>& values) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    bytes(values.data(), values.size() * sizeof(T));
-  }
-  template <class T>
-  void value(const T& v) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    bytes(&v, sizeof v);
-  }
-
- private:
-  void bytes(const void* from, std::size_t size) {
-    const auto* first = static_cast<const std::byte*>(from);
-    out_.insert(out_.end(), first, first + size);
-  }
-  std::vector<std::byte>& out_;
-};
-
-class Reader {
- public:
-  explicit Reader(std::span<const std::byte> in) : in_(in) {}
-  template <class T>
-  void column(std::vector<T>& values) {
-    bytes(values.data(), values.size() * sizeof(T));
-  }
-  template <class T>
-  void value(T& v) {
-    bytes(&v, sizeof v);
-  }
-  [[nodiscard]] bool ok() const { return ok_; }
-  [[nodiscard]] bool at_end() const { return ok_ && in_.empty(); }
-
- private:
-  void bytes(void* to, std::size_t size) {
-    ok_ = ok_ && in_.size() >= size;
-    if (!ok_ || size == 0) return;
-    std::memcpy(to, in_.data(), size);
-    in_ = in_.subspan(size);
-  }
-  std::span<const std::byte> in_;
-  bool ok_ = true;
-};
-
-std::uint64_t checksum(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+using Reader = CheckpointReader;
+using Writer = CheckpointWriter;
 
 // One list for both directions, so that they cannot differ.
 template <class Io, class C>

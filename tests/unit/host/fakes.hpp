@@ -61,6 +61,7 @@ class FakeSimulation final : public engine::Simulation {
   }
   [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
+  [[nodiscard]] engine::Mishaps mishaps() const override { return mishaps_so_far; }
   void save(std::vector<std::byte>& out) const override { out.clear(); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override { return bytes.empty(); }
 
@@ -69,6 +70,7 @@ class FakeSimulation final : public engine::Simulation {
   std::vector<std::uint16_t> type;
   std::vector<engine::Event> events_now;
   engine::Vec3 gravity_in_force{};
+  engine::Mishaps mishaps_so_far;
   std::function<void(std::uint64_t step)> on_step;
   std::uint64_t steps = 0;
   std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in

@@ -35,6 +35,21 @@ TEST(Publish, DeltasCarryTheHashOfTheAgreedState) {
   EXPECT_EQ(bench.host->report().corrected, 1U);
 }
 
+TEST(Publish, AnEngineThatExplodesIsSaidOnceASecond) {
+  Bench bench;
+  bench.simulation.on_step = [&](std::uint64_t step) {
+    if (step <= 40) ++bench.simulation.mishaps_so_far.removed;
+  };
+  bench.poll();
+  bench.run_to(100);
+  const std::vector<std::string> notices = bench.host->take_notices();
+  const auto said = [&](const char* text) {
+    return std::ranges::count_if(notices, [&](const auto& line) { return line.find(text) != line.npos; });
+  };
+  EXPECT_EQ(said("explodes"), 3) << "the first, then after one second, then the rest";
+  EXPECT_EQ(said("40 bodies removed"), 1);
+}
+
 TEST(Publish, FramesContinueFromAStartFrame) {
   HostConfig config = test_config();
   config.start_frame = 1000;

@@ -1,0 +1,18 @@
+#pragma once
+// What a simulation of rigid bodies accepts: worlds at the start, inputs at run time.
+
+#include "services/engine/bullet/motion.hpp"
+#include "services/engine/bullet/world.hpp"
+#include "services/host/simulation.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::engine {
+
+/// Errors: kInvalidArgument with the rule that `world` breaks.
+[[nodiscard]] Result<void> check(const RigidWorld& world);
+
+[[nodiscard]] MotionLimits motion_limits(const World& world);
+
+[[nodiscard]] Classification classify_input(const Input& input, const RigidWorld& world);
+
+}  // namespace tandem::engine

@@ -1,0 +1,97 @@
+#include <utility>
+
+#include "services/engine/bullet/columns.hpp"
+#include "services/engine/particles/checkpoint_bytes.hpp"
+#include "services/engine/particles/columns.hpp"
+
+namespace tandem::engine {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x31444952444E4154;  // "TANDRID1"
+
+// One list for both directions, so that they cannot differ.
+template <class Io, class C>
+void each_column(Io& io, C& columns) {
+  for (auto& column : columns.position) io.column(column);
+  for (auto& column : columns.velocity) io.column(column);
+  for (auto& column : columns.orientation) io.column(column);
+  for (auto& column : columns.angular_velocity) io.column(column);
+  io.column(columns.alive);
+  io.column(columns.activity);
+  io.column(columns.type);
+  io.column(columns.still_s);
+  io.value(columns.gravity);
+  io.value(columns.mishaps);
+  io.column(columns.waiting);
+}
+
+}  // namespace
+
+Motion RigidColumns::motion(std::uint32_t slot) const {
+  Motion motion;
+  for (std::size_t i = 0; i < 3; ++i) {
+    motion.position[i] = position[i][slot];
+    motion.velocity[i] = velocity[i][slot];
+    motion.angular_velocity[i] = angular_velocity[i][slot];
+  }
+  for (std::size_t i = 0; i < 4; ++i) motion.orientation[i] = orientation[i][slot];
+  return motion;
+}
+
+void RigidColumns::set_motion(std::uint32_t slot, const Motion& motion) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    position[i][slot] = motion.position[i];
+    velocity[i][slot] = motion.velocity[i];
+    angular_velocity[i][slot] = motion.angular_velocity[i];
+  }
+  for (std::size_t i = 0; i < 4; ++i) orientation[i][slot] = motion.orientation[i];
+}
+
+std::uint64_t fingerprint(const RigidWorld& world) {
+  std::vector<std::byte> bytes;
+  CheckpointWriter out(bytes);
+  out.value(fingerprint(world.world));
+  for (const Shape& shape : world.shapes) {
+    out.value(shape.kind);
+    out.value(shape.radius);
+    out.column(shape.values);
+  }
+  out.value(world.friction);
+  out.value(world.restitution);
+  return checksum(bytes);
+}
+
+void save_columns(const RigidColumns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out) {
+  const std::size_t begin = out.size();
+  CheckpointWriter writer(out);
+  writer.value(kMagic);
+  writer.value(world_fingerprint);
+  writer.value(static_cast<std::uint64_t>(columns.waiting.size()));
+  each_column(writer, columns);
+  writer.value(checksum(std::span<const std::byte>(out).subspan(begin)));
+}
+
+bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint, RigidColumns& columns) {
+  if (bytes.size() < sizeof(std::uint64_t)) return false;
+  const std::span<const std::byte> body = bytes.first(bytes.size() - sizeof(std::uint64_t));
+  std::uint64_t sum = 0;
+  CheckpointReader(bytes.last(sizeof sum)).value(sum);
+  if (sum != checksum(body)) return false;
+
+  CheckpointReader reader(body);
+  std::uint64_t magic = 0;
+  std::uint64_t world = 0;
+  std::uint64_t waiting = 0;
+  reader.value(magic);
+  reader.value(world);
+  reader.value(waiting);
+  if (!reader.ok() || magic != kMagic || world != world_fingerprint || waiting > kMaxWaiting) return false;
+  RigidColumns loaded(static_cast<std::uint32_t>(columns.alive.size()));
+  loaded.waiting.resize(waiting);
+  each_column(reader, loaded);
+  if (!reader.at_end()) return false;
+  columns = std::move(loaded);
+  return true;
+}
+
+}  // namespace tandem::engine

@@ -1,0 +1,25 @@
+#pragma once
+// What a simulation of rigid bodies is made of, as plain values. Scenes fill it in.
+
+#include <array>
+#include <vector>
+
+#include "services/engine/particles/world.hpp"
+#include "services/engine/shape/shape.hpp"
+
+namespace tandem::engine {
+
+/// x, y, z, w; from body to world.
+using Quaternion = std::array<float, 4>;
+
+struct RigidWorld {
+  /// All but emitters, regions and materials, of which there must be none or which are not used. Of a type
+  /// its mass; the radius is for the predictors.
+  World world;
+  std::vector<Shape> shapes;            ///< by type
+  std::vector<Quaternion> orientation;  ///< of the bodies at the start, norm 1; empty: none is turned
+  float friction = 0.5F;                ///< of all bodies and of the scene, 0 .. 10
+  float restitution = 0;                ///< 0 .. 1
+};
+
+}  // namespace tandem::engine

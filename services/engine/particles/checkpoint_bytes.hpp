@@ -1,0 +1,73 @@
+#pragma once
+// Checkpoints of engines: values and columns one after the other, in the machine's own layout, and a
+// checksum.
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace tandem::engine {
+
+static_assert(std::endian::native == std::endian::little, "checkpoints hold the machine's own layout");
+
+/// Appends to bytes of the caller.
+class CheckpointWriter {
+ public:
+  explicit CheckpointWriter(std::vector<std::byte>& out) : out_(out) {}
+  template <class T>
+  void column(const std::vector<T>& values) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes(values.data(), values.size() * sizeof(T));
+  }
+  template <class T>
+  void value(const T& v) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes(&v, sizeof v);
+  }
+
+ private:
+  void bytes(const void* from, std::size_t size) {
+    const auto* first = static_cast<const std::byte*>(from);
+    out_.insert(out_.end(), first, first + size);
+  }
+  std::vector<std::byte>& out_;
+};
+
+/// Reads what a writer wrote; after the end nothing changes any more, and ok() is false.
+class CheckpointReader {
+ public:
+  explicit CheckpointReader(std::span<const std::byte> in) : in_(in) {}
+  template <class T>
+  void column(std::vector<T>& values) {
+    bytes(values.data(), values.size() * sizeof(T));
+  }
+  template <class T>
+  void value(T& v) {
+    bytes(&v, sizeof v);
+  }
+  [[nodiscard]] bool ok() const { return ok_; }
+  [[nodiscard]] bool at_end() const { return ok_ && in_.empty(); }
+
+ private:
+  void bytes(void* to, std::size_t size) {
+    ok_ = ok_ && in_.size() >= size;
+    if (!ok_ || size == 0) return;
+    std::memcpy(to, in_.data(), size);
+    in_ = in_.subspan(size);
+  }
+  std::span<const std::byte> in_;
+  bool ok_ = true;
+};
+
+[[nodiscard]] inline std::uint64_t checksum(std::span<const std::byte> bytes) {
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
+
+}  // namespace tandem::engine
