@@ -4,14 +4,59 @@
 #include <scene.pb.h>
 #include <cmath>
 
+#include "services/engine/bullet/inputs.hpp"
+#include "services/engine/shape/shape.hpp"
 #include "services/host/simulation.hpp"
 
 namespace tandem::scenes {
 
 inline engine::Vec3 to_vec3(const idl::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
+inline engine::Vec3f to_float(const engine::Vec3& v) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+inline engine::Vec3f to_float(const idl::Vec3& v) { return to_float(to_vec3(v)); }
+
+/// Not checked.
+inline engine::Shape to_shape(const idl::BodyType& type) {
+  using Kind = engine::Shape::Kind;
+  const auto half = [](double length) { return static_cast<float>(length / 2); };
+  const auto rod = [&half](Kind kind, const idl::Rod& r) {
+    return engine::Shape{kind, 0, {static_cast<float>(r.radius_m()), half(r.length_m())}};
+  };
+  switch (type.shape_case()) {
+    case idl::BodyType::kBox:
+      return {Kind::kBox, 0, {half(type.box().x()), half(type.box().y()), half(type.box().z())}};
+    case idl::BodyType::kCapsule:
+      return rod(Kind::kCapsule, type.capsule());
+    case idl::BodyType::kCylinder:
+      return rod(Kind::kCylinder, type.cylinder());
+    case idl::BodyType::kHull: {
+      engine::Shape hull{Kind::kHull, 0, {}};
+      for (const idl::Vec3& point : type.hull().points()) {
+        for (const float v : to_float(point)) hull.values.push_back(v);
+      }
+      return hull;
+    }
+    case idl::BodyType::SHAPE_NOT_SET:
+      break;
+  }
+  return {Kind::kSphere, static_cast<float>(type.radius_m()), {}};
+}
+
 /// A checked event's input.
 inline engine::Input to_input(const idl::InputEvent& event) {
+  if (event.input_case() == idl::InputEvent::kSpawn) {
+    const idl::Spawn& spawn = event.spawn();
+    return engine::to_input(engine::Spawn{.type = static_cast<std::uint16_t>(spawn.type()),
+                                          .position = to_float(spawn.position()),
+                                          .velocity = to_float(spawn.velocity()),
+                                          .angular_velocity = to_float(spawn.angular_velocity())});
+  }
+  if (event.input_case() == idl::InputEvent::kRemove) {
+    return engine::to_input(engine::Remove{.centre = to_float(event.remove().centre()),
+                                           .radius = static_cast<float>(event.remove().radius_m())});
+  }
   engine::Input input;
   if (event.input_case() == idl::InputEvent::kGravity) {
     input.kind = static_cast<std::uint32_t>(engine::InputKind::kGravity);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/engine/bullet/bullet.hpp"
 #include "services/engine/particles/particles.hpp"
 #include "services/scenes/convert.hpp"
 #include "services/scenes/directory.hpp"
@@ -17,10 +18,6 @@ namespace {
 using engine::Vec3;
 using engine::Vec3f;
 
-Vec3f to_float(const Vec3& v) {
-  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
-}
-Vec3f to_float(const idl::Vec3& v) { return to_float(to_vec3(v)); }
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 engine::Material to_material(const idl::Material& m) {
@@ -78,10 +75,19 @@ engine::Region to_region(const Scene& scene, const idl::Region& region) {
 
 void read_types(const idl::Scene& file, Scene& scene) {
   for (const idl::BodyType& type : file.types()) {
-    BodyType read{type.name(), type.radius_m(), type.mass_kg(), 0, type.share()};
+    BodyType read{.name = type.name(),
+                  .radius_m = type.radius_m(),
+                  .bounding_radius_m = type.radius_m(),
+                  .mass_kg = type.mass_kg(),
+                  .share = type.share(),
+                  .shape = to_shape(type)};
     (void)read_colour(type.colour(), read.colour_rgba);  // checked before
-    scene.types.push_back(read);
-    scene.world.types.push_back({static_cast<float>(type.radius_m()), static_cast<float>(type.mass_kg())});
+    if (read.shape.kind != engine::Shape::Kind::kSphere) {
+      read.radius_m = engine::inner_radius(read.shape);
+      read.bounding_radius_m = engine::bounding_radius(read.shape);
+    }
+    scene.world.types.push_back({static_cast<float>(read.radius_m), static_cast<float>(type.mass_kg())});
+    scene.types.push_back(std::move(read));
   }
   scene.smallest_radius_m =
       std::min_element(scene.types.begin(), scene.types.end(), [](const BodyType& a, const BodyType& b) {
@@ -133,6 +139,28 @@ void read_script(const idl::Script& script, Scene& scene) {
   }
 }
 
+void read_start(const idl::Scene& file, Scene& scene) {
+  scene.spare = file.spare();
+  if (file.has_start()) {
+    scene.start = StartBlock{to_vec3(file.start().base()),
+                             to_vec3(file.start().proportions()),
+                             to_vec3(file.start().velocity()),
+                             file.start().spacing(),
+                             file.start().jitter(),
+                             file.start().turned()};
+  }
+  if (file.has_towers()) {
+    const idl::Towers& towers = file.towers();
+    scene.towers =
+        Towers{to_vec3(towers.base()), type_named(scene, towers.type()), towers.layers(), towers.pitch_m()};
+  }
+  if (file.has_rows()) {
+    const idl::Rows& rows = file.rows();
+    scene.rows = Rows{to_vec3(rows.base()), type_named(scene, rows.type()), rows.length(), rows.pitch_m(),
+                      rows.row_pitch_m()};
+  }
+}
+
 Scene to_scene(const idl::Scene& file, const std::string& path) {
   Scene scene;
   scene.name = scene_name_of(path);
@@ -146,15 +174,18 @@ Scene to_scene(const idl::Scene& file, const std::string& path) {
   scene.damping_per_s = file.damping_per_s();
   scene.gravity = to_vec3(file.gravity());
   scene.users = std::max(file.users(), 1U);
+  scene.engine = file.engine() == "bullet" ? EngineKind::kBullet : EngineKind::kParticles;
+  scene.friction = static_cast<float>(file.rigid().friction());
+  scene.restitution = static_cast<float>(file.rigid().restitution());
   read_types(file, scene);
   read_world(file, scene);
-  if (file.has_start()) {
-    scene.has_start = true;
-    scene.start = {to_vec3(file.start().base()), to_vec3(file.start().proportions()),
-                   to_vec3(file.start().velocity()), file.start().spacing(), file.start().jitter()};
-  }
+  read_start(file, scene);
   read_script(file.script(), scene);
   return scene;
+}
+
+std::uint32_t filled(const Scene& scene, std::uint32_t bodies) {
+  return bodies - static_cast<std::uint32_t>(scene.spare * bodies);
 }
 
 Result<Scene> read_scene(const std::string& path) {
@@ -186,15 +217,35 @@ Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::
   engine::World world = scene.world;
   world.capacity = bodies;
   world.seed = seed;
-  if (scene.has_start) world.start = fill_block(scene, bodies, seed);
+  if (scene.start) world.start = fill_block(scene, filled(scene, bodies), seed);
   return world;
+}
+
+Result<engine::RigidWorld> make_rigid_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
+  return make_world(scene, bodies, seed).map([&](engine::World&& world) {
+    engine::RigidWorld rigid;
+    rigid.world = std::move(world);
+    rigid.friction = scene.friction;
+    rigid.restitution = scene.restitution;
+    for (const BodyType& type : scene.types) rigid.shapes.push_back(type.shape);
+    const auto place = [&rigid](RigidStart start) {
+      rigid.world.start = std::move(start.bodies);
+      rigid.orientation = std::move(start.orientation);
+    };
+    if (scene.towers) place(fill_towers(scene, filled(scene, bodies), seed));
+    if (scene.rows) place(fill_rows(scene, filled(scene, bodies), seed));
+    if (scene.start && scene.start->turned) rigid.orientation = turn_at_random(filled(scene, bodies), seed);
+    return rigid;
+  });
 }
 
 Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene, std::uint32_t bodies,
                                                             std::uint64_t seed, std::uint32_t threads) {
-  auto made = make_world(scene, bodies, seed).and_then([&](const engine::World& world) {
-    return engine::make_particles(world, threads);
-  });
+  auto made = scene.engine == EngineKind::kBullet
+                  ? make_rigid_world(scene, bodies, seed).and_then(engine::make_bullet)
+                  : make_world(scene, bodies, seed).and_then([&](const engine::World& world) {
+                      return engine::make_particles(world, threads);
+                    });
   if (made) return made;
   return fail(made.error().code,
               "scene " + scene.name + " with " + std::to_string(bodies) + " bodies: " + made.error().message);

@@ -3,11 +3,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "services/engine/bullet/world.hpp"
 #include "services/engine/particles/world.hpp"
+#include "services/engine/shape/shape.hpp"
 #include "services/host/simulation.hpp"
 #include "services/scenes/script.hpp"
 #include "services/scenes/trained.hpp"
@@ -19,17 +22,38 @@ inline constexpr std::uint32_t kMaxUsers = 64;
 
 struct BodyType {
   std::string name;
-  double radius_m = 0;
+  double radius_m = 0;           ///< of what is no sphere: half of its least extent
+  double bounding_radius_m = 0;  ///< of the sphere around it
   double mass_kg = 0;
   std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
   std::uint32_t share = 0;        ///< of the start block, relative to the others
+  engine::Shape shape;
 };
 
 /// A block of bodies; see StartBlock in idl/scene.proto.
 struct StartBlock {
   engine::Vec3 base{}, proportions{1, 1, 1}, velocity{};
   double spacing = 1, jitter = 0;
+  bool turned = false;
 };
+
+/// See Towers in idl/scene.proto.
+struct Towers {
+  engine::Vec3 base{};
+  std::uint16_t type = 0;
+  std::uint32_t layers = 1;
+  double pitch_m = 1;
+};
+
+/// See Rows in idl/scene.proto.
+struct Rows {
+  engine::Vec3 base{};
+  std::uint16_t type = 0;
+  std::uint32_t length = 1;
+  double pitch_m = 1, row_pitch_m = 1;
+};
+
+enum class EngineKind : std::uint8_t { kParticles, kBullet };
 
 /// See Tilting in idl/scene.proto.
 struct Tilting {
@@ -61,9 +85,14 @@ struct Scene {
   std::vector<BodyType> types;
   std::vector<TrainedTable> trained;
 
-  engine::World world;     ///< all but capacity, seed and start
-  bool has_start = false;  ///< else all slots start empty
-  StartBlock start;
+  EngineKind engine = EngineKind::kParticles;
+  engine::World world;  ///< all but capacity, seed and start
+  float friction = 0, restitution = 0;
+  /// At most one of the three; none: all slots start empty.
+  std::optional<StartBlock> start;
+  std::optional<Towers> towers;
+  std::optional<Rows> rows;
+  double spare = 0;  ///< share of the slots that start empty
   std::vector<ScriptedInput> events;
   std::vector<Tilting> tilting;
   std::vector<Poking> poking;
@@ -79,13 +108,16 @@ struct Scene {
 
 /// The scene's simulation with `bodies` slots at frame 0. The number of bodies changes how far the scene is
 /// filled, nothing else. Errors: kInvalidArgument (bodies 0, above the limit or more than the scene's bounds
-/// hold; threads).
+/// hold; threads), kUnsupported for an engine that was not built.
 [[nodiscard]] Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene,
                                                                           std::uint32_t bodies,
                                                                           std::uint64_t seed,
                                                                           std::uint32_t threads);
 
-/// The world make_simulation() runs, for tests and tools. Errors: kInvalidArgument for the number of bodies.
+/// The worlds make_simulation() runs, for tests and tools: of particles, and of rigid bodies. Errors:
+/// kInvalidArgument for the number of bodies.
 [[nodiscard]] Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+[[nodiscard]] Result<engine::RigidWorld> make_rigid_world(const Scene& scene, std::uint32_t bodies,
+                                                          std::uint64_t seed);
 
 }  // namespace tandem::scenes

@@ -1,14 +1,16 @@
 #include "services/scenes/scene_checks.hpp"
 
+#include <algorithm>
 #include <set>
 
+#include "services/scenes/convert.hpp"
 #include "services/scenes/scene.hpp"
 
 namespace tandem::scenes {
 namespace {
 
 constexpr int kMaxShapes = 1000;  // every body is tested against every shape
-constexpr int kMaxTypes = 4096;
+constexpr std::uint32_t kMaxTypes = 4096;
 constexpr int kMaxEvents = 100000;
 
 using Names = std::set<std::string>;
@@ -19,6 +21,24 @@ bool ordered(const idl::Vec3& a, const idl::Vec3& b) {
   return a.x() <= b.x() && a.y() <= b.y() && a.z() <= b.z();
 }
 
+bool is_bullet(const idl::Scene& scene) { return scene.engine() == "bullet"; }
+constexpr const char* kNeedsBullet = "needs engine: \"bullet\"";
+
+void check_shape(const Node& node, const idl::Scene& scene, const idl::BodyType& type) {
+  if (type.shape_case() == idl::BodyType::SHAPE_NOT_SET) {
+    node.require(type.radius_m() > 0, "radius_m", "must be above 0");
+    return;
+  }
+  const std::string field =
+      type.GetReflection()
+          ->GetOneofFieldDescriptor(type, type.GetDescriptor()->FindOneofByName("shape"))
+          ->name();
+  node.require(is_bullet(scene), field, kNeedsBullet);
+  node.require(type.radius_m() == 0, "radius_m", "must be left out, as there is a " + field);
+  const auto good = engine::check(to_shape(type));
+  node.require(good.has_value(), field, good ? "" : "breaks a rule: " + good.error().message);
+}
+
 void check_material(const Node& node, const idl::Material& material) {
   node.require(material.spring() >= 0, "spring", "must not be negative");
   node.require(material.damping() >= 0, "damping", "must not be negative");
@@ -27,15 +47,15 @@ void check_material(const Node& node, const idl::Material& material) {
 
 Names check_types(const Node& root, const idl::Scene& scene) {
   Names names;
-  root.require(scene.types_size() >= 1 && scene.types_size() <= kMaxTypes, "types",
-               "needs 1 to " + std::to_string(kMaxTypes) + " entries");
+  root.require(scene.types_size() >= 1 && static_cast<std::uint32_t>(scene.types_size()) <= kMaxTypes,
+               "types", "needs 1 to " + std::to_string(kMaxTypes) + " entries");
   for (int i = 0; i < scene.types_size(); ++i) {
     const idl::BodyType& type = scene.types(i);
     const Node node = root.child("types", i);
     std::uint32_t ignored = 0;
     node.require(!type.name().empty() && names.insert(type.name()).second, "name",
                  "must be given and unique");
-    node.require(type.radius_m() > 0, "radius_m", "must be above 0");
+    check_shape(node, scene, type);
     node.require(type.mass_kg() > 0, "mass_kg", "must be above 0");
     node.require(read_colour(type.colour(), ignored), "colour", "must look like \"#RRGGBB\"");
     node.require(type.share() <= 1000000, "share", "must be at most 1000000");
@@ -68,6 +88,8 @@ void check_geometry(const Node& root, const idl::Scene& scene) {
 }
 
 void check_flow(const Node& root, const idl::Scene& scene, const Names& types) {
+  root.require(!is_bullet(scene) || scene.emitters_size() == 0, "emitters", "need engine: \"particles\"", 0);
+  root.require(!is_bullet(scene) || scene.regions_size() == 0, "regions", "need engine: \"particles\"", 0);
   for (int i = 0; i < scene.emitters_size(); ++i) {
     const idl::Emitter& emitter = scene.emitters(i);
     const Node node = root.child("emitters", i);
@@ -92,8 +114,45 @@ void check_flow(const Node& root, const idl::Scene& scene, const Names& types) {
   }
 }
 
+const idl::BodyType* box_named(const idl::Scene& scene, const std::string& name) {
+  const auto& types = scene.types();
+  const auto found =
+      std::find_if(types.begin(), types.end(), [&name](const auto& type) { return type.name() == name; });
+  return found != types.end() && found->has_box() ? &*found : nullptr;
+}
+
+void check_towers(const Node& root, const idl::Scene& scene) {
+  root.require(is_bullet(scene), "towers", kNeedsBullet);
+  const Node node = root.child("towers");
+  const idl::BodyType* type = box_named(scene, scene.towers().type());
+  node.require(type != nullptr, "type", "must name a type with a box");
+  node.require(scene.towers().layers() >= 1 && scene.towers().layers() <= 1000, "layers",
+               "must be from 1 to 1000");
+  if (type == nullptr) return;
+  node.require(scene.towers().pitch_m() > std::max(type->box().x(), 3 * type->box().z()), "pitch_m",
+               "must be above the width of a tower");
+}
+
+void check_rows(const Node& root, const idl::Scene& scene) {
+  root.require(is_bullet(scene), "rows", kNeedsBullet);
+  const Node node = root.child("rows");
+  const idl::BodyType* type = box_named(scene, scene.rows().type());
+  node.require(type != nullptr, "type", "must name a type with a box");
+  node.require(scene.rows().length() >= 1 && scene.rows().length() <= 100000, "length",
+               "must be from 1 to 100000");
+  if (type == nullptr) return;
+  node.require(scene.rows().pitch_m() > type->box().x(), "pitch_m", "must be above the box's edge along x");
+  node.require(scene.rows().row_pitch_m() > type->box().z(), "row_pitch_m",
+               "must be above the box's edge along z");
+}
+
 void check_start(const Node& root, const idl::Scene& scene) {
-  root.require(scene.has_start() || scene.emitters_size() > 0, "start", "or an emitter is needed");
+  const int starts = (scene.has_start() ? 1 : 0) + (scene.has_towers() ? 1 : 0) + (scene.has_rows() ? 1 : 0);
+  root.require(starts <= 1, "start", "and towers and rows exclude one another");
+  root.require(starts == 1 || scene.emitters_size() > 0, "start", "or an emitter is needed");
+  root.require(scene.spare() >= 0 && scene.spare() < 1, "spare", "must be at least 0 and below 1");
+  if (scene.has_towers()) check_towers(root, scene);
+  if (scene.has_rows()) check_rows(root, scene);
   if (!scene.has_start()) return;
   const Node node = root.child("start");
   const idl::Vec3& p = scene.start().proportions();
@@ -102,6 +161,7 @@ void check_start(const Node& root, const idl::Scene& scene) {
   node.require(least > 0 && most <= 1000 * least, "proportions", "must be above 0 and at most 1000 to 1");
   node.require(scene.start().spacing() >= 1, "spacing", "must be at least 1");
   node.require(scene.start().jitter() >= 0 && scene.start().jitter() <= 1, "jitter", "must be from 0 to 1");
+  node.require(is_bullet(scene) || !scene.start().turned(), "turned", kNeedsBullet);
 }
 
 void check_period(const Node& node, double start_s, double period_s, double jitter, double dt_s) {
@@ -116,7 +176,13 @@ void check_script(const Node& root, const idl::Scene& scene) {
   const idl::Script& script = scene.script();
   node.require(script.events_size() <= kMaxEvents, "events", "must be at most " + std::to_string(kMaxEvents));
   for (int i = 0; i < script.events_size(); ++i) {
-    check_event(node.child("events", i), script.events(i));
+    const Node event = node.child("events", i);
+    check_event(event, script.events(i));
+    event.require(is_bullet(scene) || !script.events(i).has_spawn(), "spawn", kNeedsBullet);
+    event.require(is_bullet(scene) || !script.events(i).has_remove(), "remove", kNeedsBullet);
+    event.require(!script.events(i).has_spawn() ||
+                      static_cast<int>(script.events(i).spawn().type()) < scene.types_size(),
+                  "spawn", "must name one of the types, from 0");
     node.child("events", i)
         .require(script.events(i).user() < kMaxUsers, "user", "must be below " + std::to_string(kMaxUsers));
   }
@@ -150,10 +216,15 @@ void check_event(const Node& node, const idl::InputEvent& event) {
                "must not be negative");
   node.require(event.when_case() != idl::InputEvent::kFrame || event.frame() >= 1, "frame",
                "must be at least 1");
-  node.require(event.input_case() != idl::InputEvent::INPUT_NOT_SET, "", "needs gravity or push");
+  node.require(event.input_case() != idl::InputEvent::INPUT_NOT_SET, "",
+               "needs gravity, push, spawn or remove");
   if (event.input_case() == idl::InputEvent::kPush) {
     node.child("push").require(event.push().radius_m() > 0, "radius_m", "must be above 0");
   }
+  if (event.has_remove())
+    node.child("remove").require(event.remove().radius_m() > 0, "radius_m", "must be above 0");
+  if (event.has_spawn())
+    node.child("spawn").require(event.spawn().type() < kMaxTypes, "type", "must be below 4096");
 }
 
 bool read_colour(const std::string& text, std::uint32_t& rgba) {
@@ -185,6 +256,12 @@ void check_scene(const Node& root, const idl::Scene& scene) {
                    scene.bounds().low().y() < scene.bounds().high().y() &&
                    scene.bounds().low().z() < scene.bounds().high().z(),
                "bounds", "must have low below high along x, y and z");
+  root.require(scene.engine().empty() || scene.engine() == "particles" || is_bullet(scene), "engine",
+               "must be \"particles\" or \"bullet\"");
+  root.require(is_bullet(scene) || !scene.has_rigid(), "rigid", kNeedsBullet);
+  root.require(scene.rigid().friction() >= 0 && scene.rigid().friction() <= 10 &&
+                   scene.rigid().restitution() >= 0 && scene.rigid().restitution() <= 1,
+               "rigid", "must have a friction from 0 to 10 and a restitution from 0 to 1");
   root.require(scene.users() <= kMaxUsers, "users", "must be at most " + std::to_string(kMaxUsers));
   root.require(scene.has_pair(), "pair", "is missing");
   if (scene.has_pair()) check_material(root.child("pair"), scene.pair());

@@ -41,9 +41,9 @@ std::uint16_t pick_type(const std::vector<BodyType>& types, std::uint64_t random
 }  // namespace
 
 std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
-  const StartBlock& block = scene.start;
+  const StartBlock& block = *scene.start;
   double diameter = 0;
-  for (const BodyType& type : scene.types) diameter = std::max(diameter, 2 * type.radius_m);
+  for (const BodyType& type : scene.types) diameter = std::max(diameter, 2 * type.bounding_radius_m);
   const double pitch = block.spacing * diameter;
   const double reach = 0.5 * block.jitter * (pitch - diameter);
   const Footprint across = footprint(block.proportions, bodies);

@@ -1,4 +1,5 @@
 #pragma once
+// Where bodies are at frame 0. Internal to scenes.
 
 #include <cstdint>
 #include <vector>
@@ -7,8 +8,21 @@
 
 namespace tandem::scenes {
 
-/// The bodies of the scene's start block, layer by layer from its base.
+/// The bodies of the scene's start block, layer by layer from its base. Precondition: it has one.
 [[nodiscard]] std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies,
                                                         std::uint64_t seed);
+
+struct RigidStart {
+  std::vector<engine::StartBody> bodies;
+  std::vector<engine::Quaternion> orientation;  ///< empty: none is turned
+};
+
+/// Tower by tower, layer by layer; the last one may be unfinished. Bodies are off their place by up to a
+/// hundredth of their width, so that seeds differ. Precondition: the scene has towers.
+[[nodiscard]] RigidStart fill_towers(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+/// Row by row. Precondition: the scene has rows.
+[[nodiscard]] RigidStart fill_rows(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+/// `bodies` orientations, uniform over all.
+[[nodiscard]] std::vector<engine::Quaternion> turn_at_random(std::uint32_t bodies, std::uint64_t seed);
 
 }  // namespace tandem::scenes

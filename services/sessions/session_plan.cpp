@@ -114,10 +114,10 @@ Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionC
     config.types.clear();
     for (const scenes::BodyType& type : scene.types) {
       config.types.push_back({.name = type.name,
-                              .radius = static_cast<float>(type.radius_m),
+                              .radius = static_cast<float>(type.bounding_radius_m),
                               .colour_rgba = type.colour_rgba,
-                              .shape = transport::Shape::kSphere,
-                              .shape_values = {}});
+                              .shape = static_cast<transport::Shape>(type.shape.kind),
+                              .shape_values = type.shape.values});
     }
     return config;
   });

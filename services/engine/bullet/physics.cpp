@@ -6,10 +6,12 @@
 namespace tandem::engine {
 namespace {
 
-// Below these for two seconds an island falls asleep. Bullet's own, 0.8 and 1, stop what is just tipping
-// over.
-constexpr btScalar kSleepMPerS = 0.1F;
-constexpr btScalar kSleepRadPerS = 0.2F;
+// Below these for two seconds an island falls asleep; piles tremble with less. Bullet's own, 0.8 and 1, stop
+// what is just tipping over.
+constexpr btScalar kSleepMPerS = 0.25F;
+constexpr btScalar kSleepRadPerS = 0.5F;
+// Scene units: without it a ball on a plane rolls for ever.
+constexpr btScalar kRollingFriction = 0.005F;
 // Of its size; Bullet's own, 4 cm, is as large as a small hull. Hulls grow by it.
 constexpr btScalar kHullMargin = 0.02F;
 constexpr int kSceneSlot = -1;
@@ -110,6 +112,8 @@ void Physics::add(std::uint32_t slot, std::uint16_t type, const Motion& motion, 
   info.m_startWorldTransform = btTransform(btQuaternion(q[0], q[1], q[2], q[3]), vector(motion.position));
   info.m_friction = world_->friction;
   info.m_restitution = world_->restitution;
+  info.m_rollingFriction = kRollingFriction;
+  info.m_spinningFriction = kRollingFriction;
   info.m_linearSleepingThreshold = kSleepMPerS;
   info.m_angularSleepingThreshold = kSleepRadPerS;
   auto body = std::make_unique<btRigidBody>(info);

@@ -79,6 +79,93 @@ TEST(SceneFiles, EveryRuleRefusesWhatBreaksIt) {
   }
 }
 
+// The small scene with rigid bodies: a type in front, which is a box unless `type` says otherwise.
+std::string rigid_refusal(const std::string& line, const std::string& type = "box { x: 1 y: 2 z: 3 }") {
+  return refusal("engine: \"bullet\" types { name: \"body\" mass_kg: 1 " + type + " } " + line);
+}
+
+TEST(SceneFiles, EveryShapeIsAccepted) {
+  for (const char* shape :
+       {"box { x: 1 y: 2 z: 3 }", "capsule { radius_m: 1 length_m: 2 }",
+        "cylinder { radius_m: 1 length_m: 2 }",
+        "hull { points { x: 1 } points { y: 1 } points { z: 1 } points { x: -1 y: -1 z: -1 } }",
+        "radius_m: 1"}) {
+    EXPECT_EQ(rigid_refusal("", shape), "accepted");
+  }
+}
+
+TEST(SceneFiles, AShapeWithoutASizeIsRefused) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"", "types[0].radius_m\" must be above 0"},
+      {"box { x: 1 y: 1 }", "types[0].box\" breaks a rule: a box needs 3 half sizes above 0"},
+      {"capsule { length_m: 1 }", "types[0].capsule\" breaks a rule: a capsule needs a radius above 0"},
+      {"cylinder { radius_m: 1 }", "types[0].cylinder\" breaks a rule"},
+      {"hull { points { x: 1 } }", "types[0].hull\" breaks a rule: a hull needs 4 to 256 points"},
+      {"hull { points { x: 1 } points { y: 1 } points { } points { x: -1 } }", "an extent along x, y and z"},
+      {"box { x: 1 y: 1 z: 1 } radius_m: 1", "types[0].radius_m\" must be left out"},
+  };
+  for (const auto& [type, expected] : cases) {
+    const std::string message = rigid_refusal("", type);
+    EXPECT_THAT(message, HasSubstr("bad.textproto:1: ")) << type;
+    EXPECT_THAT(message, HasSubstr(expected)) << type;
+  }
+}
+
+TEST(SceneFiles, EveryRuleOfRigidBodiesRefusesWhatBreaksIt) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"rigid { friction: 11 }", "rigid"},
+      {"rigid { restitution: 1.5 }", "rigid"},
+      {"spare: 1", "spare"},
+      {"towers { type: \"body\" layers: 3 pitch_m: 10 }", "start"},
+      {"emitters { type: \"body\" }", "emitters[0]"},
+      {"regions { remove: true }", "regions[0]"},
+      {"script { events { frame: 1 spawn { type: 2 } } }", "script.events[0].spawn"},
+      {"script { events { frame: 1 remove { } } }", "script.events[0].remove.radius_m"},
+  };
+  for (const auto& [line, field] : cases) EXPECT_THAT(rigid_refusal(line), HasSubstr(field + "\"")) << line;
+  for (const char* line : {"engine: \"havok\"", "rigid { }", "script { events { frame: 1 spawn { } } }",
+                           "script { events { frame: 1 remove { radius_m: 1 } } }",
+                           "types { name: \"b\" mass_kg: 1 box { x: 1 y: 1 z: 1 } }"}) {
+    EXPECT_THAT(refusal(line), HasSubstr("bullet\"")) << line;
+  }
+}
+
+TEST(SceneFiles, ParticlesStandInNoTowersOrRowsAndDoNotTurn) {
+  const TemporaryFolder folder;
+  for (const std::string start :
+       {"towers { }", "rows { }", "start { proportions { x: 1 y: 1 z: 1 } spacing: 1 turned: true }"}) {
+    std::string scene = small_scene();
+    scene.replace(scene.find("start"), std::string::npos, start);
+    EXPECT_THAT(load_scene(folder.write("bad.textproto", scene)).error().message,
+                HasSubstr("needs engine: \"bullet\""));
+  }
+}
+
+TEST(SceneFiles, TowersAndRowsThatDoNotFitTheirBodiesAreRefused) {
+  const auto arranged = [](const std::string& arrangement) {
+    const TemporaryFolder folder;
+    const auto scene = load_scene(folder.write("bad.textproto", R"(
+engine: "bullet" dt_s: 0.04 threshold_radii: 0.2
+bounds { low { x: -20 y: -20 z: -20 } high { x: 20 y: 40 z: 20 } }
+pair { spring: 100 damping: 1 shear: 1 }
+types { name: "box" mass_kg: 1 box { x: 3 y: 1 z: 1 } } types { name: "ball" mass_kg: 1 radius_m: 1 }
+)" + arrangement));
+    return scene ? "accepted" : scene.error().message;
+  };
+  EXPECT_EQ(arranged("towers { type: \"box\" layers: 3 pitch_m: 4 }"), "accepted");
+  EXPECT_EQ(arranged("rows { type: \"box\" length: 3 pitch_m: 4 row_pitch_m: 2 }"), "accepted");
+  EXPECT_THAT(arranged("towers { type: \"ball\" layers: 3 pitch_m: 4 }"), HasSubstr("towers.type\""));
+  EXPECT_THAT(arranged("towers { type: \"none\" layers: 3 pitch_m: 4 }"), HasSubstr("towers.type\""));
+  EXPECT_THAT(arranged("towers { type: \"box\" pitch_m: 4 }"), HasSubstr("towers.layers\""));
+  EXPECT_THAT(arranged("towers { type: \"box\" layers: 3 pitch_m: 3 }"), HasSubstr("towers.pitch_m\""));
+  EXPECT_THAT(arranged("rows { type: \"ball\" length: 3 pitch_m: 4 }"), HasSubstr("rows.type\""));
+  EXPECT_THAT(arranged("rows { type: \"box\" pitch_m: 4 row_pitch_m: 2 }"), HasSubstr("rows.length\""));
+  EXPECT_THAT(arranged("rows { type: \"box\" length: 3 pitch_m: 3 row_pitch_m: 2 }"),
+              HasSubstr("rows.pitch_m\""));
+  EXPECT_THAT(arranged("rows { type: \"box\" length: 3 pitch_m: 4 }"), HasSubstr("rows.row_pitch_m\""));
+  EXPECT_THAT(arranged(""), HasSubstr("start\""));
+}
+
 TEST(SceneFiles, WhatIsMissingIsNamed) {
   const TemporaryFolder folder;
   const auto scene = load_scene(folder.write("empty.textproto", ""));

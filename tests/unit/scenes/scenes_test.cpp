@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/engine/bullet/bullet.hpp"
 #include "tests/unit/scenes/temporary.hpp"
 
 namespace tandem::scenes {
@@ -31,7 +32,7 @@ TEST_P(EveryScene, LoadsAndKeepsItsBodiesInPlayUnderItsScript) {
     }
     simulation.step();
     collisions += simulation.colliding();
-    ASSERT_TRUE(!scene->has_start || simulation.events().empty()) << "a body left in frame " << frame;
+    ASSERT_TRUE(!scene->start || simulation.events().empty()) << "a body left in frame " << frame;
   }
   EXPECT_GT(collisions, 0U);
   for (std::uint32_t slot = 0; slot < 600; ++slot) {
@@ -137,8 +138,10 @@ TEST(Scenes, AnUnknownNameListsTheKnownOnes) {
   ASSERT_FALSE(scene);
   EXPECT_EQ(scene.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(scene.error().message, HasSubstr("quarter_pipe"));
-  EXPECT_THAT(scene.error().message,
-              HasSubstr("cube, emitter, four_cubes, half_pipe, half_pipe_2, half_pipe_3"));
+  EXPECT_THAT(
+      scene.error().message,
+      HasSubstr("cube, dominoes, emitter, four_cubes, half_pipe, half_pipe_2, half_pipe_3, mixed, rubble, "
+                "towers"));
 }
 
 TEST(Scenes, NoBodiesOrTooManyAreRefused) {
@@ -203,6 +206,111 @@ TEST(Scenes, NoTwoBodiesOfABlockTouchAtTheStart) {
       ASSERT_GE(squared, 1.0F);
     }
   }
+}
+
+class RigidScene : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    if (!engine::bullet_is_built()) GTEST_SKIP() << "no libbullet-dev";
+  }
+};
+
+TEST_P(RigidScene, StaysWholeUnderItsScriptAndTurns) {
+  const auto scene = load_scene(GetParam());
+  ASSERT_TRUE(scene) << scene.error().message;
+  constexpr std::uint32_t kBodies = 300;
+  auto made = make_simulation(*scene, kBodies, 7, 1);
+  ASSERT_TRUE(made) << made.error().message;
+  engine::Simulation& simulation = **made;
+  const auto inputs = scripted_inputs(*scene, 7, 0, 360);
+  EXPECT_FALSE(inputs.empty());
+  std::size_t next = 0;
+  for (std::uint64_t frame = 1; frame <= 360; ++frame) {
+    for (; next < inputs.size() && inputs[next].frame == frame; ++next) {
+      const auto classified = simulation.classify(inputs[next].input);
+      ASSERT_NE(classified.effect, engine::Classification::Effect::kRefused) << classified.reason;
+      simulation.apply(inputs[next].input);
+    }
+    simulation.step();
+    const engine::Bodies bodies = simulation.bodies();
+    for (std::uint32_t slot = 0; slot < kBodies; ++slot) {
+      if (bodies.alive[slot] == 0) continue;
+      float norm = 0;
+      for (const auto& column : bodies.orientation) norm += column[slot] * column[slot];
+      ASSERT_NEAR(norm, 1, 1e-3);
+    }
+  }
+  EXPECT_EQ(simulation.mishaps(), engine::Mishaps{});
+  EXPECT_GT(simulation.colliding(), kBodies / 2);
+}
+
+TEST_P(RigidScene, LeftAloneComesToRestExactly) {
+  const auto scene = load_scene(GetParam());
+  ASSERT_TRUE(scene) << scene.error().message;
+  auto made = make_simulation(*scene, 200, 7, 1);
+  ASSERT_TRUE(made) << made.error().message;
+  engine::Simulation& simulation = **made;
+  for (int frame = 0; frame < 900; ++frame) simulation.step();
+  const engine::Bodies bodies = simulation.bodies();
+  std::uint32_t still = 0;
+  for (std::uint32_t slot = 0; slot < 200; ++slot) {
+    still +=
+        bodies.alive[slot] != 0 && bodies.velocity[1][slot] == 0 && bodies.angular_velocity[0][slot] == 0;
+  }
+  const auto alive =
+      static_cast<std::uint32_t>(std::count(bodies.alive.begin(), bodies.alive.end(), std::uint8_t{1}));
+  EXPECT_GE(still, alive * 95 / 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, RigidScene, ::testing::Values("towers", "rubble", "dominoes", "mixed"),
+                         [](const auto& test) { return test.param; });
+
+TEST(Scenes, TowersAndDominoesStandUntilSomebodyPushes) {
+  if (!engine::bullet_is_built()) GTEST_SKIP() << "no libbullet-dev";
+  for (const char* name : {"towers", "dominoes"}) {
+    const auto scene = load_scene(name);
+    ASSERT_TRUE(scene) << scene.error().message;
+    auto made = make_simulation(*scene, 200, 7, 1);
+    ASSERT_TRUE(made) << made.error().message;
+    const engine::Bodies bodies = (*made)->bodies();
+    const std::vector<float> before(bodies.position[1].begin(), bodies.position[1].end());
+    for (int frame = 0; frame < 600; ++frame) (*made)->step();
+    for (std::uint32_t slot = 0; slot < 200; ++slot) {
+      if (bodies.alive[slot] == 0) continue;
+      ASSERT_NEAR(bodies.position[1][slot], before[slot], 0.05) << name;
+    }
+  }
+}
+
+TEST(Scenes, RigidBodiesStartAsTheSceneSays) {
+  const auto towers = load_scene("towers");
+  ASSERT_TRUE(towers) << towers.error().message;
+  EXPECT_EQ(towers->engine, EngineKind::kBullet);
+  EXPECT_FLOAT_EQ(towers->friction, 0.6F);
+  const auto world = make_rigid_world(*towers, 1000, 3);
+  ASSERT_TRUE(world) << world.error().message;
+  EXPECT_EQ(world->world.capacity, 1000U);
+  EXPECT_EQ(world->world.start.size(), 980U) << "two of a hundred slots are spare";
+  ASSERT_EQ(world->orientation.size(), 980U);
+  EXPECT_EQ(world->orientation[0][3], 1);
+  EXPECT_NE(world->orientation[3][3], 1) << "the second layer lies crosswise";
+  EXPECT_NE(world->world.start[0].position, make_rigid_world(*towers, 1000, 4)->world.start[0].position);
+  EXPECT_EQ(world->world.start[0].position, make_rigid_world(*towers, 1000, 3)->world.start[0].position);
+  const auto mixed = load_scene("mixed");
+  ASSERT_TRUE(mixed) << mixed.error().message;
+  EXPECT_NEAR(mixed->smallest_radius_m, 0.12, 1e-6) << "half of the slab's height";
+  EXPECT_EQ(mixed->types[4].shape.kind, engine::Shape::Kind::kCapsule);
+  EXPECT_NEAR(mixed->types[4].bounding_radius_m, 0.43, 1e-6);
+  EXPECT_EQ(make_rigid_world(*mixed, 100, 1)->orientation.size(), 99U);
+}
+
+TEST(Scenes, WithoutBulletItSaysSoInOneLine) {
+  if (engine::bullet_is_built()) GTEST_SKIP() << "it is there";
+  const auto scene = load_scene("towers");
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto made = make_simulation(*scene, 100, 1, 1);
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("libbullet-dev"));
 }
 
 TEST(Scenes, APathOrAnotherFolderIsReadInsteadOfTheShippedOnes) {
