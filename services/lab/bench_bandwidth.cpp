@@ -104,6 +104,14 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   // A file without any motion has no extent of its own.
   scene.extent_m = std::max(trajectory.position_bound(), trajectory.info().threshold);
   scene.types.resize(1);
+  const std::vector<engine::Shape>& shapes = trajectory.info().shapes;
+  if (!shapes.empty()) scene.types.clear();
+  for (const engine::Shape& shape : shapes) {
+    scenes::BodyType& type = scene.types.emplace_back();
+    type.radius_m = engine::inner_radius(shape);
+    type.bounding_radius_m = engine::bounding_radius(shape);
+    type.shape = shape;
+  }
   if (trajectory.info().scene.empty()) return scene;
   auto named = scenes::load_scene(trajectory.info().scene);
   if (!named) {
@@ -112,8 +120,13 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   }
   scene.extent_m = std::max(scene.extent_m, named->extent_m);
   scene.world = std::move(named->world);
-  // A recording does not say which body is of which type.
+  // A recording does not say which body is of which of the scene's types.
   scene.world.types.resize(1);
+  if (shapes.empty()) return scene;
+  const engine::ParticleType first = scene.world.types.front();
+  scene.world.types.clear();
+  for (const scenes::BodyType& type : scene.types)
+    scene.world.types.push_back({static_cast<float>(type.radius_m), first.mass});
   return scene;
 }
 

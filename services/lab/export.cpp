@@ -29,19 +29,34 @@ Result<void> export_trajectory(const ExportOptions& options) {
   choice.bodies = options.run.bodies;
   const auto stream = sessions::plan_stream(*scene, choice);
   if (!stream) return tl::unexpected(stream.error());
-  auto writer = TrajectoryWriter::create(options.out, options.run.bodies);
+  const bool turning = !source->simulation->bodies().orientation[0].empty();
+  auto writer =
+      TrajectoryWriter::create(options.out, options.run.bodies, turning ? kRigidChannels : kPointChannels);
   if (!writer) return tl::unexpected(writer.error());
   auto replay = Replay::create(*source->simulation, std::move(source->script), stream->lattice);
   if (!replay) return tl::unexpected(replay.error());
-  TrajectoryInfo info{scene->dt_s, scene->damping_per_s, scene->smallest_radius_m, scene->threshold_m,
-                      {},          options.scene};
+  TrajectoryInfo info;
+  info.dt_s = scene->dt_s;
+  info.damping_per_s = scene->damping_per_s;
+  info.radius = scene->smallest_radius_m;
+  info.threshold = scene->threshold_m;
+  info.scene = options.scene;
+  if (turning) {
+    for (const scenes::BodyType& type : scene->types) info.shapes.push_back(type.shape);
+    info.shape_of.resize(options.run.bodies);
+  }
   // A scene by its path is found from everywhere.
   if (scene->path == options.scene) info.scene = std::filesystem::absolute(scene->path).string();
   tool::Progress progress(fmt::format("{}, {} bodies: frame", scene->name, options.run.bodies),
                           options.run.frames);
   for (Frame frame = 0;; ++frame) {
     info.gravity.push_back(replay->simulation().gravity());
-    if (auto appended = writer->append(replay->simulation().bodies()); !appended) return appended;
+    const engine::Bodies bodies = replay->simulation().bodies();
+    if (auto appended = writer->append(bodies); !appended) return appended;
+    // The last that lived in a slot.
+    for (std::size_t slot = 0; slot < info.shape_of.size(); ++slot) {
+      if (bodies.alive[slot] != 0) info.shape_of[slot] = bodies.type[slot];
+    }
     if (frame == options.run.frames) break;
     if (auto stepped = replay->next(); !stepped) return stepped;
     progress.at(frame);
@@ -54,7 +69,8 @@ Result<void> export_trajectory(const ExportOptions& options) {
 void add_export(CLI::App& app, Run& run) {
   CLI::App* command = app.add_subcommand(
       "export",
-      "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity), and X.json.");
+      "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity) or, of bodies that turn, "
+      "[13], and X.json.");
   command->footer(kTrajectoryFormat);
   const auto options = std::make_shared<ExportOptions>();
   options->run.bodies = 10000;

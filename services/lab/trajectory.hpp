@@ -1,6 +1,6 @@
 #pragma once
-// Recorded trajectories: X.npy, float32 [frames + 1][bodies][6] (position, velocity; row 0 is the start), and
-// X.json.
+// Recorded trajectories: X.npy, float32 [frames + 1][bodies][6] (position, velocity) or [13] (then
+// orientation w x y z, angular velocity), row 0 is the start; and X.json.
 
 #include <cstdint>
 #include <fstream>
@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "services/engine/shape/shape.hpp"
 #include "services/host/simulation.hpp"
 #include "services/tool/output_file.hpp"
 #include "tandem/result.hpp"
@@ -19,10 +20,16 @@ namespace tandem::lab {
 inline constexpr const char* kTrajectoryFormat =
     "X.npy: row 0 is the start; little-endian float32 as numpy saves it, in any unit of length, and "
     "seconds.\n"
+    "Of a body 6 columns: position, velocity; or 13: then the quaternion w, x, y, z from body to world, norm 1 "
+    "within\n"
+    "0.001, and the angular velocity in the world's frame, rad / s, at most 2 rad a row.\n"
     "X.json: an object with\n"
     "  dt_s           seconds between rows\n"
     "  damping_per_s  share of its velocity that a free body loses in a second, 0 for none\n"
-    "  radius         of the smallest body\n"
+    "  radius         of the smallest body; or a list, one a body, of the spheres around them\n"
+    "  shapes         optional: a list of objects with \"shape\" (sphere, box, capsule, cylinder, hull) and \"values\"\n"
+    "                 (a sphere's radius; half sizes x, y, z; radius and half length along y; points x, y, z)\n"
+    "  shape_of       with shapes: for each body its place in that list, from 0\n"
     "  threshold      error of a position that a codec may leave\n"
     "  gravity        [x, y, z] for each row: what acts in the step that leads to it\n"
     "  scene          optional: a scene's name, or the path of a .textproto from the folder of X.json. Its "
@@ -43,7 +50,15 @@ struct TrajectoryInfo {
   /// Scene that tells radius, materials and walls, for predictors that need them: a name, or the path of a
   /// .textproto. Empty: none. In the file a relative path starts at the file's folder.
   std::string scene;
+  /// What bodies look like, at most 4,096; where the file has a list of radii, a sphere for each radius.
+  /// Empty: not told.
+  std::vector<engine::Shape> shapes;
+  std::vector<std::uint16_t> shape_of;  ///< by body, with shapes
 };
+
+/// Columns of a body.
+inline constexpr std::size_t kPointChannels = 6;
+inline constexpr std::size_t kRigidChannels = 13;
 
 /// The name of the sidecar that belongs to a .npy file. Errors: kInvalidArgument when `npy` does not end in
 /// .npy.
@@ -52,17 +67,21 @@ struct TrajectoryInfo {
 /// Writes a pair frame by frame; both files appear complete or not at all.
 class TrajectoryWriter {
  public:
-  /// Errors: kInvalidArgument (name does not end in .npy), kIo.
-  static Result<TrajectoryWriter> create(const std::string& npy, std::uint32_t bodies);
-  /// Adds the next row. A dead body's row is zero. Errors: kIo.
+  /// `channels`: kPointChannels, or kRigidChannels for bodies with orientation. Errors: kInvalidArgument
+  /// (name does not end in .npy), kIo.
+  static Result<TrajectoryWriter> create(const std::string& npy, std::uint32_t bodies,
+                                         std::size_t channels = kPointChannels);
+  /// Adds the next row. A dead body's row is zero, and not turned. Errors: kIo.
   Result<void> append(const engine::Bodies& bodies);
   /// `info.gravity` has one entry a row. Errors: kIo.
   Result<void> finish(const TrajectoryInfo& info);
 
  private:
-  TrajectoryWriter(tool::OutputFile npy, tool::OutputFile sidecar, std::uint32_t bodies);
+  TrajectoryWriter(tool::OutputFile npy, tool::OutputFile sidecar, std::uint32_t bodies,
+                   std::size_t channels);
   tool::OutputFile npy_, sidecar_;
   std::uint32_t bodies_;
+  std::size_t channels_;
   std::uint64_t rows_ = 0;
   std::vector<float> row_;
 };
@@ -99,6 +118,7 @@ class RecordedTrajectory final : public engine::Simulation {
   RecordedTrajectory() = default;
   Result<void> open_npy(const std::string& path);
   Result<void> check_rows();
+  [[nodiscard]] Result<void> check_turning(std::uint64_t row) const;
   bool read_row(std::uint64_t row);
 
   std::string path_;
@@ -106,10 +126,11 @@ class RecordedTrajectory final : public engine::Simulation {
   std::streamoff data_offset_ = 0;
   std::uint64_t rows_ = 0, row_ = 0;
   std::uint32_t bodies_ = 0;
+  std::size_t channels_ = 0;
   double position_bound_ = 0;
   TrajectoryInfo info_;
   std::vector<float> interleaved_;
-  std::array<std::vector<float>, 6> columns_;
+  std::array<std::vector<float>, kRigidChannels> columns_;  // as in the file
   std::vector<std::uint8_t> alive_;
   std::vector<std::uint16_t> type_;
 };

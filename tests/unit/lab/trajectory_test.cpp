@@ -43,7 +43,11 @@ class Trajectory : public ::testing::Test {
         {{columns[0], columns[1], columns[2]}, {columns[3], columns[4], columns[5]}, alive, type});
   }
   static TrajectoryInfo info() {
-    TrajectoryInfo info{1.0 / 30, 0.1, 0.5, 0.1, {}, {}};
+    TrajectoryInfo info;
+    info.dt_s = 1.0 / 30;
+    info.damping_per_s = 0.1;
+    info.radius = 0.5;
+    info.threshold = 0.1;
     for (std::uint64_t f = 0; f <= kFrames; ++f) info.gravity.push_back({0, -9.81, static_cast<double>(f)});
     return info;
   }
@@ -101,6 +105,136 @@ TEST_F(Trajectory, reads_back_what_was_written) {
     }
   }
   EXPECT_THROW(trajectory.step(), std::runtime_error);
+}
+
+/// Two bodies that turn; `change` edits the second one's orientation (x, y, z, w) and angular velocity.
+struct Turning {
+  std::array<float, 4> orientation{0, 0.6F, 0, 0.8F};
+  std::array<float, 3> angular_velocity{1, 2, 3};
+};
+
+Result<void> write_turning(const std::string& npy, TrajectoryInfo info, const Turning& turning) {
+  auto writer = TrajectoryWriter::create(npy, 2, kRigidChannels);
+  if (!writer) return tl::unexpected(writer.error());
+  const std::vector<float> zero(2, 0);
+  std::array<std::vector<float>, 4> q;
+  std::array<std::vector<float>, 3> w;
+  for (std::size_t i = 0; i < 4; ++i) q[i] = {i == 3 ? 1.0F : 0.0F, turning.orientation[i]};
+  for (std::size_t i = 0; i < 3; ++i) w[i] = {0, turning.angular_velocity[i]};
+  const std::vector<std::uint8_t> alive(2, 1);
+  const std::vector<std::uint16_t> type(2, 0);
+  for (int row = 0; row < 2; ++row) {
+    auto appended = writer->append({.position = {zero, zero, zero},
+                                    .velocity = {zero, zero, zero},
+                                    .alive = alive,
+                                    .type = type,
+                                    .orientation = {q[0], q[1], q[2], q[3]},
+                                    .angular_velocity = {w[0], w[1], w[2]}});
+    if (!appended) return appended;
+  }
+  info.gravity.resize(2);
+  return writer->finish(info);
+}
+
+TEST_F(Trajectory, reads_back_orientation_and_shapes) {
+  TrajectoryInfo written = info();
+  written.shapes = {{engine::Shape::Kind::kSphere, 0.5F, {}}, {engine::Shape::Kind::kBox, 0, {1, 2, 3}}};
+  written.shape_of = {1, 0};
+  ASSERT_TRUE(write_turning(npy_, written, {}));
+  EXPECT_EQ(std::filesystem::file_size(npy_), 128U + 2 * 2 * 13 * 4);
+  const auto opened = RecordedTrajectory::open(npy_);
+  ASSERT_TRUE(opened) << opened.error().message;
+  const engine::Bodies bodies = (*opened)->bodies();
+  EXPECT_EQ(bodies.orientation[1][1], 0.6F);
+  EXPECT_EQ(bodies.orientation[3][1], 0.8F);
+  EXPECT_EQ(bodies.orientation[3][0], 1);
+  EXPECT_EQ(bodies.angular_velocity[2][1], 3);
+  EXPECT_EQ(bodies.type[0], 1);
+  EXPECT_EQ((*opened)->info().shapes, written.shapes);
+  EXPECT_EQ((*opened)->info().shape_of, written.shape_of);
+}
+
+TEST_F(Trajectory, six_columns_have_no_orientation) {
+  write_pair();
+  const auto opened = RecordedTrajectory::open(npy_);
+  ASSERT_TRUE(opened);
+  EXPECT_TRUE((*opened)->bodies().orientation[0].empty());
+  EXPECT_TRUE((*opened)->bodies().angular_velocity[0].empty());
+}
+
+TEST_F(Trajectory, a_dead_body_is_written_as_not_turned) {
+  auto writer = TrajectoryWriter::create(npy_, 1, kRigidChannels);
+  ASSERT_TRUE(writer);
+  const std::vector<float> nan{std::numeric_limits<float>::quiet_NaN()};
+  const std::vector<std::uint8_t> alive{0};
+  const std::vector<std::uint16_t> type{0};
+  for (int row = 0; row < 2; ++row) {
+    ASSERT_TRUE(writer->append({.position = {nan, nan, nan},
+                                .velocity = {nan, nan, nan},
+                                .alive = alive,
+                                .type = type,
+                                .orientation = {nan, nan, nan, nan},
+                                .angular_velocity = {nan, nan, nan}}));
+  }
+  TrajectoryInfo two_rows = info();
+  two_rows.gravity.resize(2);
+  ASSERT_TRUE(writer->finish(two_rows));
+  const auto opened = RecordedTrajectory::open(npy_);
+  ASSERT_TRUE(opened) << opened.error().message;
+  EXPECT_EQ((*opened)->bodies().orientation[3][0], 1);
+}
+
+TEST_F(Trajectory, refuses_what_is_no_turn) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto expect = [&](const Turning& turning, const std::string& expected) {
+    ASSERT_TRUE(write_turning(npy_, info(), turning));
+    expect_refused("x.npy", expected);
+  };
+  expect({.orientation = {0, 0, 0, 0}}, "frame 0, body 1: the quaternion's norm is 0");
+  expect({.orientation = {0, 0, 0, 1.002F}}, "the quaternion's norm is 1.002");
+  expect({.orientation = {0, nan, 0, 1}}, "body 1, channel 8 is not finite");
+  expect({.angular_velocity = {0, nan, 0}}, "body 1, channel 11 is not finite");
+  expect({.angular_velocity = {0, 61, 0}}, "body 1 turns by 2.033 rad a row");
+  ASSERT_TRUE(
+      write_turning(npy_, info(), {.orientation = {0, 0, 0, 1.0009F}, .angular_velocity = {0, 59.9F, 0}}));
+  EXPECT_TRUE(RecordedTrajectory::open(npy_));
+}
+
+TEST_F(Trajectory, radii_may_be_a_list) {
+  write_pair();
+  replace(json_, "\"radius\":0.5", "\"radius\":[0.5,0.25,0.5]");
+  const auto opened = RecordedTrajectory::open(npy_);
+  ASSERT_TRUE(opened) << opened.error().message;
+  EXPECT_EQ((*opened)->info().radius, 0.25);
+  ASSERT_EQ((*opened)->info().shapes.size(), 2U);
+  EXPECT_EQ((*opened)->info().shapes[1].radius, 0.25F);
+  EXPECT_EQ((*opened)->bodies().type[1], 1);
+  EXPECT_EQ((*opened)->bodies().type[2], 0);
+}
+
+TEST_F(Trajectory, refuses_radii_and_shapes_that_are_none) {
+  for (const char* radius : {"[0.5,0.5]", "[0.5,0.5,0]", "[0.5,0.5,\"a\"]", "\"a\"", "0"}) {
+    write_pair();
+    replace(json_, "\"radius\":0.5", std::string("\"radius\":") + radius);
+    expect_refused("x.json", "radius");
+  }
+  const std::string good = R"("shape_of":[0,0,0],)";
+  for (const std::string& shapes :
+       {std::string(R"("shapes":[],)") + good, R"("shapes":7,)" + good, R"("shapes":[7],)" + good,
+        R"("shapes":[{"shape":"cone","values":[1]}],)" + good,
+        R"("shapes":[{"shape":"box","values":[1,1]}],)" + good,
+        R"("shapes":[{"shape":"box","values":["a",1,1]}],)" + good,
+        R"("shapes":[{"shape":"hull","values":[1,1,1]}],)" + good,
+        R"("shapes":[{"shape":"sphere","values":[]}],)" + good,
+        R"("shapes":[{"shape":"sphere","values":[0]}],)" + good,
+        std::string(R"("shapes":[{"shape":"sphere","values":[1]}],)"),
+        std::string(R"("shapes":[{"shape":"sphere","values":[1]}],"shape_of":[0,0],)"),
+        std::string(R"("shapes":[{"shape":"sphere","values":[1]}],"shape_of":[0,0,1],)"),
+        std::string(R"("shapes":[{"shape":"sphere","values":[1]}],"shape_of":[0,0,-1],)")}) {
+    write_pair();
+    replace(json_, "\"gravity\"", shapes + "\"gravity\"");
+    expect_refused("x.json", "shape");
+  }
 }
 
 TEST_F(Trajectory, refuses_every_input) {
