@@ -10,12 +10,12 @@ import struct
 CHANNELS = 6
 
 
-def write_pair(npy, rows, bodies, info):
-    """X.npy from the bytes of float32 [rows][bodies][6], and X.json from `info`."""
-    count, rest = divmod(len(rows), bodies * CHANNELS * 4)
+def write_pair(npy, rows, bodies, info, channels=CHANNELS):
+    """X.npy from the bytes of float32 [rows][bodies][channels], 6 or 13, and X.json from `info`."""
+    count, rest = divmod(len(rows), bodies * channels * 4)
     if rest or count != len(info["gravity"]):
         raise ValueError(f"{npy.name}: {len(rows)} bytes for {bodies} bodies and {len(info['gravity'])} rows of gravity")
-    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, {bodies}, {CHANNELS}), }}".encode()
+    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, {bodies}, {channels}), }}".encode()
     header = header.ljust(117) + b"\n"
     npy.write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + rows)
     npy.with_suffix(".json").write_text(json.dumps(info) + "\n", encoding="utf-8")

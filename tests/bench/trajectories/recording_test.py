@@ -9,6 +9,7 @@ import tempfile
 import unittest
 
 import recording
+import rigid
 
 DT_S, RADIUS = 1 / 30, 0.5
 LOW, HIGH = (-3.0, 0.0, -3.0), (3.0, 8.0, 3.0)
@@ -45,6 +46,23 @@ class Recording(unittest.TestCase):
             row = json.loads(done.stdout)["rows"][0]
             self.assertEqual((row["bodies"], row["frames"], row["predictor"]), (40, 5, predictor))
             self.assertLessEqual(row["max_error"], row["threshold"] + row["lattice_unit"])
+
+    def test_every_rigid_world_is_a_plan_whose_recording_is_read_at_60_and_30_hz(self):
+        for world in rigid.WORLDS:
+            bodies = 120
+            plan, info = rigid.plan(world, bodies, 4, 7)
+            self.assertEqual((plan, info), rigid.plan(world, bodies, 4, 7))
+            self.assertNotEqual(plan, rigid.plan(world, bodies, 4, 8)[0])
+            self.assertEqual(len(info["shape_of"]), bodies)
+            rows = array.array("f", [0, 1, 0, 0, 0, 0, 0.6, 0, 0.8, 0, 1, 2, 3] * (5 * bodies)).tobytes()
+            info["threshold"] = 0.01
+            for kept, told in ((rows, info), rigid.halved(rows, bodies, info)):
+                npy = self.folder / f"{world}.npy"
+                recording.write_pair(npy, kept, bodies, told, 13)
+                done = subprocess.run([PROGRAM, "bench", "bandwidth", "--trajectory", npy, "--codec", "tracker", "--json"],
+                                      capture_output=True, text=True, timeout=30, check=False)  # fmt: skip
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(json.loads(done.stdout)["rows"][0]["frames"], len(told["gravity"]) - 1)
 
     def test_rows_that_do_not_fit_the_bodies_are_refused(self):
         rows, info = self.falling(4, 5)

@@ -1,0 +1,125 @@
+"""Plans of rigid bodies for the recorders rigid_bullet and rigid_ode; Python alone."""
+
+import math
+import random
+
+GRAVITY, DT_S, SUBSTEPS, EDGE = 9.81, 1 / 60, 2, 0.4
+SPHERE, BOX, CAPSULE = "sphere", "box", "capsule"
+KINDS = {SPHERE: 1, BOX: 2, CAPSULE: 3}
+CUBE = (BOX, [EDGE / 2] * 3)
+
+
+def uniform_turn(random_):
+    """A quaternion w, x, y, z, uniform over all."""
+    q = [random_.gauss(0, 1) for _ in range(4)]
+    length = math.hypot(*q)
+    return [v / length for v in q]
+
+
+def room(half):
+    """A floor and four walls: normal and offset."""
+    return [(0, 1, 0, 0), (1, 0, 0, -half), (-1, 0, 0, -half), (0, 0, 1, -half), (0, 0, -1, -half)]
+
+
+def poured(random_, bodies, half, pitch, shapes):
+    """A loose block of bodies, each turned at random: shape, mass, position, quaternion."""
+    across = int((2 * half - pitch) / pitch)
+    placed = []
+    for body in range(bodies):
+        layer, place = divmod(body, across * across)
+        at = [pitch * (v - (across - 1) / 2) for v in (place % across, place // across)]
+        jitter = [random_.uniform(-0.05, 0.05) * pitch for _ in range(3)]
+        position = (at[0] + jitter[0], pitch * (layer + 0.7) + jitter[1], at[1] + jitter[2])
+        placed.append((random_.randrange(shapes), 1.0, position, uniform_turn(random_)))
+    return placed
+
+
+def kicks_at(random_, times_s, half):
+    """Blows from below: time, centre, radius, change of velocity."""
+    return [(t, (random_.uniform(-half, half), 0, random_.uniform(-half, half)), 1.5, (0, 6, 0)) for t in times_s]
+
+
+def pile(random_, bodies):
+    """Cubes poured; two kicks, gravity turned once; none falls asleep."""
+    return {"planes": room(4), "shapes": [CUBE], "bodies": poured(random_, bodies, 4, 0.75, 1), "sleep": False,
+            "kicks": kicks_at(random_, (10, 14), 2), "turn_s": 18}  # fmt: skip
+
+
+def mixed(random_, bodies):
+    """Boxes, capsules and balls of many sizes; kicks, gravity turned once."""
+    shapes = []
+    for _ in range(24):
+        size = random_.uniform(0.6, 1.4) * EDGE / 2
+        shapes += [(BOX, [size, size * random_.uniform(0.4, 1), size * random_.uniform(0.6, 1)]),
+                   (CAPSULE, [0.6 * size, size * random_.uniform(0.2, 1)]), (SPHERE, [0.8 * size])]  # fmt: skip
+    return {"planes": room(4.5), "shapes": shapes, "bodies": poured(random_, bodies, 4.5, 0.95, len(shapes)), "sleep": True,
+            "kicks": kicks_at(random_, (10, 14), 2), "turn_s": 18}  # fmt: skip
+
+
+def towers(random_, bodies):
+    """Towers of 3 x 3 x 11 cubes that are knocked over, one after the other."""
+    placed, count = [], max(1, bodies // 99)
+    side = math.ceil(math.sqrt(count))
+    for body in range(bodies):
+        tower, place = divmod(body, 99)
+        layer, spot = divmod(place, 9)
+        jitter = [random_.uniform(-0.004, 0.004) for _ in range(2)]
+        position = (3.5 * (tower % side) + 0.41 * (spot % 3) + jitter[0], EDGE * (layer + 0.5),
+                    3.5 * (tower // side) + 0.41 * (spot // 3) + jitter[1])  # fmt: skip
+        placed.append((0, 1.0, position, (1, 0, 0, 0)))
+    blows = [(2 + i, (3.5 * (i % side) + 0.4, 3.2, 3.5 * (i // side) + 0.4), 1.0,
+              (random_.choice((-5, 5)), 0, random_.uniform(-3, 3))) for i in range(0, count, 2)]  # fmt: skip
+    return {"planes": [(0, 1, 0, 0)], "shapes": [CUBE], "bodies": placed, "sleep": True, "kicks": blows, "turn_s": None}
+
+
+def dominoes(random_, bodies):
+    """Rows of 50 that are tipped over one after the other."""
+    placed = []
+    for body in range(bodies):
+        row, place = divmod(body, 50)
+        position = (0.4 * place + random_.uniform(-0.002, 0.002), 0.4, 0.7 * row)
+        placed.append((0, 1.0, position, (1, 0, 0, 0)))
+    blows = [(1 + 0.7 * row, (0, 0.4, 0.7 * row), 0.2, (1.6, 0, 0)) for row in range((bodies + 49) // 50)]
+    return {"planes": [(0, 1, 0, 0)], "shapes": [(BOX, [0.06, 0.4, 0.2])], "bodies": placed, "sleep": True, "kicks": blows,
+            "turn_s": None}  # fmt: skip
+
+
+def rest(random_, bodies):
+    """Cubes poured, then left alone."""
+    return {"planes": room(4), "shapes": [CUBE], "bodies": poured(random_, bodies, 4, 0.75, 1), "sleep": True, "kicks": [],
+            "turn_s": None}  # fmt: skip
+
+
+WORLDS = {world.__name__: world for world in (pile, mixed, towers, dominoes, rest)}
+
+
+def plan(world, bodies, frames, seed):
+    """What a recorder reads, and X.json without its threshold, for `frames` frames of 1/60 s."""
+    planned = WORLDS[world](random.Random(seed), bodies)
+    aside = GRAVITY * math.sqrt(0.5)
+    turned = None if planned["turn_s"] is None else round(planned["turn_s"] / DT_S)
+    gravity = [(aside, -aside, 0.0) if turned is not None and f >= turned else (0.0, -GRAVITY, 0.0) for f in range(frames)]
+    kicks = [(max(1, round(t / DT_S)), *centre, radius, *change) for t, centre, radius, change in planned["kicks"]]
+    lines = [[repr(DT_S), SUBSTEPS, int(planned["sleep"])]]
+
+    def listed(items):
+        lines.append([len(items)])
+        lines.extend(items)
+
+    listed(planned["planes"])
+    listed([[KINDS[kind], len(values), *values] for kind, values in planned["shapes"]])
+    listed([[shape, mass, *at, *turn] for shape, mass, at, turn in planned["bodies"]])
+    listed(kicks)
+    listed(gravity)
+    sizes = [min(values) if kind == BOX else values[0] for kind, values in planned["shapes"]]
+    info = {"dt_s": DT_S, "damping_per_s": 0, "radius": min(sizes), "gravity": [gravity[0], *gravity],
+            "shapes": [{"shape": kind, "values": values} for kind, values in planned["shapes"]],
+            "shape_of": [body[0] for body in planned["bodies"]]}  # fmt: skip
+    return "\n".join(" ".join(map(str, line)) for line in lines) + "\n", info
+
+
+def halved(rows, bodies, info):
+    """Every second row of a recording at 60 Hz, and its X.json at 30 Hz."""
+    size = bodies * 13 * 4
+    kept = b"".join(rows[i : i + size] for i in range(0, len(rows), 2 * size))
+    return kept, {**info, "dt_s": 2 * info["dt_s"], "gravity": info["gravity"][::2]}
