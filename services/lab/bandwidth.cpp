@@ -122,7 +122,7 @@ struct Lane {
   ClientTimeline client;
   CodeAccount account;
   std::vector<std::uint32_t> bytes;
-  std::uint64_t corrected = 0;
+  std::uint64_t corrected = 0, at_rest = 0;
   Errors errors;
   Snaps snaps;
   DurationHistogram predict, encode, decode, apply;
@@ -158,6 +158,7 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.encode.add(frame.mirror_ns + frame.encode_ns);
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
+  lane.at_rest += lane.stream.agreed().rest_count();
 
   lane.client.step(1);
   lane.snaps.before(lane.client.state(frame.frame));
@@ -207,6 +208,7 @@ BandwidthRow row_of(Lane& lane, double frames, const engine::Bodies& bodies) {
   lane.errors.fill(row);
   lane.snaps.fill(row, stream.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
+  row.at_rest_per_frame = static_cast<double>(lane.at_rest) / frames;
   row.snapshot_bytes_per_body = static_cast<double>(snapshot_bytes(lane.stream, bodies)) /
                                 std::max(1U, lane.stream.agreed().alive_count());
   row.predict_ms = lane.predict.quantile_ms(0.5);

@@ -35,6 +35,7 @@ struct BandwidthRow {
   double max_error = 0, rms_error = 0;     ///< scene units; agreed state against the simulation's floats
   double max_snap = 0, rms_snap = 0;       ///< scene units; how far a correction moves a body at once
   double corrected_per_frame = 0;          ///< bodies
+  double at_rest_per_frame = 0;            ///< bodies
   double snapshot_bytes_per_body = 0;      ///< of a snapshot after one frame more, all of it, by bodies alive
   std::optional<double> colliding_per_frame;  ///< bodies; not known for recorded trajectories
   double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;

@@ -98,6 +98,7 @@ constexpr Column kColumns[] = {
     {"max_snap", field<&Row::max_snap>, kOurs, kOurs},
     {"rms_snap", field<&Row::rms_snap>, kOurs, kOurs, kOurs, "rms snap", 9, 5},
     {"corrected_per_frame", field<&Row::corrected_per_frame>, kOurs, kOurs, kOurs, "corrected", 9, 1},
+    {"at_rest_per_frame", field<&Row::at_rest_per_frame>, kOurs, kNone, kOurs, "at rest", 8, 1},
     {"snapshot_bytes_per_body", field<&Row::snapshot_bytes_per_body>, kOurs, kNone, kOurs, "snapshot", 8, 2},
     {"colliding_per_frame", optional_field<&Row::colliding_per_frame>, kAll, kAll, kOurs, "colliding", 9},
     {"paper_colliding_per_frame", paper_colliding, kAll, kNone, kOurs, "paper", 7},

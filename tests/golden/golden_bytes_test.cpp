@@ -102,7 +102,7 @@ TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger err
 }
 
 TEST(GoldenBytes, OfTracker) {  // Positions alone; v and c follow from them on both sides.
-  expect_bytes("tracker", "86 2f2643e622", predicted(), target());
+  expect_bytes("tracker", "86 2f2a0106af", predicted(), target());
 }
 
 TEST(GoldenBytes, OfLifecycleAndParameters) {

@@ -117,7 +117,10 @@ class Replica {
     }
     return true;
   }
-  bool delta(const Bytes& payload) { return synthetic::receive(parts_.delta, state_, payload).has_value(); }
+  bool delta(const Bytes& payload) {
+    parts_.delta.set_gravity(drive_.gravity);
+    return synthetic::receive(parts_.delta, state_, payload).has_value();
+  }
   bool input(const std::vector<std::string>& words) {
     return inputs_
         .add({static_cast<std::uint64_t>(number(words[0])), static_cast<Frame>(number(words[1])),

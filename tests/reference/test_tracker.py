@@ -8,13 +8,14 @@ import writer
 from refusals import RefusalCase
 from tandem_reference import payload, tracker
 
-# One body of threshold 100, never corrected before; all models as at the start. Its code stream is the byte 0d:
-# flag:   bound 0fffffff of 65536ths 4096: code 0d000000 is below: 1, corrected; range 0fffffff
-# zero x: bound 07ffffff: not below: 0; code 05000001, range 08000000
-# zero y: bound 04000000: not below: 0; code 01000001, range 04000000; z is not asked
-# sign z: bound 02000000: below: 1, negative; range 02000000
-# more than 1: bound 01000000: not below: 0
-ONE_STEP_DOWN_Z = bytes.fromhex("83 02 00 0d")
+# One body of threshold 100, never corrected before; all models as at the start. Its code stream is the byte 0e:
+# flag:   bound 0fffffff of 65536ths 4096: code 0e000000 is below: 1, corrected; range 0fffffff
+# rest:   bound 00ffffff of 65536ths 4096: not below: 0; code 0d000001, range 0f000000
+# zero x: bound 07800000: not below: 0; code 05800001, range 07800000
+# zero y: bound 03c00000: not below: 0; code 01c00001, range 03c00000; z is not asked
+# sign z: bound 01e00000: below: 1, negative; range 01e00000
+# more than 1: bound 00f00000: not below: 0
+ONE_STEP_DOWN_Z = bytes.fromhex("83 02 00 0e")
 
 
 class TrackerCase(RefusalCase):
@@ -32,15 +33,15 @@ class TrackerCase(RefusalCase):
 class Decisions(TrackerCase):
     def test_a_correction_by_hand(self):
         state = self.apply(ONE_STEP_DOWN_Z).state
-        # unit = 100 * 60293 / 65536 = 91; for_v = 128 * 26214 / 2; 91 * 1677696 / 65536 = 2330; for_c = 0
+        # unit = 100 * 60293 / 65536 = 91; for_v = 128 * 26214 / 2; 91 * 1677696 / 65536 = 2330; for_c = 503290 / 9; 91 * 55921 / 65536 = 78
         self.assertEqual(state.p[:, 0].tolist(), [0, 0, -91])
         self.assertEqual(state.v[:, 0].tolist(), [0, 0, -2330])
-        self.assertEqual(state.c[:, 0].tolist(), [0, 0, 0])
+        self.assertEqual(state.c[:, 0].tolist(), [0, 0, -78])
         self.assertEqual(state.codec[:, 0].tolist(), [0, 1, 0, 0, -1])
 
     def test_models_learn_by_hand(self):
         models = self.apply(ONE_STEP_DOWN_Z).models
-        learnt = {tracker.FLAG + 45: (4096 + 65536) // 2, tracker.ZERO: 16384, tracker.ZERO + 120: 16384,
+        learnt = {tracker.FLAG + 45: (4096 + 65536) // 2, tracker.REST: 2048, tracker.ZERO: 16384, tracker.ZERO + 120: 16384,
                   tracker.SIGN + (54 + 9 + 3 + 1) * 4: 49152, tracker.MAGNITUDE: 16384}  # fmt: skip
         self.assertEqual({int(i): int(models.p[i]) for i in np.flatnonzero(models.weight)}, learnt)
         self.assertEqual(models.weight.max(), 1)
@@ -69,10 +70,10 @@ class Decisions(TrackerCase):
     def test_streams_that_are_refused(self):
         for rule, bad in (
             ("stream", "830100"),  # empty
-            ("stream", "8303000d00"),  # ends with a zero
-            ("stream", "8306000d00000001"),  # a byte left over
+            ("stream", "8303000e00"),  # ends with a zero
+            ("stream", "8307000e0000000001"),  # a byte left over
             ("corrections", "8302 0010"),  # nobody corrected
-            ("values", "83020001"),  # too many steps
+            ("values", "8305000100000e"),  # too many steps
         ):
             with self.subTest(bytes=bad):
                 self.refused(rule, self.apply, bytes.fromhex(bad))
@@ -103,6 +104,34 @@ class Filter(TrackerCase):
         self.assertEqual(self.world.state.v[1, 0], v + 2 * one)
         one = (((94 * (503290 // 9) + 2**15) >> 16) * 384 + 128) >> 8
         self.assertEqual(self.world.state.c[1, 0], c + 2 * one)
+
+    def test_a_body_put_to_rest_holds_itself_up_and_wakes_when_it_is_corrected_again(self):
+        gravity = (5, -640, 0)
+        self.world.state.v[:, 0] = 0, -640, 0
+        data = self.section({0: [0, 2, 0]}, rests=(0,))
+        self.world = payload.apply_delta(self.world, self.stream, data, gravity)
+        state = self.world.state
+        self.assertEqual((state.rest[0], state.p[1, 0]), (1, 2 * 94))
+        self.assertEqual((state.v[:, 0].tolist(), state.c[:, 0].tolist()), ([0, 0, 0], [-5, 640, 0]))
+        contexts = tracker.Contexts(state, np.zeros(1, bool), 100)
+        self.assertEqual((contexts.flag[0], contexts.rest[0]), (tracker.FLAG_AT_REST + 1, tracker.REST + 15))
+        awake = payload.apply_delta(self.world, self.stream, self.section({0: [0, 0, 1]}), gravity).state
+        self.assertEqual((awake.rest[0], awake.c[1, 0]), (0, 640))
+        self.assertGreater(awake.v[2, 0], 0)
+
+    def test_c_reaches_twice_gravity(self):
+        for _ in range(40):
+            data = self.section({0: [0, 10**6, 0]})
+            self.world = payload.apply_delta(self.world, self.stream, data, (0, -50000, 0))
+        self.assertEqual(self.world.state.c[1, 0], 100000)
+
+    def test_the_context_of_rest_knows_speeds(self):
+        self.world.state.v[1, 0] = -2001
+        contexts = tracker.Contexts(self.world.state, np.zeros(1, bool), 100)
+        self.assertEqual(contexts.rest[0], tracker.REST + 1)
+        self.world.state.v[1, 0] = 6401
+        contexts = tracker.Contexts(self.world.state, np.zeros(1, bool), 100)
+        self.assertEqual(contexts.rest[0], tracker.REST + 2)
 
     def test_single_steps_of_three_axes(self):
         state = self.apply(self.section({0: [1, -1, 1]})).state

@@ -71,7 +71,7 @@ class Vector:
         self.out += ["delta", *hex_lines(data)]
         self.hash()
 
-    def track(self, steps, before=b"", renewed=(), rounding=b""):
+    def track(self, steps, before=b"", renewed=(), rounding=b"", rests=()):
         """A delta of tracker corrections, behind other sections; contexts know nothing of a rounding."""
         between = payload.apply_delta(self.line.world, self.line.stream, before)
         between.models = self.line.world.models
@@ -83,7 +83,7 @@ class Vector:
             first, end = between.state.block_slots(block)
             here = {slot: value for slot, value in steps.items() if first <= slot < end}
             if here:
-                data += writer.tracker_section(between, between.parameters[1], here, flags, block)
+                data += writer.tracker_section(between, between.parameters[1], here, flags, block, rests)
         self.delta(data)
 
     def refuse(self, data, why):
@@ -245,22 +245,45 @@ def tracker_blocks():
     return vector
 
 
+def tracker_rest():
+    """Bodies put to rest, corrected where they rest, woken by gravity; one at rest from the start of a snapshot on."""
+    slots = [slot for slot in range(20) if slot != 7]
+    line = scattered("tracker", "ballistic", slots, 20, b"", 12)
+    vector = Vector("codec tracker: bodies put to rest, and woken", line)
+    following = worlds.random_numbers(13)
+    for frame in range(1, 13):
+        if frame == 7:
+            vector.input(1, 8, Drive((40, -700, 3), 300))
+        vector.predict()
+        rests = [slot for slot in slots if following(100) > (20 if frame % 4 else -60)]
+        if frame == 5:
+            vector.say("slots 0 and 1 spawned and teleported where bodies rest; both are corrected, 0 is put to rest")
+            place = writer.position((5, 6, 7), (640, -640, 0))
+            born = writer.record(0, 0) + writer.record(0, 1, b"\1\1", place) + writer.record(1, 2, b"\1", place)
+            vector.track({0: [1, 0, 0], 1: [0, 2, 0]}, writer.section(0x81, born), (0, 1), rests=(0,))
+        else:
+            vector.track(some_steps(slots, following, (2, 2, 3)), rests=rests)
+    vector.say("a snapshot of this frame holds the same state")
+    vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
 def tracker_refused():
-    """Code streams that must be refused, for a body whose one correction is the byte 0d."""
+    """Code streams that must be refused, for a body whose one correction is the byte 0e."""
     of = worlds.stream("tracker")
     vector = Vector("codec tracker: code streams that are refused", worlds.timeline(of, {0: ((0, 0, 0), (0, 0, 0))}))
     for why, data in (
         ("an empty code stream", "830100"),
-        ("a zero at the end", "8303000d00"),
-        ("a byte left over behind the last decision", "8306000d00000001"),
+        ("a zero at the end", "8303000e00"),
+        ("a byte left over behind the last decision", "8307000e0000000001"),
         ("nobody is corrected", "83020010"),
-        ("more than 2^31 - 1 steps", "83020001"),
+        ("more than 2^31 - 1 steps", "8305000100000e"),
     ):
         vector.refuse(bytes.fromhex(data), why)
     vector.refuse(bytes.fromhex("86"), "an empty code stream without length and block")
-    vector.refuse(bytes.fromhex("8302000d860d"), "the same block twice")
+    vector.refuse(bytes.fromhex("8302000e860e"), "the same block twice")
     vector.say("one step down z, and again as a section without length and block")
-    vector.delta(bytes.fromhex("8302000d"))
+    vector.delta(bytes.fromhex("8302000e"))
     vector.track({0: [0, 0, -1]})
     return vector
 
@@ -297,7 +320,7 @@ def rounding():
     vector.refuse(writer.section(0x87, bytes(4)), "too long")
     vector.refuse(2 * writer.section(0x87, bytes(3)), "twice")
     vector.refuse(writer.section(0x87, bytes(3)) + writer.section(0x82, writer.parameters({1: 9})), "before parameters")
-    vector.refuse(writer.section(0x83, b"\0\x0d") + writer.section(0x87, bytes(3)), "behind corrections")
+    vector.refuse(writer.section(0x83, b"\0\x0e") + writer.section(0x87, bytes(3)), "behind corrections")
     return vector
 
 
@@ -439,6 +462,7 @@ def main(folder):
         "tracker_contact": tracker("contact", 4),
         "tracker_snapshot": tracker_snapshot(),
         "tracker_blocks": tracker_blocks(),
+        "tracker_rest": tracker_rest(),
         "tracker_refused": tracker_refused(),
         "rounding": rounding(),
         "lifecycle": lifecycle(),

@@ -145,7 +145,7 @@ def write_steps(encoder, contexts, slot, steps):
         moved += 1
 
 
-def tracker_section(world, threshold, steps, renewed=None, block=0):
+def tracker_section(world, threshold, steps, renewed=None, block=0, rests=()):
     """Corrections of one block, of {slot: steps}; `world` as after the lifecycle of the delta."""
     state = world.state
     renewed = np.zeros(state.capacity, bool) if renewed is None else renewed
@@ -156,6 +156,7 @@ def tracker_section(world, threshold, steps, renewed=None, block=0):
         if state.alive[slot]:
             encoder.decide(int(contexts.flag[slot]), slot in steps)
     for slot in sorted(steps):
+        encoder.decide(int(contexts.rest[slot]), slot in rests)
         write_steps(encoder, contexts, slot, steps[slot])
     if block == state.blocks() - 1:
         return b"\x86" + encoder.finish(1)

@@ -28,6 +28,7 @@ struct CodecFrame {
   std::span<const std::uint8_t> alive;  ///< the column after the records
   std::span<const Slot> renewed;        ///< spawned, despawned or teleported by them; ascending, each once
   const CodecParameters& parameters;
+  Vec3i gravity{};             ///< of the drive in force at this frame: what c of a body at rest holds up
   unsigned position_bits = 0;  ///< rounded to multiples of 2^n: an encoder's p are, and `tracker` keeps it so
 };
 
@@ -43,6 +44,7 @@ struct Corrections {
   std::span<const Slot> slots;    ///< each once, ascending
   std::span<const Slot> renewed;  ///< as in the frame
   CodecParameters parameters;     ///< as in the frame
+  Vec3i gravity{};                ///< as in the frame
   unsigned position_bits = 0;     ///< as in the frame
 };
 

@@ -16,6 +16,7 @@ struct DeltaCodec::Impl {
   StreamParameters parameters;  // in force
   StreamParameters next;        // server: from the next encode() on
   bool round_next = false;      // server: in the next encode()
+  Vec3i gravity{};              // at the delta at hand
   // Of the delta at hand.
   std::vector<LifecycleRecord> lifecycle;
   std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
@@ -181,9 +182,10 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   const std::size_t before = writer.size();
   const std::size_t left = budget - std::min(budget, before);
   impl_->list_renewed();
-  const Corrections corrections = impl_->codec->encode(
-      {state, state.alive(), impl_->renewed, impl_->parameters.codec, rounding ? rounding->p : 0U}, target,
-      left, writer, observer);
+  const Corrections corrections =
+      impl_->codec->encode({state, state.alive(), impl_->renewed, impl_->parameters.codec, impl_->gravity,
+                            rounding ? rounding->p : 0U},
+                           target, left, writer, observer);
   TANDEM_ASSERT(!writer.overflow());
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
@@ -198,6 +200,7 @@ void DeltaCodec::set_parameters(const StreamParameters& parameters) {
   TANDEM_ASSERT(valid_parameters(parameters.codec));
   impl_->next = parameters;
 }
+void DeltaCodec::set_gravity(const Vec3i& gravity) { impl_->gravity = gravity; }
 void DeltaCodec::round_next() { impl_->round_next = true; }
 const StreamParameters& DeltaCodec::parameters() const { return impl_->parameters; }
 void DeltaCodec::restore_parameters(const StreamParameters& parameters) {
@@ -226,7 +229,7 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
     return tl::unexpected<Error>(result.error());
   impl_->list_renewed();
   const auto corrections =
-      impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters.codec,
+      impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters.codec, impl_->gravity,
                             parsed.rounding ? parsed.rounding->p : 0U},
                            impl_->sections);
   if (!corrections) return tl::unexpected<Error>(corrections.error());

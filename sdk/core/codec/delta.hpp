@@ -68,6 +68,9 @@ class DeltaCodec {
   /// Server side: the next encode() also rounds every body, as far as its threshold permits. What is encoded
   /// still holds the threshold.
   void round_next();
+  /// Gravity of the drive in force at the frame that is encoded or decoded next, 1/64 unit per frame^2; stays
+  /// until the next call. Zero at first.
+  void set_gravity(const Vec3i& gravity);
   /// Client side, from a snapshot: parameters in force, nothing is sent.
   void restore_parameters(const StreamParameters& parameters);
 

@@ -139,6 +139,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   const bool ahead = m.now > m.applied;
   if (!ahead) m.simulate(frame);
   State& state = m.at(frame).state;
+  m.parts.delta.set_gravity(m.at(frame).input.drive.gravity);
   const auto delta = m.parts.delta.decode(state, payload);
   if (!delta) return tl::unexpected<Error>(delta.error());
   m.parts.delta.apply(*delta, state);

@@ -81,6 +81,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   m.inputs.forget(m.frame);
   m.parts.predictor->step(m.state, m.state, {m.drive, m.parts.delta.parameters().step});
   result.predict_ns = watch.lap_ns();
+  m.parts.delta.set_gravity(m.drive.gravity);
   const DeltaCodec::Encoded encoded =
       m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer);
   result.encode_ns = watch.lap_ns();

@@ -163,8 +163,11 @@ def apply_records(state, records, types):
     return renewed
 
 
-def apply_delta(world, stream, data):
-    """The world after a delta, from the one with the predicted state of its frame, which stays as it is."""
+def apply_delta(world, stream, data, gravity=(0, 0, 0)):
+    """The world after a delta, from the one with the predicted state of its frame, which stays as it is.
+
+    gravity is that of the drive in force at the frame.
+    """
     parsed = parse(data, world.state)
     after = world.copy()
     after.parameters.update(parsed.parameters)
@@ -173,7 +176,7 @@ def apply_delta(world, stream, data):
     for_p, for_v, for_c = parsed.rounding
     state.p[:] = rounded(state.p, for_p)
     if stream.codec == "tracker":
-        tracker.apply_corrections(after, stream, parsed.corrections, renewed, for_p)
+        tracker.apply_corrections(after, stream, parsed.corrections, renewed, tracker.Setting(for_p, gravity))
     else:
         codecs.apply_corrections(after, stream, parsed.corrections)
     awake = state.rest == 0

@@ -40,7 +40,7 @@ class Timeline:
 
     def apply(self, data):
         """The delta of the frame predicted last."""
-        self.world = payload.apply_delta(self.world, self.stream, data)
+        self.world = payload.apply_delta(self.world, self.stream, data, self.drive.gravity)
 
 
 def check_hash(frame, state, announced):

@@ -1,5 +1,7 @@
 """The codec `tracker`: models, contexts, and the filter that corrects a body."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from . import parameters
@@ -9,8 +11,8 @@ from .number_decoder import NumberModels
 from .range_decoder import CountingDecoder
 from .state import MOST_C, MOST_P, MOST_V
 
-FLAG, ZERO, SIGN, MAGNITUDE, ESCAPE = 0, 675, 1035, 1359, 1863
-MODELS = 1895
+FLAG, FLAG_AT_REST, REST, ZERO, SIGN, MAGNITUDE, ESCAPE = 0, 675, 690, 720, 1080, 1404, 1908
+MODELS = 1940
 AGE, INTERVAL, LAST = 0, 1, slice(2, 5)
 MOST_STEPS = 2**31 - 1
 
@@ -73,12 +75,25 @@ class Contexts:
         v, c = np.where(renewed, 0, state.v), np.where(renewed, 0, state.c)
         length = np.clip(np.abs(last).max(axis=0), 1, 3) - 1
         axis = np.arange(3).reshape(3, 1)
-        self.flag = FLAG + bucket(now) * 45 + bucket(interval) * 3 + length
-        times = count_below(now, (2, 4, 8, 20)) * 4 + count_below(interval, (2, 6, 20))
-        self.zero = ZERO + (axis * 20 + times) * 6 + (last != 0)
+        rest = np.where(renewed, 0, state.rest)
+        moving = FLAG + bucket(now) * 45 + bucket(interval) * 3 + length
+        self.flag = np.where(rest, FLAG_AT_REST + bucket(now), moving)
+        ages = count_below(now, (2, 4, 8, 20))
+        fastest = np.abs(v).max(axis=0)
+        speed = sum((fastest > min(MOST_V, limit * threshold)).astype(int) for limit in (20, 64))
+        self.rest = REST + (rest * 5 + ages) * 3 + speed
+        self.zero = ZERO + (axis * 20 + ages * 4 + count_below(interval, (2, 6, 20))) * 6 + (last != 0)
         sides = side(last, 0) * 9 + side(c, threshold // 32) * 3 + side(v, threshold + threshold // 4)
         self.sign = SIGN + (axis * 27 + sides) * 4 + count_below(now, (2, 6, 20))
         self.magnitude = MAGNITUDE + (count_below(now, (1, 4, 20)) * 3 + length) * 42
+
+
+@dataclass
+class Setting:
+    """What corrections depend on beside stream and parameters: rounding of p in bits, gravity of the frame."""
+
+    rounding: int
+    gravity: tuple
 
 
 def read_steps(decoder, contexts, slot):
@@ -112,12 +127,12 @@ def read_size(decoder, magnitude):
     return number + 14
 
 
-def apply_corrections(world, stream, corrections, renewed, rounding):
+def apply_corrections(world, stream, corrections, renewed, setting):
     """Decode and apply the sections of all blocks, let the models learn and the ages grow."""
     state, models, values = world.state, world.models, parameters.named(world.parameters)
     contexts = Contexts(state, renewed, values["threshold"])
     zeros, ones = [0] * MODELS, [0] * MODELS
-    slots, steps = [], []
+    slots, rests, steps = [], [], []
     for block, body in corrections:
         first, end = state.block_slots(block)
         decoder = CountingDecoder(body.rest(), models.p.tolist(), zeros, ones)
@@ -125,7 +140,9 @@ def apply_corrections(world, stream, corrections, renewed, rounding):
         flags = contexts.flag[alive].tolist()
         corrected = [slot for slot, flag in zip(alive.tolist(), flags) if decoder.decide(flag)]
         require(corrected, "corrections", f"block {block}: no body is corrected")
-        steps += [read_steps(decoder, contexts, slot) for slot in corrected]
+        for slot in corrected:
+            rests.append(decoder.decide(int(contexts.rest[slot])))
+            steps.append(read_steps(decoder, contexts, slot))
         slots += corrected
         decoder.end()
     if not corrections:
@@ -136,7 +153,8 @@ def apply_corrections(world, stream, corrections, renewed, rounding):
     grows[slots] = False
     state.codec[AGE, grows] = np.minimum(state.codec[AGE, grows] + 1, 254)
     if len(slots):
-        correct(state, slots, np.array(steps, np.int64).T, values, stream.predictor == "ballistic", rounding)
+        correct(state, slots, np.array(steps, np.int64).T, values, stream.predictor == "ballistic", setting)
+        put_to_rest(state, slots, np.array(rests), setting.gravity)
 
 
 def by_axes(steps, long, one, two, three):
@@ -146,9 +164,17 @@ def by_axes(steps, long, one, two, three):
     return np.where(np.abs(steps).max(axis=0) > 1, long, short)
 
 
-def correct(state, slots, steps, values, ballistic, rounding):
-    """Move bodies by steps worth multiples of 2^rounding, and adjust their velocity, acceleration and columns."""
-    threshold = values["threshold"]
+def put_to_rest(state, slots, rests, gravity):
+    """Of corrected bodies, those put to rest stand and hold themselves up; the others are awake."""
+    state.rest[slots] = rests
+    still = slots[rests == 1]
+    state.v[:, still] = 0
+    state.c[:, still] = -np.array(gravity, np.int64).reshape(3, 1)
+
+
+def correct(state, slots, steps, values, ballistic, setting):
+    """Move bodies by their steps, and adjust their velocity, acceleration and columns."""
+    threshold, rounding = values["threshold"], setting.rounding
     now, last = state.codec[AGE, slots] + 1, state.codec[LAST, slots]
     share = by_axes(steps, 62259, 60293, 45220, 38666)
     unit = np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
@@ -165,7 +191,9 @@ def correct(state, slots, steps, values, ballistic, rounding):
         divisor = np.where(now == 1, 2, divisor)
     for_v = gain // divisor
     both = (gain * values["acceleration_gain"]) >> 16
-    for_c = np.where(now == 1, 0, both // np.maximum(now, 3) ** 2)
+    for_c = both // np.maximum(now, 3) ** 2
+
+    most_c = min(MOST_C, max(256 * threshold, 2 * max(abs(g) for g in setting.gravity)))
 
     def adjustment(gain_of):
         one = np.minimum(2**29, (((unit * gain_of + 2**15) >> 16) * trust + 128) >> 8)
@@ -173,8 +201,7 @@ def correct(state, slots, steps, values, ballistic, rounding):
 
     state.p[:, slots] = clamp(state.p[:, slots] + clamp(steps * unit, 2**31), MOST_P)
     state.v[:, slots] = clamp(state.v[:, slots] + adjustment(for_v), MOST_V)
-    state.c[:, slots] = clamp(state.c[:, slots] + adjustment(for_c), min(MOST_C, 256 * threshold))
+    state.c[:, slots] = clamp(state.c[:, slots] + adjustment(for_c), most_c)
     state.codec[INTERVAL, slots] = now
     state.codec[AGE, slots] = 0
     state.codec[LAST, slots] = kept
-    state.rest[slots] = 0

@@ -12,6 +12,14 @@ namespace {
 
 constexpr std::int32_t kThreshold = 4096;
 
+const TrackerGains kGains("ballistic");
+
+TrackerFilter filter_of(std::int32_t threshold, const Vec3i& gravity = {}) {
+  CodecParameters parameters;
+  parameters.threshold = threshold;
+  return {parameters, gravity, 0, kGains};
+}
+
 State one_body() {
   State state(1);
   state.spawn(0, 0, 0, {});
@@ -22,8 +30,7 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   State state = one_body();
   TrackerBody body;
   body.age = 9;
-  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, TrackerGains("ballistic"),
-               body);
+  filter_of(kThreshold).correct(state, 0, {{2, 0, 0}}, body);
   const std::int32_t d = 2 * 3891;  // 0.95 * 4096, down
   EXPECT_EQ(state.p(0)[0], d);
   EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * d / 10, 8);
@@ -35,21 +42,41 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   EXPECT_EQ(body.steps, (std::array<std::int8_t, 3>{2, 0, 0}));
 }
 
-TEST(TrackerFilter, ABodyCorrectedTwiceRunningWasHitAndLearnsVelocityAlone) {
+TEST(TrackerFilter, OfABodyCorrectedTwiceRunningMoreIsBelievedToBeVelocity) {
   State state = one_body();
   TrackerBody body;
-  correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, TrackerGains("ballistic"),
-               body);
+  filter_of(kThreshold).correct(state, 0, {{2, 0, 0}}, body);
   EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * (2 * 3891) / 2, 8);
-  EXPECT_EQ(state.c(0)[0], 0);
+  EXPECT_NEAR(state.c(0)[0], 64 * 0.8 * 0.15 * (2 * 3891) / 9, 8);
+}
+
+TEST(TrackerFilter, ABodyPutToRestHoldsItselfUp) {
+  State state = one_body();
+  state.v(1)[0] = 700;
+  TrackerBody body;
+  filter_of(kThreshold, {0, -640, 3}).correct(state, 0, {{0, 1, 0}, true}, body);
+  EXPECT_EQ(state.rest()[0], 1);
+  EXPECT_GT(state.p(1)[0], 0);
+  EXPECT_EQ(state.v(1)[0], 0);
+  EXPECT_EQ((Vec3i{state.c(0)[0], state.c(1)[0], state.c(2)[0]}), (Vec3i{0, 640, -3}));
+  filter_of(kThreshold, {0, -640, 3}).correct(state, 0, {{0, 1, 0}}, body);
+  EXPECT_EQ(state.rest()[0], 0);
+  EXPECT_GT(state.v(1)[0], 0);
+}
+
+TEST(TrackerFilter, AccelerationReachesWhatHoldsABodyUpAtAnyThreshold) {
+  constexpr std::int32_t kGravity = 1 << 20;
+  State state = one_body();
+  TrackerBody body;
+  for (int i = 0; i < 100'000; ++i) filter_of(1, {0, -kGravity, 0}).correct(state, 0, {{0, 127, 0}}, body);
+  EXPECT_EQ(state.c(1)[0], 2 * kGravity);
 }
 
 TEST(TrackerFilter, BelievesCorrectionsThatKeepTheirDirectionMore) {
   const auto velocity_after = [](std::int8_t last) {
     State state = one_body();
     TrackerBody body{9, 5, {last, 0, 0}};
-    correct_body(state, 0, {2, 0, 0}, TrackerSteppings(kThreshold), kThreshold, TrackerGains("ballistic"),
-                 body);
+    filter_of(kThreshold).correct(state, 0, {{2, 0, 0}}, body);
     return state.v(0)[0];
   };
   EXPECT_NEAR(velocity_after(2), 1.5 * velocity_after(0), 4);
@@ -62,9 +89,7 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
     TrackerBody body;
     for (int i = 0; i < 20; ++i) {
       const std::int32_t far = sign * kMostTrackerSteps;
-      body.age = 2;  // c learns nothing from a body corrected twice running
-      correct_body(state, 0, {far, far, far}, TrackerSteppings(kPositionLimit), kPositionLimit,
-                   TrackerGains("ballistic"), body);
+      filter_of(kPositionLimit).correct(state, 0, {{far, far, far}}, body);
     }
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(state.p(i)[0], sign * kPositionLimit);
@@ -117,7 +142,7 @@ TEST(TrackerSteps, FindsAPointInTheErrorBallForEveryDirectionAndThreshold) {
   costs.learn(TrackerModels());
   for (const std::int32_t threshold : {1, 2, 3, 4, 5, 7, 10, 11, 16, 17, 31}) {
     const TrackerSteppings steppings(threshold, rounding_for(threshold).p);
-    const ErrorWorth worth(threshold);
+    const ErrorWorth worth(threshold, 14);
     const std::int32_t reach = 3 * threshold + 2;
     for (std::int32_t x = -reach; x <= reach; ++x) {
       for (std::int32_t y = 0; y <= reach; ++y) {

@@ -170,7 +170,7 @@ TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
     if (steps != TrackerSteps{}) all.push_back(steps);
   }
   const TrackerModels models;
-  const Coded out = coded(all.size() * (kMostStepsBits / 8 + 1), models, [&all](DecisionEncoder& coder) {
+  const Coded out = coded(all.size() * (kMostCorrectionBits / 8 + 1), models, [&all](DecisionEncoder& coder) {
     for (TrackerSteps steps : all) code_steps(coder, {}, steps);
   });
   TrackerCounts counts{};
@@ -200,7 +200,7 @@ struct IdealCoder {
   }
 };
 
-TrackerContext context_at_rest(const TrackerBody& body) {
+TrackerContext context_of(const TrackerBody& body) {
   const std::array<std::uint8_t, 5> columns{body.age, body.interval, 0, 0, 0};
   TrackerContexts contexts(1);
   contexts.fill({0, 0, 1}, State(1), {&columns[0], &columns[1], &columns[2], &columns[3], &columns[4]}, 100);
@@ -216,14 +216,14 @@ void code_block(Coder& coder, std::uint64_t seed, std::uint64_t corrected_one_in
     const TrackerBody body{
         static_cast<std::uint8_t>(random() % 20U), static_cast<std::uint8_t>(random() % 20U), {}};
     const bool is_corrected = random() % corrected_one_in == 0;
-    coder.code(is_corrected, flag_model(body.age, flag_history(body)));
+    coder.code(is_corrected, flag_model(body.age, flag_history(body), false));
     if (is_corrected) corrected.push_back(body);
   }
   for (const TrackerBody& body : corrected) {
     TrackerSteps steps{1, 0, 0};
     for (std::int32_t& step : steps) step = static_cast<std::int32_t>(random() % 5U) - 2;
     if (steps == TrackerSteps{}) steps[0] = 20;
-    code_steps(coder, context_at_rest(body), steps);
+    code_steps(coder, context_of(body), steps);
   }
 }
 

@@ -31,9 +31,9 @@ const char* decode_block(const TrackerFrame& frame, const Block& block, std::spa
   if (count == 0) return "corrections section without a body";
   frame.list_contexts(block, std::span(corrected, count));
   DecisionDecoder coder{range, &models, &part.counts};
-  TrackerSteps* const steps = frame.delta.steps.data() + block.first;
+  TrackerCorrection* const corrections = frame.delta.corrections.data() + block.first;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (!code_steps(coder, frame.scratch.contexts.of(corrected[i]), steps[i]))
+    if (!code_correction(coder, frame.scratch.contexts.of(corrected[i]), corrections[i]))
       return "correction beyond any lattice";
   }
   if (!coder.range.at_end()) return "bytes after the code stream";

@@ -9,6 +9,7 @@
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/codec/tracker/frame.hpp"
 #include "sdk/core/codec/tracker/steps.hpp"
+#include "sdk/core/codec/tracker/stillness.hpp"
 
 namespace tandem {
 
@@ -21,7 +22,7 @@ inline constexpr std::size_t kTrackerSlackBytes = 64;
          kMostTrackerBytesPerBody * capacity;
 }
 
-/// Keeps, beside scratch memory, how long each body has waited for its correction.
+/// Keeps, beside scratch memory, how long each body has waited for its correction, and where it was.
 class TrackerEncoder {
  public:
   explicit TrackerEncoder(std::uint32_t capacity);
@@ -41,7 +42,7 @@ class TrackerEncoder {
     Steps state = Steps::kOpen;
     bool must = false;  // beyond the threshold
     bool is_sent = false;
-    TrackerSteps steps{};
+    TrackerCorrection correction{};
   };
   /// A block's share of candidates_, and of bytes_.
   struct Part {
@@ -50,6 +51,11 @@ class TrackerEncoder {
     bool fits = true;
     std::int64_t cost = 0;   // estimated: its header and all flags as zeros
     std::uint32_t sent = 0;  // by the cut at hand
+  };
+  /// What an error is worth beside bits.
+  struct Worth {
+    explicit Worth(std::int32_t threshold);
+    ErrorWorth moving, at_rest;
   };
   struct Ranked {
     std::uint64_t urgency;
@@ -67,7 +73,7 @@ class TrackerEncoder {
   /// Steps of a block's candidates that have none yet. Models are the same for a whole delta, so the choice
   /// does not depend on what else is sent.
   void choose(const TrackerFrame& frame, const State& target, const Block& block);
-  void choose(const TrackerFrame& frame, const State& target, const ErrorWorth& worth, Candidate& candidate);
+  void choose(const TrackerFrame& frame, const State& target, const Worth& worth, Candidate& candidate);
 
   /// Sends as many of the most urgent bodies as fit. True: all of them, and the early ones.
   bool write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget);
@@ -101,6 +107,7 @@ class TrackerEncoder {
   std::vector<std::uint8_t> marks_;
   bool some_wait_ = false;
   TrackerCosts costs_;
+  Stillness stillness_;
 };
 
 }  // namespace tandem

@@ -19,9 +19,8 @@ constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
 // only a part beta of the first is believed, and gamma of that of the second; both change at run time.
 //   least_k  Below so many frames one correction says too little about either: k counts as this. Usual 3; 2
 //            takes 0.5 % more bits, 4 takes 1.6 % (RESEARCH.md).
-//   hit_k    A body corrected twice running (k = 1) was hit: all of it is velocity, none acceleration, and
-//   more
-//            of it is believed, so this is less than least_k.
+//   hit_k    A body corrected twice running (k = 1) was hit: more of it is believed to be velocity, so this
+//            is less than least_k.
 //   early    How likely, in 1/65536, a correction must be for a body to go before it has to. Usual 0.3: a
 //   tenth
 //            off the RMS error for 1.4 % of the bits. Encoder only; the rest is part of the protocol.
@@ -102,9 +101,8 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
   for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
     const std::int64_t k = std::max(i, kind_->least_k);
     const auto at = static_cast<std::size_t>(i);
-    const bool hit = i == 1;
-    velocity_[at] = share / (hit ? kind_->hit_k : k);
-    acceleration_[at] = hit ? 0 : ((share * gamma) >> 16) / (k * k);
+    velocity_[at] = share / (i == 1 ? kind_->hit_k : k);
+    acceleration_[at] = ((share * gamma) >> 16) / (k * k);
   }
 }
 
@@ -133,8 +131,20 @@ void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3
 //
 // Ranges: one <= 2^30 and G, H <= 64, so that one G (1 + u/2) fits 64 bits in 2^-24; what one step may change
 // is cut at 2^29, so that n of them fit, n < 2^31.
-void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
-                  std::int32_t threshold, const TrackerGains& gains, TrackerBody& body) {
+TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gravity, unsigned position_bits,
+                             const TrackerGains& gains)
+    : steppings_(parameters.threshold, position_bits), gravity_(gravity), gains_(gains) {
+  // 256 / 64: c may move a body by four thresholds in a frame. Beyond, it would be corrected every frame
+  // anyway; but what holds it up is within reach whatever the threshold.
+  std::int32_t fall = 0;
+  for (const std::int32_t g : gravity) fall = std::max({fall, g, -g});
+  most_c_ = std::max(std::int64_t{256} * parameters.threshold, std::int64_t{2} * fall);
+  most_c_ = std::min<std::int64_t>(kVelocityLimit, most_c_);
+}
+
+void TrackerFilter::correct(State& state, Slot slot, const TrackerCorrection& correction,
+                            TrackerBody& body) const {
+  const TrackerSteps& steps = correction.steps;
   TrackerSteps now{};
   for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
   const auto before = TrackerSteppings::relative({body.steps[0], body.steps[1], body.steps[2]});
@@ -145,15 +155,12 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
   const std::int64_t belief = 256 + (std::clamp<std::int64_t>(dot >> 8, -256, 256) >> 1);
 
   const std::uint32_t k = std::min(body.age + 1U, kMostAge);
-  const std::int64_t one = steppings.unit_for(steps);
+  const std::int64_t one = steppings_.unit_for(steps);
   const auto growth_of_one = [&](std::int64_t gain) {
     return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
   };
-  const std::int64_t v_of_one = growth_of_one(gains.velocity(k));
-  const std::int64_t c_of_one = growth_of_one(gains.acceleration(k));
-  // 256 / 64: c may move a body by four thresholds in a frame. Beyond, it would be corrected every frame
-  // anyway.
-  const std::int64_t most_c = std::min<std::int64_t>(kVelocityLimit, std::int64_t{256} * threshold);
+  const std::int64_t v_of_one = growth_of_one(gains_.velocity(k));
+  const std::int64_t c_of_one = growth_of_one(gains_.acceleration(k));
   for (std::size_t i = 0; i < 3; ++i) {
     // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of
     // their own where the sum has a smaller one.
@@ -162,10 +169,11 @@ void correct_body(State& state, Slot slot, const TrackerSteps& steps, const Trac
     std::int32_t& v = state.v(i)[slot];
     std::int32_t& c = state.c(i)[slot];
     p = limited(p + n * one, kPositionLimit);
-    v = limited(v + n * v_of_one, kVelocityLimit);
-    c = limited(c + n * c_of_one, most_c);
+    v = correction.rest ? 0 : limited(v + n * v_of_one, kVelocityLimit);
+    c = correction.rest ? -gravity_[i] : limited(c + n * c_of_one, most_c_);
     body.steps[i] = static_cast<std::int8_t>(now[i]);
   }
+  state.rest()[slot] = static_cast<std::uint8_t>(correction.rest);
   body.interval = static_cast<std::uint8_t>(k);
   body.age = 0;
 }

@@ -16,6 +16,12 @@ namespace tandem {
 using TrackerSteps = std::array<std::int32_t, 3>;
 inline constexpr std::int32_t kMostTrackerSteps = INT32_MAX;
 
+/// What a delta says of a corrected body.
+struct TrackerCorrection {
+  TrackerSteps steps{};
+  bool rest = false;  ///< it stays where it then is: State::rest()
+};
+
 /// Frames since a body's last correction count up to this.
 inline constexpr std::uint32_t kMostAge = 255;
 
@@ -97,13 +103,27 @@ class TrackerSteppings {
   std::array<std::int32_t, 4> units_{1, 1, 1, 1};
 };
 
-/// Corrects a body by `steps` and updates what is remembered of it:
-///   k = min(age + 1, 255);  d = steps * unit;  u = clamp(d . d_last / e^2, -1, 1)
-///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2), H(1) = 0
-void correct_body(State& state, Slot slot, const TrackerSteps& steps, const TrackerSteppings& steppings,
-                  std::int32_t threshold, const TrackerGains& gains, TrackerBody& body);
+/// Corrects bodies in one delta.
+class TrackerFilter {
+ public:
+  /// `gains` outlive it.
+  TrackerFilter(const CodecParameters& parameters, const Vec3i& gravity, unsigned position_bits,
+                const TrackerGains& gains);
 
-/// What the correction of a body by `steps` says of the gains; before correct_body(). `c`: the body's.
+  /// Moves a body by `correction.steps` and updates what is remembered of it:
+  ///   k = min(age + 1, 255);  d = steps * unit;  u = clamp(d . d_last / e^2, -1, 1)
+  ///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2)
+  /// or, if it is put to rest, v = 0 and c = -gravity.
+  void correct(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
+
+ private:
+  TrackerSteppings steppings_;
+  Vec3i gravity_;
+  std::int64_t most_c_;
+  const TrackerGains& gains_;
+};
+
+/// What the correction of a body by `steps` says of the gains; before it is corrected. `c`: the body's.
 void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3i& c, GainEvidence& evidence);
 
 }  // namespace tandem

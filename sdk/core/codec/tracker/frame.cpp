@@ -17,7 +17,8 @@ void TrackerFrame::list_flags(const Block& block) const {
   std::uint16_t* const flags = scratch.flags.data();
   TrackerCounts& counts = delta.blocks[block.index].counts;
   list_flag_models(memory.column(0) + block.first, memory.histories() + block.first,
-                   at.alive.data() + block.first, std::span(scratch.flags).subspan(block.first, block.slots));
+                   at.predicted.rest().data() + block.first, at.alive.data() + block.first,
+                   std::span(scratch.flags).subspan(block.first, block.slots));
   // By turns in the places of zeros and ones, because neighbours often have the same model and an addition
   // would wait for the one before.
   counts = {};
@@ -27,7 +28,7 @@ void TrackerFrame::list_flags(const Block& block) const {
   for (const Slot slot : within(at.renewed, block)) {
     if (at.alive[slot] == 0) continue;
     --counts[flags[slot]][0];
-    flags[slot] = static_cast<std::uint16_t>(flag_model(0, 0));
+    flags[slot] = static_cast<std::uint16_t>(flag_model(0, 0, false));
     ++counts[flags[slot]][0];
   }
 }

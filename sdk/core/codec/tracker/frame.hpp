@@ -34,7 +34,7 @@ struct TrackerFrame {
   }
   /// The model of one slot's flag, without scratch memory.
   [[nodiscard]] std::uint32_t flag_of(Slot slot) const {
-    return is_renewed(slot) ? flag_model(0, 0) : memory.flag_of(slot);
+    return is_renewed(slot) ? flag_model(0, 0, false) : memory.flag_of(slot, at.predicted.rest()[slot] != 0);
   }
   /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots have a
   /// model that is never a one and takes no bits, so that loops need not ask.

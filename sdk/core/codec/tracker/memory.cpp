@@ -37,7 +37,7 @@ std::span<const Slot> TrackerDelta::join(std::uint32_t capacity, bool of_all_blo
     if (part.corrected == 0 && !of_all_blocks) continue;
     if (const Slot from = block_at(b, capacity).first; from != count) {
       std::copy_n(slots.begin() + from, part.corrected, slots.begin() + count);
-      std::copy_n(steps.begin() + from, part.corrected, steps.begin() + count);
+      std::copy_n(corrections.begin() + from, part.corrected, corrections.begin() + count);
     }
     count += part.corrected;
     if (sum == nullptr) {
@@ -77,8 +77,7 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
 
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block,
                           State& state) {
-  const std::int32_t threshold = corrections.parameters.threshold;
-  const TrackerSteppings steppings(threshold, corrections.position_bits);
+  const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.position_bits, gains_);
   // Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
   constexpr std::byte kYoungest{0xFF};
   std::byte* const age = columns_.data();
@@ -86,8 +85,7 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
     const Slot slot = delta.slots[i];
     TrackerBody body = this->body(slot);
-    state.rest()[slot] = 0;
-    correct_body(state, slot, delta.steps[i], steppings, threshold, gains_, body);
+    filter.correct(state, slot, delta.corrections[i], body);
     set_body(slot, body);
     age[slot] = kYoungest;
   }

@@ -16,10 +16,10 @@ namespace tandem {
 /// What a delta says, and what was seen in saying it. Its memory is made once and used for every frame.
 struct TrackerDelta {
   explicit TrackerDelta(std::uint32_t capacity)
-      : slots(capacity), steps(capacity), blocks(block_count(capacity)) {}
+      : slots(capacity), corrections(capacity), blocks(block_count(capacity)) {}
 
-  /// Of a block, which is coded beside others: its corrected slots, ascending, and their steps stand from the
-  /// block's first slot on until join(), then from `first` on.
+  /// Of a block, which is coded beside others: its corrected slots, ascending, and their corrections stand
+  /// from the block's first slot on until join(), then from `first` on.
   struct Part {
     std::uint32_t corrected = 0;
     std::uint32_t first = 0;
@@ -35,7 +35,7 @@ struct TrackerDelta {
   std::span<const Slot> join(std::uint32_t capacity, bool of_all_blocks);
 
   std::vector<Slot> slots;
-  std::vector<TrackerSteps> steps;  ///< of slots
+  std::vector<TrackerCorrection> corrections;  ///< of slots
   std::vector<Part> blocks;
   const TrackerCounts* seen = nullptr;  ///< all decisions of the delta; one of the blocks' after join()
 };
@@ -67,7 +67,9 @@ class TrackerMemory {
   }
   [[nodiscard]] TrackerBody body(Slot slot) const;
   [[nodiscard]] const std::uint8_t* histories() const { return history_.data(); }
-  [[nodiscard]] std::uint32_t flag_of(Slot slot) const { return flag_model(column(0)[slot], history_[slot]); }
+  [[nodiscard]] std::uint32_t flag_of(Slot slot, bool rest) const {
+    return flag_model(column(0)[slot], history_[slot], rest);
+  }
   [[nodiscard]] const TrackerModels& models() const { return models_; }
   [[nodiscard]] const TrackerGains& gains() const { return gains_; }
 

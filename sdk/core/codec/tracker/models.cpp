@@ -60,24 +60,41 @@ TANDEM_VECTOR_CLONES void list_signs(const std::int8_t* __restrict last, const s
   }
 }
 
+// How long it was not corrected, whether it is at rest, how fast the predicted step has it.
+TANDEM_VECTOR_CLONES void list_rests(const std::uint8_t* __restrict age, const std::uint8_t* __restrict rest,
+                                     const std::int32_t* __restrict x, const std::int32_t* __restrict y,
+                                     const std::int32_t* __restrict z, std::int32_t slow, std::int32_t fast,
+                                     std::uint32_t slots, std::uint8_t* __restrict context) {
+  for (std::uint32_t s = 0; s < slots; ++s) {
+    const auto faster = [&](std::int32_t than) {
+      return static_cast<std::uint8_t>((x[s] > than) | (x[s] < -than) | (y[s] > than) | (y[s] < -than) |
+                                       (z[s] > than) | (z[s] < -than));
+    };
+    const auto times = rest[s] * TrackerModelIndex::kShortAges + above(age[s], 1, 3, 7, 19);
+    context[s] = static_cast<std::uint8_t>(times * TrackerModelIndex::kSpeeds + faster(slow) + faster(fast));
+  }
+}
+
 TANDEM_VECTOR_CLONES void list_flag_models(const std::uint8_t* __restrict age,
                                            const std::uint8_t* __restrict history,
+                                           const std::uint8_t* __restrict rest,
                                            const std::uint8_t* __restrict alive, std::uint32_t slots,
                                            std::uint16_t* __restrict models) {
   constexpr std::uint32_t kHistories = TrackerModelIndex::kAges * TrackerModelIndex::kLengths;
   for (std::uint32_t s = 0; s < slots; ++s) {
     std::uint8_t bucket = 0;
     for (const std::uint8_t last : kLastOfRun) bucket = static_cast<std::uint8_t>(bucket + (age[s] >= last));
-    const std::uint32_t model = TrackerModelIndex::kFlag + bucket * kHistories + history[s];
+    const std::uint32_t moving = TrackerModelIndex::kFlag + bucket * kHistories + history[s];
+    const std::uint32_t model = rest[s] != 0 ? TrackerModelIndex::kFlagAtRest + bucket : moving;
     models[s] = static_cast<std::uint16_t>(alive[s] != 0 ? model : TrackerModelIndex::kDead);
   }
 }
 
 }  // namespace
 
-void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* alive,
-                      std::span<std::uint16_t> models) {
-  list_flag_models(ages, histories, alive, static_cast<std::uint32_t>(models.size()), models.data());
+void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* rest,
+                      const std::uint8_t* alive, std::span<std::uint16_t> models) {
+  list_flag_models(ages, histories, rest, alive, static_cast<std::uint32_t>(models.size()), models.data());
 }
 
 const std::array<std::uint8_t, 256> tracker_age_buckets = make_age_buckets();
@@ -99,6 +116,13 @@ void TrackerContexts::fill(const Block& block, const State& predicted,
   for (std::size_t axis = 0; axis < 3; ++axis)
     list_signs(steps(axis), predicted.c(axis).data() + first, predicted.v(axis).data() + first, threshold,
                block.slots, column(2 + axis) + first);
+  // 20/64 and one threshold a frame.
+  const auto speed = [threshold](std::int64_t share) {
+    return static_cast<std::int32_t>(std::min<std::int64_t>(share * threshold, kVelocityLimit));
+  };
+  list_rests(bodies[0] + first, predicted.rest().data() + first, predicted.v(0).data() + first,
+             predicted.v(1).data() + first, predicted.v(2).data() + first, speed(20), speed(64), block.slots,
+             column(kColumns - 1) + first);
 }
 
 // The mean of a model's decisions, each counted once, with one that says what p1 was at the start:

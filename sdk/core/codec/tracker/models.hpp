@@ -17,10 +17,13 @@ namespace tandem {
 
 /// Indices of the models, and the decisions seen in one delta: zeros and ones of each model.
 struct TrackerModelIndex {
-  static constexpr std::uint32_t kAges = 15, kLengths = 3, kShortAges = 5, kIntervals = 4, kUnary = 14;
+  static constexpr std::uint32_t kAges = 15, kLengths = 3, kShortAges = 5, kIntervals = 4, kSpeeds = 3,
+                                 kUnary = 14;
 
   static constexpr std::uint32_t kFlag = 0;
-  static constexpr std::uint32_t kZero = kFlag + kAges * kAges * kLengths;
+  static constexpr std::uint32_t kFlagAtRest = kFlag + kAges * kAges * kLengths;
+  static constexpr std::uint32_t kRest = kFlagAtRest + kAges;
+  static constexpr std::uint32_t kZero = kRest + 2 * kShortAges * kSpeeds;
   static constexpr std::uint32_t kSign = kZero + 3 * kShortAges * kIntervals * 3 * 2;
   static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
   static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
@@ -38,7 +41,8 @@ struct TrackerModels {
   /// In 1/65536: no decision costs more than 11 bits, and one that is as expected 0.0007, so that the flags
   /// of a million bodies at rest take 90 bytes. Lower saves some of those and makes each surprise dearer.
   static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
-  /// What a flag starts with, 1/16: most bodies need no correction. Forgotten after the first deltas.
+  /// What a flag and a rest start with, 1/16: most bodies need no correction. Forgotten after the first
+  /// deltas.
   static constexpr std::uint16_t kRare = 4096;
 
   TrackerModels();
@@ -52,6 +56,7 @@ struct TrackerModels {
 
 /// The context of a body's steps: parts of their models' indices.
 struct TrackerContext {
+  std::uint32_t rest = 0;                     ///< the whole index, of "is it put to rest"
   std::uint32_t zero = 0;                     ///< of "is this axis untouched"
   std::uint32_t magnitude = 0;                ///< of "is it longer"
   std::array<std::uint32_t, 3> sign{};        ///< the whole index, per axis
@@ -78,14 +83,15 @@ inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
                                    tracker_detail::length_class(body.steps));
 }
 /// The flag's index.
-[[nodiscard]] inline std::uint32_t flag_model(std::uint8_t age, std::uint8_t history) {
+[[nodiscard]] inline std::uint32_t flag_model(std::uint8_t age, std::uint8_t history, bool rest) {
+  if (rest) return TrackerModelIndex::kFlagAtRest + tracker_age_buckets[age + 1U];
   return TrackerModelIndex::kFlag +
          tracker_age_buckets[age + 1U] * (TrackerModelIndex::kAges * TrackerModelIndex::kLengths) + history;
 }
 
 /// flag_model() of many slots, from their columns; kDead where there is no body.
-void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* alive,
-                      std::span<std::uint16_t> models);
+void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* rest,
+                      const std::uint8_t* alive, std::span<std::uint16_t> models);
 
 /// The contexts of all slots of a block, a byte each: worked out side by side, whether they are used or not,
 /// which takes less time than those of a tenth of the bodies one by one.
@@ -107,6 +113,7 @@ class TrackerContexts {
     for (std::uint32_t axis = 0; axis < 3; ++axis) context.moved_last[axis] = (*at >> (5U + axis)) & 1U;
     context.magnitude = *(at += slots_) & 15U;
     const std::uint32_t sign = TrackerModelIndex::kSign + (*at >> 4U);
+    context.rest = TrackerModelIndex::kRest + bytes_[(kColumns - 1) * slots_ + slot];
     for (std::uint32_t axis = 0; axis < 3; ++axis)
       context.sign[axis] = sign + (axis * 27 + *(at += slots_)) * TrackerModelIndex::kIntervals;
     return context;
@@ -114,9 +121,9 @@ class TrackerContexts {
 
  private:
   // zero, from bit 5 on moved_last; magnitude, from bit 4 on the age in all signs; what else is in the sign
-  // of x, y, z: 0 .. 26.
-  static constexpr std::size_t kColumns = 5;
-  static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 13, 13, 13};
+  // of x, y, z: 0 .. 26; of rest: 0 .. 29.
+  static constexpr std::size_t kColumns = 6;
+  static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 13, 13, 13, 0};
   std::uint8_t* column(std::size_t i) { return bytes_.data() + i * slots_; }
 
   std::size_t slots_;
@@ -167,9 +174,9 @@ struct DecisionDecoder {
   TrackerCounts* counts = nullptr;
 };
 
-/// Most bits code_steps() takes.
-inline constexpr std::size_t kMostStepsBits =
-    3 * (22 + (std::size_t{TrackerModelIndex::kUnary} + 31) * 11 + 31);
+/// Most bits code_correction() takes.
+inline constexpr std::size_t kMostCorrectionBits =
+    11 + 3 * (22 + (std::size_t{TrackerModelIndex::kUnary} + 31) * 11 + 31);
 
 namespace tracker_detail {
 
@@ -231,6 +238,13 @@ bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps
   const bool good = code(0) && code(1) && code(2);
   coder = local;
   return good;
+}
+
+/// Codes a correction; as code_steps().
+template <class Coder>
+bool code_correction(Coder& coder, const TrackerContext& context, TrackerCorrection& correction) {
+  correction.rest = coder.code(correction.rest, context.rest);
+  return code_steps(coder, context, correction.steps);
 }
 
 }  // namespace tandem

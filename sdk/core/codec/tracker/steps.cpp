@@ -8,10 +8,6 @@
 namespace tandem {
 namespace {
 
-// Bits that an error of one threshold is worth: a smaller one is wrong again later, so bits spent on it come
-// back. With 9 bits fall by 0.8 % and the RMS error grows by 5 %; with 20 bits grow by 0.8 % (RESEARCH.md).
-constexpr std::uint64_t kErrorWorth = 14;
-
 // -log2(x / 2^12) in 1/256 bits, x in 0 .. 2^12.
 constexpr auto kBits = [] {
   std::array<std::uint16_t, 4096> table{};
@@ -88,7 +84,7 @@ Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerC
   return result;
 }
 
-// Of each point: bits + kErrorWorth * (error / threshold)^2, in 1/256 bits.
+// Of each point: bits + worth * (error / threshold)^2, in 1/256 bits.
 //
 // Bits: the axes are coded one after another, and an axis' contexts depend on how many before it moved; so
 // the costs of an axis are worked out once for each number of them (axis_costs) and picked by the point.
@@ -162,11 +158,11 @@ void TrackerCosts::learn(const TrackerModels& models) {
   }
 }
 
-ErrorWorth::ErrorWorth(std::int32_t e)
+ErrorWorth::ErrorWorth(std::int32_t e, std::uint64_t bits)
     : threshold(e),
       limit(static_cast<std::uint64_t>(e) * static_cast<std::uint64_t>(e)),
       shift(static_cast<unsigned>(std::max(0, static_cast<int>(std::bit_width(limit)) - 24))),
-      worth((kErrorWorth * 256U << 24U) / (limit >> shift)) {}
+      worth((bits * 256U << 24U) / (limit >> shift)) {}
 
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
                   const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,

@@ -48,7 +48,8 @@ struct CostCoder {
 
 /// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.
 struct ErrorWorth {
-  explicit ErrorWorth(std::int32_t e);
+  /// `bits`: what an error of one threshold is worth.
+  ErrorWorth(std::int32_t e, std::uint64_t bits);
   std::int64_t threshold;
   std::uint64_t limit;  ///< threshold squared
   unsigned shift;       ///< limit >> shift has at most 24 bits
@@ -56,7 +57,8 @@ struct ErrorWorth {
 };
 
 /// Steps that correct `to` - `from` (lattice units) at least cost: of the eight points around it that leave
-/// an error of at most the threshold, the one with the least bits + 14 * (error / threshold)^2. False: none
+/// an error of at most the threshold, the one with the least bits + what its
+/// error is worth. False: none
 /// does; `steps` is then the nearest.
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
                   const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,

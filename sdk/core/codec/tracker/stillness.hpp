@@ -1,0 +1,30 @@
+#pragma once
+// The tracker's encoder: which bodies of the full simulation stand still. Nothing here is on the wire.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/codec/codec.hpp"
+#include "sdk/core/lattice/state.hpp"
+
+namespace tandem {
+
+/// Remembers where bodies were, because engines that put no body to sleep let it tremble.
+class Stillness {
+ public:
+  explicit Stillness(std::uint32_t capacity);
+
+  /// Takes in the full simulation of the next frame.
+  void follow(const CodecFrame& frame, const State& target);
+  /// Whether a body may be put to rest: it hardly moved in the last frame, and something holds it up (a body
+  /// at the top of its throw is slow too).
+  [[nodiscard]] bool is_still(const CodecFrame& frame, Slot slot) const;
+
+ private:
+  std::array<std::vector<std::int32_t>, 3> p_, moved_, moved_before_;  // lattice units
+  std::vector<std::uint8_t> frames_;                                   // seen since it was renewed, 0 .. 2
+};
+
+}  // namespace tandem
