@@ -1,6 +1,7 @@
 #include "services/host/mirror.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace tandem::host {
@@ -9,16 +10,19 @@ namespace {
 constexpr std::uint8_t mark(engine::Event::Kind kind) {
   return static_cast<std::uint8_t>(1U << static_cast<unsigned>(kind));
 }
+// Of a quaternion's squared norm: single precision and an engine that seldom normalises.
+constexpr double kNormSlack = 0.01;
+
 constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
 constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
 constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
 
 }  // namespace
 
-Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count)
+Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups)
     : lattice_(lattice),
       type_count_(type_count),
-      target_(capacity),
+      target_(capacity, groups),
       off_(capacity),
       shown_(capacity),
       expelled_(capacity),
@@ -37,10 +41,39 @@ void Mirror::quantise(const engine::Bodies& bodies) {
     quantise_column(bodies.position[i], position, kPositionLimit, world, target_.p(i), off_);
     quantise_column(bodies.velocity[i], velocity, kVelocityLimit, kFinite, target_.v(i), off_);
   }
+  if (target_.groups().orientation) quantise_turns(bodies);
   const std::size_t capacity = shown_.size();
   for (std::size_t s = 0; s < capacity; ++s) {
     const bool sound = off_[s] == 0 && bodies.type[s] < type_count_;
     shown_[s] = static_cast<std::uint8_t>((bodies.alive[s] != 0) & sound);
+  }
+}
+
+void Mirror::quantise_turns(const engine::Bodies& bodies) {
+  const double per_frame = std::ldexp(lattice_.dt_s, 28);
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    if (bodies.alive[s] == 0) continue;
+    std::array<double, 4> q{};
+    std::array<double, 3> w{};
+    double norm = 0, speed = 0;
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      q[i] = double{bodies.orientation[i][s]};
+      norm += q[i] * q[i];
+    }
+    for (std::size_t i = 0; i < w.size(); ++i) {
+      w[i] = double{bodies.angular_velocity[i][s]} * per_frame;
+      speed += w[i] * w[i];
+    }
+    if (!(std::abs(norm - 1) <= kNormSlack) || !std::isfinite(speed)) {
+      off_[s] = 1;
+      continue;
+    }
+    const double unit = kQuaternionOne / std::sqrt(norm);
+    const double kept = std::min(1.0, kSpinLimit / std::sqrt(std::max(speed, 1.0)));
+    for (std::size_t i = 0; i < q.size(); ++i)
+      target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
+    // Towards zero, so that no rounding leads out of the limit.
+    for (std::size_t i = 0; i < w.size(); ++i) target_.w(i)[s] = static_cast<std::int32_t>(w[i] * kept);
   }
 }
 
@@ -102,8 +135,12 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
   } else if (shown && (marks & kTeleported) != 0) {
     // A slot gets one record a frame; a type changed in the same step differs still in the next and follows
     // then.
-    lifecycle_.push_back(
-        {.kind = LifecycleKind::kTeleport, .slot = slot, .reuse = 0, .type = 0, .body = target_.body(slot)});
+    lifecycle_.push_back({.kind = LifecycleKind::kTeleport,
+                          .slot = slot,
+                          .reuse = 0,
+                          .type = 0,
+                          .body = target_.body(slot),
+                          .groups = moves_all(target_.groups())});
   } else if (shown && target_.type()[slot] != type) {
     target_.type()[slot] = type;
     lifecycle_.push_back(

@@ -21,11 +21,12 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
 
 /// Follows a simulation. A body is shown to clients while it is alive, finite, on the lattice and of a listed
 /// type; one that stops being so is despawned and stays away until the engine despawns, spawns or teleports
-/// it. Velocities saturate. Allocates nothing after construction. Not thread-safe.
+/// it. Velocities saturate. With orientations they must be some too: a quaternion that is not finite or far
+/// from norm 1 takes a body off. Allocates nothing after construction. Not thread-safe.
 class Mirror {
  public:
   /// `type_count`: types the session lists, 1 or more.
-  Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count);
+  Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {});
 
   /// The start state: everything shown is simply there, in generation 0.
   void start(const engine::Bodies& bodies);
@@ -41,6 +42,7 @@ class Mirror {
 
  private:
   void quantise(const engine::Bodies& bodies);
+  void quantise_turns(const engine::Bodies& bodies);
   void clear_hidden();
   void record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks);
   void spawn(Slot slot, TypeId type);

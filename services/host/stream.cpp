@@ -39,7 +39,7 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
 struct Stream::Impl final : EncodeObserver {
   Impl(StreamConfig configuration, const StreamStart& start, ServerTimeline server)
       : config(std::move(configuration)),
-        mirror(config.lattice, config.layout.capacity, config.layout.type_count),
+        mirror(config.lattice, config.layout.capacity, config.layout.type_count, groups_of(config.layout)),
         timeline(std::move(server)),
         parameters(config.layout.parameters),
         drive(start.drive) {

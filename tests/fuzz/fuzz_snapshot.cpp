@@ -28,7 +28,7 @@ void try_snapshot(std::span<const std::byte> input) {
   require(synthetic::broken_invariant(state) == nullptr);
 
   // What was read can be written and read again.
-  std::vector<std::byte> bytes(snapshot_bytes_bound(kCapacity, *codec));
+  std::vector<std::byte> bytes(snapshot_bytes_bound(State(kCapacity), *codec));
   ByteWriter out(bytes);
   write_snapshot(*snapshot, state, *codec, out);
   require(!out.overflow());

@@ -112,6 +112,8 @@ struct CodecSetup {
   std::uint32_t capacity = 0;                ///< 1 .. kMaxCapacity
   std::span<const std::byte> tables = {};    ///< as the session has them; empty without takes_tables
   std::string_view predictor = "ballistic";  ///< Predictor::name() of the session; gains depend on it
+  Groups groups = {};                        ///< of the stream's states
+  std::span<const std::int32_t> radii = {};  ///< lattice units, by type; with orientations
   RunBlocks run_blocks = {};  ///< how to code blocks side by side, where a codec can; empty: one by one
 };
 

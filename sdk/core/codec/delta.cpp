@@ -13,6 +13,7 @@ struct DeltaCodec::Impl {
   std::unique_ptr<Codec> codec;
   std::uint32_t capacity = 0;
   TypeId type_count = 0;
+  Groups groups;
   StreamParameters parameters;  // in force
   StreamParameters next;        // server: from the next encode() on
   bool round_next = false;      // server: in the next encode()
@@ -60,7 +61,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
   switch (static_cast<SectionType>(type)) {
     case SectionType::kLifecycle: {
       if (!enter(1)) break;
-      if (auto read = read_lifecycle(body, lifecycle); !read) return read;
+      if (auto read = read_lifecycle(body, groups, lifecycle); !read) return read;
       std::copy(predicted.alive().begin(), predicted.alive().end(), alive.begin());
       if (const char* reason = check_lifecycle(lifecycle, alive, type_count)) {
         return fail(ErrorCode::kMalformed, reason);
@@ -127,12 +128,13 @@ void DeltaCodec::Impl::remember(const Delta& delta) {
 }
 
 DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
-                       const StreamParameters& parameters, TypeId type_count)
+                       const StreamParameters& parameters, TypeId type_count, const Groups& groups)
     : impl_(std::make_unique<Impl>()) {
   TANDEM_ASSERT(valid_parameters(parameters.codec));
   impl_->codec = std::move(codec);
   impl_->capacity = capacity;
   impl_->type_count = type_count;
+  impl_->groups = groups;
   impl_->parameters = parameters;
   impl_->next = parameters;
   impl_->lifecycle.reserve(std::min<std::size_t>(capacity, 1024));
@@ -146,8 +148,8 @@ DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
 DeltaCodec::~DeltaCodec() = default;
 
 std::size_t DeltaCodec::bound() const {
-  return 3 * kMostSectionHeaderBytes + impl_->capacity * kMostLifecycleBytesPerSlot + kMostParametersBytes +
-         kRoundingBytes + impl_->codec->bound();
+  return 3 * kMostSectionHeaderBytes + impl_->capacity * most_lifecycle_bytes_per_slot(impl_->groups) +
+         kMostParametersBytes + kRoundingBytes + impl_->codec->bound();
 }
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
@@ -162,7 +164,8 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
     std::copy(state.alive().begin(), state.alive().end(), impl_->alive.begin());
     TANDEM_ASSERT(check_lifecycle(lifecycle, impl_->alive, impl_->type_count) == nullptr);
 #endif
-    put_section(SectionType::kLifecycle, writer, [&](ByteWriter& body) { write_lifecycle(lifecycle, body); });
+    put_section(SectionType::kLifecycle, writer,
+                [&](ByteWriter& body) { write_lifecycle(lifecycle, impl_->groups, body); });
     apply_lifecycle(lifecycle, state);
   }
   if (impl_->next != impl_->parameters) {

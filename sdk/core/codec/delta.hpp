@@ -16,14 +16,22 @@ namespace tandem {
 
 enum class LifecycleKind : std::uint8_t { kDespawn = 0, kSpawn = 1, kTeleport = 2, kTypeChange = 3 };
 
+/// Groups that a teleport names: bit i for the i-th that the stream lists.
+inline constexpr std::uint8_t kMovesPosition = 1, kMovesOrientation = 2;
+/// All of a stream.
+[[nodiscard]] constexpr std::uint8_t moves_all(const Groups& groups) {
+  return groups.orientation ? kMovesPosition | kMovesOrientation : kMovesPosition;
+}
+
 /// One explicit change of a slot. Within a delta: ascending by slot; for one slot the only pair allowed is
 /// despawn then spawn (reuse within a frame).
 struct LifecycleRecord {
   LifecycleKind kind = LifecycleKind::kDespawn;
   Slot slot = 0;
-  std::uint8_t reuse = 0;  ///< spawn only
-  TypeId type = 0;         ///< spawn and type change
-  BodyState body;          ///< spawn and teleport
+  std::uint8_t reuse = 0;                ///< spawn only
+  TypeId type = 0;                       ///< spawn and type change
+  BodyState body;                        ///< spawn, and of a teleport what `groups` says
+  std::uint8_t groups = kMovesPosition;  ///< teleport only: at least one of the stream's
 };
 
 /// What a payload says. Spans stay valid until the next encode() or decode() of the codec that read it.
@@ -41,7 +49,7 @@ class DeltaCodec {
  public:
   /// `codec` must be made for `capacity`.
   DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity, const StreamParameters& parameters,
-             TypeId type_count);
+             TypeId type_count, const Groups& groups = {});
   DeltaCodec(DeltaCodec&&) noexcept;
   DeltaCodec& operator=(DeltaCodec&&) noexcept;
   DeltaCodec(const DeltaCodec&) = delete;

@@ -8,16 +8,47 @@ bool within(const Vec3i& values, std::int32_t limit) {
                      [limit](std::int32_t x) { return -limit <= x && x <= limit; });
 }
 
+// Also of what a record does not say, which is valid as it is.
+bool is_on_lattice(const BodyState& body) {
+  return within(body.p, kPositionLimit) && within(body.v, kVelocityLimit) && valid_quaternion(body.q) &&
+         valid_spin(body.w);
+}
+
 constexpr std::uint32_t kKinds = 4;
 constexpr std::size_t kMostHeadBytes = 4;
 constexpr std::size_t kMostTypeBytes = 3;
-constexpr std::uint8_t kPositionMask = 1;  // position is the first group listed, and the only one
 
 bool carries_body(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport;
 }
+// The content of a record, of a spawn and a teleport: each number of the groups that it names.
+template <class Visit>
+void visit_body(const LifecycleRecord& record, const Groups& groups, BodyState& body, const Visit& visit) {
+  const unsigned named = record.kind == LifecycleKind::kSpawn ? moves_all(groups) : record.groups;
+  if ((named & kMovesPosition) != 0) {
+    for (auto* values : {&body.p, &body.v}) std::for_each(values->begin(), values->end(), visit);
+  }
+  if ((named & kMovesOrientation) != 0) {
+    std::for_each(body.q.begin(), body.q.end(), visit);
+    std::for_each(body.w.begin(), body.w.end(), visit);
+  }
+}
 bool carries_type(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTypeChange;
+}
+
+// rest and c of the whole body begin anew.
+void teleport(const LifecycleRecord& record, State& state) {
+  BodyState body = state.body(record.slot);
+  if ((record.groups & kMovesPosition) != 0) {
+    body.p = record.body.p;
+    body.v = record.body.v;
+  }
+  if ((record.groups & kMovesOrientation) != 0) {
+    body.q = record.body.q;
+    body.w = record.body.w;
+  }
+  state.set_body(record.slot, body);
 }
 
 }  // namespace
@@ -39,31 +70,30 @@ const char* check_lifecycle(std::span<const LifecycleRecord> records, std::span<
       return "despawn, teleport or type change of a dead slot";
     }
     if (carries_type(record.kind) && record.type >= type_count) return "type that the session does not list";
-    if (carries_body(record.kind) &&
-        (!within(record.body.p, kPositionLimit) || !within(record.body.v, kVelocityLimit))) {
+    if (carries_body(record.kind) && !is_on_lattice(record.body))
       return "spawn or teleport beyond the lattice";
-    }
     if (record.kind == LifecycleKind::kSpawn) alive[record.slot] = 1;
     if (record.kind == LifecycleKind::kDespawn) alive[record.slot] = 0;
   }
   return nullptr;
 }
 
-void write_lifecycle(std::span<const LifecycleRecord> records, ByteWriter& out) {
+void write_lifecycle(std::span<const LifecycleRecord> records, const Groups& groups, ByteWriter& out) {
   Slot previous = 0;
   for (const LifecycleRecord& record : records) {
     out.put_leb128(std::uint64_t{record.slot - previous} * kKinds + static_cast<std::uint8_t>(record.kind));
     previous = record.slot;
     if (record.kind == LifecycleKind::kSpawn) out.put(record.reuse);
     if (carries_type(record.kind)) out.put_leb128(record.type);
-    if (record.kind == LifecycleKind::kTeleport) out.put(kPositionMask);
+    if (record.kind == LifecycleKind::kTeleport) out.put(record.groups);
     if (!carries_body(record.kind)) continue;
-    for (const std::int32_t value : record.body.p) out.put(value);
-    for (const std::int32_t value : record.body.v) out.put(value);
+    BodyState body = record.body;
+    visit_body(record, groups, body, [&out](std::int32_t& value) { out.put(value); });
   }
 }
 
-Result<void> read_lifecycle(std::span<const std::byte> section, std::vector<LifecycleRecord>& records) {
+Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& groups,
+                            std::vector<LifecycleRecord>& records) {
   records.clear();
   if (section.empty()) return fail(ErrorCode::kMalformed, "lifecycle section without a record");
   ByteReader in(section);
@@ -82,13 +112,13 @@ Result<void> read_lifecycle(std::span<const std::byte> section, std::vector<Life
       if (type > UINT16_MAX) return fail(ErrorCode::kMalformed, "type that the session does not list");
       record.type = static_cast<TypeId>(type);
     }
-    if (record.kind == LifecycleKind::kTeleport && in.get<std::uint8_t>() != kPositionMask && in.ok()) {
-      return fail(ErrorCode::kMalformed, "teleport of groups that the stream does not list");
+    if (record.kind == LifecycleKind::kTeleport) {
+      record.groups = in.get<std::uint8_t>();
+      if (in.ok() && (record.groups == 0 || (record.groups & ~unsigned{moves_all(groups)}) != 0))
+        return fail(ErrorCode::kMalformed, "teleport of groups that the stream does not list");
     }
-    if (carries_body(record.kind)) {
-      for (std::int32_t& value : record.body.p) value = in.get<std::int32_t>();
-      for (std::int32_t& value : record.body.v) value = in.get<std::int32_t>();
-    }
+    if (carries_body(record.kind))
+      visit_body(record, groups, record.body, [&in](std::int32_t& value) { value = in.get<std::int32_t>(); });
     records.push_back(record);
   }
   if (!in.ok())
@@ -106,7 +136,7 @@ void apply_lifecycle(std::span<const LifecycleRecord> records, State& state) {
         state.spawn(record.slot, record.reuse, record.type, record.body);
         break;
       case LifecycleKind::kTeleport:
-        state.set_body(record.slot, record.body);
+        teleport(record, state);
         break;
       case LifecycleKind::kTypeChange:
         state.type()[record.slot] = record.type;

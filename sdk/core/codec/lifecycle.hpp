@@ -11,7 +11,9 @@
 namespace tandem {
 
 /// Despawn and spawn of one slot: the most that a slot can cost.
-inline constexpr std::size_t kMostLifecycleBytesPerSlot = 4 + 4 + 1 + 3 + 24;
+[[nodiscard]] constexpr std::size_t most_lifecycle_bytes_per_slot(const Groups& groups) {
+  return 4 + 4 + 1 + 3 + 24 + (groups.orientation ? 28 : 0);
+}
 
 /// Why `records` break the rules (order, alive and dead slots, ranges) on top of the `alive` column; null if
 /// they do not. Leaves in `alive` the column after the records.
@@ -19,10 +21,10 @@ inline constexpr std::size_t kMostLifecycleBytesPerSlot = 4 + 4 + 1 + 3 + 24;
                                           std::span<std::uint8_t> alive, TypeId type_count);
 
 /// Appends the body of a lifecycle section.
-void write_lifecycle(std::span<const LifecycleRecord> records, ByteWriter& out);
+void write_lifecycle(std::span<const LifecycleRecord> records, const Groups& groups, ByteWriter& out);
 
 /// Reads all of `section` into `records` (replaced). Checks the layout only. Errors: kMalformed.
-[[nodiscard]] Result<void> read_lifecycle(std::span<const std::byte> section,
+[[nodiscard]] Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& groups,
                                           std::vector<LifecycleRecord>& records);
 
 /// Does what the records say. They must have passed check_lifecycle().

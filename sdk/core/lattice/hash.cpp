@@ -27,7 +27,10 @@ Update fastest_update() {
 
 struct StateHasher::Impl {
   using Working = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
-  static constexpr std::size_t kLeaves = 2;  // of a block: what all groups share, and the position group
+  // Of a block: what all groups share, positions, orientations.
+  [[nodiscard]] static std::size_t leaves_of(const State& state) {
+    return state.groups().orientation ? 3 : 2;
+  }
 
   // The part of a column, or of several one after another, that belongs to a block.
   void add(XXH3_state_t* h, const auto& column, Slot first, std::uint32_t slots) const {
@@ -51,12 +54,18 @@ struct StateHasher::Impl {
     add(h, state.rest(), first, slots);
     add_all(h, extra.codec, state, first, slots);
     add_all(h, extra.predictor, state, first, slots);
-    leaves[block * kLeaves] = XXH3_64bits_digest(h);
+    std::uint64_t* leaf = leaves.data() + block * leaves_of(state);
+    *leaf++ = XXH3_64bits_digest(h);
     XXH3_64bits_reset(h);
     for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.p(i), first, slots);
     for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.v(i), first, slots);
     for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.c(i), first, slots);
-    leaves[block * kLeaves + 1] = XXH3_64bits_digest(h);
+    *leaf++ = XXH3_64bits_digest(h);
+    if (!state.groups().orientation) return;
+    XXH3_64bits_reset(h);
+    for (std::size_t i = 0; i < kQuaternionChannels; ++i) add(h, state.q(i), first, slots);
+    for (std::size_t i = 0; i < kSpinChannels; ++i) add(h, state.w(i), first, slots);
+    *leaf = XXH3_64bits_digest(h);
   }
 
   Update update = fastest_update();
@@ -74,7 +83,7 @@ std::uint64_t StateHasher::hash(const State& state, const ExtraColumns& extra, c
   Impl& m = *impl_;
   const std::uint32_t blocks = block_count(state.capacity());
   while (m.working.size() < blocks) m.working.emplace_back(XXH3_createState(), &XXH3_freeState);
-  m.leaves.resize(blocks * Impl::kLeaves);
+  m.leaves.resize(blocks * Impl::leaves_of(state));
   if (blocks > 1 && run) {
     const auto all = [&](std::uint32_t block) { m.hash_block(state, extra, block); };
     run(blocks, std::ref(all));  // by reference: a copy would be allocated

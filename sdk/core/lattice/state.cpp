@@ -4,10 +4,14 @@
 
 namespace tandem {
 
-State::State(std::uint32_t capacity) : alive_(capacity), reuse_(capacity), type_(capacity), rest_(capacity) {
+State::State(std::uint32_t capacity, const Groups& groups)
+    : alive_(capacity), reuse_(capacity), type_(capacity), rest_(capacity) {
   for (auto* columns : {&p_, &v_, &c_}) {
     for (auto& column : *columns) column.assign(capacity, 0);
   }
+  if (!groups.orientation) return;
+  for (auto& column : q_) column.assign(capacity, 0);
+  for (auto& column : w_) column.assign(capacity, 0);
 }
 
 BodyState State::body(Slot slot) const {
@@ -16,6 +20,9 @@ BodyState State::body(Slot slot) const {
     body.p[i] = p_[i][slot];
     body.v[i] = v_[i][slot];
   }
+  if (!groups().orientation) return body;
+  body.q = quaternion(slot);
+  for (std::size_t i = 0; i < kSpinChannels; ++i) body.w[i] = w_[i][slot];
   return body;
 }
 
@@ -26,6 +33,9 @@ void State::set_body(Slot slot, const BodyState& body) {
     v_[i][slot] = std::clamp(body.v[i], -kVelocityLimit, kVelocityLimit);
     c_[i][slot] = 0;
   }
+  if (!groups().orientation) return;
+  set_quaternion(slot, body.q);
+  for (std::size_t i = 0; i < kSpinChannels; ++i) w_[i][slot] = body.w[i];
 }
 
 void State::spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& body) {
@@ -36,7 +46,7 @@ void State::spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& b
 }
 
 void State::despawn(Slot slot) {
-  set_body(slot, BodyState{});
+  set_body(slot, BodyState{{}, {}, {}, {}});
   alive_[slot] = 0;
   reuse_[slot] = 0;
   type_[slot] = 0;

@@ -4,6 +4,30 @@
 
 namespace tandem {
 
+namespace {
+
+Result<void> check_groups(const Layout& layout) {
+  const auto refuse = [](std::string reason) { return fail(ErrorCode::kInvalidArgument, std::move(reason)); };
+  for (const std::string& group : layout.groups) {
+    if (group != kPositionGroup && group != kOrientationGroup)
+      return fail(ErrorCode::kUnsupported, "unknown channel group '" + group + "'");
+  }
+  if (layout.groups.empty() || layout.groups.size() > 2 || layout.groups.front() != kPositionGroup ||
+      (layout.groups.size() == 2 && layout.groups.back() != kOrientationGroup)) {
+    return refuse("channel groups other than position, or position and orientation");
+  }
+  if (layout.groups.size() == 1 && !layout.radii.empty()) return refuse("radii that no channel group needs");
+  if (layout.groups.size() == 1) return {};
+  if (layout.radii.size() != layout.type_count) return refuse("orientations need a radius for each type");
+  for (const std::int32_t radius : layout.radii) {
+    if (radius < 1 || radius > kPositionLimit)
+      return refuse("a radius that is not in 1 .. 2^30 lattice units");
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<void> check_layout(const Layout& layout) {
   const auto refuse = [](std::string reason) { return fail(ErrorCode::kInvalidArgument, std::move(reason)); };
   if (layout.capacity == 0 || layout.capacity > kMaxCapacity) {
@@ -15,14 +39,10 @@ Result<void> check_layout(const Layout& layout) {
   if (layout.lead > kMaxLead)
     return refuse("lead " + std::to_string(layout.lead) + " is above " + std::to_string(kMaxLead));
   if (layout.region_blocks != 0) return fail(ErrorCode::kUnsupported, "several regions are not supported");
-  for (const std::string& group : layout.groups) {
-    if (group != kPositionGroup)
-      return fail(ErrorCode::kUnsupported, "unknown channel group '" + group + "'");
-  }
-  if (layout.groups.size() != 1) return refuse("channel groups that are none or repeat");
-  if (!layout.radii.empty()) return refuse("radii that no channel group needs");
-  return {};
+  return check_groups(layout);
 }
+
+Groups groups_of(const Layout& layout) { return {.orientation = layout.groups.size() > 1}; }
 
 std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
                           std::uint64_t lattice_unit_bits) {

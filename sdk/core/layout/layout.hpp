@@ -22,8 +22,9 @@ struct StreamId {
   friend bool operator==(const StreamId&, const StreamId&) = default;
 };
 
-/// The one channel group so far: p, v and c.
+/// Channel groups: p, v and c; the quaternion and the angular velocity.
 inline constexpr const char* kPositionGroup = "position";
+inline constexpr const char* kOrientationGroup = "orientation";
 
 /// Decides how the bytes of a stream are read and how its predicted step is taken. The server chooses it, the
 /// session announces it, and a client builds its timeline from it; it never changes within a generation.
@@ -34,7 +35,9 @@ struct Layout {
   std::uint32_t region_blocks =
       0;  ///< blocks of a region; 0, the one value that is played: one region of all
   std::vector<std::string> groups{kPositionGroup};  ///< channel groups in the order of their columns
-  std::vector<std::int32_t> radii;                  ///< lattice units, by type; empty: no group needs them
+  /// Of the sphere about a body's centre that holds its surface, lattice units, by type, 1 .. 2^30. With
+  /// orientations alone.
+  std::vector<std::int32_t> radii;
   std::string codec = "tracker";
   std::vector<std::byte> codec_tables;  ///< see make_codec()
   /// Of frame 0; a snapshot holds those in force.
@@ -43,6 +46,9 @@ struct Layout {
   std::vector<std::int32_t> predictor_constants;  ///< see make_predictor()
   friend bool operator==(const Layout&, const Layout&) = default;
 };
+
+/// Of a layout that passed check_layout().
+[[nodiscard]] Groups groups_of(const Layout& layout);
 
 /// Checks every number and the groups; whether codec and predictor exist and fit their tables, only making
 /// them shows. Errors: kInvalidArgument, kUnsupported (groups, regions).

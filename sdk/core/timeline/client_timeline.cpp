@@ -21,7 +21,7 @@ struct ClientTimeline::Impl {
   Impl(TimelineParts made, const Layout& layout)
       : parts(std::move(made)), type_count(layout.type_count), max_lead(layout.lead) {
     // With lead 0 the next frame still needs a place while its delta is being checked.
-    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(layout.capacity), {}});
+    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(layout.capacity, groups_of(layout)), {}});
   }
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }

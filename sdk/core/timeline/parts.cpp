@@ -11,11 +11,14 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
                            .capacity = layout.capacity,
                            .tables = layout.codec_tables,
                            .predictor = predictor->name(),
+                           .groups = groups_of(layout),
+                           .radii = layout.radii,
                            .run_blocks = local.run_blocks});
   if (!codec) return tl::unexpected<Error>(codec.error());
-  return TimelineParts{std::move(predictor),
-                       DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count),
-                       local.run_blocks, StateHasher()};
+  return TimelineParts{
+      std::move(predictor),
+      DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count, groups_of(layout)),
+      local.run_blocks, StateHasher()};
 }
 
 }  // namespace tandem

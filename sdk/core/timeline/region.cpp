@@ -128,8 +128,23 @@ void code_columns(Columns& columns, TheState& state, CodecColumns codec_columns,
     columns.column(state.v(i), Guess::kHalf, -kVelocityLimit, kVelocityLimit);
   for (std::size_t i = 0; i < kPositionChannels; ++i)
     columns.column(state.c(i), Guess::kHalf, -kVelocityLimit, kVelocityLimit);
+  if (state.groups().orientation) {
+    for (std::size_t i = 0; i < kQuaternionChannels; ++i)
+      columns.column(state.q(i), Guess::kZero, -kQuaternionOne, kQuaternionOne);
+    for (std::size_t i = 0; i < kSpinChannels; ++i)
+      columns.column(state.w(i), Guess::kZero, -kSpinLimit, kSpinLimit);
+  }
   for (std::size_t at = 0; at < codec_columns.size(); at += state.capacity())
     columns.column(codec_columns.subspan(at, state.capacity()), Guess::kZero, INT8_MIN, INT8_MAX);
+}
+
+// Whether all orientations are some.
+bool are_turns(const State& state) {
+  for (Slot slot = 0; state.groups().orientation && slot < state.capacity(); ++slot) {
+    const BodyState body = state.body(slot);
+    if (state.alive()[slot] != 0 && !(valid_quaternion(body.q) && valid_spin(body.w))) return false;
+  }
+  return true;
 }
 
 std::span<const std::int8_t> numbers(std::span<const std::byte> columns) {
@@ -141,12 +156,16 @@ std::span<std::int8_t> numbers(std::span<std::byte> columns) {
 
 }  // namespace
 
-std::size_t region_bytes_bound(std::uint32_t capacity, const Codec& codec) {
+std::size_t region_bytes_bound(const State& state, const Codec& codec) {
+  const std::uint32_t capacity = state.capacity();
   // Differences of two numbers have a bit more than the numbers.
   const std::size_t slot_bits =
       1 + most_number_bits(1) + most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX) +
       kPositionChannels *
           (most_number_bits(2U * kPositionLimit) + 2 * most_number_bits(2U * kVelocityLimit)) +
+      (state.groups().orientation ? kQuaternionChannels * most_number_bits(2U * kQuaternionOne) +
+                                        kSpinChannels * most_number_bits(2U * kSpinLimit)
+                                  : 0) +
       codec.columns().size() / capacity * most_number_bits(UINT8_MAX);
   const std::size_t bits = capacity * slot_bits + codec.models_bits_bound();
   constexpr std::size_t kFixedBytes = 256;  // region, hash, shifts; what models lose before they have learnt
@@ -171,11 +190,11 @@ Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId typ
     return fail(ErrorCode::kMalformed, "snapshot of a region that the stream does not have");
   const auto hash = in.get<std::uint64_t>();
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated region of a snapshot");
-  state = State(state.capacity());
+  state = State(state.capacity(), state.groups());
   RegionReader region(state, in.get_bytes(in.remaining()));
   std::vector<std::byte> columns(codec.columns().size());
   code_columns(region, state, numbers(std::span(columns)), type_count - 1);
-  if (!region.good()) return fail(ErrorCode::kMalformed, "snapshot value out of range");
+  if (!region.good() || !are_turns(state)) return fail(ErrorCode::kMalformed, "snapshot value out of range");
   if (auto loaded = codec.load(columns, region.coder()); !loaded)
     return tl::unexpected<Error>(loaded.error());
   return hash;

@@ -10,7 +10,7 @@
 namespace tandem {
 
 /// Most bytes write_region() writes.
-[[nodiscard]] std::size_t region_bytes_bound(std::uint32_t capacity, const Codec& codec);
+[[nodiscard]] std::size_t region_bytes_bound(const State& state, const Codec& codec);
 
 /// Writes region 0, the only one, with everything in it; `hash`: the region's.
 void write_region(std::uint64_t hash, const State& state, const Codec& codec, ByteWriter& out);

@@ -10,11 +10,11 @@
 namespace tandem {
 
 struct ServerTimeline::Impl {
-  Impl(TimelineParts made, std::uint32_t capacity, Epoch the_epoch, StreamId the_stream)
+  Impl(TimelineParts made, const Layout& layout, Epoch the_epoch, StreamId the_stream)
       : parts(std::move(made)),
         epoch(the_epoch),
         stream(the_stream),
-        state(capacity),
+        state(layout.capacity, groups_of(layout)),
         payload(parts.delta.bound()) {
     hash = parts.hash(state);
   }
@@ -43,7 +43,7 @@ Result<ServerTimeline> ServerTimeline::create(const Layout& layout, Epoch epoch,
                                               StreamId stream) {
   auto parts = make_parts(layout, local, std::move(predictor));
   if (!parts) return tl::unexpected<Error>(parts.error());
-  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), layout.capacity, epoch, stream));
+  return ServerTimeline(std::make_unique<Impl>(std::move(*parts), layout, epoch, stream));
 }
 
 ServerTimeline::ServerTimeline(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -52,7 +52,8 @@ ServerTimeline& ServerTimeline::operator=(ServerTimeline&&) noexcept = default;
 ServerTimeline::~ServerTimeline() = default;
 
 void ServerTimeline::start(Frame frame, const State& state, const Drive& drive) {
-  TANDEM_ASSERT(state.capacity() == impl_->state.capacity() && valid_drive(drive));
+  TANDEM_ASSERT(state.capacity() == impl_->state.capacity() && state.groups() == impl_->state.groups() &&
+                valid_drive(drive));
   impl_->frame = frame;
   impl_->state = state;
   impl_->drive = drive;
@@ -128,7 +129,7 @@ void ServerTimeline::snapshot(std::vector<std::byte>& out) {
 }
 
 std::size_t ServerTimeline::snapshot_bound() const {
-  return snapshot_bytes_bound(impl_->state.capacity(), impl_->parts.delta.codec());
+  return snapshot_bytes_bound(impl_->state, impl_->parts.delta.codec());
 }
 
 }  // namespace tandem

@@ -69,9 +69,9 @@ Result<void> read_all_parameters(std::span<const std::byte> section, Snapshot& s
 
 }  // namespace
 
-std::size_t snapshot_bytes_bound(std::uint32_t capacity, const Codec& codec) {
+std::size_t snapshot_bytes_bound(const State& state, const Codec& codec) {
   return kHeaderBytes + kSections * kMostSectionHeaderBytes + kMostParametersBytes +
-         kMaxPendingInputs * kInputBytes + region_bytes_bound(capacity, codec);
+         kMaxPendingInputs * kInputBytes + region_bytes_bound(state, codec);
 }
 
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out) {

@@ -24,7 +24,7 @@ struct Snapshot {
 };
 
 /// Most bytes write_snapshot() writes.
-[[nodiscard]] std::size_t snapshot_bytes_bound(std::uint32_t capacity, const Codec& codec);
+[[nodiscard]] std::size_t snapshot_bytes_bound(const State& state, const Codec& codec);
 
 /// Writes `snapshot`, `state` and the codec's state.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out);

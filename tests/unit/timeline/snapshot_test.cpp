@@ -15,7 +15,7 @@ std::unique_ptr<Codec> codec_for(std::uint32_t capacity) {
 
 std::vector<std::byte> write(const Snapshot& snapshot, const State& state) {
   const auto codec = codec_for(state.capacity());
-  std::vector<std::byte> bytes(snapshot_bytes_bound(state.capacity(), *codec));
+  std::vector<std::byte> bytes(snapshot_bytes_bound(state, *codec));
   ByteWriter out(bytes);
   write_snapshot(snapshot, state, *codec, out);
   EXPECT_FALSE(out.overflow());

@@ -10,6 +10,7 @@
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/move.hpp"
 #include "sdk/core/predict/rest.hpp"
+#include "sdk/core/predict/turns.hpp"
 
 namespace tandem {
 namespace {
@@ -228,6 +229,7 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
                 views_);
   }
   write(from, input, to);
+  turn_bodies(from, to);
 }
 
 void Contact::step_slots(const State& from, State& to, const StepInput& input,

@@ -1,0 +1,42 @@
+#pragma once
+// Orientations on the lattice: quaternions, and how an angular velocity turns them. All integers, the same to
+// the last bit everywhere; idl/PROTOCOL.md, "Turn", has the same formulas.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace tandem {
+
+/// x, y, z, w in 1/2^30, of norm 1; turns from the body's frame to the world's. q and -q are the same turn.
+using Quaternion = std::array<std::int32_t, 4>;
+/// A rotation vector, or an angular velocity per frame: world frame, 2^-28 rad, at most 2 rad long.
+using Spin = std::array<std::int32_t, 3>;
+
+inline constexpr std::size_t kQuaternionChannels = 4, kSpinChannels = 3;
+inline constexpr std::int32_t kQuaternionOne = 1 << 30;
+inline constexpr std::int32_t kSpinLimit = 1 << 29;  ///< of the vector's length
+inline constexpr Quaternion kNoTurn{0, 0, 0, kQuaternionOne};
+
+/// Of length 1 within 2^-10, so that the turn keeps it there.
+[[nodiscard]] bool valid_quaternion(const Quaternion& q);
+/// No longer than kSpinLimit.
+[[nodiscard]] bool valid_spin(const Spin& spin);
+/// The vector, all of it halved until it is valid. |components| < 2^62.
+[[nodiscard]] Spin limited_spin(std::array<std::int64_t, 3> spin);
+
+/// `q` turned by a valid `spin`. The norm stays within 1e-8 of 1, from an inexact one it moves there.
+[[nodiscard]] Quaternion turned(const Quaternion& q, const Spin& spin);
+
+/// Columns of many bodies, each as long as `still`.
+struct TurnColumns {
+  std::array<const std::int32_t*, kQuaternionChannels> from;
+  std::array<std::int32_t*, kQuaternionChannels> to;  ///< may be `from`
+  std::array<const std::int32_t*, kSpinChannels> spin;
+};
+/// turned() of every body; one with 1 in `still` stays as it is. A quaternion of zeros (a dead slot)
+/// stays so.
+void turn_all(const TurnColumns& columns, std::span<const std::uint8_t> still);
+
+}  // namespace tandem
