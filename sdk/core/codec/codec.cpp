@@ -28,7 +28,11 @@ constexpr std::array<KnownCodec, 6> kKnown{
        .takes_budget = true,
        .usual_budget = kPaperBudgetBytes}},
      {"tracker",
-      {.reads_threshold = true, .reads_gains = true, .keeps_rounding = true, .takes_budget = true}}}};
+      {.reads_threshold = true,
+       .reads_gains = true,
+       .keeps_rounding = true,
+       .turns = true,
+       .takes_budget = true}}}};
 constexpr auto kNames = [] {
   std::array<std::string_view, kKnown.size()> names{};
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kKnown[i].name;
@@ -65,6 +69,8 @@ Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup) {
   if (!traits) return tl::unexpected<Error>(traits.error());
   if (!traits->takes_tables && !setup.tables.empty())
     return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' takes no tables");
+  if (setup.groups.orientation && !traits->turns)
+    return fail(ErrorCode::kUnsupported, "codec '" + std::string(name) + "' codes no orientations");
   if (name == "tracker") return std::make_unique<Tracker>(setup);
   if (name == "none")
     return std::make_unique<BlockCodec<AbsoluteCoding<true>>>(name, capacity, AbsoluteCoding<true>(capacity));

@@ -27,6 +27,14 @@ namespace tandem {
   return sum;
 }
 
+/// How far a point of the surface of a body may be off: the distance of the centres and 2 r sin(angle / 2),
+/// lattice units, rounded up; at most a lattice unit more than it is. States with orientations.
+[[nodiscard]] std::uint64_t surface_error(const BodyState& body, const BodyState& target,
+                                          std::int32_t radius);
+/// The rotation vector (2^-28 rad) that turns `from` into `to`, near enough to choose by; where it takes more
+/// than 2 rad one of the same direction that takes less.
+[[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
+
 /// Marks (1) the slots of a block that may be off by more than `threshold`, and none of the others (0) is.
 /// `marks` holds kBlockSlots bytes; the last eight are padded with zeros. Plain loop over columns,
 /// vectorised.

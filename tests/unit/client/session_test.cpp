@@ -95,7 +95,7 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& s) { s.types.clear(); }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.parameters.codec.threshold = 0; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.region_blocks = 1; }));
-  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"orientation"}; }));
+  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"smell"}; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"position", "position"}; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.radii = {1}; }));
   EXPECT_TRUE(refused([](auto& s) { s.epoch = 0; }));
@@ -104,7 +104,7 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
 TEST_F(SessionTest, TheFirstStreamThatCanBePlayedIsPlayed) {
   auto session = server.session;
   session.streams.insert(session.streams.begin(), session.streams[0]);
-  session.streams[0].layout.groups = {"position", "orientation"};
+  session.streams[0].layout.groups = {"position", "smell"};
   session.streams[1].id.id = 1;
   rehash(session);
   const auto chosen = choose_stream(session);
@@ -115,13 +115,13 @@ TEST_F(SessionTest, TheFirstStreamThatCanBePlayedIsPlayed) {
 TEST_F(SessionTest, WithoutAStreamToPlayTheReasonOfEachIsSaid) {
   auto session = server.session;
   session.streams.push_back(session.streams[0]);
-  session.streams[0].layout.groups = {"orientation"};
+  session.streams[0].layout.groups = {"smell"};
   session.streams[1].id.id = 1;
   session.streams[1].layout.codec = "of the future";
   rehash(session);
   const auto chosen = choose_stream(session);
   ASSERT_FALSE(chosen.has_value());
-  EXPECT_NE(chosen.error().message.find("unknown channel group 'orientation'"), std::string::npos);
+  EXPECT_NE(chosen.error().message.find("unknown channel group 'smell'"), std::string::npos);
   EXPECT_NE(chosen.error().message.find("stream 1: "), std::string::npos) << chosen.error().message;
 }
 

@@ -30,7 +30,7 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   State state = one_body();
   TrackerBody body;
   body.age = 9;
-  filter_of(kThreshold).correct(state, 0, {{2, 0, 0}}, body);
+  filter_of(kThreshold).move(state, 0, {{2, 0, 0}}, body);
   const std::int32_t d = 2 * 3891;  // 0.95 * 4096, down
   EXPECT_EQ(state.p(0)[0], d);
   EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * d / 10, 8);
@@ -45,7 +45,7 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
 TEST(TrackerFilter, OfABodyCorrectedTwiceRunningMoreIsBelievedToBeVelocity) {
   State state = one_body();
   TrackerBody body;
-  filter_of(kThreshold).correct(state, 0, {{2, 0, 0}}, body);
+  filter_of(kThreshold).move(state, 0, {{2, 0, 0}}, body);
   EXPECT_NEAR(state.v(0)[0], 64 * 0.8 * (2 * 3891) / 2, 8);
   EXPECT_NEAR(state.c(0)[0], 64 * 0.8 * 0.15 * (2 * 3891) / 9, 8);
 }
@@ -54,12 +54,15 @@ TEST(TrackerFilter, ABodyPutToRestHoldsItselfUp) {
   State state = one_body();
   state.v(1)[0] = 700;
   TrackerBody body;
-  filter_of(kThreshold, {0, -640, 3}).correct(state, 0, {{0, 1, 0}, true}, body);
+  const TrackerFilter filter = filter_of(kThreshold, {0, -640, 3});
+  filter.move(state, 0, {{0, 1, 0}}, body);
+  filter.settle(state, 0, true);
   EXPECT_EQ(state.rest()[0], 1);
   EXPECT_GT(state.p(1)[0], 0);
   EXPECT_EQ(state.v(1)[0], 0);
   EXPECT_EQ((Vec3i{state.c(0)[0], state.c(1)[0], state.c(2)[0]}), (Vec3i{0, 640, -3}));
-  filter_of(kThreshold, {0, -640, 3}).correct(state, 0, {{0, 1, 0}}, body);
+  filter.move(state, 0, {{0, 1, 0}}, body);
+  filter.settle(state, 0, false);
   EXPECT_EQ(state.rest()[0], 0);
   EXPECT_GT(state.v(1)[0], 0);
 }
@@ -68,7 +71,7 @@ TEST(TrackerFilter, AccelerationReachesWhatHoldsABodyUpAtAnyThreshold) {
   constexpr std::int32_t kGravity = 1 << 20;
   State state = one_body();
   TrackerBody body;
-  for (int i = 0; i < 100'000; ++i) filter_of(1, {0, -kGravity, 0}).correct(state, 0, {{0, 127, 0}}, body);
+  for (int i = 0; i < 100'000; ++i) filter_of(1, {0, -kGravity, 0}).move(state, 0, {{0, 127, 0}}, body);
   EXPECT_EQ(state.c(1)[0], 2 * kGravity);
 }
 
@@ -76,7 +79,7 @@ TEST(TrackerFilter, BelievesCorrectionsThatKeepTheirDirectionMore) {
   const auto velocity_after = [](std::int8_t last) {
     State state = one_body();
     TrackerBody body{9, 5, {last, 0, 0}};
-    filter_of(kThreshold).correct(state, 0, {{2, 0, 0}}, body);
+    filter_of(kThreshold).move(state, 0, {{2, 0, 0}}, body);
     return state.v(0)[0];
   };
   EXPECT_NEAR(velocity_after(2), 1.5 * velocity_after(0), 4);
@@ -89,7 +92,7 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
     TrackerBody body;
     for (int i = 0; i < 20; ++i) {
       const std::int32_t far = sign * kMostTrackerSteps;
-      filter_of(kPositionLimit).correct(state, 0, {{far, far, far}}, body);
+      filter_of(kPositionLimit).move(state, 0, {{far, far, far}}, body);
     }
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(state.p(i)[0], sign * kPositionLimit);

@@ -122,7 +122,7 @@ TEST(TrackerModels, LearnTheShareOfOnesAndStayInTheirRange) {
   counts[0] = {0, 500};
   counts[1] = {500, 0};
   counts[2] = {375, 125};
-  for (int delta = 0; delta < 40; ++delta) models.learn(counts);
+  for (int delta = 0; delta < 40; ++delta) models.learn(counts, TrackerModelIndex::kCount);
   EXPECT_EQ(models.p1[0], TrackerModels::kMost);
   EXPECT_EQ(models.p1[1], TrackerModels::kLeast);
   EXPECT_NEAR(models.p1[2], 16384, 16);
@@ -134,14 +134,14 @@ TEST(TrackerModels, LearnTheShareOfOnesAndStayInTheirRange) {
 TEST(TrackerModels, YoungOnesLearnFasterThanThoseThatHaveSeenMuch) {
   TrackerModels models;
   TrackerCounts once{};
-  once[TrackerModelIndex::kSign] = {0, 3};
-  models.learn(once);
-  EXPECT_EQ(models.p1[TrackerModelIndex::kSign], (32768 + 3 * 65536) / 4);
+  once[TrackerModelIndex::kSteps] = {0, 3};
+  models.learn(once, TrackerModelIndex::kCount);
+  EXPECT_EQ(models.p1[TrackerModelIndex::kSteps], (32768 + 3 * 65536) / 4);
   TrackerCounts often{};
-  often[TrackerModelIndex::kSign] = {1000, 0};
-  models.learn(often);
-  models.learn(once);
-  EXPECT_LT(models.p1[TrackerModelIndex::kSign], 1500);
+  often[TrackerModelIndex::kSteps] = {1000, 0};
+  models.learn(often, TrackerModelIndex::kCount);
+  models.learn(once, TrackerModelIndex::kCount);
+  EXPECT_LT(models.p1[TrackerModelIndex::kSteps], 1500);
 }
 
 struct Coded {
@@ -242,7 +242,7 @@ TEST(TrackerModels, SectionsStayWithinOnePercentOfTheIdealLengthOfTheirModels) {
         code_block(coder, kSeed + frame, corrected_one_in);
       });
       real_bits += 8.0 * static_cast<double>(out.bytes.size());
-      models.learn(out.counts);
+      models.learn(out.counts, TrackerModelIndex::kCount);
     }
     EXPECT_GE(real_bits, ideal_bits);
     EXPECT_LT(real_bits, 1.01 * ideal_bits);

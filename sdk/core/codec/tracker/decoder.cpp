@@ -33,8 +33,7 @@ const char* decode_block(const TrackerFrame& frame, const Block& block, std::spa
   DecisionDecoder coder{range, &models, &part.counts};
   TrackerCorrection* const corrections = frame.delta.corrections.data() + block.first;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (!code_correction(coder, frame.scratch.contexts.of(corrected[i]), corrections[i]))
-      return "correction beyond any lattice";
+    if (!frame.code(coder, corrected[i], corrections[i])) return "correction beyond any lattice";
   }
   if (!coder.range.at_end()) return "bytes after the code stream";
   part.corrected = count;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sdk/core/codec/errors.hpp"
+#include "sdk/core/codec/tracker/joint_steps.hpp"
 
 namespace tandem {
 namespace {
@@ -34,16 +35,17 @@ Vec3i position(const State& state, Slot slot) {
 TrackerEncoder::Worth::Worth(std::int32_t threshold)
     : moving(threshold, kErrorWorth), at_rest(threshold, kRestingErrorWorth) {}
 
-TrackerEncoder::TrackerEncoder(std::uint32_t capacity)
-    : candidates_(capacity),
-      parts_(block_count(capacity)),
-      waiting_(capacity),
-      marks_(std::size_t{block_count(capacity)} * kBlockSlots),
-      stillness_(capacity) {
+TrackerEncoder::TrackerEncoder(const TrackerMemory& memory)
+    : candidates_(memory.capacity()),
+      parts_(block_count(memory.capacity())),
+      waiting_(memory.capacity()),
+      marks_(parts_.size() * kBlockSlots),
+      stillness_(memory.capacity(), memory.radii()) {
+  const std::uint32_t capacity = memory.capacity();
   std::size_t bytes = 0;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     parts_[b].first_byte = bytes;
-    bytes += kMostTrackerBytesPerBody * block_at(b, capacity).slots + kTrackerSlackBytes;
+    bytes += most_tracker_bytes_per_body(memory.turns()) * block_at(b, capacity).slots + kTrackerSlackBytes;
   }
   bytes_.resize(bytes);
   order_.reserve(capacity);
@@ -51,11 +53,12 @@ TrackerEncoder::TrackerEncoder(std::uint32_t capacity)
 
 std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const State& target,
                                              std::size_t budget, ByteWriter& out) {
-  budget = std::min({budget, tracker_bound(frame.memory.capacity()), out.rest().size()});
+  const std::size_t bound = tracker_bound(frame.memory.capacity(), frame.memory.turns());
+  budget = std::min({budget, bound, out.rest().size()});
   costs_.learn(frame.memory.models());
   stillness_.follow(frame.at, target);
   // Where bodies wait, the budget was too small a frame ago and probably still is.
-  const bool is_enough = !some_wait_ || budget >= tracker_bound(frame.memory.capacity());
+  const bool is_enough = !some_wait_ || budget >= bound;
   frame.for_each_block([&](const Block& block) {
     gather(frame, target, block);
     if (is_enough) choose(frame, target, block);
@@ -77,16 +80,31 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
   return frame.join();
 }
 
-void TrackerEncoder::gather(const TrackerFrame& frame, const State& target, const Block& block) {
+template <class Found>
+void TrackerEncoder::scan(const TrackerFrame& frame, const State& target, const Block& block,
+                          std::int32_t early, const Found& found) {
   const State& predicted = frame.at.predicted;
+  if (!frame.memory.turns()) {
+    const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
+                                                     kBlockSlots);
+    for_each_beyond(predicted, target, block, early, marks, found);
+    return;
+  }
+  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
+    if (frame.at.alive[slot] == 0) continue;
+    const std::uint64_t error =
+        surface_error(predicted.body(slot), target.body(slot), frame.memory.radii()[target.type()[slot]]);
+    if (error > static_cast<std::uint64_t>(early)) found(slot, error * error);
+  }
+}
+
+void TrackerEncoder::gather(const TrackerFrame& frame, const State& target, const Block& block) {
   const Worth worth(frame.at.parameters.threshold);
   const auto early = static_cast<std::int32_t>((frame.at.parameters.threshold * kEarlyShare) >> 8);
   Candidate* const first = candidates_.data() + block.first;
   Slot* const slots = frame.delta.slots.data() + block.first;
   std::uint32_t count = 0;
-  const std::span<std::uint8_t, kBlockSlots> marks(marks_.data() + std::size_t{block.index} * kBlockSlots,
-                                                   kBlockSlots);
-  for_each_beyond(predicted, target, block, early, marks, [&](Slot slot, std::uint64_t error) {
+  scan(frame, target, block, early, [&](Slot slot, std::uint64_t error) {
     const bool must = error > worth.moving.limit;
     if (!must && frame.memory.models().p1[frame.flag_of(slot)] <= frame.memory.gains().early()) return;
     slots[count] = slot;
@@ -99,13 +117,25 @@ void TrackerEncoder::gather(const TrackerFrame& frame, const State& target, cons
 void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, const Worth& worth,
                             Candidate& candidate) {
   const Slot slot = candidate.slot;
-  TrackerSteps& steps = candidate.correction.steps;
-  candidate.correction.rest = stillness_.is_still(frame.at, slot);
-  const bool inside = choose_steps(position(frame.at.predicted, slot), position(target, slot),
-                                   TrackerSteppings(frame.at.parameters.threshold, frame.at.position_bits),
-                                   candidate.correction.rest ? worth.at_rest : worth.moving, costs_,
-                                   frame.scratch.contexts.of(slot), steps);
-  const bool is_of_use = inside || (candidate.must && steps != TrackerSteps{});
+  TrackerCorrection& correction = candidate.correction;
+  correction.rest = stillness_.is_still(frame.at, target, slot);
+  const ErrorWorth& of_error = correction.rest ? worth.at_rest : worth.moving;
+  const TrackerContext context = frame.scratch.contexts.of(slot);
+  const std::int32_t threshold = frame.at.parameters.threshold;
+  bool inside = false;
+  if (frame.memory.turns()) {
+    const BodyState from = frame.at.predicted.body(slot);
+    const BodyState to = target.body(slot);
+    const std::int32_t radius = frame.memory.radii()[target.type()[slot]];
+    inside = choose_joint_steps({from, to, radius, threshold, frame.at.position_bits}, of_error, costs_,
+                                context, frame.turn_context_of(slot), correction);
+  } else {
+    inside = choose_steps(position(frame.at.predicted, slot), position(target, slot),
+                          TrackerSteppings(threshold, frame.at.position_bits), of_error, costs_, context,
+                          correction.steps);
+  }
+  const bool is_of_use =
+      inside || (candidate.must && (is_some(correction.steps) || is_some(correction.turn)));
   candidate.state = is_of_use ? Candidate::Steps::kFound : Candidate::Steps::kUseless;
 }
 
@@ -157,7 +187,7 @@ void TrackerEncoder::rank(const TrackerFrame& frame) {
     frame.list_flags(block);
     // Finer than costs_, because there are so many of them.
     std::uint64_t zeros = 0;
-    for (std::uint32_t model = 0; model < TrackerModelIndex::kZero; ++model) {
+    for (std::uint32_t model = 0; model < TrackerModelIndex::kSteps; ++model) {
       if (coded.counts[model][0] == 0) continue;
       const std::uint32_t p0 = 65536U - frame.memory.models().p1[model];
       zeros += std::uint64_t{coded.counts[model][0]} * ((16U << 16U) - log2_of(p0, 16));
@@ -182,7 +212,7 @@ std::int32_t TrackerEncoder::cost(const TrackerFrame& frame, const Candidate& ca
   const auto& flag = costs_.of[frame.flag_of(candidate.slot)];
   CostCoder coder{&costs_};
   TrackerCorrection correction = candidate.correction;
-  code_correction(coder, frame.scratch.contexts.of(candidate.slot), correction);
+  frame.code(coder, candidate.slot, correction);
   return static_cast<std::int32_t>(coder.cost) + flag[1] - flag[0];
 }
 
@@ -272,7 +302,8 @@ void TrackerEncoder::write_block(const TrackerFrame& frame, const Block& block, 
   part.coded_bytes = 0;
   part.fits = true;
   if (count == 0) return;
-  const std::size_t room = kMostTrackerBytesPerBody * block.slots + kTrackerSlackBytes;
+  const std::size_t room =
+      most_tracker_bytes_per_body(frame.memory.turns()) * block.slots + kTrackerSlackBytes;
   RangeEncoder flags{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
   frame.list_flags(block);
   // Corrected bodies get a mark beside their models, so that no branch asks which they are.
@@ -288,8 +319,7 @@ void TrackerEncoder::write_block(const TrackerFrame& frame, const Block& block, 
     flags.put(model >= kMark, frame.memory.models().p1[model % kMark]);
   }
   DecisionEncoder coder{flags, &frame.memory.models(), &coded.counts};
-  for (std::uint32_t i = 0; i < count; ++i)
-    code_correction(coder, frame.scratch.contexts.of(corrected[i]), corrections[i]);
+  for (std::uint32_t i = 0; i < count; ++i) frame.code(coder, corrected[i], corrections[i]);
   part.coded_bytes = coder.range.finish();
   part.fits = !coder.range.overflow();
 }

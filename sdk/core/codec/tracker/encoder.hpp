@@ -14,18 +14,19 @@
 namespace tandem {
 
 /// What the encoder keeps to, as to a budget. Bodies that all jump at once take about a third of it.
-inline constexpr std::size_t kMostTrackerBytesPerBody = 24;
+[[nodiscard]] constexpr std::size_t most_tracker_bytes_per_body(bool turns) { return turns ? 48 : 24; }
 inline constexpr std::size_t kTrackerSlackBytes = 64;
 /// Most bytes of sections for a capacity.
-[[nodiscard]] constexpr std::size_t tracker_bound(std::uint32_t capacity) {
+[[nodiscard]] constexpr std::size_t tracker_bound(std::uint32_t capacity, bool turns) {
   return block_count(capacity) * (kMostSectionHeaderBytes + kMostBlockNumberBytes + kTrackerSlackBytes) +
-         kMostTrackerBytesPerBody * capacity;
+         most_tracker_bytes_per_body(turns) * capacity;
 }
 
 /// Keeps, beside scratch memory, how long each body has waited for its correction, and where it was.
 class TrackerEncoder {
  public:
-  explicit TrackerEncoder(std::uint32_t capacity);
+  /// `memory` outlives it.
+  explicit TrackerEncoder(const TrackerMemory& memory);
 
   /// Writes at most `budget` bytes of sections, fills in frame.delta and returns the corrected slots,
   /// ascending; changes nothing else.
@@ -70,6 +71,10 @@ class TrackerEncoder {
 
   /// Candidates of a block without their steps.
   void gather(const TrackerFrame& frame, const State& target, const Block& block);
+  /// Calls found(slot, error squared) for the bodies of a block that are off by more than `early`.
+  template <class Found>
+  void scan(const TrackerFrame& frame, const State& target, const Block& block, std::int32_t early,
+            const Found& found);
   /// Steps of a block's candidates that have none yet. Models are the same for a whole delta, so the choice
   /// does not depend on what else is sent.
   void choose(const TrackerFrame& frame, const State& target, const Block& block);

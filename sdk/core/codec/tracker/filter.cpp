@@ -123,17 +123,43 @@ void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3
   }
 }
 
-// One step along an axis is worth `one` lattice units, n of them n * one. It changes
-//   p by n one,   v by n G(k) one (1 + u/2),   c by n H(k) one (1 + u/2),
-// with v and c in 1/64 units, so that G = 64 beta / k and H = 64 beta gamma / k^2 (in 1/65536: TrackerGains).
-// u in -1 .. 1 is the product with the last correction in squares of the threshold: two in the same direction
-// mean that too little was believed, two in opposite ones that too much was.
-//
-// Ranges: one <= 2^30 and G, H <= 64, so that one G (1 + u/2) fits 64 bits in 2^-24; what one step may change
-// is cut at 2^29, so that n of them fit, n < 2^31.
+namespace {
+
+// What a correction means for the velocity and the acceleration behind it, and for what is remembered.
+struct Meaning {
+  Meaning(const TrackerSteps& steps, const TrackerBody& body) : k(std::min(body.age + 1U, kMostAge)) {
+    for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
+    const std::int64_t product =
+        dot(TrackerSteppings::relative({body.steps[0], body.steps[1], body.steps[2]}),
+            TrackerSteppings::relative(now));
+    // Corrections that keep pointing the same way are believed more, in 1/256: 128 .. 384.
+    belief = 256 + (std::clamp<std::int64_t>(product >> 8, -256, 256) >> 1);
+  }
+  /// Of v, c or w, by one step that is worth `one`, in 1/64 of its unit.
+  [[nodiscard]] std::int64_t growth(std::int64_t one, std::int64_t gain) const {
+    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
+  }
+  void remember(TrackerBody& body) const {
+    for (std::size_t i = 0; i < 3; ++i) body.steps[i] = static_cast<std::int8_t>(now[i]);
+    body.interval = static_cast<std::uint8_t>(k);
+    body.age = 0;
+  }
+
+  std::uint32_t k;
+  std::int64_t belief = 0;
+  TrackerSteps now{};
+};
+
+}  // namespace
+
 TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gravity, unsigned position_bits,
-                             const TrackerGains& gains)
-    : steppings_(parameters.threshold, position_bits), gravity_(gravity), gains_(gains) {
+                             const TrackerGains& gains, std::span<const std::int32_t> radii)
+    : coarse_(parameters.threshold, position_bits,
+              radii.empty() ? TrackerSteppings::kAlone : TrackerSteppings::kJoint),
+      fine_(parameters.threshold, position_bits, TrackerSteppings::kFine),
+      gravity_(gravity),
+      gains_(gains),
+      radii_(radii) {
   // 256 / 64: c may move a body by four thresholds in a frame. Beyond, it would be corrected every frame
   // anyway; but what holds it up is within reach whatever the threshold.
   std::int32_t fall = 0;
@@ -142,25 +168,21 @@ TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gra
   most_c_ = std::min<std::int64_t>(kVelocityLimit, most_c_);
 }
 
-void TrackerFilter::correct(State& state, Slot slot, const TrackerCorrection& correction,
-                            TrackerBody& body) const {
+// One step along an axis is worth `one` lattice units, n of them n * one. It changes
+//   p by n one,   v by n G(k) one (1 + u/2),   c by n H(k) one (1 + u/2),
+// with v and c in 1/64 units, so that G = 64 beta / k and H = 64 beta gamma / k^2 (in 1/65536: TrackerGains).
+// u in -1 .. 1 is the product with the last correction in squares of the threshold: two in the same direction
+// mean that too little was believed, two in opposite ones that too much was.
+//
+// Ranges: one <= 2^30 and G, H <= 64, so that one G (1 + u/2) fits 64 bits in 2^-24; what one step may change
+// is cut at 2^29, so that n of them fit, n < 2^31.
+void TrackerFilter::move(State& state, Slot slot, const TrackerCorrection& correction,
+                         TrackerBody& body) const {
   const TrackerSteps& steps = correction.steps;
-  TrackerSteps now{};
-  for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
-  const auto before = TrackerSteppings::relative({body.steps[0], body.steps[1], body.steps[2]});
-  const auto after = TrackerSteppings::relative(now);
-  std::int64_t dot = 0;
-  for (std::size_t i = 0; i < 3; ++i) dot += std::int64_t{before[i]} * after[i];
-  // Corrections that keep pointing the same way are believed more, in 1/256: 128 .. 384.
-  const std::int64_t belief = 256 + (std::clamp<std::int64_t>(dot >> 8, -256, 256) >> 1);
-
-  const std::uint32_t k = std::min(body.age + 1U, kMostAge);
-  const std::int64_t one = steppings_.unit_for(steps);
-  const auto growth_of_one = [&](std::int64_t gain) {
-    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
-  };
-  const std::int64_t v_of_one = growth_of_one(gains_.velocity(k));
-  const std::int64_t c_of_one = growth_of_one(gains_.acceleration(k));
+  const Meaning meaning(steps, body);
+  const std::int64_t one = steppings(correction).unit_for(steps);
+  const std::int64_t v_of_one = meaning.growth(one, gains_.velocity(meaning.k));
+  const std::int64_t c_of_one = meaning.growth(one, gains_.acceleration(meaning.k));
   for (std::size_t i = 0; i < 3; ++i) {
     // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of
     // their own where the sum has a smaller one.
@@ -169,13 +191,38 @@ void TrackerFilter::correct(State& state, Slot slot, const TrackerCorrection& co
     std::int32_t& v = state.v(i)[slot];
     std::int32_t& c = state.c(i)[slot];
     p = limited(p + n * one, kPositionLimit);
-    v = correction.rest ? 0 : limited(v + n * v_of_one, kVelocityLimit);
-    c = correction.rest ? -gravity_[i] : limited(c + n * c_of_one, most_c_);
-    body.steps[i] = static_cast<std::int8_t>(now[i]);
+    v = limited(v + n * v_of_one, kVelocityLimit);
+    c = limited(c + n * c_of_one, most_c_);
   }
-  state.rest()[slot] = static_cast<std::uint8_t>(correction.rest);
-  body.interval = static_cast<std::uint8_t>(k);
-  body.age = 0;
+  meaning.remember(body);
+}
+
+// The same with an angle for `one`; w has the unit of angles, not 1/64 of it.
+void TrackerFilter::turn(State& state, Slot slot, const TrackerCorrection& correction,
+                         TrackerBody& body) const {
+  const TrackerSteps& steps = correction.turn;
+  const Meaning meaning(steps, body);
+  const std::int64_t one = steppings(correction).angle_for(steps, radii_[state.type()[slot]]);
+  const std::int64_t w_of_one = meaning.growth(one, gains_.velocity(meaning.k)) >> 6;
+  std::array<std::int64_t, 3> by{}, w{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    by[i] = steps[i] * one;
+    w[i] = state.w(i)[slot] + steps[i] * w_of_one;
+  }
+  state.set_quaternion(slot, turned(state.quaternion(slot), limited_spin(by)));
+  const Spin kept = limited_spin(w);
+  for (std::size_t i = 0; i < 3; ++i) state.w(i)[slot] = kept[i];
+  meaning.remember(body);
+}
+
+void TrackerFilter::settle(State& state, Slot slot, bool rest) const {
+  state.rest()[slot] = static_cast<std::uint8_t>(rest);
+  if (!rest) return;
+  for (std::size_t i = 0; i < 3; ++i) {
+    state.v(i)[slot] = 0;
+    state.c(i)[slot] = -gravity_[i];
+    if (state.groups().orientation) state.w(i)[slot] = 0;
+  }
 }
 
 }  // namespace tandem

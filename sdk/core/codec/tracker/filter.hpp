@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 #include "sdk/core/codec/codec.hpp"
@@ -18,16 +20,20 @@ inline constexpr std::int32_t kMostTrackerSteps = INT32_MAX;
 
 /// What a delta says of a corrected body.
 struct TrackerCorrection {
-  TrackerSteps steps{};
-  bool rest = false;  ///< it stays where it then is: State::rest()
+  TrackerSteps steps{};  ///< of its position; all zero: that is not corrected
+  TrackerSteps turn{};   ///< of its orientation, likewise; one of the two is
+  bool fine = false;     ///< both are, by smaller steps
+  bool rest = false;     ///< it stays where it then is: State::rest()
 };
+[[nodiscard]] inline bool is_some(const TrackerSteps& steps) { return (steps[0] | steps[1] | steps[2]) != 0; }
 
 /// Frames since a body's last correction count up to this.
 inline constexpr std::uint32_t kMostAge = 255;
 
-/// What the codec remembers of a body besides p, v and c. All zero for a new body and for a dead slot.
+/// What the codec remembers of a body's position besides p, v and c, or of its orientation besides q and w.
+/// All zero for a new body and for a dead slot.
 struct TrackerBody {
-  std::uint8_t age = 0;                ///< frames since the last correction, 0 .. kMostAge - 1
+  std::uint8_t age = 0;                ///< frames since its last correction, 0 .. kMostAge - 1
   std::uint8_t interval = 0;           ///< k of the last correction, 0: none yet
   std::array<std::int8_t, 3> steps{};  ///< of the last correction, saturated at +-127
 };
@@ -62,10 +68,15 @@ class TrackerSteppings {
   /// No correction is longer than this along an axis.
   static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
 
+  /// What steps are worth beside their share of the threshold, in 1/65536. Where position and orientation may
+  /// both be off they are smaller, so that more of the error ball is left to the other.
+  static constexpr std::int64_t kAlone = 65536, kJoint = 55706, kFine = 33423;
+
   /// Steps are worth multiples of 2^position_bits, so that rounded positions stay round; at most 2^24.
-  explicit TrackerSteppings(std::int32_t threshold, unsigned position_bits = 0) {
-    const auto share = [threshold, position_bits](std::int64_t of_65536) {
-      const std::int64_t whole = ((threshold * of_65536) >> 16) >> position_bits << position_bits;
+  explicit TrackerSteppings(std::int32_t threshold, unsigned position_bits = 0, std::int64_t size = kAlone) {
+    const auto share = [threshold, position_bits, size](std::int64_t of_65536) {
+      const std::int64_t whole = ((threshold * ((of_65536 * size) >> 16)) >> 16) >> position_bits
+                                                                                        << position_bits;
       return static_cast<std::int32_t>(std::max(std::int64_t{1} << position_bits, whole));
     };
     for (std::size_t i = 0; i < kUnits.size(); ++i) units_[i] = share(kUnits[i]);
@@ -76,6 +87,15 @@ class TrackerSteppings {
   /// What one step is worth: where an axis moves by more than one (0), or where all |steps| <= 1 and so many
   /// (1 .. 3) of them are not zero.
   [[nodiscard]] std::int32_t unit(std::size_t moved) const { return units_[moved]; }
+
+  /// The angle (2^-28 rad) by which a point at this radius (lattice units) moves by one step.
+  [[nodiscard]] std::int32_t angle(std::size_t moved, std::int32_t radius) const {
+    return static_cast<std::int32_t>(
+        std::clamp<std::int64_t>((std::int64_t{units_[moved]} << 28) / radius, 1, kSpinLimit));
+  }
+  [[nodiscard]] std::int32_t angle_for(const TrackerSteps& steps, std::int32_t radius) const {
+    return angle(unit_of(steps), radius);
+  }
 
   /// The same in 1/256 of the threshold; steps within +-127.
   [[nodiscard]] static std::array<std::int32_t, 3> relative(const TrackerSteps& steps) {
@@ -103,24 +123,33 @@ class TrackerSteppings {
   std::array<std::int32_t, 4> units_{1, 1, 1, 1};
 };
 
-/// Corrects bodies in one delta.
+/// Corrects bodies in one delta. With k = min(age + 1, 255), u = clamp(d . d_last / e^2, -1, 1):
+///   position:     d = steps * unit;   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2)
+///   orientation:  d = steps * angle;  q turned by d;  w += G(k) d (1 + u/2)
+/// of a body that is put to rest then v = w = 0 and c = -gravity.
 class TrackerFilter {
  public:
-  /// `gains` outlive it.
+  /// `radii` of the stream, with orientations; they and `gains` outlive it.
   TrackerFilter(const CodecParameters& parameters, const Vec3i& gravity, unsigned position_bits,
-                const TrackerGains& gains);
+                const TrackerGains& gains, std::span<const std::int32_t> radii = {});
 
-  /// Moves a body by `correction.steps` and updates what is remembered of it:
-  ///   k = min(age + 1, 255);  d = steps * unit;  u = clamp(d . d_last / e^2, -1, 1)
-  ///   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2)
-  /// or, if it is put to rest, v = 0 and c = -gravity.
-  void correct(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
+  /// Corrects the position by `correction.steps` and updates what is remembered of it.
+  void move(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
+  /// Likewise the orientation, by `correction.turn`.
+  void turn(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
+  /// Last: wakes the body, or puts it to rest.
+  void settle(State& state, Slot slot, bool rest) const;
 
  private:
-  TrackerSteppings steppings_;
+  [[nodiscard]] const TrackerSteppings& steppings(const TrackerCorrection& correction) const {
+    return correction.fine ? fine_ : coarse_;
+  }
+
+  TrackerSteppings coarse_, fine_;
   Vec3i gravity_;
   std::int64_t most_c_;
   const TrackerGains& gains_;
+  std::span<const std::int32_t> radii_;
 };
 
 /// What the correction of a body by `steps` says of the gains; before it is corrected. `c`: the body's.

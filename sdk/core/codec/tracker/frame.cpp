@@ -16,7 +16,7 @@ std::span<const Slot> within(std::span<const Slot> renewed, const Block& block) 
 void TrackerFrame::list_flags(const Block& block) const {
   std::uint16_t* const flags = scratch.flags.data();
   TrackerCounts& counts = delta.blocks[block.index].counts;
-  list_flag_models(memory.column(0) + block.first, memory.histories() + block.first,
+  list_flag_models(memory.flag_ages() + block.first, memory.histories() + block.first,
                    at.predicted.rest().data() + block.first, at.alive.data() + block.first,
                    std::span(scratch.flags).subspan(block.first, block.slots));
   // By turns in the places of zeros and ones, because neighbours often have the same model and an addition
@@ -45,6 +45,13 @@ void TrackerFrame::list_contexts(const Block& block, std::span<const Slot> slots
     contexts.fill(block, at.predicted, columns, threshold);
   }
   for (const Slot slot : within(at.renewed, block)) contexts.renew(slot);
+}
+
+TrackerTurnContext TrackerFrame::turn_context_of(Slot slot) const {
+  if (is_renewed(slot)) return turn_context({}, {}, {});
+  const State& predicted = at.predicted;
+  return turn_context(memory.body(slot), memory.turn(slot),
+                      {predicted.w(0)[slot], predicted.w(1)[slot], predicted.w(2)[slot]});
 }
 
 std::span<const Slot> TrackerFrame::join() const {

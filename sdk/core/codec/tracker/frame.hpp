@@ -39,6 +39,15 @@ struct TrackerFrame {
   /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots have a
   /// model that is never a one and takes no bits, so that loops need not ask.
   void list_flags(const Block& block) const;
+  /// Of a slot, in a stream with orientations.
+  [[nodiscard]] TrackerTurnContext turn_context_of(Slot slot) const;
+  /// Codes a correction; as code_correction().
+  template <class Coder>
+  bool code(Coder& coder, Slot slot, TrackerCorrection& correction) const {
+    const TrackerContext context = scratch.contexts.of(slot);
+    return memory.turns() ? code_correction(coder, context, turn_context_of(slot), correction)
+                          : code_correction(coder, context, correction);
+  }
   /// Fills the contexts of a block, at least those of `slots`.
   void list_contexts(const Block& block, std::span<const Slot> slots) const;
   /// Once every block is coded: completes the delta. Returns the corrected slots, ascending.

@@ -52,49 +52,90 @@ std::span<const Slot> TrackerDelta::join(std::uint32_t capacity, bool of_all_blo
   return std::span<const Slot>(slots).first(count);
 }
 
-TrackerMemory::TrackerMemory(std::uint32_t capacity, std::string_view predictor)
-    : capacity_(capacity),
-      columns_(kColumns * std::size_t{capacity}),
-      history_(capacity),
-      gains_(predictor) {}
+TrackerMemory::TrackerMemory(const CodecSetup& setup)
+    : capacity_(setup.capacity),
+      radii_(setup.radii.begin(), setup.radii.end()),
+      columns_((turns() ? 2 : 1) * kColumns * setup.capacity),
+      history_(setup.capacity),
+      youngest_(turns() ? setup.capacity : 0),
+      gains_(setup.predictor) {}
 
-void TrackerMemory::set_body(Slot slot, const TrackerBody& body) {
-  std::byte* at = columns_.data() + slot;
+void TrackerMemory::write(std::size_t column, Slot slot, const TrackerBody& body) {
+  std::byte* at = columns_.data() + column * capacity_ + slot;
   *at = static_cast<std::byte>(body.age);
   *(at += capacity_) = static_cast<std::byte>(body.interval);
   for (const std::int8_t step : body.steps) *(at += capacity_) = static_cast<std::byte>(step);
+}
+
+void TrackerMemory::derive(Slot slot) {
+  const TrackerBody body = turns() ? merged(this->body(slot), turn(slot)) : this->body(slot);
   history_[slot] = flag_history(body);
+  if (turns()) youngest_[slot] = body.age;
 }
 
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections,
                           const RunBlocks& run_blocks, State& state) {
   gains_.set(corrections.parameters.velocity_gain, corrections.parameters.acceleration_gain);
-  for (const Slot slot : corrections.renewed) set_body(slot, {});
+  for (const Slot slot : corrections.renewed) {
+    write(0, slot, {});
+    if (turns()) write(kColumns, slot, {});
+    derive(slot);
+  }
   for_each_tracker_block(capacity_, run_blocks,
                          [&](const Block& block) { apply(delta, corrections, block, state); });
-  if (delta.seen != nullptr) models_.learn(*delta.seen);
+  if (delta.seen != nullptr) models_.learn(*delta.seen, models_in_use());
+}
+
+namespace {
+
+// Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
+constexpr std::uint8_t kYoungest = 0xFF;
+
+}  // namespace
+
+void TrackerMemory::correct(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
+                            State& state) {
+  if (is_some(correction.steps)) {
+    TrackerBody body = this->body(slot);
+    filter.move(state, slot, correction, body);
+    write(0, slot, body);
+  }
+  if (is_some(correction.turn)) {
+    TrackerBody body = turn(slot);
+    filter.turn(state, slot, correction, body);
+    write(kColumns, slot, body);
+  }
+  filter.settle(state, slot, correction.rest);
+  derive(slot);
+  if (is_some(correction.steps)) columns_[slot] = std::byte{kYoungest};
+  if (is_some(correction.turn)) columns_[kColumns * capacity_ + slot] = std::byte{kYoungest};
 }
 
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block,
                           State& state) {
-  const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.position_bits, gains_);
-  // Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
-  constexpr std::byte kYoungest{0xFF};
-  std::byte* const age = columns_.data();
+  const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.position_bits, gains_,
+                             radii_);
   const TrackerDelta::Part& part = delta.blocks[block.index];
-  for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
-    const Slot slot = delta.slots[i];
-    TrackerBody body = this->body(slot);
-    filter.correct(state, slot, delta.corrections[i], body);
-    set_body(slot, body);
-    age[slot] = kYoungest;
-  }
-  const Slot end = block.first + block.slots;
-  const std::span<const Slot> renewed = corrections.renewed;
-  auto at = std::lower_bound(renewed.begin(), renewed.end(), block.first);
-  for (; at != renewed.end() && *at < end; ++at) age[*at] = kYoungest;
+  for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i)
+    correct(filter, delta.corrections[i], delta.slots[i], state);
+  const std::span<const Slot> all = corrections.renewed;
+  const auto first = std::lower_bound(all.begin(), all.end(), block.first);
+  const std::span<const Slot> renewed{first, std::lower_bound(first, all.end(), block.first + block.slots)};
+  grow_older(0, block, renewed, state);
+  if (!turns()) return;
+  grow_older(kColumns, block, renewed, state);
+  const std::uint8_t* const turned = column(kColumns);
+  for (Slot slot = block.first; slot < block.first + block.slots; ++slot)
+    youngest_[slot] = std::min(column(0)[slot], turned[slot]);
+}
+
+void TrackerMemory::grow_older(std::size_t column, const Block& block, std::span<const Slot> renewed,
+                               const State& state) {
+  std::byte* const age = columns_.data() + column * capacity_;
+  for (const Slot slot : renewed) age[slot] = std::byte{kYoungest};
   // 255 wraps to 0; what was 254 stays there.
   const std::uint8_t* const alive = state.alive().data();
+  const Slot end = block.first + block.slots;
   for (Slot slot = block.first; slot < end; ++slot) {
     const auto was = std::to_integer<std::uint8_t>(age[slot]);
     const auto older = static_cast<std::uint8_t>(was + (was != kMostAge - 1 ? 1 : 0));
@@ -104,36 +145,39 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
 
 void TrackerMemory::save_models(NumberEncoder& out) const {
   ModelsCoder coder;
-  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+  for (std::size_t i = 0; i < models_in_use(); ++i) {
     std::uint8_t weight = models_.weight[i];
     std::uint16_t p1 = models_.p1[i];
     coder.code(out, weight, p1);
   }
 }
 
-std::size_t TrackerMemory::models_bits_bound() {
-  return TrackerModelIndex::kCount * (most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX));
+std::size_t TrackerMemory::models_bits_bound() const {
+  return models_in_use() * (most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX));
 }
 
 Result<void> TrackerMemory::load(std::span<const std::byte> columns, NumberDecoder& in) {
   if (columns.size() != columns_.size())
     return fail(ErrorCode::kMalformed, "coder state of another number of columns");
-  if (std::any_of(columns.begin(), columns.begin() + capacity_,
-                  [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMostAge; })) {
-    return fail(ErrorCode::kMalformed, "coder state with an impossible age");
+  for (std::size_t group = 0; group < columns.size(); group += kColumns * capacity_) {
+    const auto of_group = columns.subspan(group, kColumns * capacity_);
+    if (std::any_of(of_group.begin(), of_group.begin() + capacity_,
+                    [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMostAge; })) {
+      return fail(ErrorCode::kMalformed, "coder state with an impossible age");
+    }
+    const auto steps = of_group.subspan(2 * std::size_t{capacity_});
+    if (std::find(steps.begin(), steps.end(), std::byte{0x80}) != steps.end())
+      return fail(ErrorCode::kMalformed, "coder state with a step of -128");
   }
-  const auto steps = columns.subspan(2 * std::size_t{capacity_});
-  if (std::find(steps.begin(), steps.end(), std::byte{0x80}) != steps.end())
-    return fail(ErrorCode::kMalformed, "coder state with a step of -128");
   ModelsCoder coder;
   TrackerModels models;
-  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+  for (std::size_t i = 0; i < models_in_use(); ++i) {
     if (!coder.code(in, models.weight[i], models.p1[i]))
       return fail(ErrorCode::kMalformed, "coder state with an impossible model");
   }
   if (!in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length");
   std::copy(columns.begin(), columns.end(), columns_.begin());
-  for (Slot slot = 0; slot < capacity_; ++slot) history_[slot] = flag_history(body(slot));
+  for (Slot slot = 0; slot < capacity_; ++slot) derive(slot);
   models_ = models;
   return {};
 }

@@ -54,10 +54,9 @@ void for_each_tracker_block(std::uint32_t capacity, const RunBlocks& run_blocks,
 
 class TrackerMemory {
  public:
-  static constexpr std::size_t kColumns = 5;  ///< age, interval, steps x, y, z
+  static constexpr std::size_t kColumns = 5;  ///< of a group: age, interval, steps x, y, z
 
-  /// `predictor`: Predictor::name().
-  TrackerMemory(std::uint32_t capacity, std::string_view predictor);
+  explicit TrackerMemory(const CodecSetup& setup);
 
   [[nodiscard]] std::uint32_t capacity() const { return capacity_; }
   /// All columns, one after another: part of the state hash.
@@ -65,10 +64,19 @@ class TrackerMemory {
   [[nodiscard]] const std::uint8_t* column(std::size_t i) const {
     return reinterpret_cast<const std::uint8_t*>(columns_.data()) + i * capacity_;
   }
-  [[nodiscard]] TrackerBody body(Slot slot) const;
+  /// With orientations; then turn() remembers them, and the models of turns count.
+  [[nodiscard]] bool turns() const { return !radii_.empty(); }
+  [[nodiscard]] std::uint32_t models_in_use() const {
+    return turns() ? TrackerModelIndex::kCount : TrackerModelIndex::kOfPositions;
+  }
+  [[nodiscard]] std::span<const std::int32_t> radii() const { return radii_; }
+  [[nodiscard]] TrackerBody body(Slot slot) const { return read(0, slot); }
+  [[nodiscard]] TrackerBody turn(Slot slot) const { return read(kColumns, slot); }
+  /// What flags depend on, by slot.
+  [[nodiscard]] const std::uint8_t* flag_ages() const { return turns() ? youngest_.data() : column(0); }
   [[nodiscard]] const std::uint8_t* histories() const { return history_.data(); }
   [[nodiscard]] std::uint32_t flag_of(Slot slot, bool rest) const {
-    return flag_model(column(0)[slot], history_[slot], rest);
+    return flag_model(flag_ages()[slot], history_[slot], rest);
   }
   [[nodiscard]] const TrackerModels& models() const { return models_; }
   [[nodiscard]] const TrackerGains& gains() const { return gains_; }
@@ -80,22 +88,29 @@ class TrackerMemory {
 
   /// As Codec has them.
   void save_models(NumberEncoder& out) const;
-  [[nodiscard]] static std::size_t models_bits_bound();
+  [[nodiscard]] std::size_t models_bits_bound() const;
   [[nodiscard]] Result<void> load(std::span<const std::byte> columns, NumberDecoder& models);
 
  private:
-  void set_body(Slot slot, const TrackerBody& body);
+  [[nodiscard]] TrackerBody read(std::size_t column, Slot slot) const;
+  void write(std::size_t column, Slot slot, const TrackerBody& body);
+  void correct(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot, State& state);
+  void grow_older(std::size_t column, const Block& block, std::span<const Slot> renewed, const State& state);
+  // Works out again what follows from the columns of a slot.
+  void derive(Slot slot);
   void apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block, State& state);
 
   std::uint32_t capacity_;
-  std::vector<std::byte> columns_;
-  std::vector<std::uint8_t> history_;  // flag_history() of each body, which follows from the columns
+  std::vector<std::int32_t> radii_;
+  std::vector<std::byte> columns_;  // of positions, then of orientations
+  // What follows from the columns: flag_history() of each body, and its younger age where it has two.
+  std::vector<std::uint8_t> history_, youngest_;
   TrackerModels models_;
   TrackerGains gains_;  // follow from the parameters in force
 };
 
-inline TrackerBody TrackerMemory::body(Slot slot) const {
-  const std::byte* at = columns_.data() + slot;
+inline TrackerBody TrackerMemory::read(std::size_t column, Slot slot) const {
+  const std::byte* at = columns_.data() + column * capacity_ + slot;
   TrackerBody body;
   body.age = std::to_integer<std::uint8_t>(*at);
   body.interval = std::to_integer<std::uint8_t>(*(at += capacity_));

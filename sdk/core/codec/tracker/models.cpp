@@ -18,6 +18,9 @@ constexpr std::array<std::uint8_t, 256> make_age_buckets() {
   return buckets;
 }
 
+// 2^-10 rad a frame: below, the sign of an angular velocity says nothing.
+constexpr std::int32_t kSlowTurn = 1 << 18;
+
 // How many of the limits are below n.
 template <class... Limits>
 std::uint8_t above(std::uint8_t n, Limits... limits) {
@@ -47,11 +50,8 @@ TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
 
 // Of one axis: which way it went last, which way c pushes and v goes.
 TANDEM_VECTOR_CLONES void list_signs(const std::int8_t* __restrict last, const std::int32_t* __restrict c,
-                                     const std::int32_t* __restrict v, std::int32_t threshold,
+                                     const std::int32_t* __restrict v, std::int32_t faint, std::int32_t slow,
                                      std::uint32_t slots, std::uint8_t* __restrict sign) {
-  // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
-  const std::int32_t slow = threshold + threshold / 4;
-  const std::int32_t faint = threshold / 32;
   for (std::uint32_t s = 0; s < slots; ++s) {
     // 0: below -limit, 1: between, 2: above.
     const std::int32_t side = 9 * ((last[s] > 0) - (last[s] < 0)) + 3 * ((c[s] > faint) - (c[s] < -faint)) +
@@ -100,8 +100,8 @@ void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, c
 const std::array<std::uint8_t, 256> tracker_age_buckets = make_age_buckets();
 
 TrackerModels::TrackerModels() {
-  std::fill(p1.begin(), p1.begin() + TrackerModelIndex::kZero, kRare);
-  std::fill(p1.begin() + TrackerModelIndex::kZero, p1.end(), std::uint16_t{32768});
+  std::fill(p1.begin(), p1.begin() + TrackerModelIndex::kSteps, kRare);
+  std::fill(p1.begin() + TrackerModelIndex::kSteps, p1.end(), std::uint16_t{32768});
   p1[TrackerModelIndex::kDead] = 0;
 }
 
@@ -113,9 +113,10 @@ void TrackerContexts::fill(const Block& block, const State& predicted,
   };
   list_ages(bodies[0] + first, bodies[1] + first, steps(0), steps(1), steps(2), block.slots,
             column(0) + first, column(1) + first);
+  // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
   for (std::size_t axis = 0; axis < 3; ++axis)
-    list_signs(steps(axis), predicted.c(axis).data() + first, predicted.v(axis).data() + first, threshold,
-               block.slots, column(2 + axis) + first);
+    list_signs(steps(axis), predicted.c(axis).data() + first, predicted.v(axis).data() + first,
+               threshold / 32, threshold + threshold / 4, block.slots, column(2 + axis) + first);
   // 20/64 and one threshold a frame.
   const auto speed = [threshold](std::int64_t share) {
     return static_cast<std::int32_t>(std::min<std::int64_t>(share * threshold, kVelocityLimit));
@@ -125,13 +126,46 @@ void TrackerContexts::fill(const Block& block, const State& predicted,
              column(kColumns - 1) + first);
 }
 
+TrackerBody merged(const TrackerBody& position, const TrackerBody& turn) {
+  TrackerBody body = position;
+  body.age = std::min(position.age, turn.age);
+  if (turn.interval != 0 && (body.interval == 0 || turn.interval < body.interval))
+    body.interval = turn.interval;
+  if (tracker_detail::length_class(turn.steps) > tracker_detail::length_class(body.steps))
+    body.steps = turn.steps;
+  return body;
+}
+
+TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& turn, const Spin& w) {
+  TrackerTurnContext context;
+  const std::uint32_t last = position.age == turn.age ? 0 : position.age < turn.age ? 1 : 2;
+  const auto age = [](const TrackerBody& body) { return std::uint32_t{above(body.age, 1, 3, 7, 19)}; };
+  context.choice =
+      (last * TrackerModelIndex::kShortAges + age(position)) * TrackerModelIndex::kShortAges + age(turn);
+  std::uint8_t zero = 0, magnitude = 0;
+  list_ages(&turn.age, &turn.interval, &turn.steps[0], &turn.steps[1], &turn.steps[2], 1, &zero, &magnitude);
+  TrackerContext& steps = context.turn;
+  steps.steps = TrackerModelIndex::kTurnSteps;
+  steps.zero = zero & 31U;
+  steps.magnitude = magnitude & 15U;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    constexpr std::int32_t kNone = 0;
+    std::uint8_t sign = 0;
+    list_signs(&turn.steps[axis], &kNone, &w[axis], 0, kSlowTurn, 1, &sign);
+    steps.moved_last[axis] = (zero >> (5U + axis)) & 1U;
+    steps.sign[axis] = steps.steps + TrackerModelIndex::kSign +
+                       (axis * 27 + sign) * TrackerModelIndex::kIntervals + (magnitude >> 4U);
+  }
+  return context;
+}
+
 // The mean of a model's decisions, each counted once, with one that says what p1 was at the start:
 //   p1' = ((weight + 1) p1 + 65536 ones) / (weight + 1 + seen),  weight' = min(weight + seen, 255).
 // Up to 255 decisions it is their running mean. Beyond, the past is worth 256 decisions and fades: a delta of
 // n moves p1 by the share n / (256 + n) of the way to what it shows. With a larger limit models follow slower
 // when a scene calms down, with a smaller one they are noisy where decisions are rare; this one fits a byte.
-void TrackerModels::learn(const TrackerCounts& counts) {
-  for (std::size_t i = 0; i < TrackerModelIndex::kCount; ++i) {
+void TrackerModels::learn(const TrackerCounts& counts, std::uint32_t models) {
+  for (std::size_t i = 0; i < models; ++i) {
     const std::uint32_t ones = counts[i][1];
     const std::uint32_t seen = counts[i][0] + ones;
     if (seen == 0) continue;

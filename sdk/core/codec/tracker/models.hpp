@@ -23,11 +23,20 @@ struct TrackerModelIndex {
   static constexpr std::uint32_t kFlag = 0;
   static constexpr std::uint32_t kFlagAtRest = kFlag + kAges * kAges * kLengths;
   static constexpr std::uint32_t kRest = kFlagAtRest + kAges;
-  static constexpr std::uint32_t kZero = kRest + 2 * kShortAges * kSpeeds;
+  static constexpr std::uint32_t kSteps = kRest + 2 * kShortAges * kSpeeds;  ///< of positions
+  // Of steps, from their first on.
+  static constexpr std::uint32_t kZero = 0;
   static constexpr std::uint32_t kSign = kZero + 3 * kShortAges * kIntervals * 3 * 2;
   static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
   static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
-  static constexpr std::uint32_t kCount = kEscape + 32;
+  static constexpr std::uint32_t kStepModels = kEscape + 32;
+  static constexpr std::uint32_t kOfPositions =
+      kSteps + kStepModels;  ///< all of a stream without orientations
+  static constexpr std::uint32_t kBoth = kOfPositions;
+  static constexpr std::uint32_t kWhich = kBoth + 3 * kShortAges * kShortAges;
+  static constexpr std::uint32_t kFine = kWhich + 3 * kShortAges * kShortAges;
+  static constexpr std::uint32_t kTurnSteps = kFine + 1;  ///< of orientations
+  static constexpr std::uint32_t kCount = kTurnSteps + kStepModels;
   static constexpr std::uint32_t kEven = kCount;     ///< of decisions without a model
   static constexpr std::uint32_t kDead = kEven + 1;  ///< of slots without a body: never a 1
   static constexpr std::uint32_t kAll = kDead + 1;
@@ -48,7 +57,8 @@ struct TrackerModels {
   TrackerModels();
   /// p1 becomes the mean of what it was, counted weight + 1 times, and of the decisions; the weight grows by
   /// their number, up to 255.
-  void learn(const TrackerCounts& counts);
+  /// Of the first `models`.
+  void learn(const TrackerCounts& counts, std::uint32_t models);
 
   std::array<std::uint16_t, TrackerModelIndex::kAll> p1{};
   std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
@@ -56,12 +66,22 @@ struct TrackerModels {
 
 /// The context of a body's steps: parts of their models' indices.
 struct TrackerContext {
-  std::uint32_t rest = 0;                     ///< the whole index, of "is it put to rest"
-  std::uint32_t zero = 0;                     ///< of "is this axis untouched"
-  std::uint32_t magnitude = 0;                ///< of "is it longer"
-  std::array<std::uint32_t, 3> sign{};        ///< the whole index, per axis
-  std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
+  std::uint32_t steps = TrackerModelIndex::kSteps;  ///< the first model of its steps
+  std::uint32_t rest = 0;                           ///< the whole index, of "is it put to rest"
+  std::uint32_t zero = 0;                           ///< of "is this axis untouched"
+  std::uint32_t magnitude = 0;                      ///< of "is it longer"
+  std::array<std::uint32_t, 3> sign{};              ///< the whole index, per axis
+  std::array<std::uint32_t, 3> moved_last{};        ///< 0, 1: whether the last correction moved this axis
 };
+
+/// What a body of a stream with orientations adds.
+struct TrackerTurnContext {
+  std::uint32_t choice = 0;  ///< of "are both corrected" and "which"
+  TrackerContext turn;       ///< of the orientation's steps
+};
+/// `position`, `turn`: as remembered before the delta; zeros of a renewed body, and so `w`.
+[[nodiscard]] TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& turn,
+                                              const Spin& w);
 
 /// Buckets of frame counts 0 .. 255; see models.cpp.
 extern const std::array<std::uint8_t, 256> tracker_age_buckets;
@@ -76,6 +96,10 @@ inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
 }
 
 }  // namespace tracker_detail
+
+/// What a flag depends on in a stream with orientations: the younger correction, the shorter interval (0:
+/// none), the longer steps.
+[[nodiscard]] TrackerBody merged(const TrackerBody& position, const TrackerBody& turn);
 
 /// The part of a flag's index that changes only when its body is corrected: 0 .. 44.
 [[nodiscard]] inline std::uint8_t flag_history(const TrackerBody& body) {
@@ -112,7 +136,7 @@ class TrackerContexts {
     context.zero = *at & 31U;
     for (std::uint32_t axis = 0; axis < 3; ++axis) context.moved_last[axis] = (*at >> (5U + axis)) & 1U;
     context.magnitude = *(at += slots_) & 15U;
-    const std::uint32_t sign = TrackerModelIndex::kSign + (*at >> 4U);
+    const std::uint32_t sign = context.steps + TrackerModelIndex::kSign + (*at >> 4U);
     context.rest = TrackerModelIndex::kRest + bytes_[(kColumns - 1) * slots_ + slot];
     for (std::uint32_t axis = 0; axis < 3; ++axis)
       context.sign[axis] = sign + (axis * 27 + *(at += slots_)) * TrackerModelIndex::kIntervals;
@@ -134,12 +158,14 @@ class TrackerContexts {
 [[nodiscard]] inline std::uint32_t zero_model(const TrackerContext& context, std::uint32_t axis,
                                               std::uint32_t moved) {
   using Index = TrackerModelIndex;
-  return Index::kZero + ((axis * Index::kShortAges * Index::kIntervals + context.zero) * 3 + moved) * 2 +
+  return context.steps + Index::kZero +
+         ((axis * Index::kShortAges * Index::kIntervals + context.zero) * 3 + moved) * 2 +
          context.moved_last[axis];
 }
 /// Index of "is it longer than 1", after `moved` axes that are not zero; those of longer ones follow it.
 [[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t moved) {
-  return TrackerModelIndex::kMagnitude + (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
+  return context.steps + TrackerModelIndex::kMagnitude +
+         (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
 }
 
 /// Decisions into bytes; counts them.
@@ -182,10 +208,10 @@ namespace tracker_detail {
 
 // x >= 0 as the number of bits of x + 1, in unary, then those bits without the first.
 template <class Coder>
-bool code_escape(Coder& coder, std::uint32_t& x) {
+bool code_escape(Coder& coder, std::uint32_t models, std::uint32_t& x) {
   const std::uint64_t wanted = std::uint64_t{x} + 1;
   unsigned bits = 0;
-  while (bits < 31 && coder.code((wanted >> (bits + 1)) != 0, TrackerModelIndex::kEscape + bits)) ++bits;
+  while (bits < 31 && coder.code((wanted >> (bits + 1)) != 0, models + bits)) ++bits;
   std::uint64_t value = 1;
   for (unsigned i = bits; i-- > 0;) {
     value = value << 1U | static_cast<std::uint64_t>(coder.code_even(((wanted >> i) & 1U) != 0));
@@ -214,7 +240,7 @@ template <class Coder>
   if (size > TrackerModelIndex::kUnary) {
     std::uint32_t beyond = length > TrackerModelIndex::kUnary ? length - TrackerModelIndex::kUnary - 1 : 0;
     Coder rare = coder;  // a copy, so that a call that is not inlined leaves `coder` in registers
-    const bool good = tracker_detail::code_escape(rare, beyond);
+    const bool good = tracker_detail::code_escape(rare, context.steps + TrackerModelIndex::kEscape, beyond);
     coder = rare;
     if (!good) return false;
     size = TrackerModelIndex::kUnary + 1 + beyond;
@@ -245,6 +271,28 @@ template <class Coder>
 bool code_correction(Coder& coder, const TrackerContext& context, TrackerCorrection& correction) {
   correction.rest = coder.code(correction.rest, context.rest);
   return code_steps(coder, context, correction.steps);
+}
+
+/// The same in a stream with orientations.
+template <class Coder>
+bool code_correction(Coder& coder, const TrackerContext& context, const TrackerTurnContext& turn_context,
+                     TrackerCorrection& correction) {
+  using Index = TrackerModelIndex;
+  correction.rest = coder.code(correction.rest, context.rest);
+  bool moves = is_some(correction.steps);
+  bool turns = is_some(correction.turn);
+  if (coder.code(moves && turns, Index::kBoth + turn_context.choice)) {
+    moves = turns = true;
+    correction.fine = coder.code(correction.fine, Index::kFine);
+  } else {
+    turns = coder.code(turns, Index::kWhich + turn_context.choice);
+    moves = !turns;
+    correction.fine = false;
+  }
+  if (!moves) correction.steps = {};
+  if (!turns) correction.turn = {};
+  return (!moves || code_steps(coder, context, correction.steps)) &&
+         (!turns || code_steps(coder, turn_context.turn, correction.turn));
 }
 
 }  // namespace tandem

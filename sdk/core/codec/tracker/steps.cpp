@@ -45,6 +45,8 @@ class Choices {
   /// The cheapest point within the error ball; false: there is none.
   bool cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
                 const TrackerContext& context, TrackerSteps& steps) const;
+  [[nodiscard]] std::array<TrackerPoint, 8> list(const TrackerCosts& costs,
+                                                 const TrackerContext& context) const;
 
  private:
   // In 1/256 bits, [earlier axes that are not zero][longer].
@@ -149,7 +151,29 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
   return true;
 }
 
+std::array<TrackerPoint, 8> Choices::list(const TrackerCosts& costs, const TrackerContext& context) const {
+  const AxisCosts x_costs = axis_costs<0>(costs, context);
+  const AxisCosts y_costs = axis_costs<1>(costs, context);
+  const AxisCosts z_costs = axis_costs<2>(costs, context);
+  std::array<TrackerPoint, 8> points;
+  for (std::uint32_t point = 0; point < points.size(); ++point) {
+    const std::uint32_t x = point >> 2U;
+    const std::uint32_t y = (point >> 1U) & 1U;
+    const std::uint32_t z = point & 1U;
+    const TrackerSteps steps{value(0, x), value(1, y), value(2, z)};
+    const auto moved_x = static_cast<std::uint32_t>(steps[0] != 0);
+    const std::uint32_t moved = moved_x + static_cast<std::uint32_t>(steps[1] != 0);
+    points[point] = {steps, x_costs[0][x] + y_costs[moved_x][y] + z_costs[moved][z]};
+  }
+  return points;
+}
+
 }  // namespace
+
+std::array<TrackerPoint, 8> points_around(const Vec3i& from, const Vec3i& to, std::int32_t unit,
+                                          const TrackerCosts& costs, const TrackerContext& context) {
+  return Choices(from, to, unit).list(costs, context);
+}
 
 void TrackerCosts::learn(const TrackerModels& models) {
   for (std::size_t i = 0; i < of.size(); ++i) {

@@ -64,4 +64,14 @@ bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& st
                   const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
                   TrackerSteps& steps);
 
+/// Steps that a body may be corrected by, and what they cost, in 1/256 bits.
+struct TrackerPoint {
+  TrackerSteps steps{};
+  std::uint32_t cost = 0;
+};
+/// The eight points of multiples of `unit` around `to` - `from`, one of which may be zero.
+[[nodiscard]] std::array<TrackerPoint, 8> points_around(const Vec3i& from, const Vec3i& to, std::int32_t unit,
+                                                        const TrackerCosts& costs,
+                                                        const TrackerContext& context);
+
 }  // namespace tandem

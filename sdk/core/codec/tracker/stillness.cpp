@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/codec/errors.hpp"
+
 namespace tandem {
 namespace {
 
@@ -14,8 +16,13 @@ constexpr std::int64_t kMostPush = std::int64_t{1} << 30;
 
 }  // namespace
 
-Stillness::Stillness(std::uint32_t capacity) : frames_(capacity) {
+Stillness::Stillness(std::uint32_t capacity, std::span<const std::int32_t> radii)
+    : radii_(radii), frames_(capacity) {
   for (auto* columns : {&p_, &moved_, &moved_before_}) {
+    for (auto& column : *columns) column.resize(capacity);
+  }
+  if (radii.empty()) return;
+  for (auto* columns : {&q_, &q_before_}) {
     for (auto& column : *columns) column.resize(capacity);
   }
 }
@@ -34,10 +41,14 @@ void Stillness::follow(const CodecFrame& frame, const State& target) {
       before[s] = now[s];
     }
   }
+  for (std::size_t i = 0; i < kQuaternionChannels && !radii_.empty(); ++i) {
+    std::swap(q_[i], q_before_[i]);
+    std::copy(target.q(i).begin(), target.q(i).end(), q_[i].begin());
+  }
   for (std::uint8_t& frames : frames_) frames = static_cast<std::uint8_t>(std::min(frames + 1, 3));
 }
 
-bool Stillness::is_still(const CodecFrame& frame, Slot slot) const {
+bool Stillness::is_still(const CodecFrame& frame, const State& target, Slot slot) const {
   if (frames_[slot] < 2) return false;
   const std::int64_t slow = frame.parameters.threshold / kSlow;
   std::int64_t moved = 0, pushed = 0, fall = 0;  // squared; the last two in 1/64 units
@@ -53,7 +64,13 @@ bool Stillness::is_still(const CodecFrame& frame, Slot slot) const {
     pushed += a * a;
     fall += g * g;
   }
-  return moved <= slow * slow && 4 * pushed >= fall;
+  if (moved > slow * slow || 4 * pushed < fall) return false;
+  if (radii_.empty()) return true;
+  const BodyState now = target.body(slot);
+  BodyState before = now;
+  for (std::size_t axis = 0; axis < 3; ++axis) before.p[axis] -= moved_[axis][slot];
+  for (std::size_t i = 0; i < kQuaternionChannels; ++i) before.q[i] = q_before_[i][slot];
+  return surface_error(before, now, radii_[target.type()[slot]]) <= static_cast<std::uint64_t>(slow);
 }
 
 }  // namespace tandem

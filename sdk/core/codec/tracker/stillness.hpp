@@ -14,17 +14,20 @@ namespace tandem {
 /// Remembers where bodies were, because engines that put no body to sleep let it tremble.
 class Stillness {
  public:
-  explicit Stillness(std::uint32_t capacity);
+  /// `radii` of the stream, with orientations.
+  Stillness(std::uint32_t capacity, std::span<const std::int32_t> radii);
 
   /// Takes in the full simulation of the next frame.
   void follow(const CodecFrame& frame, const State& target);
   /// Whether a body may be put to rest: it hardly moved in the last frame, and something holds it up (a body
   /// at the top of its throw is slow too).
-  [[nodiscard]] bool is_still(const CodecFrame& frame, Slot slot) const;
+  [[nodiscard]] bool is_still(const CodecFrame& frame, const State& target, Slot slot) const;
 
  private:
   std::array<std::vector<std::int32_t>, 3> p_, moved_, moved_before_;  // lattice units
-  std::vector<std::uint8_t> frames_;                                   // seen since it was renewed, 0 .. 2
+  std::array<std::vector<std::int32_t>, kQuaternionChannels> q_, q_before_;
+  std::span<const std::int32_t> radii_;
+  std::vector<std::uint8_t> frames_;  // seen since it was renewed, 0 .. 2
 };
 
 }  // namespace tandem

@@ -15,7 +15,7 @@ void report(const TrackerFrame& frame, std::span<const Slot> corrected, EncodeOb
   const State& predicted = frame.at.predicted;
   for (std::size_t i = 0; i < corrected.size(); ++i) {
     const Slot slot = corrected[i];
-    if (frame.is_renewed(slot)) continue;
+    if (frame.is_renewed(slot) || !is_some(delta.corrections[i].steps)) continue;
     add_evidence(frame.memory.body(slot), delta.corrections[i].steps,
                  {predicted.c(0)[slot], predicted.c(1)[slot], predicted.c(2)[slot]}, evidence);
   }
@@ -26,14 +26,14 @@ void report(const TrackerFrame& frame, std::span<const Slot> corrected, EncodeOb
 
 Tracker::Tracker(const CodecSetup& setup)
     : run_blocks_(setup.run_blocks),
-      memory_(setup.capacity, setup.predictor),
+      memory_(setup),
       scratch_(setup.capacity),
       delta_(setup.capacity),
       decoder_(setup.capacity) {}
 
 Corrections Tracker::encode(const CodecFrame& at, const State& target, std::size_t budget, ByteWriter& out,
                             EncodeObserver* observer) {
-  if (!encoder_) encoder_ = std::make_unique<TrackerEncoder>(memory_.capacity());
+  if (!encoder_) encoder_ = std::make_unique<TrackerEncoder>(memory_);
   const TrackerFrame frame = this->frame(at);
   const std::span<const Slot> corrected = encoder_->encode(frame, target, budget, out);
   if (observer != nullptr) report(frame, corrected, *observer);

@@ -20,14 +20,16 @@ class Tracker final : public Codec {
   explicit Tracker(const CodecSetup& setup);
 
   [[nodiscard]] std::string_view name() const override { return "tracker"; }
-  [[nodiscard]] std::size_t bound() const override { return tracker_bound(memory_.capacity()); }
+  [[nodiscard]] std::size_t bound() const override {
+    return tracker_bound(memory_.capacity(), memory_.turns());
+  }
   Corrections encode(const CodecFrame& at, const State& target, std::size_t budget, ByteWriter& out,
                      EncodeObserver* observer) override;
   Result<Corrections> decode(const CodecFrame& at, std::span<const Section> sections) override;
   void apply(const Corrections& corrections, State& state) override;
   [[nodiscard]] std::span<const std::byte> columns() const override { return memory_.columns(); }
   void save_models(NumberEncoder& out) const override { memory_.save_models(out); }
-  [[nodiscard]] std::size_t models_bits_bound() const override { return TrackerMemory::models_bits_bound(); }
+  [[nodiscard]] std::size_t models_bits_bound() const override { return memory_.models_bits_bound(); }
   [[nodiscard]] Result<void> load(std::span<const std::byte> columns, NumberDecoder& models) override {
     return memory_.load(columns, models);
   }
