@@ -3,37 +3,15 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "sdk/core/lattice/state.hpp"
+#include "tests/property/random.hpp"
 
 namespace tandem::synthetic {
-
-/// Only the engine of the standard library is the same everywhere; its distributions are not.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  /// 0 .. count - 1.
-  std::uint64_t below(std::uint64_t count) { return engine_() % count; }
-  bool one_in(std::uint64_t count) { return below(count) == 0; }
-  /// Within +-limit, every order of magnitude about as often as any other.
-  std::int32_t value(std::int32_t limit) {
-    const auto spread = static_cast<std::int64_t>(below(2 * static_cast<std::uint64_t>(limit) + 1)) - limit;
-    return static_cast<std::int32_t>(spread >> below(30));
-  }
-  /// Within +-limit, evenly.
-  std::int32_t even(std::int32_t limit) {
-    return static_cast<std::int32_t>(
-        static_cast<std::int64_t>(below(2 * static_cast<std::uint64_t>(limit) + 1)) - limit);
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 inline constexpr TypeId kTypes = 3;
 

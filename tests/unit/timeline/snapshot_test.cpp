@@ -63,6 +63,55 @@ TEST(Snapshot, ReadsBackWhatWasWritten) {
   }
 }
 
+// One body in three rests.
+State turned_state(Random& random, std::uint32_t capacity) {
+  State state(capacity, {.orientation = true});
+  for (Slot slot = 0; slot < capacity; ++slot) {
+    if (random.one_in(4)) continue;
+    BodyState body = random_body(random);
+    body.q = any_quaternion(random);
+    body.w = any_spin(random);
+    state.spawn(slot, 0, 0, body);
+    state.rest()[slot] = static_cast<std::uint8_t>(random.one_in(3));
+  }
+  return state;
+}
+
+TEST(Snapshot, ReadsBackOrientations) {
+  Random random(9);
+  for (const std::uint32_t capacity : {1U, 7U, 64U, 1000U}) {
+    const State state = turned_state(random, capacity);
+    State loaded(capacity, state.groups());
+    const auto read = read_snapshot(write(example(), state), kTypes, loaded, *codec_for(capacity));
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(loaded, state);
+  }
+}
+
+TEST(Snapshot, OfOtherGroupsIsRefused) {
+  Random random(10);
+  const State turned = turned_state(random, 100);
+  State plain(100);
+  EXPECT_FALSE(read_snapshot(write(example(), turned), kTypes, plain, *codec_for(100)));
+  State loaded(100, turned.groups());
+  EXPECT_FALSE(read_snapshot(write(example(), random_state(random, 100)), kTypes, loaded, *codec_for(100)));
+}
+
+TEST(Snapshot, OrientationsThatNoStateMayHoldAreRefused) {
+  const auto refused = [](const Quaternion& q, const Spin& w) {
+    State state(3, {.orientation = true});
+    state.spawn(1, 0, 0, {{1, 2, 3}, {}, q, w});
+    State loaded(3, state.groups());
+    return !read_snapshot(write(example(), state), kTypes, loaded, *codec_for(3)).has_value();
+  };
+  EXPECT_FALSE(refused(kNoTurn, {0, 0, kSpinLimit}));
+  EXPECT_TRUE(refused({}, {})) << "zeros";
+  EXPECT_TRUE(refused({0, 0, 0, kQuaternionOne + 1}, {})) << "a component";
+  EXPECT_TRUE(refused({0, 0, 0, kQuaternionOne / 2}, {})) << "the norm";
+  EXPECT_TRUE(refused(kNoTurn, {0, 0, -kSpinLimit - 1})) << "an axis";
+  EXPECT_TRUE(refused(kNoTurn, {kSpinLimit, 1, 0})) << "the length";
+}
+
 TEST(Snapshot, CostsAtMostTwentyBytesABodyInAWorldOf23BitPositions) {
   Random random(7);
   State state(10000);
@@ -94,7 +143,9 @@ TEST(Snapshot, MultiplesOfAPowerOfTwoAreNotPaidForTheirZeros) {
 // Finds for each number the one that models take for least likely, as a world could that wants to do harm.
 class Adversary {
  public:
-  Adversary(std::uint32_t most_bits, std::int64_t limit) : most_bits_(most_bits), limit_(limit) {}
+  /// `guesses` false: of a column whose guess stays 0.
+  Adversary(std::uint32_t most_bits, std::int64_t limit, bool guesses = true)
+      : most_bits_(most_bits), limit_(limit), guesses_(guesses) {}
   std::int32_t next(unsigned halvings) {
     const auto unlikely = [](const LearningModel& model) { return model.p1 < 32768; };
     std::int64_t x = 0;
@@ -102,7 +153,7 @@ class Adversary {
     if (std::abs(guess_ + x) > limit_) x = -x;
     code_number(coder_, models_, x);
     const std::int64_t value = guess_ + x;
-    guess_ = halvings == 0 ? value : (guess_ + value) >> halvings;
+    if (guesses_) guess_ = halvings == 0 ? value : (guess_ + value) >> halvings;
     return static_cast<std::int32_t>(value);
   }
 
@@ -121,6 +172,7 @@ class Adversary {
 
   std::uint32_t most_bits_;
   std::int64_t limit_;
+  bool guesses_;
   std::int64_t guess_ = 0;
   NumberModels models_;
   std::vector<std::byte> nothing_;
@@ -144,6 +196,28 @@ TEST(Snapshot, NumbersThatMisleadItsModelsStayWithinTheBound) {
       State loaded(bodies);
       ASSERT_TRUE(read_snapshot(write(example(), state), kTypes, loaded, *codec_for(bodies)));
       EXPECT_EQ(loaded, state);
+    }
+  }
+}
+
+TEST(Snapshot, OrientationsThatMisleadItsModelsStayWithinTheBound) {
+  for (const std::uint32_t bodies : {1U, 2U, 3U, 5U, 10U, 30U, 100U, 3000U}) {
+    SCOPED_TRACE(bodies);
+    for (const std::uint32_t spare_bits : {0U, 1U, 10U}) {
+      Adversary p(30 - spare_bits, kPositionLimit), v(28 - spare_bits, kVelocityLimit);
+      Adversary q(30 - spare_bits, kQuaternionOne, false), w(29 - spare_bits, kSpinLimit, false);
+      State state(bodies, {.orientation = true});
+      for (Slot slot = 0; slot < bodies; ++slot) {
+        state.spawn(slot, static_cast<std::uint8_t>(slot * 37U), static_cast<TypeId>(slot % kTypes), {});
+        const std::int32_t at = p.next(0), speed = v.next(1), turn = q.next(0), spin = w.next(0);
+        for (std::size_t i = 0; i < kPositionChannels; ++i) {
+          state.p(i)[slot] = at;
+          state.v(i)[slot] = state.c(i)[slot] = speed;
+        }
+        for (std::size_t i = 0; i < kQuaternionChannels; ++i) state.q(i)[slot] = turn;
+        for (std::size_t i = 0; i < kSpinChannels; ++i) state.w(i)[slot] = spin;
+      }
+      write(example(), state);  // no turns that a state may hold, but bytes that fit
     }
   }
 }
