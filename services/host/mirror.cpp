@@ -12,6 +12,8 @@ constexpr std::uint8_t mark(engine::Event::Kind kind) {
 }
 // Of a quaternion's squared norm: single precision and an engine that seldom normalises.
 constexpr double kNormSlack = 0.01;
+// One short of the limit, whose square a double does not tell from the next integers.
+constexpr double kMostSpin = kSpinLimit - 1;
 
 constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
 constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
@@ -69,7 +71,7 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
       continue;
     }
     const double unit = kQuaternionOne / std::sqrt(norm);
-    const double kept = std::min(1.0, kSpinLimit / std::sqrt(std::max(speed, 1.0)));
+    const double kept = std::min(1.0, kMostSpin / std::sqrt(std::max(speed, 1.0)));
     for (std::size_t i = 0; i < q.size(); ++i)
       target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
     // Towards zero, so that no rounding leads out of the limit.

@@ -30,6 +30,10 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
   bool whole = start.bodies.alive.size() == capacity && start.bodies.type.size() == capacity;
   for (const auto& column : start.bodies.position) whole = whole && column.size() == capacity;
   for (const auto& column : start.bodies.velocity) whole = whole && column.size() == capacity;
+  if (groups_of(config.layout).orientation) {
+    for (const auto& column : start.bodies.orientation) whole = whole && column.size() == capacity;
+    for (const auto& column : start.bodies.angular_velocity) whole = whole && column.size() == capacity;
+  }
   if (!whole) return refuse(fmt::format("body columns that are not of {} slots", capacity));
   return {};
 }

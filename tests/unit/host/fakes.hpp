@@ -57,7 +57,9 @@ class FakeSimulation final : public engine::Simulation {
     return {.position = {position[0], position[1], position[2]},
             .velocity = {velocity[0], velocity[1], velocity[2]},
             .alive = alive,
-            .type = type};
+            .type = type,
+            .orientation = {orientation[0], orientation[1], orientation[2], orientation[3]},
+            .angular_velocity = {angular_velocity[0], angular_velocity[1], angular_velocity[2]}};
   }
   [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
@@ -65,7 +67,16 @@ class FakeSimulation final : public engine::Simulation {
   void save(std::vector<std::byte>& out) const override { out.clear(); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override { return bytes.empty(); }
 
+  /// From now on its bodies have orientations, all unturned at first.
+  void turn() {
+    for (auto& column : orientation) column.assign(capacity(), 0.0F);
+    orientation[3].assign(capacity(), 1.0F);
+    for (auto& column : angular_velocity) column.assign(capacity(), 0.0F);
+  }
+
   std::array<std::vector<float>, 3> position, velocity;
+  std::array<std::vector<float>, 4> orientation;
+  std::array<std::vector<float>, 3> angular_velocity;
   std::vector<std::uint8_t> alive;
   std::vector<std::uint16_t> type;
   std::vector<engine::Event> events_now;

@@ -105,5 +105,15 @@ TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {
   EXPECT_EQ(stream.error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(Stream, OfOrientationsRefusesBodiesThatHaveNone) {
+  HostConfig config = test_config();
+  config.stream.layout.groups = {kPositionGroup, kOrientationGroup};
+  config.stream.layout.radii.assign(config.stream.layout.type_count, 1000);
+  const FakeSimulation simulation(config.stream.layout.capacity);
+  const auto stream = Stream::create(config.stream, start_of(simulation, config));
+  ASSERT_FALSE(stream);
+  EXPECT_EQ(stream.error().code, ErrorCode::kInvalidArgument);
+}
+
 }  // namespace
 }  // namespace tandem::host
