@@ -43,6 +43,12 @@ std::vector<Entry> read_entries(const fs::path& path) {
 
 std::int64_t number(const std::string& word) { return std::stoll(word); }
 
+std::vector<std::int32_t> numbers(std::span<const std::string> words) {
+  std::vector<std::int32_t> all;
+  for (const std::string& word : words) all.push_back(static_cast<std::int32_t>(number(word)));
+  return all;
+}
+
 Bytes hex(const std::vector<std::string>& words) {
   std::string digits;
   for (const std::string& word : words) digits += word;
@@ -68,10 +74,8 @@ std::optional<Layout> layout_of(const std::map<std::string, std::vector<std::str
     if (key == "codec") layout.codec = words[0];
     if (key == "codec_tables") layout.codec_tables = hex(words);
     if (key == "predictor") layout.predictor = words[0];
-    if (key == "predictor_constants") {
-      for (const auto& word : words)
-        layout.predictor_constants.push_back(static_cast<std::int32_t>(number(word)));
-    }
+    if (key == "predictor_constants") layout.predictor_constants = numbers(words);
+    if (key == "radii") layout.radii = numbers(words);
     if (key == "groups") layout.groups = words;
     if (key == "parameters") {
       std::vector<Parameter> list;
@@ -88,21 +92,39 @@ std::optional<Layout> layout_of(const std::map<std::string, std::vector<std::str
   return layout;
 }
 
+/// As make_parts(). Vectors of orientations alone correct nothing, so that their codec need not know any.
+Result<TimelineParts> parts_of(const Layout& layout) {
+  auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
+  if (!predictor) return tl::unexpected<Error>(predictor.error());
+  if (!groups_of(layout).orientation || layout.codec != "none")
+    return make_parts(layout, {}, std::move(*predictor));
+  return TimelineParts{std::move(*predictor),
+                       DeltaCodec(std::move(*make_codec({.name = layout.codec, .capacity = layout.capacity})),
+                                  layout.capacity, layout.parameters, layout.type_count, groups_of(layout)),
+                       {},
+                       StateHasher()};
+}
+
 /// A stream as a vector tells it: unlike a timeline, it may be asked for any step in any order.
 class Replica {
  public:
   Replica(const Layout& layout, TimelineParts parts)
-      : layout_(layout), parts_(std::move(parts)), state_(layout.capacity) {}
+      : layout_(layout), parts_(std::move(parts)), state_(layout.capacity, groups_of(layout)) {}
 
   void start(const Drive& drive, Frame frame, std::span<const std::string> bodies) {
     drive_ = drive;
     frame_ = frame;
-    for (std::size_t at = 0; at + 13 <= bodies.size(); at += 13) {
-      std::array<std::int32_t, 13> n{};
-      for (std::size_t i = 0; i < n.size(); ++i) n[i] = static_cast<std::int32_t>(number(bodies[at + i]));
+    const bool turns = state_.groups().orientation;
+    const std::size_t width = turns ? 20 : 13;
+    for (std::size_t at = 0; at + width <= bodies.size(); at += width) {
+      const std::vector<std::int32_t> n = numbers(bodies.subspan(at, width));
       const auto slot = static_cast<Slot>(n[0]);
-      state_.spawn(slot, static_cast<std::uint8_t>(n[1]), static_cast<TypeId>(n[2]),
-                   {{n[4], n[5], n[6]}, {n[7], n[8], n[9]}});
+      BodyState body{{n[4], n[5], n[6]}, {n[7], n[8], n[9]}};
+      if (turns) {
+        body.q = {n[13], n[14], n[15], n[16]};
+        body.w = {n[17], n[18], n[19]};
+      }
+      state_.spawn(slot, static_cast<std::uint8_t>(n[1]), static_cast<TypeId>(n[2]), body);
       state_.rest()[slot] = static_cast<std::uint8_t>(n[3]);
       for (std::size_t i = 0; i < 3; ++i) state_.c(i)[slot] = n[10 + i];
     }
@@ -130,10 +152,8 @@ class Replica {
   }
   /// The first is loaded; a later one holds what there is now.
   bool snapshot(const Bytes& bytes) {
-    State state(layout_.capacity);
-    auto fresh = make_parts(
-        layout_, {},
-        std::move(*make_predictor(layout_.predictor, layout_.capacity, layout_.predictor_constants)));
+    State state(layout_.capacity, groups_of(layout_));
+    auto fresh = parts_of(layout_);
     const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec());
     if (!read) return false;
     if (fresh->hash(state) != read->hash || fresh->hasher.region_hash() != read->region_hash) return false;
@@ -163,10 +183,29 @@ class Replica {
   bool started_ = false;
 };
 
+/// q and w, then q turned by w.
+void check_turn(const std::vector<std::string>& words) {
+  const std::vector<std::int32_t> n = numbers(words);
+  ASSERT_EQ(n.size(), 11U);
+  const Quaternion q{n[0], n[1], n[2], n[3]};
+  const Spin w{n[4], n[5], n[6]};
+  EXPECT_TRUE(valid_quaternion(q));
+  EXPECT_TRUE(valid_spin(w));
+  EXPECT_EQ(turned(q, w), (Quaternion{n[7], n[8], n[9], n[10]}));
+}
+
 class Vectors : public testing::TestWithParam<std::string> {};
 
 TEST_P(Vectors, AgreeToTheBit) {
   const std::vector<Entry> entries = read_entries(fs::path(TANDEM_VECTORS_DIR) / GetParam());
+  if (entries.front().key == "turn") {
+    for (const Entry& entry : entries) {
+      SCOPED_TRACE(testing::Message() << "line " << entry.line);
+      ASSERT_EQ(entry.key, "turn");
+      check_turn(entry.words);
+    }
+    return;
+  }
   static const std::vector<std::string> kSteps{"predict", "delta", "input", "snapshot", "hash", "refuse"};
   const auto first = std::find_if(entries.begin(), entries.end(), [](const Entry& entry) {
     return std::find(kSteps.begin(), kSteps.end(), entry.key) != kSteps.end();
@@ -179,9 +218,7 @@ TEST_P(Vectors, AgreeToTheBit) {
     const std::uint64_t unit = std::stoull(header["lattice_unit"][0], nullptr, 16);
     EXPECT_EQ(to_hex(layout_hash(*layout, 1, unit)), header["layout_hash"][0]);
   }
-  auto predictor = make_predictor(layout->predictor, layout->capacity, layout->predictor_constants);
-  ASSERT_TRUE(predictor);
-  auto parts = make_parts(*layout, {}, std::move(*predictor));
+  auto parts = parts_of(*layout);
   ASSERT_TRUE(parts) << parts.error().message;
   Replica replica(*layout, std::move(*parts));
   if (first != entries.end() && first->key != "snapshot") {

@@ -84,6 +84,56 @@ class Lifecycle(RefusalCase):
                 self.refused(rule, self.apply, bad)
 
 
+class Orientations(RefusalCase):
+    Q, W = (2**29, -(2**29), 2**29, 2**29), (0, 0, -(2**29))
+    TURN = writer.orientation(Q, W)
+
+    def setUp(self):
+        self.stream = worlds.stream(turns=True)
+        self.before = worlds.world(self.stream, {2: ((9, 9, 9), (8, 8, 8))})
+        self.before.state.w[:, 2] = 7
+        self.before.state.c[:, 2], self.before.state.rest[2] = 3, 1
+
+    def apply(self, data):
+        return payload.apply_delta(self.before, self.stream, data).state
+
+    def slot(self, state, slot):
+        return [tuple(rows[:, slot].tolist()) for rows in (state.p, state.v, state.q, state.w)]
+
+    def test_a_spawn_holds_both_groups(self):
+        state = self.apply(bytes.fromhex("8137 0d 07 01") + PLACE + self.TURN)
+        self.assertEqual(self.slot(state, 3), [P, V, self.Q, self.W])
+
+    def test_a_teleport_sets_the_groups_that_it_names(self):
+        old = self.slot(self.before.state, 2)
+        for groups, content, expected in (
+            (b"\1", PLACE, [P, V, *old[2:]]),
+            (b"\2", self.TURN, [*old[:2], self.Q, self.W]),
+            (b"\3", PLACE + self.TURN, [P, V, self.Q, self.W]),
+        ):
+            with self.subTest(groups=groups):
+                state = self.apply(records(writer.record(2, 2, groups, content)))
+                self.assertEqual(self.slot(state, 2), expected)
+                self.assertEqual((state.rest[2], state.c[:, 2].tolist()), (False, [0, 0, 0]))
+
+    def test_a_despawn_zeroes_the_orientation(self):
+        self.assertFalse(self.apply(records(writer.record(2, 0))).q.any())
+
+    def test_what_is_refused(self):
+        half = 2**29
+        for rule, bad in (
+            ("length", records(writer.record(3, 1, b"\0\0", PLACE))),
+            ("lifecycle", records(writer.record(2, 2, b"\0"))),
+            ("lifecycle", records(writer.record(2, 2, b"\4", self.TURN))),
+            ("lifecycle", records(writer.record(3, 2, b"\2", self.TURN))),
+            ("values", records(writer.record(3, 1, b"\0\0", PLACE, writer.orientation((0, 0, 0, 0), self.W)))),
+            ("values", records(writer.record(2, 2, b"\2", writer.orientation((half, half, half, 0), self.W)))),
+            ("values", records(writer.record(2, 2, b"\2", writer.orientation(self.Q, (half, 0, 1))))),
+        ):
+            with self.subTest(bytes=bad.hex()):
+                self.refused(rule, self.apply, bad)
+
+
 class Sections(RefusalCase):
     def setUp(self):
         self.stream = worlds.stream("quantized")

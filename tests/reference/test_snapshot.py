@@ -124,6 +124,37 @@ class Numbers(unittest.TestCase):
                 decoder.end()
 
 
+class WithOrientations(RefusalCase):
+    def setUp(self):
+        self.stream = worlds.stream(turns=True)
+        self.line = worlds.timeline(self.stream, {slot: ((slot, 0, 0), (0, 0, 0)) for slot in (1, 2, 5)})
+        self.state = self.line.world.state
+
+    def test_a_stream_in_mid_turn_carries_on_from_its_snapshot(self):
+        self.state.w[:, 1], self.state.w[:, 5] = (1000, -(2**28), 5), (0, 2**29, 0)
+        self.state.rest[2] = 1
+        self.line.predict()
+        cut = snapshot.read(writer.snapshot(self.line), self.stream)
+        self.assertTrue((cut.world.state.q == self.state.q).all() and (cut.world.state.w == self.state.w).all())
+        other = type(self.line).of_snapshot(self.stream, cut)
+        self.line.predict()
+        other.predict()
+        self.assertEqual(other.world.state.hash(), self.state.hash())
+
+    def test_what_no_state_may_hold_is_refused(self):
+        for rows, values in (
+            (self.state.q, (0, 0, 0, 0)),
+            (self.state.q, (0, 0, 0, 2**29)),
+            (self.state.q, (2**30 + 1, 0, 0, 0)),
+            (self.state.w, (2**29, 1, 0)),
+            (self.state.w, (0, 0, -(2**29) - 1)),
+        ):
+            before = rows[:, 2].copy()
+            rows[:, 2] = values
+            self.refused("snapshot", snapshot.read, writer.snapshot(self.line), self.stream)
+            rows[:, 2] = before
+
+
 class WithModels(RefusalCase):
     def test_a_tracker_stream_carries_on_from_its_snapshot(self):
         of = worlds.stream("tracker", capacity=100)

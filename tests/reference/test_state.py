@@ -28,6 +28,16 @@ class Hashes(unittest.TestCase):
         region = xxh3_64(u64(leaf0) + u64(leaf1))
         self.assertEqual(state.hash(), xxh3_64(u64(region)))
 
+    def test_orientations_are_a_leaf_of_their_own(self):
+        state = State(1, "none", True)
+        state.alive[0] = 1
+        state.q[:, 0], state.w[:, 0] = (1, -1, 2, 3), (4, 5, -6)
+        orientation = xxh3_64(bytes.fromhex("01000000 ffffffff 02000000 03000000 04000000 05000000 faffffff"))
+        self.assertEqual(state.leaves(0), [xxh3_64(b"\1\0\0\0\0"), xxh3_64(bytes(36)), orientation])
+        state.clear(0)
+        self.assertEqual(state.hash(), State(1, "none", True).hash())
+        self.assertNotEqual(state.hash(), State(1, "none").hash())
+
     def test_columns_go_by_block(self):
         state = State(16385, "none")
         state.alive[[0, 16384]] = 1
@@ -80,6 +90,32 @@ class Sessions(unittest.TestCase):
             with self.subTest(changes=changes), self.assertRaises(Refused) as caught:
                 worlds.stream(**changes)
             self.assertEqual(caught.exception.rule, "session")
+
+    def test_groups_and_the_radii_that_they_need(self):
+        both = ["position", "orientation"]
+        self.assertTrue(self.grouped(both, [1, 2**30]).orientation)
+        self.assertFalse(self.grouped(["position"], []).orientation)
+        self.assertIn("groups position orientation\nradii 7 8\n", self.grouped(both, [7, 8]).layout_text())
+        for groups, radii in (
+            ([], []),
+            (["orientation"], [1, 1]),
+            (["orientation", "position"], [1, 1]),
+            (["position", "position"], []),
+            ([*both, "orientation"], [1, 1]),
+            (["position", "colour"], []),
+            (["position"], [1, 1]),
+            (both, []),
+            (both, [1]),
+            (both, [1, 1, 1]),
+            (both, [0, 1]),
+            (both, [1, 2**30 + 1]),
+        ):
+            with self.subTest(groups=groups, radii=radii), self.assertRaises(Refused) as caught:
+                self.grouped(groups, radii)
+            self.assertEqual(caught.exception.rule, "session")
+
+    def grouped(self, groups, radii):
+        return stream.Stream(8, 2, "none", "ballistic", dict(worlds.PARAMETERS), groups=groups, radii=radii)
 
 
 if __name__ == "__main__":

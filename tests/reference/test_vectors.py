@@ -61,6 +61,15 @@ class Checker(unittest.TestCase):
         self.wrong("not hex", "delta xx\nhash 0000000000000000")
         self.wrong("capacity is missing", "", SMALL.replace("capacity 4", ""))
         self.wrong("13 numbers", "", SMALL.replace("0 0 0  0 0 0  0 0 0", "0 0 0"))
+        self.wrong("20 numbers", "", SMALL + "groups position orientation\nradii 1\n")
+
+    def test_turns_stand_in_a_file_of_their_own(self):
+        good = "turn 0 0 0 1073741824  1 -1 1  2 -2 2 1073741824\n"
+        self.assertEqual(check(2 * good, ""), 2)
+        self.wrong("computed", good.replace("-2 2 ", "-2 3 "), "")
+        self.wrong("no quaternion", good.replace("0 0 0 1073741824  1", "0 0 0 1073741825  1"), "")
+        self.wrong("instead of 11", "turn 1 2 3", "")
+        self.wrong("without a header", good)
 
 
 class Faults(unittest.TestCase):
@@ -74,7 +83,7 @@ class Faults(unittest.TestCase):
         return bytes(data)
 
     def test_vectors_with_faults(self):
-        for seed, name in enumerate(("absolute", "quantized", "huffman", "lifecycle", "sections", "tracker_contact")):
+        for seed, name in enumerate(("absolute", "quantized", "huffman", "lifecycle", "sections", "tracker_contact", "orientation")):
             dice = random.Random(seed)
             vector = vectors.Vector((FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
             of = vector.stream()

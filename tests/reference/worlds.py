@@ -1,5 +1,7 @@
 """Streams and states that several tests share."""
 
+import math
+
 import numpy as np
 
 from tandem_reference import payload
@@ -18,18 +20,22 @@ CONTACT = [
 FALL = Drive((0, -3000, 0), 200)
 
 
-def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b""):
-    """A small stream."""
+def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False):
+    """A small stream; with orientations where it `turns`."""
     constants = [] if predictor == "ballistic" else CONTACT
-    return Stream(capacity, types, codec, predictor, dict(parameters or PARAMETERS), tables, constants)
+    groups = ["position", "orientation"] if turns else ["position"]
+    radii = [500 + kind for kind in range(types)] if turns else []
+    return Stream(capacity, types, codec, predictor, dict(parameters or PARAMETERS), tables, constants, groups, radii)
 
 
 def world(of, bodies=()):
-    """A world of bodies {slot: (p, v)}."""
-    state = State(of.capacity, of.codec)
+    """A world of bodies {slot: (p, v)}, not turned."""
+    state = State(of.capacity, of.codec, of.orientation)
     for slot, (p, v) in dict(bodies).items():
         state.alive[slot] = 1
         state.p[:, slot], state.v[:, slot] = p, v
+        if of.orientation:
+            state.q[3, slot] = ONE
     return payload.World(state, dict(of.parameters), payload.start_models(of))
 
 
@@ -48,6 +54,20 @@ def random_numbers(seed=1):
         return (x >> 8) % (2 * limit) - limit
 
     return following
+
+
+def some_quaternion(following):
+    """A quaternion; any as likely as any other of a cube."""
+    numbers = [following(1000) + 0.5 for _ in range(4)]
+    length = math.sqrt(sum(number * number for number in numbers))
+    return [round(number / length * ONE) for number in numbers]
+
+
+def some_spin(following):
+    """An angular velocity of any order of magnitude, up to one near the limit."""
+    w = [following(300000000) for _ in range(3)]
+    small = abs(following(28))
+    return [axis >> small for axis in w]
 
 
 def two_hundred_bodies(codec="none"):

@@ -1,5 +1,6 @@
 """Writes the test vectors: python3 write_vectors.py FOLDER. What they are: idl/vectors/README.md."""
 
+import math
 import pathlib
 import struct
 import sys
@@ -7,12 +8,14 @@ import sys
 import numpy as np
 import worlds
 import writer
-from tandem_reference import payload, snapshot, xxh3
+from tandem_reference import payload, snapshot, turn, xxh3
 from tandem_reference.errors import Refused
 from tandem_reference.huffman import Table
 from tandem_reference.predict import Drive
 
 NOTE = "# Written by tests/reference from PROTOCOL.md alone; tests/golden checks that ours agrees."
+# Of the group orientation, which was written with the C++ in view.
+TURN_NOTE = "# Written by tests/reference; tests/golden checks that ours agrees."
 
 
 def hex_lines(data):
@@ -26,13 +29,16 @@ class Vector:
     def __init__(self, about, line, start=None):
         self.line = line
         of = line.stream
-        self.out = [f"# {about}", NOTE, f"capacity {of.capacity}", f"types {of.types}", f"codec {of.codec}"]
+        note = TURN_NOTE if of.orientation else NOTE
+        self.out = [f"# {about}", note, f"capacity {of.capacity}", f"types {of.types}", f"codec {of.codec}"]
         if of.codec_tables:
             self.out += ["codec_tables", *hex_lines(of.codec_tables)]
         self.out.append(f"predictor {of.predictor}")
         if of.predictor_constants:
             self.out.append("predictor_constants " + " ".join(str(value) for value in of.predictor_constants))
-        self.out.append("groups position")
+        self.out.append("groups " + " ".join(of.groups))
+        if of.radii:
+            self.out.append("radii " + " ".join(str(radius) for radius in of.radii))
         self.out.append("parameters " + " ".join(f"{i}={value}" for i, value in of.parameters.items()))
         if start is None:
             self.bodies()
@@ -44,11 +50,16 @@ class Vector:
         """Drive, frame and state before the first step."""
         drive, state = self.line.drive, self.line.world.state
         self.out.append("drive " + " ".join(str(value) for value in (*drive.gravity, drive.damping)))
-        self.out += [f"frame {self.line.frame}", "bodies  # slot reuse type rest  p x y z  v x y z  c x y z"]
+        names = "slot reuse type rest  p x y z  v x y z  c x y z"
+        groups = [state.p, state.v, state.c]
+        if state.orientation:
+            names += "  q x y z w  w x y z"
+            groups += [state.q, state.w]
+        self.out += [f"frame {self.line.frame}", f"bodies  # {names}"]
         for slot in np.flatnonzero(state.alive):
             numbers = [slot, state.reuse[slot], state.type[slot], int(state.rest[slot])]
-            columns = ["  ".join(" ".join(str(x) for x in rows[:, slot]) for rows in (state.p, state.v, state.c))]
-            self.out.append("    " + " ".join(str(x) for x in numbers) + "  " + columns[0])
+            columns = "  ".join(" ".join(str(x) for x in rows[:, slot]) for rows in groups)
+            self.out.append("    " + " ".join(str(x) for x in numbers) + "  " + columns)
 
     def say(self, text):
         """A comment before the next step."""
@@ -123,12 +134,16 @@ class Vector:
         return "\n".join(self.out) + "\n"
 
 
-def scattered(codec, predictor, slots, capacity, tables=b"", seed=1):
-    """A timeline of bodies at seeded places."""
-    of = worlds.stream(codec, predictor, capacity, tables=tables)
+def scattered(codec, predictor, slots, capacity, tables=b"", seed=1, turns=False):
+    """A timeline of bodies at seeded places, turned and turning if it says so."""
+    of = worlds.stream(codec, predictor, capacity, tables=tables, turns=turns)
     following = worlds.random_numbers(seed)
     places = {s: ([following(9000) for _ in range(3)], [following(900) for _ in range(3)]) for s in slots}
-    return worlds.timeline(of, places)
+    line = worlds.timeline(of, places)
+    for slot in slots if turns else ():
+        line.world.state.q[:, slot] = worlds.some_quaternion(following)
+        line.world.state.w[:, slot] = worlds.some_spin(following)
+    return line
 
 
 def absolute():
@@ -419,6 +434,134 @@ def ballistic_rest():
     return vector
 
 
+def turns():
+    """Quaternions turned by angular velocities."""
+    one, third = turn.ONE, 309959000  # a third of the limit's square
+    limits = [[0, 0, 0], [1, -1, 1], [turn.MOST_W, 0, 0], [0, -turn.MOST_W, 0], [0, 0, turn.MOST_W - 1],
+              [third, third, third], [-third, third, -third]]  # fmt: skip
+    long, short = math.isqrt(2**58 + 2**48), math.isqrt(2**60 - 2**50) + 1
+    plain = [[0, 0, 0, one], [0, 0, 0, -one], [one, 0, 0, 0], [0, -one, 0, 0], [one // 2] * 4,
+             [long, -long, long, -long], [0, 0, short, 0], [0, -short, 0, 0]]  # fmt: skip
+    following = worlds.random_numbers(31)
+    cases = [(q, w) for q in plain for w in limits]
+    cases += [(worlds.some_quaternion(following), w) for w in limits]
+    cases += [(worlds.some_quaternion(following), worlds.some_spin(following)) for _ in range(60)]
+    about = "# The turn: q x y z w, w x y z, then q afterwards; limits, norms just allowed, any, a chain"
+    lines = [about, TURN_NOTE]
+    for q, w in cases:
+        lines.append(turn_line(q, w)[0])
+    q, w = worlds.some_quaternion(following), [200000000, -100000000, 50000000]
+    for _ in range(40):
+        line, q = turn_line(q, w)
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+def turn_line(q, w):
+    """A step `turn`, and the quaternion that it leads to."""
+    of, by = np.array(q, np.int64).reshape(4, 1), np.array(w, np.int64).reshape(3, 1)
+    assert turn.is_quaternion(of).all() and turn.is_spin(by).all(), (q, w)
+    after = turn.turned(of, by)[:, 0].tolist()
+    return "turn " + "  ".join(" ".join(str(x) for x in numbers) for numbers in (q, w, after)), after
+
+
+def orientation():
+    """Records of both groups."""
+    line = scattered("none", "ballistic", (0, 1, 2, 5, 6), 8, b"", 21, True)
+    state, one = line.world.state, turn.ONE
+    state.rest[[0, 1]] = 1
+    state.c[1, :2] = 3000
+    state.v[:, :2] = 0
+    state.w[:, 0] = 0
+    vector = Vector("group orientation: records of every kind; 0 and 1 rest, 1 with an angular velocity", line)
+    place = writer.position((-1, 2, -3), (4, -5, 6))
+    q, w, most = worlds.some_quaternion(worlds.random_numbers(22)), (1000, -2**28, 77), turn.MOST_W
+    turned = writer.orientation(q, w)
+    edge = writer.orientation((0, one, 0, 0), (0, 0, -most))
+    vector.predict(3)
+    for why, records in (
+        ("despawn of 2", [writer.record(2, 0)]),
+        ("spawn in 2", [writer.record(2, 1, b"\1\1", place, turned)]),
+        ("a teleport of the orientation of 0, which wakes it; c of 0 becomes 0", [writer.record(0, 2, b"\2", turned)]),
+        ("of the position of 5", [writer.record(5, 2, b"\1", place)]),
+        ("of both of 6, at the limit of w", [writer.record(6, 2, b"\3", place, edge)]),
+        ("type change of 1, which wakes nobody", [writer.record(1, 3, b"\1")]),
+        ("despawn and spawn of 5", [writer.record(5, 0), writer.record(0, 1, b"\0\1", place, edge)]),
+    ):
+        vector.say(why)
+        vector.delta(writer.section(0x81, b"".join(records)))
+        vector.predict()
+    vector.say("p is rounded, q and w are not")
+    vector.delta(writer.section(0x87, bytes([5, 5, 5])))
+    vector.predict(10)
+    vector.input(1, line.frame + 1, Drive((0, -2999, 5), 100))
+    vector.say("gravity changes and wakes 1: it turns in the same step")
+    vector.predict(3)
+
+    def spawn(q, w):
+        return [writer.record(3, 1, b"\1\1", place, writer.orientation(q, w))]
+
+    half = one // 2
+    for why, records in (
+        ("a spawn without an orientation", [writer.record(3, 1, b"\1\1", place)]),
+        ("a quaternion of zeros", spawn((0, 0, 0, 0), w)),
+        ("too short a quaternion", spawn((half, half, half, half - 1100000), w)),
+        ("too long a quaternion", spawn((half, half, half, half + 1100000), w)),
+        ("a component beyond 1", spawn((0, 0, 0, one + 1), w)),
+        ("a component far beyond 1", spawn((-(2**31), 0, 0, 0), w)),
+        ("an axis of w beyond the limit", spawn(q, (most + 1, 0, 0))),
+        ("w longer than the limit", spawn(q, (0, most, 1))),
+        ("w far beyond the limit", spawn(q, (-(2**31), 0, 2**31 - 1))),
+        ("a teleport of no group", [writer.record(1, 2, b"\0")]),
+        ("a teleport of a group that is not listed", [writer.record(1, 2, b"\4", turned)]),
+        ("of one beside those that are", [writer.record(1, 2, b"\7", place, turned)]),
+        ("a teleport of the orientation of a dead slot", [writer.record(3, 2, b"\2", turned)]),
+        ("one that is no quaternion", [writer.record(1, 2, b"\2", writer.orientation((0, 0, 0, half), w))]),
+        ("one that ends too soon", [writer.record(1, 2, b"\2", turned[:-4])]),
+        ("one with the position's content", [writer.record(1, 2, b"\2", place)]),
+    ):
+        vector.refuse(writer.section(0x81, b"".join(records)), why)
+    return vector
+
+
+def orientation_snapshot():
+    """Orientations in a snapshot, and what none may hold."""
+    slots = [slot for slot in range(40) if slot % 7]
+    line = scattered("none", "ballistic", slots, 40, b"", 23, True)
+    state = line.world.state
+    state.rest[1], state.c[1, 1], state.w[:, 1] = 1, 3000, 0
+    state.q[:, 2], state.w[:, 2] = (0, 0, 0, -turn.ONE), (0, turn.MOST_W, 0)
+    start = writer.snapshot(line)
+    broken = []
+    for why, rows, values in (
+        ("a quaternion of zeros", state.q, (0, 0, 0, 0)),
+        ("too long a quaternion", state.q, (turn.ONE // 2, turn.ONE // 2, turn.ONE // 2, turn.ONE // 2 + 1100000)),
+        ("a component beyond 1", state.q, (turn.ONE + 1, 0, 0, 0)),
+        ("w longer than the limit", state.w, (turn.MOST_W, 0, -1)),
+        ("an axis of w beyond the limit", state.w, (0, 0, -turn.MOST_W - 1)),
+    ):
+        before = rows[:, 3].copy()
+        rows[:, 3] = values
+        broken.append((writer.snapshot(line), why))
+        rows[:, 3] = before
+    vector = Vector("group orientation: a snapshot in mid-turn", line, start)
+    vector.predict(5)
+    for data, why in broken:
+        vector.refuse_snapshot(data, why)
+    vector.say("a snapshot of this frame holds the same state")
+    vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
+def orientation_steps(predictor):
+    """Bodies that push each other and turn: one has nothing to do with the other."""
+    line = scattered("none", predictor, range(12), 12, b"", 24, True)
+    line.world.state.rest[3], line.world.state.c[1, 3] = 1, 3000
+    vector = Vector(f"group orientation with {predictor}; 3 rests", line)
+    vector.predict(10)
+    return vector
+
+
 def fifty_steps(predictor):
     """The world of 200 bodies among a plane, a box and a ball."""
     line = worlds.timeline(worlds.stream("none", predictor, 200, parameters={**worlds.PARAMETERS, 4: 800}))
@@ -472,10 +615,15 @@ def main(folder):
         "contact": fifty_steps("contact"),
         "contact_rest": contact_rest(),
         "field": fifty_steps("field"),
+        "orientation": orientation(),
+        "orientation_contact": orientation_steps("contact"),
+        "orientation_field": orientation_steps("field"),
+        "orientation_snapshot": orientation_snapshot(),
     }
     for name, vector in vectors.items():
         (pathlib.Path(folder) / f"{name}.txt").write_text(vector.text(), encoding="utf-8")
     (pathlib.Path(folder) / "layout.txt").write_text(layout(), encoding="utf-8")
+    (pathlib.Path(folder) / "turn.txt").write_text(turns(), encoding="utf-8")
 
 
 if __name__ == "__main__":

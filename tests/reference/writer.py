@@ -38,6 +38,11 @@ def position(p, v):
     return struct.pack("<6i", *p, *v)
 
 
+def orientation(q, w):
+    """The content of the group orientation."""
+    return struct.pack("<7i", *q, *w)
+
+
 def joined_codes(codes):
     """(length, code) pairs as bytes, most significant bit first, zeros behind."""
     bits = "".join(format(code, f"0{length}b") for length, code in codes if length)
@@ -203,6 +208,8 @@ def region(world):
     for rows, how in ((state.p, reference.BEFORE), (state.v, reference.HALF), (state.c, reference.HALF)):
         for axis in range(3):
             column(numbers, rows[axis, slots], how, at_rest)
+    for row in (*state.q, *state.w):
+        column(numbers, row[slots], reference.ZERO, at_rest)
     for row in state.codec:
         column(numbers, (row[slots] + 128) % 256 - 128, reference.ZERO, at_rest)
     if world.models:

@@ -1,10 +1,10 @@
 """A delta: its sections, and what they do to the predicted state."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import codecs, parameters, tracker
+from . import codecs, parameters, tracker, turn
 from .errors import require
 from .reader import Reader
 from .state import MOST_P, MOST_V
@@ -41,8 +41,7 @@ class Record:
     kind: int
     reuse: int = 0
     type: int = 0
-    p: tuple = ()
-    v: tuple = ()
+    columns: dict = field(default_factory=dict)  # those that it sets, by name
 
 
 @dataclass
@@ -78,7 +77,7 @@ def parse(data, state):
         require(ascends or kind == before == CORRECTIONS, "order", f"{known[kind]} behind section 0x{before or 0:02x}")
         before = kind
         if kind == LIFECYCLE:
-            parsed.records = read_records(body)
+            parsed.records = read_records(body, state.orientation)
         elif kind == PARAMETERS:
             parsed.parameters = parameters.read(body)
         elif kind == ROUNDING:
@@ -106,16 +105,26 @@ def rounded(columns, bits):
 
 
 def read_position(body):
-    """p and v as lifecycle records hold them."""
+    """The content of the group `position`."""
     values = [body.i32() for _ in range(6)]
     p, v = tuple(values[:3]), tuple(values[3:])
     require(all(abs(value) <= MOST_P for value in p), "values", "a position out of range")
     require(all(abs(value) <= MOST_V for value in v), "values", "a velocity out of range")
-    return p, v
+    return {"p": p, "v": v}
 
 
-def read_records(body):
-    """The records of a lifecycle section."""
+def read_orientation(body):
+    """The content of the group `orientation`."""
+    values = [body.i32() for _ in range(7)]
+    q, w = tuple(values[:4]), tuple(values[4:])
+    require(turn.is_quaternion(np.array(q, np.int64)), "values", f"a quaternion of {q}")
+    require(turn.is_spin(np.array(w, np.int64)), "values", f"an angular velocity of {w}")
+    return {"q": q, "w": w}
+
+
+def read_records(body, orientation):
+    """The records of a lifecycle section; with the group `orientation` or without."""
+    all_groups = 3 if orientation else 1
     records = []
     slot = 0
     while body.left() or not records:
@@ -129,11 +138,14 @@ def read_records(body):
             record.reuse = body.u8()
         if record.kind in (SPAWN, TYPE_CHANGE):
             record.type = body.leb128(3)
+        groups = all_groups if record.kind == SPAWN else 0
         if record.kind == TELEPORT:
             groups = body.u8()
-            require(groups == 1, "lifecycle", f"slot {slot}: a teleport of the groups {groups:#x}")
-        if record.kind in (SPAWN, TELEPORT):
-            record.p, record.v = read_position(body)
+            require(1 <= groups <= all_groups, "lifecycle", f"slot {slot}: a teleport of the groups {groups:#x}")
+        if groups & 1:
+            record.columns |= read_position(body)
+        if groups & 2:
+            record.columns |= read_orientation(body)
         records.append(record)
     return records
 
@@ -156,7 +168,9 @@ def apply_records(state, records, types):
         if record.kind in (SPAWN, TYPE_CHANGE):
             state.type[slot] = record.type
         if record.kind in (SPAWN, TELEPORT):
-            state.p[:, slot], state.v[:, slot], state.c[:, slot] = record.p, record.v, 0
+            for name, values in record.columns.items():
+                getattr(state, name)[:, slot] = values
+            state.c[:, slot] = 0
             state.rest[slot] = 0
             state.codec[:, slot] = 0
             renewed[slot] = 1

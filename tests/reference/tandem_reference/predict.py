@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import contact
+from . import contact, turn
 from .state import MOST_C, MOST_P, MOST_V
 
 
@@ -25,6 +25,8 @@ def step(state, stream, decay, drive):
         force_free_step(state, moving, gravity, decay, drive.damping)
     else:
         contact.step(state, stream.world, moving, gravity, decay, drive.damping)
+    if state.orientation:
+        state.q[:, moving] = turn.turned(state.q[:, moving], state.w[:, moving])
 
 
 def force_free_step(state, moving, gravity, decay, damping):

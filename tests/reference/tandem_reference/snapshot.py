@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import parameters
+from . import parameters, turn
 from .errors import require
 from .number_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
@@ -94,7 +94,7 @@ def read_region(body, stream):
     require(body.leb128(4) == 0, "snapshot", "a region that does not exist")
     announced = body.u64()
     numbers = NumberDecoder(body.rest())
-    state = State(stream.capacity, stream.codec)
+    state = State(stream.capacity, stream.codec, stream.orientation)
     living, before = [Model(), Model()], 0
     for slot in range(stream.capacity):
         before = int(numbers.decide(living[before]))
@@ -112,6 +112,10 @@ def read_region(body, stream):
     for rows, how, most in ((state.p, BEFORE, MOST_P), (state.v, HALF, MOST_V), (state.c, HALF, MOST_C)):
         for axis in range(3):
             rows[axis, slots] = column(how, -most, most)
+    for rows, most in ((state.q, turn.ONE), (state.w, turn.MOST_W)):
+        for row in rows:
+            row[slots] = column(ZERO, -most, most)
+    state.check_ranges(stream.types, "snapshot")
     for i, row in enumerate(state.codec):
         values = np.array(column(ZERO, -128, 127), np.int64)
         row[slots] = values % 256 if i < 2 else values

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from . import turn
 from .errors import require
 from .xxh3 import xxh3_64
 
@@ -11,10 +12,14 @@ CODEC_COLUMNS = {"tracker": 5}
 
 
 class State:
-    """Columns as arrays over the slots; p, v, c and the codec's have one row an axis or column."""
+    """Columns as arrays over the slots; p, v, c, q, w and the codec's have one row an axis or column.
 
-    def __init__(self, capacity, codec):
+    Without the group `orientation` q and w have no rows.
+    """
+
+    def __init__(self, capacity, codec, orientation=False):
         self.capacity = capacity
+        self.orientation = orientation
         self.alive = np.zeros(capacity, bool)
         self.reuse = np.zeros(capacity, np.int64)
         self.type = np.zeros(capacity, np.int64)
@@ -22,13 +27,15 @@ class State:
         self.p = np.zeros((3, capacity), np.int64)
         self.v = np.zeros((3, capacity), np.int64)
         self.c = np.zeros((3, capacity), np.int64)
+        self.q = np.zeros((4 * orientation, capacity), np.int64)
+        self.w = np.zeros((3 * orientation, capacity), np.int64)
         self.codec = np.zeros((CODEC_COLUMNS.get(codec, 0), capacity), np.int64)
 
     def copy(self):
         """The same state in arrays of its own."""
         twin = object.__new__(State)
-        twin.capacity = self.capacity
-        for name in ("alive", "reuse", "type", "rest", "p", "v", "c", "codec"):
+        twin.capacity, twin.orientation = self.capacity, self.orientation
+        for name in ("alive", "reuse", "type", "rest", "p", "v", "c", "q", "w", "codec"):
             setattr(twin, name, getattr(self, name).copy())
         return twin
 
@@ -36,7 +43,7 @@ class State:
         """What a despawn does: every column of the slot is zero."""
         for column in (self.alive, self.reuse, self.type, self.rest):
             column[slot] = 0
-        for rows in (self.p, self.v, self.c, self.codec):
+        for rows in (self.p, self.v, self.c, self.q, self.w, self.codec):
             rows[:, slot] = 0
 
     def blocks(self):
@@ -48,7 +55,7 @@ class State:
         return block * BLOCK, min((block + 1) * BLOCK, self.capacity)
 
     def leaves(self, block):
-        """The hashes of a block: of what every slot has, then of the group `position`."""
+        """The hashes of a block: of what every slot has, then of each group."""
         first, end = self.block_slots(block)
         common = [
             self.alive[first:end].astype("u1"),
@@ -57,8 +64,9 @@ class State:
             self.rest[first:end].astype("u1"),
             *(row[first:end].astype("u1") for row in self.codec),
         ]
-        position = [row[first:end].astype("<i4") for rows in (self.p, self.v, self.c) for row in rows]
-        return [xxh3_64(b"".join(column.tobytes() for column in columns)) for columns in (common, position)]
+        groups = [(self.p, self.v, self.c)] + [(self.q, self.w)] * self.orientation
+        of_groups = [[row[first:end].astype("<i4") for rows in group for row in rows] for group in groups]
+        return [xxh3_64(b"".join(column.tobytes() for column in columns)) for columns in (common, *of_groups)]
 
     def region_hash(self):
         """The hash of the one region: of the leaves of all blocks."""
@@ -74,3 +82,7 @@ class State:
         require(not np.any(self.type >= types), rule, "a type that the session does not have")
         for rows, most, name in ((self.p, MOST_P, "p"), (self.v, MOST_V, "v"), (self.c, MOST_C, "c")):
             require(not np.any(np.abs(rows) > most), rule, f"{name} out of range")
+        if self.orientation:
+            living = self.alive.astype(bool)
+            require(turn.is_quaternion(self.q[:, living]).all(), rule, "a quaternion that is none")
+            require(turn.is_spin(self.w[:, living]).all(), rule, "w out of range")

@@ -8,6 +8,8 @@ from .errors import require
 
 CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
 PREDICTORS = ("ballistic", "contact", "field")
+GROUPS = ["position"], ["position", "orientation"]
+MOST_RADIUS = 2**30
 VERSION = 1
 
 
@@ -31,11 +33,14 @@ class Stream:
     def __post_init__(self):
         require(1 <= self.capacity <= 2**20, "session", f"capacity {self.capacity}")
         require(1 <= self.types <= 65535, "session", f"{self.types} types")
-        require(self.groups == ["position"], "session", f"groups {self.groups}")
+        require(self.groups in GROUPS, "session", f"groups {self.groups}")
         require(self.region_blocks == 0, "session", "regions are not played")
         require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
         require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
-        require(not self.radii, "session", "radii where no group needs them")
+        self.orientation = "orientation" in self.groups
+        needed = self.types if self.orientation else 0
+        require(len(self.radii) == needed, "session", f"{len(self.radii)} radii where the groups need {needed}")
+        require(all(1 <= radius <= MOST_RADIUS for radius in self.radii), "session", f"radii {self.radii}")
         self.parameters = parameters.complete(list(self.parameters.items()))
         if self.codec in ("entropy", "limited"):
             self.tables = huffman.two_tables(self.codec_tables)

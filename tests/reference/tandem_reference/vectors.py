@@ -4,7 +4,9 @@ import pathlib
 import struct
 from dataclasses import dataclass
 
-from . import parameters, payload, snapshot
+import numpy as np
+
+from . import parameters, payload, snapshot, turn
 from .errors import Refused
 from .snapshot import check_drive
 from .state import State
@@ -16,7 +18,7 @@ HEADER = {
     "capacity", "types", "codec", "codec_tables", "predictor", "predictor_constants", "groups", "radii", "parameters",
     "lattice_unit", "lead", "region_blocks", "layout_hash", "drive", "frame", "bodies",
 }  # fmt: skip
-STEPS = {"predict", "delta", "input", "snapshot", "hash", "refuse"}
+STEPS = {"predict", "delta", "input", "snapshot", "turn", "hash", "refuse"}
 
 
 class Wrong(Exception):
@@ -140,17 +142,19 @@ class Vector:
 
     def start(self, stream):
         """The timeline of the state in `bodies`."""
-        state = State(stream.capacity, stream.codec)
+        state = State(stream.capacity, stream.codec, stream.orientation)
         numbers = self.get("bodies", Line.integers, [])
-        if len(numbers) % 13:
-            raise self.header["bodies"].wrong("13 numbers a body")
-        for at in range(0, len(numbers), 13):
-            slot, reuse, kind, rest, *columns = numbers[at : at + 13]
+        width = 20 if stream.orientation else 13
+        if len(numbers) % width:
+            raise self.header["bodies"].wrong(f"{width} numbers a body")
+        for at in range(0, len(numbers), width):
+            slot, reuse, kind, rest, *columns = numbers[at : at + width]
             if not 0 <= slot < stream.capacity or rest not in (0, 1):
                 raise self.header["bodies"].wrong(f"slot {slot}, rest {rest}")
             state.alive[slot], state.rest[slot] = 1, rest
             state.reuse[slot], state.type[slot] = reuse, kind
-            state.p[:, slot], state.v[:, slot], state.c[:, slot] = columns[:3], columns[3:6], columns[6:]
+            state.p[:, slot], state.v[:, slot], state.c[:, slot] = columns[:3], columns[3:6], columns[6:9]
+            state.q[:, slot], state.w[:, slot] = columns[9:13], columns[13:]
         state.check_ranges(stream.types, "vector")
         *gravity, damping = self.get("drive", lambda line: line.integers(4), [0, 0, 0, 0])
         frame = self.get("frame", lambda line: line.integers(1)[0], 0)
@@ -160,6 +164,10 @@ class Vector:
     def check(self):
         """Do all steps; how many outcomes agreed. Raises Wrong at the first that does not."""
         steps = list(self.steps)
+        if not self.header and all(line.key == "turn" for line in steps):
+            for line in steps:
+                check_turn(line)
+            return len(steps)
         try:
             stream = self.stream()
         except Refused as refusal:
@@ -182,6 +190,8 @@ class Vector:
                 check_hash(line, timeline)
                 agreed += 1
             else:
+                if line.key == "turn":
+                    raise line.wrong("stands in a file of its own, without a header")
                 timeline, refusal = do_step(line, stream, timeline)
                 if refusal and outcome != "refuse":
                     raise line.wrong(f"refused ({refusal})")
@@ -193,6 +203,17 @@ class Vector:
             line = self.header["layout_hash"]
             if line.hash() != stream.layout_hash():
                 raise line.wrong(f"computed {text(stream.layout_hash())}")
+
+
+def check_turn(line):
+    """A quaternion turned by an angular velocity must be the one of the vector."""
+    numbers = np.array(line.integers(11), np.int64)
+    q, w, expected = numbers[:4], numbers[4:7], numbers[7:]
+    if not (turn.is_quaternion(q) and turn.is_spin(w)):
+        raise line.wrong("no quaternion or no angular velocity")
+    computed = turn.turned(q.reshape(4, 1), w.reshape(3, 1))[:, 0]
+    if (computed != expected).any():
+        raise line.wrong(f"computed {computed.tolist()}")
 
 
 def do_step(line, stream, timeline):
