@@ -13,6 +13,22 @@ bool uses(const Picture& picture, const DrawnFrame& frame) {
 
 }  // namespace
 
+void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps, DrawnFrame& drawn) {
+  const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
+  drawn.frame = frame;
+  for (std::size_t channel = 0; channel < kPositionChannels; ++channel) {
+    copy(state.p(channel), drawn.p[channel]);
+    copy(state.v(channel), drawn.v[channel]);
+  }
+  for (std::size_t channel = 0; channel < kQuaternionChannels; ++channel)
+    copy(state.q(channel), drawn.q[channel]);
+  for (std::size_t channel = 0; channel < kSpinChannels; ++channel) copy(state.w(channel), drawn.w[channel]);
+  copy(state.alive(), drawn.alive);
+  copy(state.reuse(), drawn.generation);
+  copy(state.type(), drawn.type);
+  copy(jumps, drawn.jumps);
+}
+
 DrawnFrame& PictureExchange::unused(const Picture& next) {
   const std::lock_guard lock(mutex_);
   const auto found = std::find_if(frames_.begin(), frames_.end(), [&](const DrawnFrame& frame) {

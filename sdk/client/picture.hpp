@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sdk/client/server_clock.hpp"
@@ -14,15 +15,27 @@
 
 namespace tandem::client {
 
-/// The columns of one frame that sampling reads: 29 bytes a slot.
+/// The columns of one frame that sampling reads: 29 bytes a slot, 57 with orientations.
 struct DrawnFrame {
   Frame frame = 0;
   std::array<std::vector<std::int32_t>, kPositionChannels> p, v;
+  std::array<std::vector<std::int32_t>, kQuaternionChannels> q;  ///< empty without orientations
+  std::array<std::vector<std::int32_t>, kSpinChannels> w;        ///< likewise
   std::vector<std::uint8_t> alive;
   std::vector<std::uint8_t> generation;
   std::vector<TypeId> type;
   std::vector<std::uint8_t> jumps;  ///< counts the bodies' spawns and teleports since the snapshot, wraps
+
+  [[nodiscard]] bool has_orientations() const { return !q[0].empty(); }
+  [[nodiscard]] Quaternion quaternion(Slot slot) const {
+    return {q[0][slot], q[1][slot], q[2][slot], q[3][slot]};
+  }
+  [[nodiscard]] Spin spin(Slot slot) const { return {w[0][slot], w[1][slot], w[2][slot]}; }
 };
+
+/// Copies what sampling reads of `state`, the one of `frame`. `jumps`: a count a slot. Allocates where
+/// `drawn` held fewer slots.
+void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps, DrawnFrame& drawn);
 
 /// All that one sample() reads, of one moment. The frames belong to a PictureExchange.
 struct Picture {

@@ -48,18 +48,8 @@ void PictureWriter::draw_ahead(const ClientTimeline& timeline) {
 }
 
 const DrawnFrame* PictureWriter::draw(const ClientTimeline& timeline, Frame frame) {
-  const State& state = timeline.state(frame);
   DrawnFrame& drawn = exchange_.unused(picture_);
-  const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
-  drawn.frame = frame;
-  for (std::size_t channel = 0; channel < kPositionChannels; ++channel) {
-    copy(state.p(channel), drawn.p[channel]);
-    copy(state.v(channel), drawn.v[channel]);
-  }
-  copy(state.alive(), drawn.alive);
-  copy(state.reuse(), drawn.generation);
-  copy(state.type(), drawn.type);
-  copy(jumps_, drawn.jumps);
+  client::draw(timeline.state(frame), frame, jumps_, drawn);
   return &drawn;
 }
 

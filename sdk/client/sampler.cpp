@@ -15,6 +15,7 @@ void Sampler::begin(const Picture& picture) {
   epoch_ = picture.epoch;
   capacity_ = picture.agreed->alive.size();
   shown_.assign(3 * capacity_, 0);
+  shown_turns_.assign(picture.agreed->has_orientations() ? capacity_ : 0, Rotation{0, 0, 0, 1});
   shown_alive_.assign(capacity_, 0);
   shown_generation_.assign(capacity_, 0);
   shown_jumps_.assign(capacity_, 0);
@@ -78,13 +79,53 @@ void Sampler::extrapolate(const Picture& picture, double share, double beyond, d
   }
 }
 
+void Sampler::show_turn(std::size_t slot, const Rotation& turn, Sample& out) {
+  shown_turns_[slot] = turn;
+  std::copy(turn.begin(), turn.end(), out.orientations.begin() + static_cast<std::ptrdiff_t>(4 * slot));
+}
+
+void Sampler::interpolate_turns(const Picture& picture, double share, Sample& out) {
+  const DrawnFrame& agreed = *picture.agreed;
+  const DrawnFrame& before = picture.before != nullptr ? *picture.before : agreed;
+  const auto lag = static_cast<float>(1 - share);
+  for (Slot slot = 0; slot < shown_turns_.size(); ++slot) {
+    if (agreed.alive[slot] == 0) continue;
+    Rotation turn = to_rotation(agreed.quaternion(slot));
+    const bool jumped = before.jumps[slot] != agreed.jumps[slot];
+    if (!jumped) turn = between(turn, to_rotation(before.quaternion(slot)), lag);
+    show_turn(slot, turn, out);
+  }
+}
+
+void Sampler::extrapolate_turns(const Picture& picture, double share, double beyond, double blend,
+                                double frames, Sample& out) {
+  const DrawnFrame& agreed = *picture.agreed;
+  const DrawnFrame& ahead = *picture.ahead;
+  for (Slot slot = 0; slot < shown_turns_.size(); ++slot) {
+    if (agreed.alive[slot] == 0) continue;
+    const Spin spin = ahead.spin(slot);
+    Rotation turn = between(to_rotation(agreed.quaternion(slot)), to_rotation(ahead.quaternion(slot)),
+                            static_cast<float>(share));
+    if (beyond > 0) turn = turned_on(turn, spin, static_cast<float>(beyond));
+    if (out.changes[slot] == BodyChange::kNone) {
+      const Rotation expected = turned_on(shown_turns_[slot], spin, static_cast<float>(frames));
+      turn = between(turn, expected, static_cast<float>(blend));
+    }
+    show_turn(slot, turn, out);
+  }
+}
+
 void Sampler::sample(const Picture& picture, std::int64_t now_ns, SampleMode mode, Sample& out) {
   const DrawnFrame& agreed = *picture.agreed;
   const Pacer& pacer = picture.pacer;
-  if (epoch_ != picture.epoch || capacity_ != agreed.alive.size()) begin(picture);
+  const bool had_orientations = !shown_turns_.empty();
+  if (epoch_ != picture.epoch || capacity_ != agreed.alive.size() ||
+      had_orientations != agreed.has_orientations())
+    begin(picture);
   out.epoch = epoch_;
   out.capacity = static_cast<std::uint32_t>(capacity_);
   out.positions.resize(3 * capacity_);
+  out.orientations.resize(4 * shown_turns_.size());
   out.changes.resize(capacity_);
   out.alive = agreed.alive;
   out.generation = agreed.generation;
@@ -96,13 +137,18 @@ void Sampler::sample(const Picture& picture, std::int64_t now_ns, SampleMode mod
   if (mode == SampleMode::kInterpolate) {
     const double wanted = pacer.known() ? pacer.arrived_frame(now_ns) - 1 : applied;
     out.frame = std::clamp(wanted, applied - (picture.before != nullptr ? 1 : 0), applied);
-    interpolate(picture, out.frame - (applied - 1), out);
+    const double share = out.frame - (applied - 1);
+    interpolate(picture, share, out);
+    interpolate_turns(picture, share, out);
   } else {
     const double wanted = pacer.known() ? pacer.server_frame(now_ns) : applied;
     out.frame = std::clamp(wanted, applied, applied + ahead + 1);
     const double share = ahead > 0 ? std::min(1.0, (out.frame - applied) / ahead) : 1;
-    extrapolate(picture, share, std::max(0.0, out.frame - applied - ahead), std::exp(-elapsed_s / kBlendS),
-                std::clamp(out.frame - last_frame_, -2.0, 2.0), out);
+    const double beyond = std::max(0.0, out.frame - applied - ahead);
+    const double blend = std::exp(-elapsed_s / kBlendS);
+    const double frames = std::clamp(out.frame - last_frame_, -2.0, 2.0);
+    extrapolate(picture, share, beyond, blend, frames, out);
+    extrapolate_turns(picture, share, beyond, blend, frames, out);
   }
   last_ns_ = now_ns;
   last_frame_ = out.frame;

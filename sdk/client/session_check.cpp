@@ -11,9 +11,9 @@ namespace {
 constexpr std::uint32_t kDefinedLead = 1;
 constexpr double kMinFrameRateHz = 1;
 constexpr double kMaxFrameRateHz = 10'000;
-// The largest payload is `none` over all slots with a lifecycle record each: below 64 bytes a slot, plus
-// headers.
-constexpr std::uint64_t kMaxBytesPerSlot = 128;
+// The largest payload has a correction and a lifecycle record of every slot: below 128 bytes a slot with
+// orientations, plus headers.
+constexpr std::uint64_t kMaxBytesPerSlot = 256;
 constexpr std::uint64_t kMaxFixedBytes = 1U << 20U;
 
 tl::unexpected<Error> bad(const std::string& what) { return fail(ErrorCode::kMalformed, what); }

@@ -89,12 +89,17 @@ enum class SampleMode : std::uint8_t {
 };
 
 /// The bodies at one moment, to draw. Arrays are `capacity` long, positions three times that (x, y, z of slot
-/// 0, of slot 1, ...). Values of slots with alive == 0 are unspecified, except their `change`.
+/// 0, of slot 1, ...), orientations four times. Values of slots with alive == 0 are unspecified, except their
+/// `change`.
 struct Sample {
   std::uint64_t epoch = 0;
   double frame = 0;  ///< the moment, in frames
   std::uint32_t capacity = 0;
   std::vector<float> positions;  ///< scene units
+  /// Quaternions x, y, z, w (Eigen's order) of norm 1, from the body's frame to the world's. q and -q are the
+  /// same orientation, and a body's may change from one to the other between samples. Empty where the session
+  /// has no orientations: its bodies are points.
+  std::vector<float> orientations;
   std::vector<std::uint8_t> alive;
   std::vector<std::uint8_t> generation;
   std::vector<std::uint16_t> types;  ///< index into Client::types()

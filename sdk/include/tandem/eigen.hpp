@@ -3,6 +3,7 @@
 // needs it.
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "tandem/client.hpp"
 
@@ -12,6 +13,22 @@ namespace tandem {
 /// gone.
 [[nodiscard]] inline Eigen::Map<const Eigen::Matrix3Xf> positions(const Sample& sample) {
   return {sample.positions.data(), 3, static_cast<Eigen::Index>(sample.capacity)};
+}
+
+/// Whether the session has orientations, which the next two need.
+[[nodiscard]] inline bool has_orientations(const Sample& sample) { return !sample.orientations.empty(); }
+
+/// Orientations, 4 x capacity, a column a slot: the coefficients x, y, z, w of an Eigen::Quaternionf. 4 x 0
+/// without orientations. Views `sample`, as positions() does.
+[[nodiscard]] inline Eigen::Map<const Eigen::Matrix4Xf> orientations(const Sample& sample) {
+  return {sample.orientations.data(), 4, static_cast<Eigen::Index>(sample.orientations.size() / 4)};
+}
+
+/// Of the body in `slot`, below capacity and alive: from its frame to the world's, of norm 1. Needs
+/// orientations. Views `sample`, as positions() does.
+[[nodiscard]] inline Eigen::Map<const Eigen::Quaternionf> orientation(const Sample& sample,
+                                                                      std::uint32_t slot) {
+  return Eigen::Map<const Eigen::Quaternionf>(sample.orientations.data() + std::size_t{4} * slot);
 }
 
 /// 1 where a slot holds a body, 0 where not; capacity long. Views `sample`, as positions() does.

@@ -75,6 +75,36 @@ void sample(benchmark::State& state, SampleMode mode) {
 BENCHMARK_CAPTURE(sample, interpolate, SampleMode::kInterpolate)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(sample, extrapolate, SampleMode::kExtrapolate)->Unit(benchmark::kMicrosecond);
 
+// The same of bodies with orientations, all of which turn and are corrected a little in every frame.
+void sample_turning(benchmark::State& state, SampleMode mode) {
+  const std::vector<std::uint8_t> jumps(kBodies);
+  std::array<DrawnFrame, 3> frames;
+  for (Frame frame = 0; frame < frames.size(); ++frame) {
+    State bodies(kBodies, {.orientation = true});
+    for (Slot slot = 0; slot < kBodies; ++slot) {
+      const auto tilt = static_cast<std::int32_t>(slot * (frame + 1) % 1000) << 10U;
+      const Spin spin{1 << 25, tilt, 1 << 24};
+      bodies.spawn(slot, 0, 0, {.q = turned(turned(kNoTurn, spin), {tilt, 0, 0}), .w = spin});
+    }
+    draw(bodies, frame + 1, jumps, frames[frame]);
+  }
+  Picture picture{.epoch = 1, .lattice_unit = 0.001, .pacer = Pacer(30)};
+  picture.before = &frames[0];
+  picture.agreed = &frames[1];
+  picture.ahead = &frames[2];
+  std::int64_t now_ns = 0;
+  picture.pacer.on_delta(2, now_ns, now_ns);
+  Sampler sampler;
+  Sample out;
+  for (auto _ : state) {
+    sampler.sample(picture, now_ns, mode, out);
+    benchmark::DoNotOptimize(out.orientations.data());
+    now_ns = (now_ns + 4 * kMs) % (2 * kFrameNs);
+  }
+}
+BENCHMARK_CAPTURE(sample_turning, interpolate, SampleMode::kInterpolate)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(sample_turning, extrapolate, SampleMode::kExtrapolate)->Unit(benchmark::kMicrosecond);
+
 void frame(benchmark::State& state, bool sampling) {
   World world;
   if (sampling) world.core().start_sampling();

@@ -125,6 +125,38 @@ TEST_F(SessionTest, WithoutAStreamToPlayTheReasonOfEachIsSaid) {
   EXPECT_NE(chosen.error().message.find("stream 1: "), std::string::npos) << chosen.error().message;
 }
 
+TEST_F(SessionTest, OrientationsNeedARadiusOfEachType) {
+  const auto refused = [&](const std::vector<std::int32_t>& radii) {
+    auto session = server.session;
+    session.streams[0].layout.groups = {"position", "orientation"};
+    session.streams[0].layout.radii = radii;
+    rehash(session);
+    const auto chosen = choose_stream(session);
+    return !chosen && chosen.error().message.find("radius") != std::string::npos;
+  };
+  std::vector<std::int32_t> radii(server.session.types.size(), 1000);
+  EXPECT_FALSE(refused(radii));
+  EXPECT_TRUE(refused({}));
+  for (const std::int32_t out_of_range : {0, -1, kPositionLimit + 1}) {
+    radii.front() = out_of_range;
+    EXPECT_TRUE(refused(radii)) << out_of_range;
+  }
+  radii.front() = 1000;
+  radii.push_back(1000);
+  EXPECT_TRUE(refused(radii));
+}
+
+TEST_F(SessionTest, RadiiArePartOfTheLayoutHash) {
+  auto session = server.session;
+  session.streams[0].layout.groups = {"position", "orientation"};
+  session.streams[0].layout.radii.assign(session.types.size(), 1000);
+  rehash(session);
+  session.streams[0].layout.radii.front() = 1001;
+  const auto chosen = choose_stream(session);
+  ASSERT_FALSE(chosen.has_value());
+  EXPECT_EQ(chosen.error().code, ErrorCode::kMismatch);
+}
+
 TEST_F(SessionTest, ANewEpochEmptiesEverything) {
   join();
   for (int i = 0; i < 5; ++i) frame();
