@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tandem::host {
 namespace {
@@ -37,14 +38,15 @@ std::size_t least_budget(const QualityGoal& goal, double frame_rate_hz) {
 }
 
 QualityControl::QualityControl(const QualityGoal& goal, StepRule steps, const CodecParameters& start,
-                               std::uint32_t bodies, double frame_rate_hz)
+                               std::uint32_t bodies, double frame_rate_hz, std::vector<std::int32_t> radii)
     : goal_(goal),
+      radii_(std::move(radii)),
       steps_(steps),
       start_(start),
       bodies_(bodies),
       frame_rate_hz_(frame_rate_hz),
-      frames_per_decision_(
-          static_cast<std::uint32_t>(std::clamp(std::lround(frame_rate_hz / 4), 1L, 1000L))) {}
+      frames_per_decision_(static_cast<std::uint32_t>(std::clamp(std::lround(frame_rate_hz / 4), 1L, 1000L))),
+      statistics_(radii_) {}
 
 double QualityControl::ratio() const {
   const double mbit_per_s = static_cast<double>(bytes_) * 8 / kBitsPerMbit * frame_rate_hz_ / frames_;
@@ -99,7 +101,7 @@ bool QualityControl::after_frame(std::size_t payload_bytes, std::uint32_t correc
   frames_ = 0;
   bytes_ = 0;
   corrected_ = 0;
-  statistics_ = {};
+  statistics_ = ResidualStatistics(radii_);
   return parameters != before;
 }
 

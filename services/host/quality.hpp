@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "sdk/core/codec/codec.hpp"
 #include "services/host/residual_statistics.hpp"
@@ -36,9 +37,9 @@ enum class StepRule : std::uint8_t {
 /// Looks at every frame and decides four times a second. Deterministic; no clock. Not thread-safe.
 class QualityControl {
  public:
-  /// `start`: the parameters of the first frame, of `bodies` bodies.
+  /// `start`: the parameters of the first frame, of `bodies` bodies. `radii`: Layout::radii.
   QualityControl(const QualityGoal& goal, StepRule steps, const CodecParameters& start, std::uint32_t bodies,
-                 double frame_rate_hz);
+                 double frame_rate_hz, std::vector<std::int32_t> radii = {});
 
   /// What an encoder's observer is told.
   void observe(const State& predicted, const State& target, const CodecParameters& parameters) {
@@ -58,6 +59,7 @@ class QualityControl {
   void judge(std::int32_t threshold);
 
   QualityGoal goal_;
+  std::vector<std::int32_t> radii_;
   StepRule steps_;
   CodecParameters start_;
   std::uint32_t bodies_;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "sdk/core/codec/observer.hpp"
@@ -10,10 +11,14 @@
 
 namespace tandem::host {
 
-/// Residuals of the bodies beyond the threshold, summed over the frames observed. Two passes over the same
+/// Residuals of the bodies beyond the threshold, with orientations those whose surface is, summed over the
+/// frames observed. Two passes over the same
 /// inputs: the first with `selective` for the largest residuals, the second with `quantized` and the ranges
 /// found for the symbol counts.
 struct ResidualStatistics final : EncodeObserver {
+  ResidualStatistics() = default;
+  /// `radii`: Layout::radii of the stream.
+  explicit ResidualStatistics(std::vector<std::int32_t> radii) : radii_(std::move(radii)) {}
   void frame(const State& predicted, const State& target, const CodecParameters& parameters) override;
 
   std::uint64_t frames = 0;
@@ -24,6 +29,9 @@ struct ResidualStatistics final : EncodeObserver {
   SymbolCounts velocity_counts{};
 
  private:
+  void add(const State& predicted, const State& target, Slot slot, const CodecParameters& parameters);
+
+  std::vector<std::int32_t> radii_;
   std::vector<std::uint8_t> marks_;
 };
 

@@ -31,6 +31,8 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
   for (const auto& column : start.bodies.position) whole = whole && column.size() == capacity;
   for (const auto& column : start.bodies.velocity) whole = whole && column.size() == capacity;
   if (groups_of(config.layout).orientation) {
+    if (start.bodies.orientation[0].empty())
+      return refuse("the stream has orientations, which the simulation's bodies do not have");
     for (const auto& column : start.bodies.orientation) whole = whole && column.size() == capacity;
     for (const auto& column : start.bodies.angular_velocity) whole = whole && column.size() == capacity;
   }
@@ -52,7 +54,7 @@ struct Stream::Impl final : EncodeObserver {
     bodies = mirror.target().alive_count();
     if (config.quality) {
       quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters.codec,
-                      config.layout.capacity, start.frame_rate_hz);
+                      config.layout.capacity, start.frame_rate_hz, config.layout.radii);
     }
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
   }
@@ -145,7 +147,7 @@ std::uint32_t Stream::measure_client_cost() const {
   const auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
   if (m.clock == nullptr || m.bodies == 0 || !predictor) return 0;
   const StepInput input{.drive = m.drive, .parameters = m.parameters.step};
-  State to(layout.capacity);
+  State to(layout.capacity, groups_of(layout));
   StateHasher hasher;
   std::array<std::int64_t, 9> took_ns{};
   for (std::int64_t& took : took_ns) {

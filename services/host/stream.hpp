@@ -40,8 +40,8 @@ struct StreamStart {
 /// of the next. Owns no thread, clock or socket; the same calls give the same bytes. Not thread-safe.
 class Stream {
  public:
-  /// Errors: kInvalidArgument (layout, goals, body columns not `capacity` long), kUnsupported (codec,
-  /// predictor), kMalformed (tables, constants).
+  /// Errors: kInvalidArgument (layout, goals, body columns not `capacity` long, orientations in the layout
+  /// that the bodies do not have), kUnsupported (codec, predictor), kMalformed (tables, constants).
   static Result<Stream> create(StreamConfig config, const StreamStart& start);
   Stream(Stream&&) noexcept;
   Stream& operator=(Stream&&) noexcept;

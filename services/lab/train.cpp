@@ -21,7 +21,7 @@ Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
   if (!replay) return tl::unexpected(replay.error());
   auto stream = host::Stream::create(config, {.bodies = simulation.bodies(), .drive = replay->start_drive()});
   if (!stream) return tl::unexpected(stream.error());
-  host::ResidualStatistics observed;
+  host::ResidualStatistics observed(config.layout.radii);
   for (Frame frame = 1; frame <= frames; ++frame) {
     if (auto stepped = replay->next(); !stepped) return tl::unexpected(stepped.error());
     for (const ScheduledDrive& input : replay->scheduled()) {

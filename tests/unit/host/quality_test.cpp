@@ -74,6 +74,21 @@ TEST(Quality, WithoutATargetTheThresholdStaysAndRangesFollowWhatIsCorrected) {
   EXPECT_EQ(run(control, 10, 500, grown), grown) << "nothing was corrected: nothing was learnt";
 }
 
+TEST(Quality, RangesFollowBodiesThatAreCorrectedForTheirTurn) {
+  QualityControl control({.smallest_threshold = 1000, .largest_threshold = 1000}, StepRule::kFollow, kStart,
+                         1000, 30, {20'000});
+  State predicted(1, {.orientation = true});
+  predicted.spawn(0, 0, 0, {});
+  State target = predicted;
+  target.set_body(0, {.p = {900, 0, 0}, .v = {127'000, 0, 0}, .q = turned(kNoTurn, {1 << 28, 0, 0})});
+  CodecParameters parameters = kStart;
+  for (int decision = 0; decision < 3; ++decision) {
+    control.observe(predicted, target, parameters);
+    while (!control.after_frame(500, 10, parameters)) continue;
+    EXPECT_EQ(parameters.velocity_step, 1100) << "decision " << decision;
+  }
+}
+
 TEST(Quality, StepsOfACodecThatDoesNotReadThemStay) {
   QualityControl control =
       control_of({.smallest_threshold = 1000, .largest_threshold = 1000}, StepRule::kLeave);

@@ -39,5 +39,23 @@ TEST(ResidualStatistics, OnlyBodiesBeyondTheThresholdCount) {
   EXPECT_EQ(statistics.velocity_counts[2], 1U);
 }
 
+TEST(ResidualStatistics, WithOrientationsBodiesCountWhoseSurfaceIsBeyond) {
+  State predicted(3, {.orientation = true});
+  for (Slot slot = 0; slot < 3; ++slot) predicted.spawn(slot, 0, slot == 2 ? 1 : 0, {});
+  State target = predicted;
+  // A turn of 0.1 rad: 100 units at a radius of 1000, 10 at one of 100.
+  const Quaternion turn = turned(kNoTurn, {0, 0, (1 << 28) / 10});
+  for (const Slot slot : {1U, 2U}) target.set_quaternion(slot, turn);
+  target.p(0)[1] = 7;
+  target.p(0)[2] = 50;
+  ResidualStatistics statistics({1000, 100});
+  statistics.frame(predicted, target, {90, 10, 20});
+  EXPECT_EQ(statistics.bodies, 1U);
+  EXPECT_EQ(statistics.largest_position, 7U);
+  statistics.frame(predicted, target, {55, 10, 20});
+  EXPECT_EQ(statistics.bodies, 3U);
+  EXPECT_EQ(statistics.largest_position, 50U);
+}
+
 }  // namespace
 }  // namespace tandem::host

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "tests/property/synthetic.hpp"
@@ -96,20 +97,55 @@ TEST(Stream, CountsWhatItCorrectsForTraining) {
   EXPECT_EQ(statistics.bodies, corrected);
 }
 
+HostConfig turning_config() {
+  HostConfig config = test_config();
+  config.stream.layout.codec = "tracker";
+  config.stream.layout.codec_tables.clear();
+  config.stream.layout.groups = {kPositionGroup, kOrientationGroup};
+  config.stream.layout.radii.assign(config.stream.layout.type_count, 1000);
+  return config;
+}
+
+TEST(Stream, ShowsHowBodiesTurn) {
+  const HostConfig config = turning_config();
+  FakeSimulation simulation(4);
+  simulation.turn();
+  auto created = Stream::create(config.stream, start_of(simulation, config));
+  ASSERT_TRUE(created) << created.error().message;
+  for (int frame = 1; frame <= 30; ++frame) {
+    const float half = 0.05F * static_cast<float>(frame);
+    simulation.orientation[2][1] = std::sin(half);
+    simulation.orientation[3][1] = std::cos(half);
+    simulation.angular_velocity[2][1] = 3;
+    created->produce(simulation.bodies(), {});
+  }
+  const Quaternion turned = created->agreed().quaternion(1);
+  const double reached = config.stream.layout.parameters.codec.threshold / 1000.0;
+  EXPECT_NEAR(2 * std::atan2(turned[2], turned[3]), 3.0, reached);
+  EXPECT_EQ(created->agreed().quaternion(0), kNoTurn);
+}
+
+TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
+  const HostConfig config = turning_config();
+  FakeSimulation simulation(4);
+  const auto refused = [&] {
+    const auto stream = Stream::create(config.stream, start_of(simulation, config));
+    return stream ? std::string() : stream.error().message;
+  };
+  EXPECT_NE(refused().find("orientations"), std::string::npos) << refused();
+  simulation.turn();
+  EXPECT_EQ(refused(), "");
+  simulation.orientation[3].pop_back();
+  EXPECT_NE(refused().find("body columns"), std::string::npos) << refused();
+  simulation.turn();
+  simulation.angular_velocity[0].clear();
+  EXPECT_NE(refused().find("body columns"), std::string::npos) << refused();
+}
+
 TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {
   HostConfig config = test_config();
   config.stream.layout.capacity = 5;
   const FakeSimulation simulation(4);
-  const auto stream = Stream::create(config.stream, start_of(simulation, config));
-  ASSERT_FALSE(stream);
-  EXPECT_EQ(stream.error().code, ErrorCode::kInvalidArgument);
-}
-
-TEST(Stream, OfOrientationsRefusesBodiesThatHaveNone) {
-  HostConfig config = test_config();
-  config.stream.layout.groups = {kPositionGroup, kOrientationGroup};
-  config.stream.layout.radii.assign(config.stream.layout.type_count, 1000);
-  const FakeSimulation simulation(config.stream.layout.capacity);
   const auto stream = Stream::create(config.stream, start_of(simulation, config));
   ASSERT_FALSE(stream);
   EXPECT_EQ(stream.error().code, ErrorCode::kInvalidArgument);
