@@ -103,7 +103,9 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   scene.threshold_m = trajectory.info().threshold;
   // A file without any motion has no extent of its own.
   scene.extent_m = std::max(trajectory.position_bound(), trajectory.info().threshold);
+  scene.turns = !trajectory.bodies().orientation[0].empty();
   scene.types.resize(1);
+  scene.types.front().bounding_radius_m = trajectory.info().radius;
   const std::vector<engine::Shape>& shapes = trajectory.info().shapes;
   if (!shapes.empty()) scene.types.clear();
   for (const engine::Shape& shape : shapes) {

@@ -175,6 +175,7 @@ Scene to_scene(const idl::Scene& file, const std::string& path) {
   scene.gravity = to_vec3(file.gravity());
   scene.users = std::max(file.users(), 1U);
   scene.engine = file.engine() == "bullet" ? EngineKind::kBullet : EngineKind::kParticles;
+  scene.turns = scene.engine == EngineKind::kBullet;
   scene.friction = static_cast<float>(file.rigid().friction());
   scene.restitution = static_cast<float>(file.rigid().restitution());
   read_types(file, scene);

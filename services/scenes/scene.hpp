@@ -82,6 +82,7 @@ struct Scene {
   double threshold_m = 0;  ///< error threshold
   double extent_m = 0;     ///< largest |coordinate| within the bounds
   std::uint32_t users = 1;
+  bool turns = false;  ///< bodies have orientations: engine::Bodies::orientation
   std::vector<BodyType> types;
   std::vector<TrainedTable> trained;
 

@@ -9,6 +9,7 @@
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "services/host/block_threads.hpp"
 #include "services/sessions/contact_plan.hpp"
+#include "services/sessions/group_plan.hpp"
 
 namespace tandem::sessions {
 namespace {
@@ -91,6 +92,8 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   stream.lattice = *lattice;
   stream.layout.capacity = choice.bodies;
   stream.layout.type_count = static_cast<TypeId>(scene.types.size());
+  if (auto chosen = choose_groups(scene, *lattice, *traits, stream.layout); !chosen)
+    return tl::unexpected(chosen.error());
   stream.layout.parameters.codec = *parameters;
   stream.layout.codec = choice.codec;
   if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table);

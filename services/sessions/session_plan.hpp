@@ -37,7 +37,7 @@ struct SessionChoice {
 
 /// The stream that follows from scene and choice. Where nothing was trained for this size and threshold, the
 /// nearest table is used, and the built-in one for a scene that was never trained. Errors: kInvalidArgument
-/// (the threshold, or a world too large for it).
+/// (the threshold, a world too large for it, or a body type that turns and has no radius).
 [[nodiscard]] Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice);
 
 /// A host's configuration with that stream, the scene's frame rate, types and names; the rest keeps its

@@ -1,0 +1,83 @@
+// Which sessions have orientations.
+#include "services/sessions/group_plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "services/sessions/session_plan.hpp"
+
+namespace tandem::sessions {
+namespace {
+
+constexpr CodecTraits kCodesTurns{.turns = true};
+constexpr host::Lattice kLattice{.unit = 0.001, .dt_s = 1.0 / 60};
+const std::vector<std::string> kBoth{kPositionGroup, kOrientationGroup};
+
+scenes::Scene turning_scene() {
+  scenes::Scene scene;
+  scene.turns = true;
+  scene.types.resize(2);
+  scene.types[0].bounding_radius_m = 0.5;
+  scene.types[1].bounding_radius_m = 0.0101;
+  return scene;
+}
+
+TEST(GroupPlan, BodiesThatTurnHaveOrientationsAndRadiiRoundedUp) {
+  Layout layout;
+  ASSERT_TRUE(choose_groups(turning_scene(), kLattice, kCodesTurns, layout));
+  EXPECT_EQ(layout.groups, kBoth);
+  EXPECT_EQ(layout.radii, (std::vector<std::int32_t>{500, 11}));
+}
+
+TEST(GroupPlan, WithACodecThatCodesNoneTheyArePoints) {
+  Layout layout;
+  ASSERT_TRUE(choose_groups(turning_scene(), kLattice, CodecTraits{}, layout));
+  EXPECT_EQ(layout.groups, Layout{}.groups);
+  EXPECT_TRUE(layout.radii.empty());
+}
+
+TEST(GroupPlan, BodiesThatDoNotTurnArePointsWithAnyCodec) {
+  scenes::Scene scene = turning_scene();
+  scene.turns = false;
+  scene.types[0].bounding_radius_m = 0;
+  Layout layout;
+  ASSERT_TRUE(choose_groups(scene, kLattice, kCodesTurns, layout));
+  EXPECT_EQ(layout.groups, Layout{}.groups);
+  EXPECT_TRUE(layout.radii.empty());
+}
+
+TEST(GroupPlan, ATypeWithoutARadiusOrOneBeyondTheLatticeIsNamed) {
+  for (const double radius : {0.0, -1.0, 1.1e6, std::numeric_limits<double>::quiet_NaN()}) {
+    scenes::Scene scene = turning_scene();
+    scene.types[1].name = "pebble";
+    scene.types[1].bounding_radius_m = radius;
+    Layout layout;
+    const auto chosen = choose_groups(scene, kLattice, kCodesTurns, layout);
+    ASSERT_FALSE(chosen) << radius;
+    EXPECT_EQ(chosen.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(chosen.error().message.find("pebble"), std::string::npos);
+  }
+}
+
+TEST(GroupPlan, ScenesOfRigidBodiesTurnAndThoseOfParticlesDoNot) {
+  EXPECT_TRUE(scenes::load_scene("towers").value().turns);
+  EXPECT_FALSE(scenes::load_scene("half_pipe").value().turns);
+}
+
+TEST(GroupPlan, AStreamHasWhatItsCodecCodes) {
+  const auto scene = scenes::load_scene("mixed").value();
+  for (const std::string_view codec : codec_names()) {
+    SCOPED_TRACE(codec);
+    SessionChoice choice;
+    choice.bodies = 100;
+    choice.codec = codec;
+    const auto stream = plan_stream(scene, choice);
+    ASSERT_TRUE(stream) << stream.error().message;
+    EXPECT_EQ(stream->layout.groups.size() == 2, codec_traits(codec)->turns);
+    EXPECT_TRUE(check_layout(stream->layout));
+  }
+}
+
+}  // namespace
+}  // namespace tandem::sessions
