@@ -16,32 +16,82 @@ namespace {
 
 constexpr Epoch kEpoch = 1;
 
-/// Euclidean distances of what a client shows to the simulation's floats, over all bodies that are shown.
+/// The largest of many lengths, and their root mean square.
+class Lengths {
+ public:
+  void add_squared(double squared) {
+    max_squared_ = std::max(max_squared_, squared);
+    sum_squared_ += squared;
+    ++count_;
+  }
+  [[nodiscard]] double max() const { return std::sqrt(max_squared_); }
+  /// 0 of none.
+  [[nodiscard]] double rms() const {
+    return count_ == 0 ? 0 : std::sqrt(sum_squared_ / static_cast<double>(count_));
+  }
+
+ private:
+  double max_squared_ = 0, sum_squared_ = 0;
+  std::uint64_t count_ = 0;
+};
+
+/// Of what a client shows to the simulation's floats, over all bodies that are shown.
 class Errors {
  public:
   /// `shown(channel, body)` in scene units.
   template <class Shown>
   void add(std::span<const std::uint8_t> alive, const engine::Bodies& bodies, const Shown& shown) {
     for (std::size_t body = 0; body < alive.size(); ++body) {
-      if (alive[body] == 0) continue;
-      double squared = 0;
-      for (std::size_t channel = 0; channel < 3; ++channel) {
-        const double off = shown(channel, body) - double{bodies.position[channel][body]};
-        squared += off * off;
-      }
-      max_squared_ = std::max(max_squared_, squared);
-      sum_squared_ += squared;
-      ++body_frames_;
+      if (alive[body] != 0) centre_.add_squared(distance_squared(bodies, body, shown));
+    }
+  }
+  /// As above, and how far the farthest point of a surface is off.
+  void add(const State& agreed, const engine::Bodies& bodies, double unit,
+           std::span<const std::int32_t> radii) {
+    const auto shown = [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; };
+    add(agreed.alive(), bodies, shown);
+    if (!agreed.groups().orientation) return;
+    has_surface_ = true;
+    for (Slot slot = 0; slot < agreed.capacity(); ++slot) {
+      if (agreed.alive()[slot] == 0) continue;
+      const double radius = radii[agreed.type()[slot]] * unit;
+      const double off = std::sqrt(distance_squared(bodies, slot, shown)) +
+                         radius * turned_off(agreed.quaternion(slot), bodies, slot);
+      surface_.add_squared(off * off);
     }
   }
   void fill(BandwidthRow& row) const {
-    row.max_error = std::sqrt(max_squared_);
-    if (body_frames_ > 0) row.rms_error = std::sqrt(sum_squared_ / static_cast<double>(body_frames_));
+    row.max_error = centre_.max();
+    row.rms_error = centre_.rms();
+    if (!has_surface_) return;
+    row.max_surface_error = surface_.max();
+    row.rms_surface_error = surface_.rms();
   }
 
  private:
-  double max_squared_ = 0, sum_squared_ = 0;
-  std::uint64_t body_frames_ = 0;
+  template <class Shown>
+  static double distance_squared(const engine::Bodies& bodies, std::size_t body, const Shown& shown) {
+    double squared = 0;
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const double off = shown(channel, body) - double{bodies.position[channel][body]};
+      squared += off * off;
+    }
+    return squared;
+  }
+  /// 2 sin(a / 2); neither norm nor sign of a quaternion matters.
+  static double turned_off(const Quaternion& q, const engine::Bodies& bodies, std::size_t body) {
+    double product = 0, ours = 0, theirs = 0;
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      const double a = q[i], b = double{bodies.orientation[i][body]};
+      product += a * b;
+      ours += a * a;
+      theirs += b * b;
+    }
+    return 2 * std::sqrt(std::max(0.0, 1 - product * product / (ours * theirs)));
+  }
+
+  Lengths centre_, surface_;
+  bool has_surface_ = false;
 };
 
 /// How far corrections move bodies at once: what somebody sees who shows a client's state as it is.
@@ -56,23 +106,19 @@ class Snaps {
   void after(const State& agreed, std::span<const Slot> touched, std::span<const LifecycleRecord> renewed) {
     for (const Slot slot : touched) {
       if (std::ranges::any_of(renewed, [slot](const auto& record) { return record.slot == slot; })) continue;
-      const double squared =
+      snaps_.add_squared(
           static_cast<double>(distance_squared({before_[0][slot], before_[1][slot], before_[2][slot]},
-                                               {agreed.p(0)[slot], agreed.p(1)[slot], agreed.p(2)[slot]}));
-      max_squared_ = std::max(max_squared_, squared);
-      sum_squared_ += squared;
-      ++count_;
+                                               {agreed.p(0)[slot], agreed.p(1)[slot], agreed.p(2)[slot]})));
     }
   }
   void fill(BandwidthRow& row, double unit) const {
-    row.max_snap = std::sqrt(max_squared_) * unit;
-    if (count_ > 0) row.rms_snap = std::sqrt(sum_squared_ / static_cast<double>(count_)) * unit;
+    row.max_snap = snaps_.max() * unit;
+    row.rms_snap = snaps_.rms() * unit;
   }
 
  private:
   std::array<std::vector<std::int32_t>, kPositionChannels> before_;
-  double max_squared_ = 0, sum_squared_ = 0;
-  std::uint64_t count_ = 0;
+  Lengths snaps_;
 };
 
 /// The books of adaptive codecs: what their decisions took, and what they would have taken at best.
@@ -168,9 +214,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   if (!applied) return applied;
   const State& agreed = lane.client.state(frame.frame);
   lane.snaps.after(agreed, lane.client.touched(), frame.lifecycle);
-  const double unit = lane.stream.config().lattice.unit;
-  lane.errors.add(agreed.alive(), simulation.bodies(),
-                  [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; });
+  const host::StreamConfig& config = lane.stream.config();
+  lane.errors.add(agreed, simulation.bodies(), config.lattice.unit, config.layout.radii);
   return {};
 }
 

@@ -33,10 +33,13 @@ struct BandwidthRow {
   std::optional<double> ideal_mbit_per_s;  ///< code length of adaptive models, without rounding and headers
   std::optional<double> bound_mbit_per_s;  ///< their decisions at the best fixed probability of each context
   double max_error = 0, rms_error = 0;     ///< scene units; agreed state against the simulation's floats
-  double max_snap = 0, rms_snap = 0;       ///< scene units; how far a correction moves a body at once
-  double corrected_per_frame = 0;          ///< bodies
-  double at_rest_per_frame = 0;            ///< bodies
-  double snapshot_bytes_per_body = 0;      ///< of a snapshot after one frame more, all of it, by bodies alive
+  /// Scene units, of the sphere around each body: |dp| + 2 r sin(a / 2), a the angle by which it is turned
+  /// off. What the threshold is about in sessions with orientations; none in others.
+  std::optional<double> max_surface_error, rms_surface_error;
+  double max_snap = 0, rms_snap = 0;   ///< scene units; how far a correction moves a body at once
+  double corrected_per_frame = 0;      ///< bodies
+  double at_rest_per_frame = 0;        ///< bodies
+  double snapshot_bytes_per_body = 0;  ///< of a snapshot after one frame more, all of it, by bodies alive
   std::optional<double> colliding_per_frame;  ///< bodies; not known for recorded trajectories
   double step_ms = 0, predict_ms = 0, encode_ms = 0, decode_ms = 0, apply_ms = 0;
   std::string missing;                   ///< not empty: nothing was measured, for want of this Debian package

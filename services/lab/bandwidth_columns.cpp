@@ -93,8 +93,12 @@ constexpr Column kColumns[] = {
     {"bound_mbit_per_s", optional_field<&Row::bound_mbit_per_s>, kAll, kAll, kMeasured, "bound", 7, 3},
     {"max_error", field<&Row::max_error>, kMeasured, kMeasured, kMeasured, "max err", 9, 5},
     {"rms_error", field<&Row::rms_error>, kMeasured, kMeasured, kMeasured, "rms err", 9, 5},
+    {"max_surface_error", optional_field<&Row::max_surface_error>, kOurs, kOurs},
+    {"rms_surface_error", optional_field<&Row::rms_surface_error>, kOurs, kOurs},
     // People compare it with the errors.
     {"threshold", field<&Row::threshold>, kNone, kNone, kMeasured, "threshold", 9, 5},
+    {"max_surface_error", optional_field<&Row::max_surface_error>, kNone, kNone, kOurs, "max surf", 9, 5},
+    {"rms_surface_error", optional_field<&Row::rms_surface_error>, kNone, kNone, kOurs, "rms surf", 9, 5},
     {"max_snap", field<&Row::max_snap>, kOurs, kOurs},
     {"rms_snap", field<&Row::rms_snap>, kOurs, kOurs, kOurs, "rms snap", 9, 5},
     {"corrected_per_frame", field<&Row::corrected_per_frame>, kOurs, kOurs, kOurs, "corrected", 9, 1},

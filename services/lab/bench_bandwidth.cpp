@@ -314,6 +314,8 @@ void add_bandwidth(CLI::App& bench, Run& run) {
                       "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
   command->add_flag("--json", options->json, "One JSON object: rows[...]");
   command->footer(
+      "Errors and the threshold are of centres; where a session has orientations the threshold is of surfaces:\n"
+      "max surf and rms surf, of the sphere around each body.\n"
       "bound: Mbit/s of tracker's decisions at the best fixed probability of each context.\n"
       "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.\n"
       "Bits and errors are the same on any number of --threads and --jobs; times are quiet with --jobs 1.");

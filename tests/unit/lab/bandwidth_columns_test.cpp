@@ -14,16 +14,32 @@ TEST(BandwidthColumns, rows_have_the_agreed_fields) {
   ASSERT_EQ(json["rows"].size(), 1U);
   std::vector<std::string> keys;
   for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
-  EXPECT_THAT(
-      keys,
-      ::testing::UnorderedElementsAre(
-          "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain", "acceleration_gain",
-          "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit", "mbit_per_s", "ideal_mbit_per_s",
-          "bound_mbit_per_s", "max_error", "rms_error", "max_snap", "rms_snap", "corrected_per_frame",
-          "at_rest_per_frame", "snapshot_bytes_per_body", "colliding_per_frame", "step_ms", "predict_ms",
-          "encode_ms", "decode_ms", "apply_ms", "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
+  EXPECT_THAT(keys, ::testing::UnorderedElementsAre(
+                        "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain",
+                        "acceleration_gain", "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit",
+                        "mbit_per_s", "ideal_mbit_per_s", "bound_mbit_per_s", "max_error", "rms_error",
+                        "max_surface_error", "rms_surface_error", "max_snap", "rms_snap",
+                        "corrected_per_frame", "at_rest_per_frame", "snapshot_bytes_per_body",
+                        "colliding_per_frame", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms",
+                        "paper_mbit_per_s", "paper_colliding_per_frame", "missing"));
   EXPECT_TRUE(json["rows"][0]["number"].is_null());
   EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
+}
+
+TEST(BandwidthColumns, surface_errors_are_there_with_orientations_alone) {
+  BandwidthRow row;
+  row.predictor = "ballistic";
+  row.max_error = 0.125;
+  const auto of = [](const BandwidthRow& one) {
+    return nlohmann::json::parse(to_json(std::vector{one}))["rows"][0];
+  };
+  EXPECT_TRUE(of(row)["max_surface_error"].is_null());
+  EXPECT_TRUE(of(row)["rms_surface_error"].is_null());
+  row.max_surface_error = 0.5;
+  row.rms_surface_error = 0.25;
+  EXPECT_EQ(of(row)["max_surface_error"], 0.5);
+  EXPECT_EQ(of(row)["rms_surface_error"], 0.25);
+  EXPECT_EQ(of(row)["max_error"], 0.125);
 }
 
 BandwidthRow peer() {
@@ -39,7 +55,7 @@ BandwidthRow peer() {
 
 TEST(BandwidthColumns, a_peers_row_has_nothing_of_what_only_ours_have) {
   const std::string csv = to_csv(std::vector{peer()});
-  EXPECT_EQ(csv.substr(csv.find('\n') + 1), "pile,,20,zip,,,,,0,0,0,1.5,,,,0.25,0,,,,3,\n");
+  EXPECT_EQ(csv.substr(csv.find('\n') + 1), "pile,,20,zip,,,,,0,0,0,1.5,,,,0.25,0,,,,,,3,\n");
   const auto json = nlohmann::json::parse(to_json(std::vector{peer()}))["rows"][0];
   EXPECT_EQ(json["mbit_per_s"], 1.5);
   EXPECT_TRUE(json["rms_snap"].is_null());
@@ -55,7 +71,7 @@ TEST(BandwidthColumns, a_peer_that_was_not_built_shows_no_numbers) {
   BandwidthRow row = peer();
   row.missing = "libzip-dev";
   const std::string csv = to_csv(std::vector{row});
-  EXPECT_EQ(csv.substr(csv.find('\n') + 1), "pile,,20,zip,,,,,0,0,0,,,,,,,,,,3,libzip-dev\n");
+  EXPECT_EQ(csv.substr(csv.find('\n') + 1), "pile,,20,zip,,,,,0,0,0,,,,,,,,,,,,3,libzip-dev\n");
   EXPECT_TRUE(nlohmann::json::parse(to_json(std::vector{row}))["rows"][0]["max_error"].is_null());
   EXPECT_THAT(
       to_table(std::vector{row}),

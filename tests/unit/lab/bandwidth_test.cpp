@@ -116,6 +116,28 @@ TEST(Bandwidth, adaptive_codecs_show_what_their_decisions_took_and_the_bound_bes
   EXPECT_LE(*row.ideal_mbit_per_s, row.mbit_per_s);
 }
 
+TEST(Bandwidth, with_orientations_the_threshold_is_kept_by_surfaces) {
+  constexpr double kRadius = 0.5;
+  Bouncing simulation(kBodies, 4);
+  auto all = streams({"tracker", "tracker"});
+  Layout& layout = all[0].layout;
+  layout.groups = {kPositionGroup, kOrientationGroup};
+  layout.radii = {static_cast<std::int32_t>(kRadius * all[0].lattice.position_scale())};
+  auto replay = Replay::create(simulation, {}, all[0].lattice);
+  ASSERT_TRUE(replay);
+  const auto rows = measure_bandwidth(*replay, all, 120, [](Frame) {});
+  ASSERT_TRUE(rows) << rows.error().message;
+  const BandwidthRow& turning = (*rows)[0];
+  ASSERT_TRUE(turning.max_surface_error && turning.rms_surface_error);
+  EXPECT_LE(*turning.max_surface_error, kThreshold + 3 * all[0].lattice.unit);
+  EXPECT_GT(*turning.max_surface_error, turning.max_error);
+  EXPECT_GT(*turning.rms_surface_error, turning.rms_error);
+  EXPECT_LE(*turning.rms_surface_error, *turning.max_surface_error);
+  const BandwidthRow& points = (*rows)[1];
+  EXPECT_FALSE(points.max_surface_error || points.rms_surface_error) << "of the same simulation";
+  EXPECT_LE(points.max_error, kThreshold * 1.01);
+}
+
 TEST(Bandwidth, peers_keep_to_the_same_largest_error_and_name_a_missing_library) {
   Bouncing simulation(kBodies);
   const auto all = streams({"selective"});
