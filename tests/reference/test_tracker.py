@@ -55,7 +55,7 @@ class Decisions(TrackerCase):
 
     def test_probability_and_weight_have_limits(self):
         models = tracker.Models()
-        many = np.zeros(tracker.MODELS, np.int64)
+        many = np.zeros_like(models.weight)
         many[:2] = 10**6, 300
         models.learn(many, np.zeros_like(many))
         self.assertEqual((models.p[0], models.weight[0], models.weight[2]), (32, 255, 0))

@@ -9,6 +9,7 @@ import numpy as np
 import worlds
 import writer
 from tandem_reference import payload, snapshot, turn, xxh3
+from tandem_reference import tracker as reference_tracker
 from tandem_reference.errors import Refused
 from tandem_reference.huffman import Table
 from tandem_reference.predict import Drive
@@ -281,6 +282,66 @@ def tracker_rest():
     vector.say("a snapshot of this frame holds the same state")
     vector.snapshot(writer.snapshot(vector.line))
     return vector
+
+
+def tracker_turns():
+    """Corrections of both groups and of one, fine and not, rests, renewed bodies, a snapshot."""
+    slots = [slot for slot in range(24) if slot % 6 != 5]
+    line = scattered("tracker", "ballistic", slots, 24, b"", 31, turns=True)
+    line.world.state.type[::3] = 1
+    vector = Vector("codec tracker: orientations", line)
+    following = worlds.random_numbers(32)
+
+    def some_corrections(sizes):
+        corrections = {}
+        for slot in slots:
+            rest = int(following(100) > 70)
+            steps = [following(size) for size in sizes] if following(100) > -40 else None
+            turn_by = [following(size) for size in sizes] if following(100) > -40 else None
+            correction = tracker_of(rest, steps, turn_by, following(2) & 1)
+            if correction:
+                corrections[slot] = correction
+        return corrections
+
+    content = writer.position((500, 600, 700), (9999, -9999, 0)) + turned_content(following)
+    for frame in range(1, 15):
+        if frame == 9:
+            vector.input(1, 10, Drive((40, -2800, 3), 300))
+        vector.predict()
+        if frame == 4:
+            vector.say("slot 3 teleported, orientation alone, not corrected; slot 5 spawned and corrected")
+            born = writer.section(
+                0x81, writer.record(3, 2, b"\2", turned_content(following)) + writer.record(2, 1, b"\1\1", content)
+            )
+            corrections = {slot: how for slot, how in some_corrections((2, 2, 2)).items() if slot != 3}
+            corrections[5] = reference_tracker.Correction(0, [1, 0, 0], [0, 1, -2], 1)
+            vector.track(corrections, born, (3, 5))
+        elif frame == 6:
+            vector.say("nobody is corrected")
+            vector.delta(b"")
+        elif frame == 8:
+            vector.say("p, v and c rounded; a new threshold")
+            changed = writer.section(0x82, writer.parameters({1: 77}))
+            vector.track(some_corrections((2, 3, 2)), changed, rounding=writer.section(0x87, bytes([2, 5, 3])))
+        else:
+            vector.track(some_corrections((1, 2, 3) if frame < 11 else (20, 200, 3000)))
+    vector.say("a snapshot of this frame holds the same state")
+    vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
+def tracker_of(rest, steps, turn_by, fine):
+    """A correction of the groups that have steps other than 0; None if none has."""
+    steps = steps if steps and any(steps) else None
+    turn_by = turn_by if turn_by and any(turn_by) else None
+    if not steps and not turn_by:
+        return None
+    return reference_tracker.Correction(rest, steps, turn_by, fine if steps and turn_by else 0)
+
+
+def turned_content(following):
+    """What a record says of an orientation."""
+    return struct.pack("<7i", *worlds.some_quaternion(following), *worlds.some_spin(following))
 
 
 def tracker_refused():
@@ -606,6 +667,7 @@ def main(folder):
         "tracker_snapshot": tracker_snapshot(),
         "tracker_blocks": tracker_blocks(),
         "tracker_rest": tracker_rest(),
+        "tracker_turns": tracker_turns(),
         "tracker_refused": tracker_refused(),
         "rounding": rounding(),
         "lifecycle": lifecycle(),

@@ -128,8 +128,24 @@ class NumberEncoder(RangeEncoder):
             self.even_bits(size & ((1 << left) - 1), left)
 
 
-def write_steps(encoder, contexts, slot, steps):
+def write_correction(encoder, contexts, slot, correction, orientation):
     """The decisions of a corrected body."""
+    encoder.decide(int(contexts.rest[slot]), correction.rest)
+    if orientation:
+        both, choice = bool(correction.steps and correction.turn), int(contexts.choice[slot])
+        encoder.decide(tracker.BOTH + choice, both)
+        if both:
+            encoder.decide(tracker.FINE, correction.fine)
+        else:
+            encoder.decide(tracker.WHICH + choice, bool(correction.turn))
+    if correction.steps:
+        write_steps(encoder, contexts.position, slot, correction.steps)
+    if correction.turn:
+        write_steps(encoder, contexts.turn, slot, correction.turn)
+
+
+def write_steps(encoder, contexts, slot, steps):
+    """The decisions of the steps of a group."""
     moved = 0
     for axis in range(3):
         size = abs(steps[axis])
@@ -144,14 +160,17 @@ def write_steps(encoder, contexts, slot, steps):
             number = size - 14
             bits = number.bit_length() - 1
             for i in range(min(bits + 1, 31)):
-                encoder.decide(tracker.ESCAPE + i, bits > i)
+                encoder.decide(contexts.escape + i, bits > i)
             for i in range(bits - 1, -1, -1):
                 encoder.decision(32768, number >> i & 1)
         moved += 1
 
 
 def tracker_section(world, threshold, steps, renewed=None, block=0, rests=()):
-    """Corrections of one block, of {slot: steps}; `world` as after the lifecycle of the delta."""
+    """Corrections of one block, of {slot: steps of the position, or a Correction}.
+
+    `world` is as after the lifecycle of the delta.
+    """
     state = world.state
     renewed = np.zeros(state.capacity, bool) if renewed is None else renewed
     contexts = tracker.Contexts(state, renewed, threshold)
@@ -161,8 +180,10 @@ def tracker_section(world, threshold, steps, renewed=None, block=0, rests=()):
         if state.alive[slot]:
             encoder.decide(int(contexts.flag[slot]), slot in steps)
     for slot in sorted(steps):
-        encoder.decide(int(contexts.rest[slot]), slot in rests)
-        write_steps(encoder, contexts, slot, steps[slot])
+        correction = steps[slot]
+        if isinstance(correction, list):
+            correction = tracker.Correction(slot in rests, correction)
+        write_correction(encoder, contexts, slot, correction, state.orientation)
     if block == state.blocks() - 1:
         return b"\x86" + encoder.finish(1)
     return section(0x83, leb128(block) + encoder.finish(1))

@@ -30,7 +30,7 @@ class World:
 
 def start_models(stream):
     """The models of a stream at its start; codecs other than `tracker` have none."""
-    return tracker.Models() if stream.codec == "tracker" else None
+    return tracker.Models(stream.orientation) if stream.codec == "tracker" else None
 
 
 @dataclass

@@ -8,7 +8,7 @@ from .xxh3 import xxh3_64
 
 BLOCK = 16384
 MOST_P, MOST_V, MOST_C = 2**30, 2**28, 2**28
-CODEC_COLUMNS = {"tracker": 5}
+CODEC_COLUMNS = {"tracker": 5}  # of each group
 
 
 class State:
@@ -29,7 +29,7 @@ class State:
         self.c = np.zeros((3, capacity), np.int64)
         self.q = np.zeros((4 * orientation, capacity), np.int64)
         self.w = np.zeros((3 * orientation, capacity), np.int64)
-        self.codec = np.zeros((CODEC_COLUMNS.get(codec, 0), capacity), np.int64)
+        self.codec = np.zeros((CODEC_COLUMNS.get(codec, 0) * (1 + orientation), capacity), np.int64)
 
     def copy(self):
         """The same state in arrays of its own."""

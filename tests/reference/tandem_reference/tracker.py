@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import parameters
+from . import parameters, turn
 from .errors import require
 from .integers import clamp
 from .number_decoder import NumberModels
@@ -12,18 +12,22 @@ from .range_decoder import CountingDecoder
 from .state import MOST_C, MOST_P, MOST_V
 
 FLAG, FLAG_AT_REST, REST, ZERO, SIGN, MAGNITUDE, ESCAPE = 0, 675, 690, 720, 1080, 1404, 1908
-MODELS = 1940
+STEP_MODELS = 1220
+OF_POSITIONS = ZERO + STEP_MODELS
+BOTH, WHICH, FINE, TURN = OF_POSITIONS, OF_POSITIONS + 75, OF_POSITIONS + 150, OF_POSITIONS + 151
 AGE, INTERVAL, LAST = 0, 1, slice(2, 5)
+GROUP = 5  # columns
+SLOW_TURN = 2**18
 MOST_STEPS = 2**31 - 1
 
 
 class Models:
     """Probability of a 1 (in 1/65536) and weight of every model, in the order of the specification."""
 
-    def __init__(self):
-        self.p = np.full(MODELS, 32768, np.int64)
+    def __init__(self, orientation=False):
+        self.p = np.full(TURN + STEP_MODELS if orientation else OF_POSITIONS, 32768, np.int64)
         self.p[FLAG:ZERO] = 4096
-        self.weight = np.zeros(MODELS, np.int64)
+        self.weight = np.zeros_like(self.p)
 
     def copy(self):
         """The same models in arrays of their own."""
@@ -42,7 +46,7 @@ class Models:
     def read(self, numbers):
         """Take the models of a snapshot."""
         weights, probabilities, before = NumberModels(), NumberModels(), 32768
-        for model in range(MODELS):
+        for model in range(len(self.p)):
             lacks = numbers.number(weights)
             require(0 <= lacks <= 255, "snapshot", f"a model that lacks {lacks} of its weight")
             self.weight[model] = -lacks % 256
@@ -67,25 +71,57 @@ def side(x, limit):
     return np.where(x < -limit, 0, np.where(x > limit, 2, 1))
 
 
+class StepContexts:
+    """The models of the steps of one group, from its columns and from c (or 0) and v (or w) compared with limits."""
+
+    def __init__(self, first, columns, c, v, limits):
+        now, interval, last = columns[AGE] + 1, columns[INTERVAL], columns[LAST]
+        self.first = first
+        self.ages = count_below(now, (2, 4, 8, 20))
+        self.length = np.clip(np.abs(last).max(axis=0), 1, 3) - 1
+        axis = np.arange(3).reshape(3, 1)
+        times = self.ages * 4 + count_below(interval, (2, 6, 20))
+        self.zero = first + (axis * 20 + times) * 6 + (last != 0)
+        sides = side(last, 0) * 9 + side(c, limits[0]) * 3 + side(v, limits[1])
+        self.sign = first + SIGN - ZERO + (axis * 27 + sides) * 4 + count_below(now, (2, 6, 20))
+        self.magnitude = first + MAGNITUDE - ZERO + (count_below(now, (1, 4, 20)) * 3 + self.length) * 42
+        self.escape = first + ESCAPE - ZERO
+
+
 class Contexts:
     """The models that the decisions of each slot use, from the predicted state and the columns before the delta."""
 
     def __init__(self, state, renewed, threshold):
-        now, interval, last = state.codec[AGE] + 1, state.codec[INTERVAL], state.codec[LAST]
-        v, c = np.where(renewed, 0, state.v), np.where(renewed, 0, state.c)
-        length = np.clip(np.abs(last).max(axis=0), 1, 3) - 1
-        axis = np.arange(3).reshape(3, 1)
+        columns, v = state.codec[:GROUP], np.where(renewed, 0, state.v)
         rest = np.where(renewed, 0, state.rest)
+        limits = threshold // 32, threshold + threshold // 4
+        self.position = StepContexts(ZERO, columns, np.where(renewed, 0, state.c), v, limits)
+        now, interval, length = columns[AGE] + 1, columns[INTERVAL], self.position.length
+        if state.orientation:
+            turns = state.codec[GROUP:]
+            w = np.where(renewed, 0, state.w)
+            self.turn = StepContexts(TURN, turns, np.zeros_like(w), w, (0, SLOW_TURN))
+            last = np.where(columns[AGE] == turns[AGE], 0, np.where(columns[AGE] < turns[AGE], 1, 2))
+            self.choice = (last * 5 + self.position.ages) * 5 + self.turn.ages
+            now = np.minimum(now, turns[AGE] + 1)
+            both = np.stack([interval, turns[INTERVAL]])
+            interval = np.where(both.min(axis=0) > 0, both.min(axis=0), both.max(axis=0))
+            length = np.maximum(length, self.turn.length)
         moving = FLAG + bucket(now) * 45 + bucket(interval) * 3 + length
         self.flag = np.where(rest, FLAG_AT_REST + bucket(now), moving)
-        ages = count_below(now, (2, 4, 8, 20))
         fastest = np.abs(v).max(axis=0)
         speed = sum((fastest > min(MOST_V, limit * threshold)).astype(int) for limit in (20, 64))
-        self.rest = REST + (rest * 5 + ages) * 3 + speed
-        self.zero = ZERO + (axis * 20 + ages * 4 + count_below(interval, (2, 6, 20))) * 6 + (last != 0)
-        sides = side(last, 0) * 9 + side(c, threshold // 32) * 3 + side(v, threshold + threshold // 4)
-        self.sign = SIGN + (axis * 27 + sides) * 4 + count_below(now, (2, 6, 20))
-        self.magnitude = MAGNITUDE + (count_below(now, (1, 4, 20)) * 3 + length) * 42
+        self.rest = REST + (rest * 5 + self.position.ages) * 3 + speed
+
+
+@dataclass
+class Correction:
+    """What a delta says of a corrected body; steps are None where a group is not corrected."""
+
+    rest: int
+    steps: list = None
+    turn: list = None
+    fine: int = 0
 
 
 @dataclass
@@ -96,29 +132,48 @@ class Setting:
     gravity: tuple
 
 
+def read_correction(decoder, contexts, slot, orientation):
+    """The correction of one body."""
+    correction = Correction(decoder.decide(int(contexts.rest[slot])))
+    moves, turns = 1, 0
+    if orientation:
+        choice = int(contexts.choice[slot])
+        if decoder.decide(BOTH + choice):
+            turns = 1
+            correction.fine = decoder.decide(FINE)
+        else:
+            turns = decoder.decide(WHICH + choice)
+            moves = 1 - turns
+    if moves:
+        correction.steps = read_steps(decoder, contexts.position, slot)
+    if turns:
+        correction.turn = read_steps(decoder, contexts.turn, slot)
+    return correction
+
+
 def read_steps(decoder, contexts, slot):
-    """The steps of a corrected body, axis by axis."""
+    """The steps of a corrected group, axis by axis."""
     steps, moved = [0, 0, 0], 0
     for axis in range(3):
         asked = axis < 2 or moved > 0
         if asked and not decoder.decide(int(contexts.zero[axis, slot]) + 2 * moved):
             continue
         negative = decoder.decide(int(contexts.sign[axis, slot]))
-        size = read_size(decoder, int(contexts.magnitude[slot]) + 14 * moved)
+        size = read_size(decoder, int(contexts.magnitude[slot]) + 14 * moved, contexts.escape)
         steps[axis] = -size if negative else size
         moved += 1
     return steps
 
 
-def read_size(decoder, magnitude):
-    """The absolute value of steps that are not 0; `magnitude` is the first of the 14 models."""
+def read_size(decoder, magnitude, escape):
+    """The absolute value of steps that are not 0; `magnitude` and `escape` are the first of their models."""
     size = 1
     while size <= 14 and decoder.decide(magnitude + size - 1):
         size += 1
     if size <= 14:
         return size
     bits = 0
-    while bits < 31 and decoder.decide(ESCAPE + bits):
+    while bits < 31 and decoder.decide(escape + bits):
         bits += 1
     number = 1
     for _ in range(bits):
@@ -131,30 +186,27 @@ def apply_corrections(world, stream, corrections, renewed, setting):
     """Decode and apply the sections of all blocks, let the models learn and the ages grow."""
     state, models, values = world.state, world.models, parameters.named(world.parameters)
     contexts = Contexts(state, renewed, values["threshold"])
-    zeros, ones = [0] * MODELS, [0] * MODELS
-    slots, rests, steps = [], [], []
+    zeros, ones = [0] * len(models.p), [0] * len(models.p)
+    corrected = {}
     for block, body in corrections:
         first, end = state.block_slots(block)
         decoder = CountingDecoder(body.rest(), models.p.tolist(), zeros, ones)
         alive = first + np.flatnonzero(state.alive[first:end])
         flags = contexts.flag[alive].tolist()
-        corrected = [slot for slot, flag in zip(alive.tolist(), flags) if decoder.decide(flag)]
-        require(corrected, "corrections", f"block {block}: no body is corrected")
-        for slot in corrected:
-            rests.append(decoder.decide(int(contexts.rest[slot])))
-            steps.append(read_steps(decoder, contexts, slot))
-        slots += corrected
+        slots = [slot for slot, flag in zip(alive.tolist(), flags) if decoder.decide(flag)]
+        require(slots, "corrections", f"block {block}: no body is corrected")
+        for slot in slots:
+            corrected[slot] = read_correction(decoder, contexts, slot, state.orientation)
         decoder.end()
     if not corrections:
-        zeros = np.bincount(contexts.flag[state.alive], minlength=MODELS)
+        zeros = np.bincount(contexts.flag[state.alive], minlength=len(models.p))
     models.learn(np.array(zeros), np.array(ones))
-    slots = np.array(slots, np.int64)
-    grows = state.alive & ~renewed
-    grows[slots] = False
-    state.codec[AGE, grows] = np.minimum(state.codec[AGE, grows] + 1, 254)
-    if len(slots):
-        correct(state, slots, np.array(steps, np.int64).T, values, stream.predictor == "ballistic", setting)
-        put_to_rest(state, slots, np.array(rests), setting.gravity)
+    for group in range(0, len(state.codec), GROUP):
+        of_group = [slot for slot, what in corrected.items() if (what.turn if group else what.steps)]
+        grows = state.alive & ~renewed
+        grows[of_group] = False
+        state.codec[group + AGE, grows] = np.minimum(state.codec[group + AGE, grows] + 1, 254)
+    correct(state, corrected, values, stream, setting)
 
 
 def by_axes(steps, long, one, two, three):
@@ -164,44 +216,80 @@ def by_axes(steps, long, one, two, three):
     return np.where(np.abs(steps).max(axis=0) > 1, long, short)
 
 
-def put_to_rest(state, slots, rests, gravity):
-    """Of corrected bodies, those put to rest stand and hold themselves up; the others are awake."""
-    state.rest[slots] = rests
-    still = slots[rests == 1]
-    state.v[:, still] = 0
-    state.c[:, still] = -np.array(gravity, np.int64).reshape(3, 1)
+@dataclass
+class Group:
+    """The corrected bodies of one group: their slots and steps, and what the codec remembers of it."""
+
+    slots: np.ndarray
+    steps: np.ndarray
+    fine: np.ndarray
+    columns: np.ndarray
+
+    @classmethod
+    def of(cls, corrected, what, columns):
+        """Of {slot: Correction} those where `what` is corrected; None if there is none."""
+        slots = [slot for slot, correction in corrected.items() if getattr(correction, what)]
+        if not slots:
+            return None
+        steps = np.array([getattr(corrected[slot], what) for slot in slots], np.int64).T
+        return cls(np.array(slots), steps, np.array([corrected[slot].fine for slot in slots]), columns)
+
+    def unit(self, threshold, orientation, rounding):
+        """Lattice units that a step is worth."""
+        share = by_axes(self.steps, 62259, 60293, 45220, 38666)
+        if orientation:
+            share = (share * np.where(self.fine, 33423, 55706)) >> 16
+        return np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
+
+    def growth(self, one, gain_of):
+        """What a step adds to v, c or w, in 1/64 of its unit; `gain_of` by the time since the last correction."""
+        last, kept = self.columns[LAST, self.slots], clamp(self.steps, 127)
+        before = last * by_axes(last, 243, 235, 176, 151)
+        after = kept * by_axes(kept, 243, 235, 176, 151)
+        trust = 256 + (clamp((before * after).sum(axis=0) >> 8, 256) >> 1)
+        now = self.columns[AGE, self.slots] + 1
+        return np.minimum(2**29, (((one * gain_of(now) + 2**15) >> 16) * trust + 128) >> 8)
+
+    def remember(self):
+        """These corrections, as the last ones."""
+        self.columns[INTERVAL, self.slots] = self.columns[AGE, self.slots] + 1
+        self.columns[AGE, self.slots] = 0
+        self.columns[LAST, self.slots] = clamp(self.steps, 127)
 
 
-def correct(state, slots, steps, values, ballistic, setting):
-    """Move bodies by their steps, and adjust their velocity, acceleration and columns."""
-    threshold, rounding = values["threshold"], setting.rounding
-    now, last = state.codec[AGE, slots] + 1, state.codec[LAST, slots]
-    share = by_axes(steps, 62259, 60293, 45220, 38666)
-    unit = np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
-
-    kept = clamp(steps, 127)
-    before = last * by_axes(last, 243, 235, 176, 151)
-    after = kept * by_axes(kept, 243, 235, 176, 151)
-    agreement = clamp((before * after).sum(axis=0) >> 8, 256)
-    trust = 256 + (agreement >> 1)
-
+def correct(state, corrected, values, stream, setting):
+    """Move and turn bodies by their steps, adjust their velocities and accelerations, put them to rest or wake them."""
+    threshold = values["threshold"]
     gain = 128 * values["velocity_gain"]
-    divisor = np.where(now <= 3, 3, now)
-    if ballistic:
-        divisor = np.where(now == 1, 2, divisor)
-    for_v = gain // divisor
-    both = (gain * values["acceleration_gain"]) >> 16
-    for_c = both // np.maximum(now, 3) ** 2
 
-    most_c = min(MOST_C, max(256 * threshold, 2 * max(abs(g) for g in setting.gravity)))
+    def for_v(now):
+        divisor = np.where(now <= 3, 3, now)
+        return gain // (np.where(now == 1, 2, divisor) if stream.predictor == "ballistic" else divisor)
 
-    def adjustment(gain_of):
-        one = np.minimum(2**29, (((unit * gain_of + 2**15) >> 16) * trust + 128) >> 8)
-        return clamp(steps * one, 2**29)
+    def for_c(now):
+        return ((gain * values["acceleration_gain"]) >> 16) // np.maximum(now, 3) ** 2
 
-    state.p[:, slots] = clamp(state.p[:, slots] + clamp(steps * unit, 2**31), MOST_P)
-    state.v[:, slots] = clamp(state.v[:, slots] + adjustment(for_v), MOST_V)
-    state.c[:, slots] = clamp(state.c[:, slots] + adjustment(for_c), most_c)
-    state.codec[INTERVAL, slots] = now
-    state.codec[AGE, slots] = 0
-    state.codec[LAST, slots] = kept
+    moved = Group.of(corrected, "steps", state.codec[:GROUP])
+    if moved:
+        slots, steps = moved.slots, moved.steps
+        unit = moved.unit(threshold, state.orientation, setting.rounding)
+        most_c = min(MOST_C, max(256 * threshold, 2 * max(abs(g) for g in setting.gravity)))
+        state.p[:, slots] = clamp(state.p[:, slots] + clamp(steps * unit, 2**31), MOST_P)
+        state.v[:, slots] = clamp(state.v[:, slots] + clamp(steps * moved.growth(unit, for_v), 2**29), MOST_V)
+        state.c[:, slots] = clamp(state.c[:, slots] + clamp(steps * moved.growth(unit, for_c), 2**29), most_c)
+        moved.remember()
+    turned = Group.of(corrected, "turn", state.codec[GROUP:])
+    if turned:
+        slots, steps = turned.slots, turned.steps
+        radii = np.array(stream.radii, np.int64)[state.type[slots]]
+        unit = turned.unit(threshold, True, setting.rounding)
+        angle = np.clip((unit << 28) // radii, 1, turn.MOST_W)
+        state.q[:, slots] = turn.turned(state.q[:, slots], turn.limited(steps * angle))
+        state.w[:, slots] = turn.limited(state.w[:, slots] + steps * (turned.growth(angle, for_v) >> 6))
+        turned.remember()
+    slots = np.array(list(corrected), np.int64)
+    state.rest[slots] = [correction.rest for correction in corrected.values()]
+    still = [slot for slot, correction in corrected.items() if correction.rest]
+    state.v[:, still] = 0
+    state.w[:, still] = 0
+    state.c[:, still] = -np.array(setting.gravity, np.int64).reshape(3, 1)

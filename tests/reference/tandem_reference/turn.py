@@ -21,6 +21,14 @@ def is_spin(w):
     return short & ((w * w * short).sum(axis=0) <= MOST_W**2)
 
 
+def limited(w):
+    """Angular velocities whose components are halved together until they are in range."""
+    w = w.copy()
+    while not np.all(fits := is_spin(w)):
+        w[:, ~fits] >>= 1
+    return w
+
+
 def times(a, b):
     """A product of numbers of which one is in 2^-28."""
     return (a * b) >> 28
