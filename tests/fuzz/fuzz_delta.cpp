@@ -18,9 +18,10 @@ void require(bool holds) {
 }
 
 struct Target {
-  explicit Target(std::string_view codec) : delta(synthetic::make_delta(codec, kCapacity, kParameters)) {
+  explicit Target(const synthetic::Coded& coded)
+      : delta(synthetic::make_delta(coded.codec, kCapacity, kParameters, {}, coded.groups)) {
     synthetic::Random random(1);
-    before = synthetic::random_state(random, kCapacity);
+    before = synthetic::random_state(random, kCapacity, 4, coded.groups);
     state = before;
   }
   DeltaCodec delta;
@@ -31,7 +32,7 @@ struct Target {
 void try_payload(std::span<const std::byte> input) {
   static std::vector<Target> targets = [] {
     std::vector<Target> made;
-    for (const std::string_view name : codec_names()) made.emplace_back(name);
+    for (const synthetic::Coded& coded : synthetic::all_coded()) made.emplace_back(coded);
     return made;
   }();
   if (input.empty()) return;

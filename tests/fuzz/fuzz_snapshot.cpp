@@ -1,6 +1,7 @@
 // Any snapshot: refused, or loaded into a state that holds what every state holds and can be simulated.
 
 #include <cstdlib>
+#include <string_view>
 
 #include "sdk/core/timeline/snapshot.hpp"
 #include "tests/property/synthetic.hpp"
@@ -14,11 +15,11 @@ void require(bool holds) {
   if (!holds) std::abort();
 }
 
-void try_snapshot(std::span<const std::byte> input) {
-  static const std::unique_ptr<Codec> codec = synthetic::codec_of("quantized", kCapacity);
+void try_snapshot(std::span<const std::byte> input, std::string_view name, const Groups& groups) {
   static const std::unique_ptr<Predictor> predictor = std::move(*make_predictor("ballistic", kCapacity, {}));
   // The hash is the caller's to check, so the reader alone must keep every rule.
-  State state(kCapacity);
+  const std::unique_ptr<Codec> codec = synthetic::codec_of(name, kCapacity, {}, groups);
+  State state(kCapacity, groups);
   const auto snapshot = read_snapshot(input, synthetic::kTypes, state, *codec);
   if (!snapshot) return;
   require(synthetic::broken_invariant(state) == nullptr);
@@ -28,11 +29,11 @@ void try_snapshot(std::span<const std::byte> input) {
   require(synthetic::broken_invariant(state) == nullptr);
 
   // What was read can be written and read again.
-  std::vector<std::byte> bytes(snapshot_bytes_bound(State(kCapacity), *codec));
+  std::vector<std::byte> bytes(snapshot_bytes_bound(state, *codec));
   ByteWriter out(bytes);
   write_snapshot(*snapshot, state, *codec, out);
   require(!out.overflow());
-  State again(kCapacity);
+  State again(kCapacity, groups);
   require(read_snapshot(out.written(), synthetic::kTypes, again, *codec).has_value());
   require(again == state);
 }
@@ -41,6 +42,7 @@ void try_snapshot(std::span<const std::byte> input) {
 }  // namespace tandem
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  tandem::try_snapshot(std::as_bytes(std::span(data, size)));
+  tandem::try_snapshot(std::as_bytes(std::span(data, size)), "quantized", {});
+  tandem::try_snapshot(std::as_bytes(std::span(data, size)), "tracker", {.orientation = true});
   return 0;
 }

@@ -21,7 +21,9 @@ void require(bool holds) {
 }
 
 struct Side {
-  Side() : delta(synthetic::make_delta("tracker", kCapacity, kParameters)), state(kCapacity) {}
+  explicit Side(const Groups& groups)
+      : delta(synthetic::make_delta("tracker", kCapacity, kParameters, {}, groups)),
+        state(kCapacity, groups) {}
   void save(std::vector<std::byte>& bytes) const { bytes = synthetic::coder_state(delta.codec()); }
   DeltaCodec delta;
   State state;
@@ -30,9 +32,9 @@ struct Side {
 // A decoder that is given everything, and a twin that is given only what the first one took: they end alike.
 class Stream {
  public:
-  Stream() {
+  explicit Stream(const Groups& groups) : side_(groups), twin_(groups) {
     synthetic::Random random(1);
-    start_ = synthetic::random_state(random, kCapacity);
+    start_ = synthetic::random_state(random, kCapacity, 4, groups);
     side_.save(fresh_);
   }
   void restart() {
@@ -70,8 +72,7 @@ class Stream {
   std::vector<std::byte> fresh_, edited_, saved_;
 };
 
-void try_stream(std::span<const std::byte> input) {
-  static Stream stream;
+void try_stream(Stream& stream, std::span<const std::byte> input) {
   stream.restart();
   while (!input.empty()) {
     const auto n = std::to_integer<std::size_t>(input[0]);
@@ -88,6 +89,8 @@ void try_stream(std::span<const std::byte> input) {
 }  // namespace tandem
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  tandem::try_stream(std::as_bytes(std::span(data, size)));
+  static tandem::Stream stream({}), turning({.orientation = true});
+  tandem::try_stream(stream, std::as_bytes(std::span(data, size)));
+  tandem::try_stream(turning, std::as_bytes(std::span(data, size)));
   return 0;
 }

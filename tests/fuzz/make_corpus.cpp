@@ -25,23 +25,25 @@ bool write_file(const std::filesystem::path& path, std::span<const std::byte> by
 
 // The state that fuzz_delta decodes onto, moved a little, much and not at all; with and without lifecycle.
 bool write_deltas(const std::filesystem::path& folder) {
-  for (std::size_t codec = 0; codec < codec_names().size(); ++codec) {
+  const std::vector<synthetic::Coded> all = synthetic::all_coded();
+  for (std::size_t which = 0; which < all.size(); ++which) {
+    const auto& [codec, groups] = all[which];
     for (const std::uint64_t moved_one_in : {1U, 6U}) {
       for (const bool lively : {false, true}) {
         synthetic::Random random(1);
-        State state = synthetic::random_state(random, kCapacity);
+        State state = synthetic::random_state(random, kCapacity, 4, groups);
         State target = synthetic::random_target(random, state, moved_one_in);
         std::vector<LifecycleRecord> lifecycle;
         if (lively) lifecycle = synthetic::random_lifecycle(random, state, target, 4);
-        DeltaCodec delta = synthetic::make_delta(codec_names()[codec], kCapacity, kParameters);
+        DeltaCodec delta = synthetic::make_delta(codec, kCapacity, kParameters, {}, groups);
         if (lively) delta.set_parameters({{100, 8, 32, 30000, 5000}, {900}});
         if (lively) delta.round_next();
         std::vector<std::byte> bytes(1 + delta.bound());
-        bytes[0] = static_cast<std::byte>(codec);
+        bytes[0] = static_cast<std::byte>(which);
         const auto encoded = delta.encode(state, target, lifecycle, kNoBudget, std::span(bytes).subspan(1));
         bytes.resize(1 + encoded.size_bytes);
-        const std::string name = std::string(codec_names()[codec]) + "-" + std::to_string(moved_one_in) +
-                                 (lively ? "-lifecycle" : "");
+        const std::string name = std::string(codec) + (groups.orientation ? "-turning-" : "-") +
+                                 std::to_string(moved_one_in) + (lively ? "-lifecycle" : "");
         if (!write_file(folder / "delta" / name, bytes)) return false;
       }
     }
@@ -97,24 +99,31 @@ bool write_streams(const std::filesystem::path& folder) {
   return true;
 }
 
-bool write_snapshots(const std::filesystem::path& folder) {
+bool write_snapshots(const std::filesystem::path& folder, bool turning) {
   Layout layout;
   layout.capacity = kCapacity;
   layout.type_count = synthetic::kTypes;
-  layout.codec = "quantized";
+  layout.codec = turning ? "tracker" : "quantized";
+  if (turning) {
+    layout.groups = {kPositionGroup, kOrientationGroup};
+    layout.radii = {synthetic::kRadii.begin(), synthetic::kRadii.end()};
+  }
   layout.parameters = kParameters;
   layout.predictor = "ballistic";
   for (const std::uint64_t dead_one_in : {0U, 1U, 3U}) {
     synthetic::Random random(2);
     auto server = ServerTimeline::create(layout, 1);
     if (!server) return false;
-    server->start(10, synthetic::random_state(random, kCapacity, dead_one_in), Drive{{0, -640, 0}, 10});
+    server->start(10, synthetic::random_state(random, kCapacity, dead_one_in, groups_of(layout)),
+                  Drive{{0, -640, 0}, 10});
     for (std::uint64_t number = 1; number <= dead_one_in; ++number) {
       if (!server->schedule({number, 11 + number, Drive{{1, 2, 3}, 4}})) return false;
     }
     std::vector<std::byte> bytes;
     server->snapshot(bytes);
-    if (!write_file(folder / "snapshot" / ("dead-one-in-" + std::to_string(dead_one_in)), bytes))
+    if (!write_file(folder / "snapshot" /
+                        ((turning ? "turning-" : "") + ("dead-one-in-" + std::to_string(dead_one_in))),
+                    bytes))
       return false;
   }
   return true;
@@ -130,7 +139,7 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path folder(argv[1]);
   if (tandem::write_messages(folder) && tandem::write_deltas(folder) && tandem::write_streams(folder) &&
-      tandem::write_snapshots(folder))
+      tandem::write_snapshots(folder, false) && tandem::write_snapshots(folder, true))
     return 0;
   std::fprintf(stderr, "could not write to %s\n", argv[1]);
   return 1;

@@ -19,13 +19,13 @@ struct Corpus {
   Bytes payload;
 };
 
-std::vector<Corpus> deltas_of(std::string_view codec, std::uint32_t capacity, std::uint64_t seed) {
+std::vector<Corpus> deltas_of(const synthetic::Coded& coded, std::uint32_t capacity, std::uint64_t seed) {
   Random random(seed);
   std::vector<Corpus> corpus;
   for (int i = 0; i < 20; ++i) {
-    DeltaCodec server = synthetic::make_delta(codec, capacity, kParameters);
+    DeltaCodec server = synthetic::make_delta(coded.codec, capacity, kParameters, {}, coded.groups);
     Bytes out(server.bound());
-    State state = synthetic::random_state(random, capacity);
+    State state = synthetic::random_state(random, capacity, 4, coded.groups);
     const State before = state;
     State target = synthetic::random_target(random, state, 1 + random.below(6));
     const auto lifecycle = synthetic::random_lifecycle(random, state, target, 1 + random.below(12));
@@ -39,14 +39,14 @@ std::vector<Corpus> deltas_of(std::string_view codec, std::uint32_t capacity, st
 TEST(HostileDelta, AMutatedPayloadIsRefusedOrAppliedAlikeByEverybody) {
   constexpr std::uint64_t kSeed = 11;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  for (const std::string_view codec : codec_names()) {
-    SCOPED_TRACE(codec);
+  for (const synthetic::Coded& coded : synthetic::all_coded()) {
+    SCOPED_TRACE(testing::Message() << coded.codec << (coded.groups.orientation ? ", turning" : ""));
     Random random(kSeed);
     int applied = 0;
     for (const std::uint32_t capacity : {1U, 9U, 40U}) {
-      const auto corpus = deltas_of(codec, capacity, kSeed + capacity);
-      DeltaCodec one = synthetic::make_delta(codec, capacity, kParameters);
-      DeltaCodec two = synthetic::make_delta(codec, capacity, kParameters);
+      const auto corpus = deltas_of(coded, capacity, kSeed + capacity);
+      DeltaCodec one = synthetic::make_delta(coded.codec, capacity, kParameters, {}, coded.groups);
+      DeltaCodec two = synthetic::make_delta(coded.codec, capacity, kParameters, {}, coded.groups);
       for (int round = 0; round < 4000; ++round) {
         const Corpus& sample = corpus[random.below(corpus.size())];
         Bytes payload = sample.payload;

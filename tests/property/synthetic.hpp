@@ -15,20 +15,27 @@ namespace tandem::synthetic {
 
 inline constexpr TypeId kTypes = 3;
 
-inline BodyState random_body(Random& random) {
+/// Of a stream with orientations, by type.
+inline constexpr std::array<std::int32_t, kTypes> kRadii{1, 3000, 40'000'000};
+
+inline BodyState random_body(Random& random, const Groups& groups = {}) {
   BodyState body;
   for (std::int32_t& p : body.p) p = random.value(kPositionLimit);
   for (std::int32_t& v : body.v) v = random.value(kVelocityLimit);
+  if (!groups.orientation) return body;
+  body.q = random_quaternion(random);
+  body.w = random_spin(random);
   return body;
 }
 
 /// One slot in `dead_one_in` is dead (0: none).
-inline State random_state(Random& random, std::uint32_t capacity, std::uint64_t dead_one_in = 4) {
-  State state(capacity);
+inline State random_state(Random& random, std::uint32_t capacity, std::uint64_t dead_one_in = 4,
+                          const Groups& groups = {}) {
+  State state(capacity, groups);
   for (Slot slot = 0; slot < capacity; ++slot) {
     if (dead_one_in != 0 && random.one_in(dead_one_in)) continue;
     // One draw a statement: compilers differ in the order in which they evaluate arguments.
-    const BodyState body = random_body(random);
+    const BodyState body = random_body(random, groups);
     const auto type = static_cast<TypeId>(random.below(kTypes));
     const auto generation = static_cast<std::uint8_t>(random.below(256));
     state.spawn(slot, generation, type, body);
@@ -42,15 +49,34 @@ inline State random_target(Random& random, const State& state, std::uint64_t mov
   for (Slot slot = 0; slot < state.capacity(); ++slot) {
     if (state.alive()[slot] == 0 || moved_one_in == 0 || !random.one_in(moved_one_in)) continue;
     BodyState body = state.body(slot);
-    if (random.one_in(10)) body = random_body(random);
+    if (random.one_in(10)) body = random_body(random, state.groups());
     const auto shifted = [&random](std::int32_t from, std::int32_t by, std::int32_t limit) {
       return std::clamp(from + random.value(by), -limit, limit);
     };
     for (std::int32_t& p : body.p) p = shifted(p, 1 << 14, kPositionLimit);
     for (std::int32_t& v : body.v) v = shifted(v, 1 << 16, kVelocityLimit);
+    if (state.groups().orientation && random.one_in(2)) {
+      Spin by = random_spin(random);
+      for (std::int32_t& a : by) a /= 16;
+      body.q = turned(body.q, by);
+      body.w = random.one_in(2) ? by : body.w;
+    }
     target.set_body(slot, body);
   }
   return target;
+}
+
+/// A body after a teleport.
+inline BodyState teleported(BodyState body, const LifecycleRecord& record) {
+  if ((record.groups & kMovesPosition) != 0) {
+    body.p = record.body.p;
+    body.v = record.body.v;
+  }
+  if ((record.groups & kMovesOrientation) != 0) {
+    body.q = record.body.q;
+    body.w = record.body.w;
+  }
+  return body;
 }
 
 /// Valid records for about one slot in `one_in`, applied to `target` too.
@@ -60,7 +86,7 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
   for (Slot slot = 0; slot < state.capacity(); ++slot) {
     if (!random.one_in(one_in)) continue;
     LifecycleRecord record{LifecycleKind::kSpawn, slot, static_cast<std::uint8_t>(random.below(256)),
-                           static_cast<TypeId>(random.below(kTypes)), random_body(random)};
+                           static_cast<TypeId>(random.below(kTypes)), random_body(random, state.groups())};
     if (state.alive()[slot] == 0) {
       records.push_back(record);
       target.spawn(slot, record.reuse, record.type, record.body);
@@ -77,8 +103,11 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
         target.spawn(slot, record.reuse, record.type, record.body);
         break;
       case 2:
-        records.push_back({LifecycleKind::kTeleport, slot, 0, 0, record.body});
-        target.set_body(slot, record.body);
+        record.kind = LifecycleKind::kTeleport;
+        record.groups = moves_all(state.groups());
+        if (state.groups().orientation) record.groups = static_cast<std::uint8_t>(1 + random.below(3));
+        target.set_body(slot, teleported(target.body(slot), record));
+        records.push_back(record);
         break;
       default:
         records.push_back({LifecycleKind::kTypeChange, slot, 0, record.type, {}});
@@ -95,15 +124,35 @@ inline std::vector<std::byte> tables_for(std::string_view codec) {
 }
 
 inline std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capacity,
-                                       const RunBlocks& run_blocks = {}) {
+                                       const RunBlocks& run_blocks = {}, const Groups& groups = {}) {
   const auto tables = tables_for(name);
-  return std::move(
-      *make_codec({.name = name, .capacity = capacity, .tables = tables, .run_blocks = run_blocks}));
+  const std::span<const std::int32_t> radii(kRadii);
+  return std::move(*make_codec({.name = name,
+                                .capacity = capacity,
+                                .tables = tables,
+                                .groups = groups,
+                                .radii = radii.first(groups.orientation ? radii.size() : 0),
+                                .run_blocks = run_blocks}));
 }
 
 inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
-                             const StreamParameters& parameters, const RunBlocks& run_blocks = {}) {
-  return {codec_of(codec, capacity, run_blocks), capacity, parameters, kTypes};
+                             const StreamParameters& parameters, const RunBlocks& run_blocks = {},
+                             const Groups& groups = {}) {
+  return {codec_of(codec, capacity, run_blocks, groups), capacity, parameters, kTypes, groups};
+}
+
+/// A codec and the groups of a stream that it can code.
+struct Coded {
+  std::string_view codec;
+  Groups groups;
+};
+inline std::vector<Coded> all_coded() {
+  std::vector<Coded> all;
+  for (const std::string_view name : codec_names()) all.push_back({name, {}});
+  for (const std::string_view name : codec_names()) {
+    if (codec_traits(name)->turns) all.push_back({name, {.orientation = true}});
+  }
+  return all;
 }
 
 /// A client's part: decodes `payload` against `state`, then applies it.
@@ -129,6 +178,10 @@ inline const char* broken_invariant(const State& state) {
       if (!within(p, kPositionLimit) || !within(v, kVelocityLimit) || !within(c, kVelocityLimit))
         return "limits";
     }
+    if (!state.groups().orientation) continue;
+    const BodyState body = state.body(slot);
+    if (dead && (body.q != Quaternion{} || body.w != Spin{})) return "dead slot is not zero";
+    if (!dead && (!valid_quaternion(body.q) || !valid_spin(body.w))) return "no turn";
   }
   return nullptr;
 }
