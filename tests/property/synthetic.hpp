@@ -23,8 +23,8 @@ inline BodyState random_body(Random& random, const Groups& groups = {}) {
   for (std::int32_t& p : body.p) p = random.value(kPositionLimit);
   for (std::int32_t& v : body.v) v = random.value(kVelocityLimit);
   if (!groups.orientation) return body;
-  body.q = random_quaternion(random);
-  body.w = random_spin(random);
+  body.q = any_quaternion(random);
+  body.w = any_spin(random);
   return body;
 }
 
@@ -56,7 +56,7 @@ inline State random_target(Random& random, const State& state, std::uint64_t mov
     for (std::int32_t& p : body.p) p = shifted(p, 1 << 14, kPositionLimit);
     for (std::int32_t& v : body.v) v = shifted(v, 1 << 16, kVelocityLimit);
     if (state.groups().orientation && random.one_in(2)) {
-      Spin by = random_spin(random);
+      Spin by = any_spin(random);
       for (std::int32_t& a : by) a /= 16;
       body.q = turned(body.q, by);
       body.w = random.one_in(2) ? by : body.w;

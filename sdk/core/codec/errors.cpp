@@ -43,8 +43,10 @@ std::uint64_t surface_error(const BodyState& body, const BodyState& target, std:
   return apart + ((std::uint64_t{2} * static_cast<std::uint32_t>(radius) * half_sine) >> 30U) + 1;
 }
 
+namespace {
+
 // Of the half angle h: h / sin h by the series of the arc sine in sin^2; up to 1 rad it is off by 1/200.
-Spin turn_between(const Quaternion& from, const Quaternion& to) {
+std::array<std::int64_t, 3> rough_turn_between(const Quaternion& from, const Quaternion& to) {
   const Quaternion d = difference(from, to);
   const auto x = static_cast<std::int64_t>(half_sine_squared(d) >> 32U);  // 2^-28
   std::int64_t ratio = 0;                                                 // 2^-28
@@ -53,6 +55,16 @@ Spin turn_between(const Quaternion& from, const Quaternion& to) {
     ratio = ((ratio * x) >> 28) + term;
   std::array<std::int64_t, 3> spin{};
   for (std::size_t i = 0; i < 3; ++i) spin[i] = (d[i] * ratio) >> 29;
+  return spin;
+}
+
+}  // namespace
+
+Spin turn_between(const Quaternion& from, const Quaternion& to) {
+  const Spin rough = limited_spin(rough_turn_between(from, to));
+  // What it is off by turns about the same axis.
+  std::array<std::int64_t, 3> spin = rough_turn_between(turned(from, rough), to);
+  for (std::size_t i = 0; i < 3; ++i) spin[i] += rough[i];
   return limited_spin(spin);
 }
 

@@ -31,8 +31,8 @@ namespace tandem {
 /// lattice units, rounded up; at most a lattice unit more than it is. States with orientations.
 [[nodiscard]] std::uint64_t surface_error(const BodyState& body, const BodyState& target,
                                           std::int32_t radius);
-/// The rotation vector (2^-28 rad) that turns `from` into `to`, near enough to choose by; where it takes more
-/// than 2 rad one of the same direction that takes less.
+/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes more
+/// than 2 rad, half of one or less.
 [[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
 
 /// Marks (1) the slots of a block that may be off by more than `threshold`, and none of the others (0) is.

@@ -238,7 +238,7 @@ class Group:
         """Lattice units that a step is worth."""
         share = by_axes(self.steps, 62259, 60293, 45220, 38666)
         if orientation:
-            share = (share * np.where(self.fine, 33423, 55706)) >> 16
+            share = (share * np.where(self.fine, 27525, 48497)) >> 16
         return np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
 
     def growth(self, one, gain_of):

@@ -69,8 +69,8 @@ class TrackerSteppings {
   static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
 
   /// What steps are worth beside their share of the threshold, in 1/65536. Where position and orientation may
-  /// both be off they are smaller, so that more of the error ball is left to the other.
-  static constexpr std::int64_t kAlone = 65536, kJoint = 55706, kFine = 33423;
+  /// both be off they are smaller, so that more of the error ball is left to the other; RESEARCH.md, "Turns".
+  static constexpr std::int64_t kAlone = 65536, kJoint = 48497, kFine = 27525;
 
   /// Steps are worth multiples of 2^position_bits, so that rounded positions stay round; at most 2^24.
   explicit TrackerSteppings(std::int32_t threshold, unsigned position_bits = 0, std::int64_t size = kAlone) {
