@@ -270,6 +270,32 @@ def server_restart(stage):
             raise Failed(f"{name} applied {frames} frames of the new run")
 
 
+def rigid(stage):
+    """Bodies of Bullet that turn, poked and tilted: a late joiner, a server that is killed; the reference decoder follows."""
+    script = stage.folder / "tilts.textproto"
+    dice = random.Random(7)
+    with open(script, "w", encoding="ascii") as out:
+        for i in range(80):
+            x, z = dice.uniform(-2, 2), dice.uniform(-2, 2)
+            out.write(f"inputs {{ time_s: {0.5 * (i + 1):.2f} gravity {{ x: {x:.3f} y: -9.5 z: {z:.3f} }} }}\n")
+    stage.server("before", "--scripted", scene="dominoes", bodies=300)
+    stage.client("participant", "--input-script", script, "--capture", stage.folder / "participant.mcap")
+    stage.wait_live(["participant"], lambda live: live.get("frame", 0) > 200, "frame 200")
+    stage.client("late", "--observe", "--capture", stage.folder / "late.mcap")
+    stage.wait_live(["participant", "late"], lambda live: live.get("frame", 0) > 450, "frame 450")
+    stage.kill("before")
+    stage.server("after", scene="dominoes", bodies=300)
+    stage.wait(lambda: stage.hashes("after"), "the new server's first frames")
+    new_epoch = next(iter(stage.hashes("after")))[0]
+    stage.wait(lambda: len([epoch for epoch, _ in stage.hashes("late") if epoch == new_epoch]) > 200, "200 new frames")
+    for name, least in (("participant", 400), ("late", 200)):
+        report = stage.stop(name)
+        check_report(report, ["inputs_sent", "inputs_acted"] if name == "participant" else [])
+        compare(stage, ["before", "after"], name, least, report["resyncs"])
+        check_capture(stage.folder / f"{name}.mcap", stage.hashes(name))
+    stage.stop("after")
+
+
 def no_server(stage):
     """A client without a server says so, waits, gives up when told to; then one starts late and it plays."""
     stage.client("alone", "--timeout", 3, "--seconds", 1)
@@ -374,7 +400,9 @@ def reference(stage):
 # Accounts of up to 256 clients (1.1 KB each), and what was reserved at the start but is written to only later: a server of
 # 2,000 bodies reserves 5 MB.
 MEMORY_SLACK_KB = 4096
-SCENARIOS = {f.__name__: f for f in (two_thousand_frames, server_restart, no_server, endings, emitter, reference)}
+SCENARIOS = {
+    f.__name__: f for f in (two_thousand_frames, server_restart, rigid, no_server, endings, emitter, reference)
+}
 
 
 def main():
