@@ -148,7 +148,10 @@ std::vector<BodyTypeInfo> Client::types() const {
   const std::lock_guard lock(impl_->mutex);
   std::vector<BodyTypeInfo> out;
   if (const auto* session = impl_->core.session()) {
-    for (const auto& type : session->types) out.push_back({type.name, type.radius, type.colour_rgba});
+    for (const auto& type : session->types) {
+      out.push_back(
+          {type.name, type.radius, type.colour_rgba, static_cast<BodyShape>(type.shape), type.shape_values});
+    }
   }
   return out;
 }

@@ -70,10 +70,22 @@ struct ClientStatus {
   std::uint32_t queue_high_water = 0;  ///< deltas that waited at once, at most
 };
 
+/// What a body looks like, in its own frame; scene units.
+enum class BodyShape : std::uint32_t {
+  kNone = 0,
+  kSphere = 1,    ///< no values: the radius
+  kBox = 2,       ///< half sizes x, y, z
+  kCapsule = 3,   ///< radius, half of the length between the centres of the caps, along y
+  kCylinder = 4,  ///< radius, half of the height, along y
+  kHull = 5,      ///< convex: points x, y, z, at least four
+};
+
 struct BodyTypeInfo {
   std::string name;
-  float radius = 0;               ///< scene units
+  float radius = 0;               ///< of the sphere that holds the body; scene units
   std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
+  BodyShape shape = BodyShape::kSphere;
+  std::vector<float> shape_values = {};  ///< as the shape says
 };
 
 enum class BodyChange : std::uint8_t {

@@ -6,6 +6,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "tandem/client.hpp"
+#include "tests/unit/client/fake_server.hpp"
 
 namespace tandem {
 namespace {
@@ -100,6 +101,28 @@ TEST_F(ClientApi, ASampleDoesNotWaitForThePollInWork) {
   for (int i = 0; i < 200 && lines == 0; ++i) client->poll(0.05);
   EXPECT_EQ(lines, 1);
   EXPECT_EQ(client->status().phase, ClientPhase::kRefused);
+}
+
+TEST_F(ClientApi, TypesTellWhatBodiesLookLike) {
+  transport::DdsOptions dds;
+  dds.session = options.session = "shaped";
+  auto server = transport::make_dds_server_port(dds);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  transport::SessionMessage session = client::FakeServer(1, 4, 1).session;
+  session.session = options.session;
+  session.types = {{"plank", 2.5F, 0xFFU, transport::Shape::kBox, {1, 2, 0.5F}}};
+  ASSERT_TRUE((*server)->write(session).has_value());
+  options.background = false;
+  auto client = Client::connect(options);
+  ASSERT_TRUE(client.has_value()) << client.error().message;
+  for (int i = 0; i < 200 && client->types().empty(); ++i) client->poll(0.05);
+  const auto types = client->types();
+  ASSERT_EQ(types.size(), 1U);
+  EXPECT_EQ(types[0].name, "plank");
+  EXPECT_EQ(types[0].radius, 2.5F);
+  EXPECT_EQ(types[0].colour_rgba, 0xFFU);
+  EXPECT_EQ(types[0].shape, BodyShape::kBox);
+  EXPECT_EQ(types[0].shape_values, (std::vector<float>{1, 2, 0.5F}));
 }
 
 }  // namespace
