@@ -13,7 +13,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x80BB352AF1536E2D;
+constexpr std::uint64_t kGolden = 0xBA61003892A88FF5;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field";
 constexpr std::pair<std::string_view, std::string_view> kSessions[] = {

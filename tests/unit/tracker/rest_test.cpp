@@ -126,6 +126,20 @@ TEST(Rest, GravityThatChangesWakesAndABodyAtTheTopOfItsThrowIsAwake) {
   EXPECT_EQ(resting, 0U);
 }
 
+TEST(Rest, NothingOverflowsAtTheLimitsOfTheLattice) {  // undefined behaviour once made compilers disagree
+  const Layout layout = layout_of("ballistic", 1);
+  auto server = server_of(layout);
+  State target(1);
+  target.spawn(0, 0, 0, {{kPositionLimit, kPositionLimit, kPositionLimit}, {}});
+  server.start(0, target, {{kVelocityLimit, -kVelocityLimit, kVelocityLimit}, 0});
+  for (int i = 0; i < 8; ++i) {
+    const std::int32_t side = i / 2 % 2 == 0 ? kPositionLimit : -kPositionLimit;
+    target.set_body(0, {{side, -side, side}, {}});
+    server.advance(target, {});
+  }
+  EXPECT_EQ(server.state().alive_count(), 1U);
+}
+
 TEST(Rest, SurvivesASnapshotAndEndsWithTheBody) {
   const Layout layout = layout_of("field");
   auto server = server_of(layout);
