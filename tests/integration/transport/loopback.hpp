@@ -23,7 +23,7 @@ inline DdsOptions loopback() {
   static int count = 0;
   setenv("CYCLONEDDS_URI", kLoopback, 1);
   DdsOptions options;
-  options.domain = 1 + static_cast<std::uint32_t>(getpid()) % 229;
+  options.domain = 1 + static_cast<std::uint32_t>(getpid()) % 99;  // beyond, ports are ephemeral ones
   options.session = "test-" + std::to_string(getpid()) + "-" + std::to_string(++count);
   return options;
 }
