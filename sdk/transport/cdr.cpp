@@ -158,9 +158,7 @@ void fields(Visitor& visit, M& m) {
 }
 
 void parameters(Writer& visit, const StreamParameters& values) {
-  const auto list = list_parameters(values);
-  const std::vector<Parameter> all(list.begin(), list.end());
-  visit.sequence(all, [&](const Parameter& parameter) { fields(visit, parameter); });
+  visit.sequence(list_parameters(values), [&](const Parameter& parameter) { fields(visit, parameter); });
 }
 
 void parameters(Reader& visit, StreamParameters& values) {

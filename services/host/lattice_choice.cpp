@@ -12,6 +12,7 @@ bool positive(double value) { return std::isfinite(value) && value > 0; }
 
 constexpr double kDefaultRange = 8;  // thresholds; about what fast scenes leave behind in one frame
 constexpr double kRangeSteps = 127;
+constexpr int kAngleBits = 28;  // of a radian on the lattice
 
 // Rounded up, at least 1. Errors are the caller's: the value was checked to be finite and not negative.
 std::int32_t step_of(double range) {
@@ -53,6 +54,25 @@ Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshol
   parameters.position_step = step_of(position_range * lattice.position_scale());
   parameters.velocity_step = step_of(velocity_range * lattice.velocity_scale());
   return parameters;
+}
+
+Result<void> set_turn_steps(const Lattice& lattice, double turn_range, double spin_range, double radius,
+                            CodecParameters& parameters) {
+  if (!std::isfinite(turn_range) || turn_range < 0 || !std::isfinite(spin_range) || spin_range < 0 ||
+      !positive(radius)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "ranges of turns must be finite and not negative, radii positive");
+  }
+  const double usual = kDefaultRange * parameters.threshold * lattice.unit / radius;
+  if (turn_range == 0) turn_range = usual;
+  if (spin_range == 0) spin_range = usual / lattice.dt_s;
+  // No turn is larger than kSpinLimit.
+  const auto step = [](double range) {
+    return step_of(std::min(std::ldexp(range, kAngleBits), double{kSpinLimit}));
+  };
+  parameters.turn_step = step(turn_range);
+  parameters.spin_step = step(spin_range * lattice.dt_s);
+  return {};
 }
 
 Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity, double damping_per_s) {

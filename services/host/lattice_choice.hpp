@@ -35,6 +35,12 @@ inline constexpr int kFewestHalvings = 8;  ///< coarser would show in the error
 [[nodiscard]] Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshold,
                                                        double position_range, double velocity_range);
 
+/// Sets the steps of turns: `turn_range` (rad) and `spin_range` (rad/s) as codec_parameters() has its ranges;
+/// 0 stands for turns that move the surface of a body of `radius` (scene units) by eight thresholds (per
+/// frame). Errors: kInvalidArgument for what is negative or not finite.
+[[nodiscard]] Result<void> set_turn_steps(const Lattice& lattice, double turn_range, double spin_range,
+                                          double radius, CodecParameters& parameters);
+
 /// Gravity (scene units / s^2) and damping (1/s) as the integers of the predicted step. Errors:
 /// kInvalidArgument for what is not finite or does not fit (|g| <= 2^28, 0 <= D < 2^16).
 [[nodiscard]] Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity,

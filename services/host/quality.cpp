@@ -77,6 +77,9 @@ CodecParameters QualityControl::with_steps(CodecParameters parameters) const {
   };
   parameters.position_step = follow(parameters.position_step, wanted.position_step, start_.position_step);
   parameters.velocity_step = follow(parameters.velocity_step, wanted.velocity_step, start_.velocity_step);
+  if (!has_turn_steps(parameters)) return parameters;
+  parameters.turn_step = follow(parameters.turn_step, wanted.turn_step, start_.turn_step);
+  parameters.spin_step = follow(parameters.spin_step, wanted.spin_step, start_.spin_step);
   return parameters;
 }
 

@@ -28,34 +28,45 @@ void ResidualStatistics::add(const State& predicted, const State& target, Slot s
     ++position_counts[static_cast<std::uint8_t>(q[i])];
     ++velocity_counts[static_cast<std::uint8_t>(q[i + 3])];
   }
+  if (!turns()) return;
+  const Spin turn = turn_between(predicted.quaternion(slot), target.quaternion(slot));
+  for (std::size_t i = 0; i < kSpinChannels; ++i) {
+    largest_turn = std::max(largest_turn, magnitude(turn[i], 0));
+    largest_spin = std::max(largest_spin, magnitude(predicted.w(i)[slot], target.w(i)[slot]));
+    ++turn_counts[static_cast<std::uint8_t>(q[i + 6])];
+    ++spin_counts[static_cast<std::uint8_t>(q[i + 9])];
+  }
 }
 
 void ResidualStatistics::frame(const State& predicted, const State& target,
                                const CodecParameters& parameters) {
   ++frames;
-  if (!radii_.empty()) {
-    for (Slot slot = 0; slot < predicted.capacity(); ++slot) {
-      if (predicted.alive()[slot] == 0) continue;
-      const std::int32_t radius = radii_[predicted.type()[slot]];
-      const std::uint64_t error = surface_error(predicted.body(slot), target.body(slot), radius);
-      if (error > static_cast<std::uint32_t>(parameters.threshold)) add(predicted, target, slot, parameters);
-    }
-    return;
-  }
   marks_.resize(kBlockSlots);
+  const auto found = [&](Slot slot, std::uint64_t) { add(predicted, target, slot, parameters); };
   for (std::uint32_t b = 0; b < block_count(predicted.capacity()); ++b) {
-    for_each_beyond(predicted, target, block_at(b, predicted.capacity()), parameters.threshold,
-                    std::span<std::uint8_t, kBlockSlots>(marks_.data(), kBlockSlots),
-                    [&](Slot slot, std::uint64_t) { add(predicted, target, slot, parameters); });
+    const Block block = block_at(b, predicted.capacity());
+    if (turns()) {
+      for_each_surface_beyond(predicted, target, block, parameters.threshold, radii_, found);
+    } else {
+      for_each_beyond(predicted, target, block, parameters.threshold,
+                      std::span<std::uint8_t, kBlockSlots>(marks_.data(), kBlockSlots), found);
+    }
   }
 }
 
 CodecParameters trained_parameters(const ResidualStatistics& statistics, std::int32_t threshold) {
-  return {threshold, step_for(statistics.largest_position), step_for(statistics.largest_velocity)};
+  CodecParameters parameters{threshold, step_for(statistics.largest_position),
+                             step_for(statistics.largest_velocity)};
+  if (!statistics.turns()) return parameters;
+  parameters.turn_step = step_for(statistics.largest_turn);
+  parameters.spin_step = step_for(statistics.largest_spin);
+  return parameters;
 }
 
 std::vector<std::byte> trained_tables(const ResidualStatistics& statistics) {
-  return code_tables(statistics.position_counts, statistics.velocity_counts);
+  std::vector<SymbolCounts> counts{statistics.position_counts, statistics.velocity_counts};
+  if (statistics.turns()) counts.insert(counts.end(), {statistics.turn_counts, statistics.spin_counts});
+  return code_tables(counts);
 }
 
 }  // namespace tandem::host

@@ -12,9 +12,8 @@
 namespace tandem::host {
 
 /// Residuals of the bodies beyond the threshold, with orientations those whose surface is, summed over the
-/// frames observed. Two passes over the same
-/// inputs: the first with `selective` for the largest residuals, the second with `quantized` and the ranges
-/// found for the symbol counts.
+/// frames observed. Two passes over the same inputs: the first with `selective` for the largest residuals,
+/// the second with `quantized` and the ranges found for the symbol counts.
 struct ResidualStatistics final : EncodeObserver {
   ResidualStatistics() = default;
   /// `radii`: Layout::radii of the stream.
@@ -27,6 +26,12 @@ struct ResidualStatistics final : EncodeObserver {
   std::uint32_t largest_velocity = 0;  ///< of one component, 1/64 unit per frame
   SymbolCounts position_counts{};      ///< by residual byte (two's complement), with the parameters in force
   SymbolCounts velocity_counts{};
+  // With orientations alone.
+  std::uint32_t largest_turn = 0;  ///< of one component of a rotation vector, 2^-28 rad
+  std::uint32_t largest_spin = 0;  ///< of one component of an angular velocity, 2^-28 rad per frame
+  SymbolCounts turn_counts{};
+  SymbolCounts spin_counts{};
+  [[nodiscard]] bool turns() const { return !radii_.empty(); }
 
  private:
   void add(const State& predicted, const State& target, Slot slot, const CodecParameters& parameters);
@@ -40,7 +45,7 @@ struct ResidualStatistics final : EncodeObserver {
 [[nodiscard]] CodecParameters trained_parameters(const ResidualStatistics& statistics,
                                                  std::int32_t threshold);
 
-/// Code lengths from the symbol counts: 256 for positions, then 256 for velocities.
+/// Code lengths from the symbol counts: see code_tables.hpp.
 [[nodiscard]] std::vector<std::byte> trained_tables(const ResidualStatistics& statistics);
 
 }  // namespace tandem::host

@@ -127,7 +127,8 @@ void Stream::Impl::choose_parameters(const FrameResult& result) {
 }
 
 Result<void> Stream::set_parameters(const StreamParameters& parameters) {
-  if (!valid_parameters(parameters.codec))
+  if (!valid_parameters(parameters.codec) ||
+      has_turn_steps(parameters.codec) != has_turn_steps(impl_->parameters.codec))
     return fail(ErrorCode::kInvalidArgument, "parameters out of range");
   if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
   impl_->parameters = parameters;

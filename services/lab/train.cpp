@@ -1,6 +1,7 @@
 #include "services/lab/train.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "services/host/residual_statistics.hpp"
@@ -9,6 +10,8 @@ namespace tandem::lab {
 namespace {
 
 constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experimental runs"
+
+double radians(std::uint32_t on_lattice) { return std::ldexp(static_cast<double>(on_lattice), -28); }
 
 /// What a stream corrected in one pass over the source.
 Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
@@ -61,6 +64,10 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
   table.position_range_m = kMargin * std::max(1U, ranges->largest_position) / first->lattice.position_scale();
   table.velocity_range_m_per_s =
       kMargin * std::max(1U, ranges->largest_velocity) / first->lattice.velocity_scale();
+  if (ranges->turns()) {
+    table.turn_range_rad = kMargin * radians(std::max(1U, ranges->largest_turn));
+    table.spin_range_rad_per_s = kMargin * radians(std::max(1U, ranges->largest_spin)) / first->lattice.dt_s;
+  }
 
   scene.trained = {table};
   choice.codec = "quantized";
@@ -71,6 +78,10 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
   const std::vector<std::byte> tables = host::trained_tables(*counts);
   table.position_code_lengths = lengths(tables, 0);
   table.velocity_code_lengths = lengths(tables, kSymbols);
+  if (counts->turns()) {
+    table.turn_code_lengths = lengths(tables, 2 * kSymbols);
+    table.spin_code_lengths = lengths(tables, 3 * kSymbols);
+  }
   return table;
 }
 

@@ -45,6 +45,10 @@ void check_table(const Node& node, const idl::TrainedTable& table) {
   node.require(table.velocity_range_m_per_s() >= 0, "velocity_range_m_per_s", "must not be negative");
   check_lengths(node, table.position_code_lengths(), "position_code_lengths");
   check_lengths(node, table.velocity_code_lengths(), "velocity_code_lengths");
+  node.require(table.turn_range_rad() >= 0, "turn_range_rad", "must not be negative");
+  node.require(table.spin_range_rad_per_s() >= 0, "spin_range_rad_per_s", "must not be negative");
+  check_lengths(node, table.turn_code_lengths(), "turn_code_lengths");
+  check_lengths(node, table.spin_code_lengths(), "spin_code_lengths");
 }
 
 idl::TrainedTable to_proto(const TrainedTable& table) {
@@ -55,6 +59,10 @@ idl::TrainedTable to_proto(const TrainedTable& table) {
   out.set_velocity_range_m_per_s(table.velocity_range_m_per_s);
   for (const std::uint8_t length : table.position_code_lengths) out.add_position_code_lengths(length);
   for (const std::uint8_t length : table.velocity_code_lengths) out.add_velocity_code_lengths(length);
+  out.set_turn_range_rad(table.turn_range_rad);
+  out.set_spin_range_rad_per_s(table.spin_range_rad_per_s);
+  for (const std::uint8_t length : table.turn_code_lengths) out.add_turn_code_lengths(length);
+  for (const std::uint8_t length : table.spin_code_lengths) out.add_spin_code_lengths(length);
   return out;
 }
 
@@ -113,7 +121,9 @@ Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path) {
     check_table(root.child("tables", i), table);
     tables.push_back({table.bodies(), table.threshold_m(), table.position_range_m(),
                       table.velocity_range_m_per_s(), narrowed(table.position_code_lengths()),
-                      narrowed(table.velocity_code_lengths())});
+                      narrowed(table.velocity_code_lengths()), table.turn_range_rad(),
+                      table.spin_range_rad_per_s(), narrowed(table.turn_code_lengths()),
+                      narrowed(table.spin_code_lengths())});
   }
   if (findings.first) return tl::unexpected(*findings.first);
   return tables;

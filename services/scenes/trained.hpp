@@ -17,6 +17,11 @@ struct TrainedTable {
   double velocity_range_m_per_s = 0;
   std::vector<std::uint8_t> position_code_lengths;  ///< bits by symbol
   std::vector<std::uint8_t> velocity_code_lengths;
+  // Of scenes whose bodies turn.
+  double turn_range_rad = 0;
+  double spin_range_rad_per_s = 0;
+  std::vector<std::uint8_t> turn_code_lengths{};
+  std::vector<std::uint8_t> spin_code_lengths{};
   bool operator==(const TrainedTable&) const = default;
 };
 

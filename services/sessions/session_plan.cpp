@@ -18,12 +18,31 @@ namespace {
 constexpr double kFinest = 0.25;
 constexpr double kCoarsest = 4;
 
-std::vector<std::byte> codec_tables(const scenes::TrainedTable& table) {
+std::vector<std::byte> codec_tables(const scenes::TrainedTable& table, const Groups& groups) {
   std::vector<std::byte> bytes;
-  for (const auto* lengths : {&table.position_code_lengths, &table.velocity_code_lengths}) {
-    for (const std::uint8_t length : *lengths) bytes.push_back(std::byte{length});
-  }
-  return bytes.empty() ? default_code_tables() : bytes;
+  const auto append = [&bytes](const std::vector<std::uint8_t>& lengths) {
+    for (const std::uint8_t length : lengths) bytes.push_back(std::byte{length});
+  };
+  const std::vector<std::byte> usual = default_code_tables(groups);
+  append(table.position_code_lengths);
+  append(table.velocity_code_lengths);
+  if (bytes.empty()) return usual;
+  if (!groups.orientation) return bytes;
+  append(table.turn_code_lengths);
+  append(table.spin_code_lengths);
+  // Of a table that was trained before bodies turned.
+  if (table.turn_code_lengths.empty()) bytes.insert(bytes.end(), usual.begin() + 2 * kSymbols, usual.end());
+  return bytes;
+}
+
+// Where the codec reads them and bodies turn.
+Result<void> choose_turn_steps(const scenes::Scene& scene, const scenes::TrainedTable& table,
+                               const CodecTraits& traits, host::StreamConfig& stream) {
+  if (!traits.reads_steps || !groups_of(stream.layout).orientation) return {};
+  const double smallest =
+      std::ranges::min(scene.types, {}, &scenes::BodyType::bounding_radius_m).bounding_radius_m;
+  return host::set_turn_steps(stream.lattice, table.turn_range_rad, table.spin_range_rad_per_s, smallest,
+                              stream.layout.parameters.codec);
 }
 
 // Cells are as large as the largest bodies, and hold so many smaller ones at most.
@@ -95,8 +114,10 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   if (auto chosen = choose_groups(scene, *lattice, *traits, stream.layout); !chosen)
     return tl::unexpected(chosen.error());
   stream.layout.parameters.codec = *parameters;
+  if (auto chosen = choose_turn_steps(scene, table, *traits, stream); !chosen)
+    return tl::unexpected(chosen.error());
   stream.layout.codec = choice.codec;
-  if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table);
+  if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table, groups_of(stream.layout));
   if (traits->takes_budget) stream.budget = choice.budget_bytes.value_or(traits->usual_budget);
   if (auto chosen = choose_predictor(scene, choice, *traits, stream); !chosen)
     return tl::unexpected(chosen.error());

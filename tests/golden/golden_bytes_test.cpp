@@ -54,13 +54,24 @@ State target() {
   return state;
 }
 
+// The parameters that a stream of `codec` has beside others.
+StreamParameters parameters_of(std::string_view codec, const Groups& groups) {
+  StreamParameters parameters = kParameters;
+  if (!groups.orientation || !codec_traits(codec)->reads_steps) return parameters;
+  parameters.codec.turn_step = 1 << 20;
+  parameters.codec.spin_step = 1 << 16;
+  return parameters;
+}
+
 // Encodes with `codec`, expects the bytes, and decodes these bytes to the same state.
 void expect_bytes(std::string_view codec, std::string_view hex, const State& from, const State& to,
                   std::span<const LifecycleRecord> lifecycle = {}, const StreamParameters* changed = nullptr,
                   std::size_t budget = kNoBudget) {
   SCOPED_TRACE(codec);
-  DeltaCodec server = synthetic::make_delta(codec, from.capacity(), kParameters);
-  DeltaCodec client = synthetic::make_delta(codec, from.capacity(), kParameters);
+  const Groups groups = from.groups();
+  const StreamParameters parameters = parameters_of(codec, groups);
+  DeltaCodec server = synthetic::make_delta(codec, from.capacity(), parameters, {}, groups);
+  DeltaCodec client = synthetic::make_delta(codec, from.capacity(), parameters, {}, groups);
   if (changed != nullptr) server.set_parameters(*changed);
   Bytes out(server.bound());
   State agreed = from;
@@ -103,6 +114,32 @@ TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger err
 
 TEST(GoldenBytes, OfTracker) {  // Positions alone; v and c follow from them on both sides.
   expect_bytes("tracker", "86 2f2a0106af", predicted(), target());
+}
+
+// Slot 1 of two, turned by a quarter about z; then off by (50, 0, 0), five and three steps of a turn and
+// seven of w.
+State turning(bool more) {
+  State state(2, synthetic::kTurning);
+  BodyState body{{1, -1, 256}, {64, 0, -2}, {0, 0, 759250125, 759250125}, {1 << 20, 0, -5}};
+  if (more) {
+    body.p[0] += 50;
+    body.q = turned(body.q, {0, 5 << 20, -3 << 20});
+    body.w[1] = 7 << 16;
+  }
+  state.spawn(1, 0, 1, body);
+  return state;
+}
+
+TEST(GoldenBytes, OfNoneWithOrientations) {
+  expect_bytes("none",
+               "83 36 00 02 33000000 ffffffff 00010000 40000000 00000000 feffffff"
+               "77227100 77227100 fd9afc2c f45d842d 00001000 00000700 fbffffff",
+               turning(false), turning(true));
+}
+
+TEST(GoldenBytes, OfEntropyWithOrientations) {
+  // Residuals of 5, of none, of 0, 5, -3 (a step is 2^20) and of 0, 7, 0 (2^16).
+  expect_bytes("entropy", "83 08 00 02 a80001581880", turning(false), turning(true));
 }
 
 TEST(GoldenBytes, OfLifecycleAndParameters) {

@@ -18,23 +18,61 @@ struct Session {
   std::uint64_t dead_one_in = *rc::gen::element<std::uint64_t>(0, 1, 2, 10);
   std::uint64_t moved_one_in = *rc::gen::element<std::uint64_t>(0, 1, 2, 20, 1000);
   std::uint64_t seed = *rc::gen::arbitrary<std::uint64_t>();
+  Groups groups = {};
+
+  [[nodiscard]] bool is_exact() const { return codec == "none" || codec == "selective"; }
+  [[nodiscard]] StreamParameters start() const {
+    StreamParameters parameters{{200, 16, 64}};
+    if (groups.orientation && codec_traits(codec)->reads_steps) {
+      parameters.codec.turn_step = 1 << 20;
+      parameters.codec.spin_step = 1 << 18;
+    }
+    return parameters;
+  }
+  [[nodiscard]] DeltaCodec delta(const StreamParameters& parameters) const {
+    return synthetic::make_delta(codec, capacity, parameters, {}, groups);
+  }
+  [[nodiscard]] State state(Random& random) const {
+    return synthetic::random_state(random, capacity, dead_one_in, groups);
+  }
+  /// What a correction is due to, and the larger one goes first.
+  [[nodiscard]] std::uint64_t error(const State& state, const State& target, Slot slot) const {
+    if (!groups.orientation) return error_squared(state, target, slot);
+    if (state.alive()[slot] == 0) return 0;
+    return surface_error(state.body(slot), target.body(slot), synthetic::kRadii[target.type()[slot]]);
+  }
+  [[nodiscard]] std::uint64_t limit(std::int32_t threshold) const {
+    const auto t = static_cast<std::uint64_t>(threshold);
+    return groups.orientation ? t : t * t;
+  }
 };
 
-StreamParameters random_parameters(Random& random) {
-  const auto positive = [&random](std::int32_t most) { return 1 + std::abs(random.value(most - 1)); };
-  return {{positive(1 << 20), positive(kMaxStep), positive(kMaxStep)}};
+/// One of the paper's codecs on bodies that turn.
+Session turning_session() {
+  Session session;
+  session.codec = codec_names()[*rc::gen::inRange<std::size_t>(0, 5)];
+  session.groups = synthetic::kTurning;
+  return session;
 }
 
-RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
-  const Session session;
+StreamParameters random_parameters(Random& random, const StreamParameters& start) {
+  const auto positive = [&random](std::int32_t most) { return 1 + std::abs(random.value(most - 1)); };
+  StreamParameters parameters{{positive(1 << 20), positive(kMaxStep), positive(kMaxStep)}};
+  if (!has_turn_steps(start.codec)) return parameters;
+  parameters.codec.turn_step = positive(kMaxStep);
+  parameters.codec.spin_step = positive(kMaxStep);
+  return parameters;
+}
+
+void leaves_both_sides_with_the_same_state(const Session& session) {
   Random random(session.seed);
-  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, {{200, 16, 64}});
-  DeltaCodec client = synthetic::make_delta(session.codec, session.capacity, {{200, 16, 64}});
+  DeltaCodec server = session.delta(session.start());
+  DeltaCodec client = session.delta(session.start());
   std::vector<std::byte> out(server.bound());
-  State agreed = synthetic::random_state(random, session.capacity, session.dead_one_in);
+  State agreed = session.state(random);
   State held = agreed;
   for (int frame = 0; frame < 4; ++frame) {
-    if (random.one_in(3)) server.set_parameters(random_parameters(random));
+    if (random.one_in(3)) server.set_parameters(random_parameters(random, session.start()));
     if (random.one_in(3)) server.round_next();
     State target = synthetic::random_target(random, agreed, session.moved_one_in);
     const auto lifecycle =
@@ -56,19 +94,23 @@ RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
   }
 }
 
-RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
-  const Session session;
+RC_GTEST_PROP(AnyCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
+  leaves_both_sides_with_the_same_state({});
+}
+RC_GTEST_PROP(TurningCodec, LeavesEncoderAndDecoderWithTheSameState, ()) {
+  leaves_both_sides_with_the_same_state(turning_session());
+}
+
+void corrects_what_is_beyond_the_threshold_and_nothing_else(const Session& session) {
   Random random(session.seed);
-  const StreamParameters parameters = random_parameters(random);
-  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, parameters);
+  const StreamParameters parameters = random_parameters(random, session.start());
+  DeltaCodec server = session.delta(parameters);
   std::vector<std::byte> out(server.bound());
-  const State predicted = synthetic::random_state(random, session.capacity, session.dead_one_in);
+  const State predicted = session.state(random);
   const State target = synthetic::random_target(random, predicted, session.moved_one_in);
   State agreed = predicted;
   server.encode(agreed, target, {}, kNoBudget, out);
-  const bool exact = session.codec == "none" || session.codec == "selective";
-  const auto limit = static_cast<std::uint64_t>(parameters.codec.threshold) *
-                     static_cast<std::uint64_t>(parameters.codec.threshold);
+  const std::uint64_t limit = session.limit(parameters.codec.threshold);
   // What a residual of one axis may be after a correction.
   const auto settled = [](std::int32_t before, std::int32_t after, std::int32_t wanted, std::int32_t step) {
     const std::uint32_t error_before = magnitude(before, wanted);
@@ -78,8 +120,8 @@ RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
            (error_before > range && error == error_before - range);
   };
   for (Slot slot = 0; slot < session.capacity; ++slot) {
-    const bool beyond = error_squared(predicted, target, slot) > limit;
-    if (exact) {
+    const bool beyond = session.error(predicted, target, slot) > limit;
+    if (session.is_exact()) {
       const bool sent = predicted.alive()[slot] != 0 && (beyond || session.codec == "none");
       RC_ASSERT(agreed.body(slot) == (sent ? target : predicted).body(slot));
       continue;
@@ -102,14 +144,18 @@ RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
   }
 }
 
-RC_GTEST_PROP(AnyCodec, UnderABudgetNothingLeftOutIsWorseThanWhatWasSent, ()) {
-  const Session session;
-  RC_PRE(session.codec != "tracker");  // weighs waiting too, and learns from the first encode
+RC_GTEST_PROP(AnyCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
+  corrects_what_is_beyond_the_threshold_and_nothing_else({});
+}
+RC_GTEST_PROP(TurningCodec, CorrectsWhatIsBeyondTheThresholdAndNothingElse, ()) {
+  corrects_what_is_beyond_the_threshold_and_nothing_else(turning_session());
+}
+
+void leaves_nothing_out_that_is_worse_than_what_it_sends(const Session& session) {
   Random random(session.seed);
-  const StreamParameters parameters{{200, 16, 64}};
-  const State predicted = synthetic::random_state(random, session.capacity, session.dead_one_in);
+  const State predicted = session.state(random);
   const State target = synthetic::random_target(random, predicted, session.moved_one_in);
-  DeltaCodec server = synthetic::make_delta(session.codec, session.capacity, parameters);
+  DeltaCodec server = session.delta(session.start());
   std::vector<std::byte> out(server.bound());
   State agreed = predicted;
   const auto all = server.encode(agreed, target, {}, kNoBudget, out);
@@ -118,7 +164,7 @@ RC_GTEST_PROP(AnyCodec, UnderABudgetNothingLeftOutIsWorseThanWhatWasSent, ()) {
   const std::size_t budget = random.below(all.correction_bytes + 2);
   const auto some = server.encode(agreed, target, {}, budget, out);
   RC_ASSERT(some.correction_bytes <= budget);
-  const auto order = [&](Slot slot) { return std::pair(~error_squared(predicted, target, slot), slot); };
+  const auto order = [&](Slot slot) { return std::pair(~session.error(predicted, target, slot), slot); };
   std::vector<Slot> left_out;
   std::set_difference(everything.begin(), everything.end(), server.touched().begin(), server.touched().end(),
                       std::back_inserter(left_out));
@@ -127,6 +173,15 @@ RC_GTEST_PROP(AnyCodec, UnderABudgetNothingLeftOutIsWorseThanWhatWasSent, ()) {
   std::pair<std::uint64_t, Slot> worst_sent{0, 0};
   for (const Slot slot : server.touched()) worst_sent = std::max(worst_sent, order(slot));
   for (const Slot slot : left_out) RC_ASSERT(some.corrected == 0 || worst_sent < order(slot));
+}
+
+RC_GTEST_PROP(AnyCodec, UnderABudgetNothingLeftOutIsWorseThanWhatWasSent, ()) {
+  const Session session;
+  RC_PRE(session.codec != "tracker");  // weighs waiting too, and learns from the first encode
+  leaves_nothing_out_that_is_worse_than_what_it_sends(session);
+}
+RC_GTEST_PROP(TurningCodec, UnderABudgetNothingLeftOutIsWorseThanWhatWasSent, ()) {
+  leaves_nothing_out_that_is_worse_than_what_it_sends(turning_session());
 }
 
 RC_GTEST_PROP(AnyCodec, TheEncoderRepeatsItself, ()) {

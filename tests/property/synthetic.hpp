@@ -15,6 +15,7 @@ namespace tandem::synthetic {
 
 inline constexpr TypeId kTypes = 3;
 
+inline constexpr Groups kTurning{.orientation = true};
 /// Of a stream with orientations, by type.
 inline constexpr std::array<std::int32_t, kTypes> kRadii{1, 3000, 40'000'000};
 
@@ -23,7 +24,9 @@ inline BodyState random_body(Random& random, const Groups& groups = {}) {
   for (std::int32_t& p : body.p) p = random.value(kPositionLimit);
   for (std::int32_t& v : body.v) v = random.value(kVelocityLimit);
   if (!groups.orientation) return body;
-  body.q = any_quaternion(random);
+  // Integers alone, so that golden sessions are the same whatever a compiler does to floating point.
+  body.q = kNoTurn;
+  for (int i = 0; i < 3; ++i) body.q = turned(body.q, any_spin(random));
   body.w = any_spin(random);
   return body;
 }
@@ -119,13 +122,13 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
 }
 
 /// The tables that make_codec() wants for a name.
-inline std::vector<std::byte> tables_for(std::string_view codec) {
-  return codec_traits(codec)->takes_tables ? default_code_tables() : std::vector<std::byte>{};
+inline std::vector<std::byte> tables_for(std::string_view codec, const Groups& groups = {}) {
+  return codec_traits(codec)->takes_tables ? default_code_tables(groups) : std::vector<std::byte>{};
 }
 
 inline std::unique_ptr<Codec> codec_of(std::string_view name, std::uint32_t capacity,
                                        const RunBlocks& run_blocks = {}, const Groups& groups = {}) {
-  const auto tables = tables_for(name);
+  const auto tables = tables_for(name, groups);
   const std::span<const std::int32_t> radii(kRadii);
   return std::move(*make_codec({.name = name,
                                 .capacity = capacity,
@@ -170,6 +173,11 @@ inline const char* broken_invariant(const State& state) {
     if (state.type()[slot] >= kTypes) return "type that the session does not list";
     const bool dead = state.alive()[slot] == 0;
     if (dead && (state.reuse()[slot] != 0 || state.type()[slot] != 0)) return "dead slot is not zero";
+    if (state.groups().orientation) {
+      const BodyState body = state.body(slot);
+      if (dead && (body.q != Quaternion{} || body.w != Spin{})) return "dead slot is not zero";
+      if (!dead && (!valid_quaternion(body.q) || !valid_spin(body.w))) return "no orientation";
+    }
     for (std::size_t i = 0; i < kPositionChannels; ++i) {
       const std::int32_t p = state.p(i)[slot];
       const std::int32_t v = state.v(i)[slot];

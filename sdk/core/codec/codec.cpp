@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "sdk/core/codec/paper/absolute_coding.hpp"
 #include "sdk/core/codec/paper/residual_coding.hpp"
@@ -16,15 +18,21 @@ struct KnownCodec {
   CodecTraits traits;
 };
 constexpr std::array<KnownCodec, 6> kKnown{
-    {{"none", {.is_baseline = true}},
-     {"selective", {.is_baseline = true, .reads_threshold = true}},
-     {"quantized", {.is_baseline = true, .reads_threshold = true, .reads_steps = true}},
-     {"entropy", {.is_baseline = true, .reads_threshold = true, .reads_steps = true, .takes_tables = true}},
+    {{"none", {.is_baseline = true, .turns = true}},
+     {"selective", {.is_baseline = true, .reads_threshold = true, .turns = true}},
+     {"quantized", {.is_baseline = true, .reads_threshold = true, .reads_steps = true, .turns = true}},
+     {"entropy",
+      {.is_baseline = true,
+       .reads_threshold = true,
+       .reads_steps = true,
+       .takes_tables = true,
+       .turns = true}},
      {"limited",
       {.is_baseline = true,
        .reads_threshold = true,
        .reads_steps = true,
        .takes_tables = true,
+       .turns = true,
        .takes_budget = true,
        .usual_budget = kPaperBudgetBytes}},
      {"tracker",
@@ -45,6 +53,11 @@ Result<CodeLengths> read_lengths(std::span<const std::byte> bytes) {
   if (!is_complete_code(lengths))
     return fail(ErrorCode::kMalformed, "code lengths are no complete prefix code");
   return lengths;
+}
+
+template <class Coding, class... Arguments>
+std::unique_ptr<Codec> of(const CodecSetup& setup, Arguments&&... arguments) {
+  return std::make_unique<BlockCodec<Coding>>(setup, Coding(std::forward<Arguments>(arguments)...));
 }
 
 }  // namespace
@@ -69,31 +82,25 @@ Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup) {
   if (!traits) return tl::unexpected<Error>(traits.error());
   if (!traits->takes_tables && !setup.tables.empty())
     return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' takes no tables");
-  if (setup.groups.orientation && !traits->turns)
-    return fail(ErrorCode::kUnsupported, "codec '" + std::string(name) + "' codes no orientations");
   if (name == "tracker") return std::make_unique<Tracker>(setup);
-  if (name == "none")
-    return std::make_unique<BlockCodec<AbsoluteCoding<true>>>(name, capacity, AbsoluteCoding<true>(capacity));
-  if (name == "selective") {
-    return std::make_unique<BlockCodec<AbsoluteCoding<false>>>(name, capacity,
-                                                               AbsoluteCoding<false>(capacity));
-  }
-  if (name == "quantized") {
-    using Coding = ResidualCoding<PlainResiduals>;
-    return std::make_unique<BlockCodec<Coding>>(name, capacity, Coding(capacity, PlainResiduals{}));
-  }
-  if (setup.tables.size() != 2 * kSymbols) {
-    return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' needs 512 code lengths, got " +
+  if (name == "none") return of<AbsoluteCoding<true>>(setup, capacity, setup.groups);
+  if (name == "selective") return of<AbsoluteCoding<false>>(setup, capacity, setup.groups);
+  const std::size_t vectors = residual_vectors(setup.groups);
+  if (name == "quantized")
+    return of<ResidualCoding<PlainResiduals>>(setup, capacity, PlainResiduals(vectors));
+  if (setup.tables.size() != vectors * kSymbols) {
+    return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' needs " +
+                                           std::to_string(vectors * kSymbols) + " code lengths, got " +
                                            std::to_string(setup.tables.size()) +
                                            " (default_code_tables() has some)");
   }
-  const auto position = read_lengths(setup.tables.first(kSymbols));
-  if (!position) return tl::unexpected<Error>(position.error());
-  const auto velocity = read_lengths(setup.tables.last(kSymbols));
-  if (!velocity) return tl::unexpected<Error>(velocity.error());
-  using Coding = ResidualCoding<HuffmanResiduals>;
-  return std::make_unique<BlockCodec<Coding>>(name, capacity,
-                                              Coding(capacity, HuffmanResiduals(*position, *velocity)));
+  std::vector<CodeLengths> lengths;
+  for (std::size_t vector = 0; vector < vectors; ++vector) {
+    const auto read = read_lengths(setup.tables.subspan(vector * kSymbols, kSymbols));
+    if (!read) return tl::unexpected<Error>(read.error());
+    lengths.push_back(*read);
+  }
+  return of<ResidualCoding<HuffmanResiduals>>(setup, capacity, HuffmanResiduals(lengths));
 }
 
 }  // namespace tandem

@@ -98,7 +98,7 @@ struct CodecTraits {
   bool reads_threshold = false;  ///< the others send every body
   bool reads_steps = false;      ///< quantisation steps
   bool reads_gains = false;      ///< and the decay that goes with them
-  bool takes_tables = false;     ///< 512 code lengths (code_tables.hpp)
+  bool takes_tables = false;     ///< code lengths (code_tables.hpp)
   bool keeps_rounding = false;   ///< corrected bodies stay round: CodecFrame::position_bits
   bool turns = false;            ///< codes orientations too
   bool takes_budget = false;     ///< is meant to have one; any codec obeys it

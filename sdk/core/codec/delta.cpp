@@ -74,6 +74,8 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
       const auto named = read_parameters(body, parsed.parameters);
       if (!named) return tl::unexpected<Error>(named.error());
       if (*named == 0) return fail(ErrorCode::kMalformed, "parameters section that names none");
+      if (has_turn_steps(parsed.parameters.codec) != has_turn_steps(parameters.codec))
+        return fail(ErrorCode::kMalformed, "parameter that the stream does not list");
       return {};
     }
     case SectionType::kRounding: {
@@ -200,7 +202,8 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
 }
 
 void DeltaCodec::set_parameters(const StreamParameters& parameters) {
-  TANDEM_ASSERT(valid_parameters(parameters.codec));
+  TANDEM_ASSERT(valid_parameters(parameters.codec) &&
+                has_turn_steps(parameters.codec) == has_turn_steps(impl_->parameters.codec));
   impl_->next = parameters;
 }
 void DeltaCodec::set_gravity(const Vec3i& gravity) { impl_->gravity = gravity; }

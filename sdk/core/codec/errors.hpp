@@ -31,8 +31,21 @@ namespace tandem {
 /// lattice units, rounded up; at most a lattice unit more than it is. States with orientations.
 [[nodiscard]] std::uint64_t surface_error(const BodyState& body, const BodyState& target,
                                           std::int32_t radius);
-/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes more
-/// than 2 rad, half of one or less.
+/// Calls f(slot, surface error) for every alive body of the block whose surface may be off by more than
+/// `threshold`, ascending. `radii` by type.
+template <class F>
+void for_each_surface_beyond(const State& state, const State& target, const Block& block,
+                             std::int32_t threshold, std::span<const std::int32_t> radii, F&& f) {
+  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
+    if (state.alive()[slot] == 0) continue;
+    const std::uint64_t error =
+        surface_error(state.body(slot), target.body(slot), radii[target.type()[slot]]);
+    if (error > static_cast<std::uint64_t>(threshold)) f(slot, error);
+  }
+}
+
+/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes
+/// more than 2 rad, half of one or less.
 [[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
 
 /// Marks (1) the slots of a block that may be off by more than `threshold`, and none of the others (0) is.

@@ -15,6 +15,8 @@ Range range_of(ParameterId id) {
       return {1, kPositionLimit};
     case ParameterId::kPositionStep:
     case ParameterId::kVelocityStep:
+    case ParameterId::kTurnStep:
+    case ParameterId::kSpinStep:
       return {1, kMaxStep};
     case ParameterId::kDecay:
     case ParameterId::kVelocityGain:
@@ -41,9 +43,13 @@ std::int32_t parameter(const StreamParameters& values, ParameterId id) {
     case ParameterId::kVelocityGain:
       return values.codec.velocity_gain;
     case ParameterId::kAccelerationGain:
+      return values.codec.acceleration_gain;
+    case ParameterId::kTurnStep:
+      return values.codec.turn_step;
+    case ParameterId::kSpinStep:
       break;
   }
-  return values.codec.acceleration_gain;
+  return values.codec.spin_step;
 }
 
 Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int32_t value) {
@@ -73,14 +79,20 @@ Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int3
     case ParameterId::kAccelerationGain:
       values.codec.acceleration_gain = static_cast<std::uint16_t>(value);
       break;
+    case ParameterId::kTurnStep:
+      values.codec.turn_step = value;
+      break;
+    case ParameterId::kSpinStep:
+      values.codec.spin_step = value;
+      break;
   }
   return {};
 }
 
-std::array<Parameter, kParameterCount> list_parameters(const StreamParameters& values) {
-  std::array<Parameter, kParameterCount> list;
-  for (std::uint32_t id = 1; id <= kParameterCount; ++id) {
-    list[id - 1] = {id, parameter(values, static_cast<ParameterId>(id))};
+std::vector<Parameter> list_parameters(const StreamParameters& values) {
+  std::vector<Parameter> list;
+  for (std::uint32_t id = 1; id <= parameter_count(values); ++id) {
+    list.push_back({id, parameter(values, static_cast<ParameterId>(id))});
   }
   return list;
 }
@@ -94,12 +106,12 @@ Result<StreamParameters> parameters_from(std::span<const Parameter> list) {
     if (auto set = set_parameter(values, each.id, each.value); !set)
       return tl::unexpected<Error>(set.error());
   }
-  if (list.size() != kParameterCount) return fail(ErrorCode::kMalformed, "parameters missing");
+  if (list.size() != parameter_count(values)) return fail(ErrorCode::kMalformed, "parameters missing");
   return values;
 }
 
 void write_parameters(const StreamParameters& values, const StreamParameters* in_force, ByteWriter& out) {
-  for (std::uint32_t id = 1; id <= kParameterCount; ++id) {
+  for (std::uint32_t id = 1; id <= parameter_count(values); ++id) {
     const std::int32_t value = parameter(values, static_cast<ParameterId>(id));
     if (in_force != nullptr && parameter(*in_force, static_cast<ParameterId>(id)) == value) continue;
     out.put(static_cast<std::uint8_t>(id));

@@ -2,10 +2,10 @@
 // What may change between frames: each delta that changes something says so. Two types, for two readers who
 // start to read at different frames.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/state.hpp"
@@ -21,6 +21,9 @@ struct CodecParameters {
   // For codecs that steer a filter (`tracker`); nothing to the others. Any value is valid.
   std::uint16_t velocity_gain = 26214;     ///< beta, in 1/32768: share of a correction that is an error of v
   std::uint16_t acceleration_gain = 9830;  ///< gamma, in 1/65536: share of that that is an error of c
+  // Listed where codec and groups of the stream need both, 0 in all others.
+  std::int32_t turn_step = 0;  ///< 2^-28 rad per quantisation step of a rotation vector. 1 .. 2^24
+  std::int32_t spin_step = 0;  ///< 2^-28 rad per frame per step of an angular velocity. 1 .. 2^24
   friend bool operator==(const CodecParameters&, const CodecParameters&) = default;
 };
 /// What the predicted step reads besides state and drive: a change in delta f is in force from the step that
@@ -40,11 +43,18 @@ struct StreamParameters {
 /// 127 steps of this size span the lattice from end to end.
 inline constexpr std::int32_t kMaxStep = 1 << 24;
 
-/// True when all parameters are in their ranges.
+/// Whether the steps of turns are listed. Never changes within a stream.
+[[nodiscard]] constexpr bool has_turn_steps(const CodecParameters& parameters) {
+  return parameters.turn_step != 0 || parameters.spin_step != 0;
+}
+
+/// True when all parameters that are listed are in their ranges.
 [[nodiscard]] constexpr bool valid_parameters(const CodecParameters& parameters) {
   const auto in = [](std::int32_t value, std::int32_t most) { return value >= 1 && value <= most; };
   return in(parameters.threshold, kPositionLimit) && in(parameters.position_step, kMaxStep) &&
-         in(parameters.velocity_step, kMaxStep);
+         in(parameters.velocity_step, kMaxStep) &&
+         (!has_turn_steps(parameters) ||
+          (in(parameters.turn_step, kMaxStep) && in(parameters.spin_step, kMaxStep)));
 }
 
 /// As they are named in sessions, deltas and snapshots: idl/PROTOCOL.md, "Parameters".
@@ -55,8 +65,15 @@ enum class ParameterId : std::uint8_t {
   kDecay = 4,
   kVelocityGain = 5,
   kAccelerationGain = 6,
+  kTurnStep = 7,
+  kSpinStep = 8,
 };
-inline constexpr std::uint32_t kParameterCount = 6;
+/// Of any stream, and of one with steps of turns.
+inline constexpr std::uint32_t kCommonParameters = 6, kParameterCount = 8;
+/// How many a stream lists: the ids from 1 on.
+[[nodiscard]] constexpr std::uint32_t parameter_count(const StreamParameters& values) {
+  return has_turn_steps(values.codec) ? kParameterCount : kCommonParameters;
+}
 inline constexpr std::size_t kMostParameterValueBytes = 5;
 /// Most bytes that write_parameters() writes.
 inline constexpr std::size_t kMostParametersBytes = kParameterCount * (1 + kMostParameterValueBytes);
@@ -70,16 +87,16 @@ struct Parameter {
   std::int32_t value = 0;
   friend bool operator==(const Parameter&, const Parameter&) = default;
 };
-/// All of them, ascending by id, as a session lists them.
-[[nodiscard]] std::array<Parameter, kParameterCount> list_parameters(const StreamParameters& values);
+/// All that the stream has, ascending by id, as a session lists them.
+[[nodiscard]] std::vector<Parameter> list_parameters(const StreamParameters& values);
 /// From such a list, untrusted. Errors: kMalformed (out of order, repeated, missing, out of range),
 /// kUnsupported (unknown id).
 [[nodiscard]] Result<StreamParameters> parameters_from(std::span<const Parameter> list);
 
 /// Writes those of `values` that differ from what is in force; all of them where `in_force` is null.
 void write_parameters(const StreamParameters& values, const StreamParameters* in_force, ByteWriter& out);
-/// Reads untrusted bytes into `values`, those that are named. Returns how many were. Errors: kMalformed,
-/// kUnsupported (unknown id); then `values` is as before.
+/// Reads untrusted bytes into `values`, those that are named. Returns how many were; whether the stream lists
+/// them is the caller's to check. Errors: kMalformed, kUnsupported (unknown id); then `values` is as before.
 [[nodiscard]] Result<std::uint32_t> read_parameters(std::span<const std::byte> section,
                                                     StreamParameters& values);
 

@@ -93,6 +93,8 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
   if (read->stream != stream) return fail(ErrorCode::kOutOfOrder, "snapshot of another stream");
+  if (has_turn_steps(read->parameters.codec) != has_turn_steps(m.parts.delta.parameters().codec))
+    return fail(ErrorCode::kMalformed, "snapshot with other parameters than the stream lists");
   const std::uint64_t hash = m.parts.hash(state);
   if (hash != read->hash || m.parts.hasher.region_hash() != read->region_hash) {
     return fail(ErrorCode::kMismatch,

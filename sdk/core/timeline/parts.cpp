@@ -15,6 +15,10 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
                            .radii = layout.radii,
                            .run_blocks = local.run_blocks});
   if (!codec) return tl::unexpected<Error>(codec.error());
+  const bool reads_turn_steps = groups_of(layout).orientation && codec_traits(layout.codec)->reads_steps;
+  if (has_turn_steps(layout.parameters.codec) != reads_turn_steps)
+    return fail(ErrorCode::kInvalidArgument,
+                "steps of turns that nothing reads, or none where they are read");
   return TimelineParts{
       std::move(predictor),
       DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count, groups_of(layout)),

@@ -63,7 +63,8 @@ Result<void> read_inputs(std::span<const std::byte> section, Snapshot& snapshot)
 Result<void> read_all_parameters(std::span<const std::byte> section, Snapshot& snapshot) {
   const auto named = read_parameters(section, snapshot.parameters);
   if (!named) return tl::unexpected<Error>(named.error());
-  if (*named != kParameterCount) return fail(ErrorCode::kMalformed, "snapshot without all parameters");
+  if (*named != parameter_count(snapshot.parameters))
+    return fail(ErrorCode::kMalformed, "snapshot without all parameters");
   return {};
 }
 

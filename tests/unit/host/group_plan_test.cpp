@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "services/sessions/session_plan.hpp"
@@ -77,6 +78,35 @@ TEST(GroupPlan, AStreamHasWhatItsCodecCodes) {
     EXPECT_EQ(stream->layout.groups.size() == 2, codec_traits(codec)->turns);
     EXPECT_TRUE(check_layout(stream->layout));
   }
+}
+
+TEST(GroupPlan, StepsAndTablesOfTurnsAreThoseThatWereTrained) {
+  auto scene = scenes::load_scene("mixed").value();
+  SessionChoice choice;
+  choice.bodies = 100;
+  choice.codec = "entropy";
+  const auto usual = plan_stream(scene, choice).value();
+  EXPECT_TRUE(has_turn_steps(usual.layout.parameters.codec));
+  EXPECT_TRUE(largest_delta_bytes(usual));
+
+  const std::vector<std::uint8_t> flat(256, 8);
+  scenes::TrainedTable table;
+  table.bodies = 100;
+  table.threshold_m = scene.threshold_m;
+  table.position_code_lengths = table.velocity_code_lengths = flat;
+  scene.trained = {table};
+  const auto partly = plan_stream(scene, choice).value();
+  EXPECT_TRUE(largest_delta_bytes(partly)) << "trained before bodies turned";
+  EXPECT_EQ(partly.layout.codec_tables.size(), 1024U);
+
+  table.turn_range_rad = 0.25;
+  table.spin_range_rad_per_s = 2;
+  table.turn_code_lengths = table.spin_code_lengths = flat;
+  scene.trained = {table};
+  const auto wholly = plan_stream(scene, choice).value();
+  EXPECT_EQ(wholly.layout.codec_tables, std::vector<std::byte>(1024, std::byte{8}));
+  EXPECT_NEAR(std::ldexp(wholly.layout.parameters.codec.turn_step, -28) * 127, 0.25, 1e-5);
+  EXPECT_NEAR(std::ldexp(wholly.layout.parameters.codec.spin_step, -28) * 127 / scene.dt_s, 2, 1e-4);
 }
 
 }  // namespace

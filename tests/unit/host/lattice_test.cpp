@@ -69,6 +69,22 @@ TEST(CodecParametersOf, RefusesWhatDoesNotFit) {
   EXPECT_FALSE(codec_parameters(lattice, lattice.unit / 4, 0, 0));
 }
 
+TEST(TurnStepsOf, CoverTheRangeAndAreOfTheSurfaceWhereNothingWasTrained) {
+  const auto lattice = *choose_lattice(0.02, 10, kDt);
+  auto parameters = *codec_parameters(lattice, 0.02, 0, 0);
+  ASSERT_TRUE(set_turn_steps(lattice, 0.5, 3, 0.2, parameters));
+  EXPECT_NEAR(std::ldexp(parameters.turn_step, -28) * 127, 0.5, 1e-5);
+  EXPECT_NEAR(std::ldexp(parameters.spin_step, -28) * 127 / kDt, 3, 1e-4);
+  ASSERT_TRUE(set_turn_steps(lattice, 0, 0, 0.2, parameters));
+  EXPECT_NEAR(std::ldexp(parameters.turn_step, -28) * 127 * 0.2, 8 * 0.02, 1e-5);
+  EXPECT_EQ(parameters.spin_step, parameters.turn_step);
+  ASSERT_TRUE(set_turn_steps(lattice, 1e9, 1e9, 0.2, parameters));
+  EXPECT_TRUE(valid_parameters(parameters));
+  EXPECT_FALSE(set_turn_steps(lattice, -1, 0, 0.2, parameters));
+  EXPECT_FALSE(set_turn_steps(lattice, 0, std::nan(""), 0.2, parameters));
+  EXPECT_FALSE(set_turn_steps(lattice, 0, 0, 0, parameters));
+}
+
 TEST(ToDrive, ConvertsGravityAndDampingToThePredictedStepsIntegers) {
   const auto lattice = *choose_lattice(1.0 / 64, 64, kDt);  // unit 2^-18
   const auto drive = to_drive(lattice, {0, 0, -9.0}, 0.3);

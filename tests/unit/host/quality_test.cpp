@@ -89,6 +89,21 @@ TEST(Quality, RangesFollowBodiesThatAreCorrectedForTheirTurn) {
   }
 }
 
+TEST(Quality, StepsOfTurnsFollowAsTheOthersDo) {
+  CodecParameters parameters = kStart;
+  parameters.turn_step = parameters.spin_step = 1000;
+  QualityControl control({.smallest_threshold = 1000, .largest_threshold = 1000}, StepRule::kFollow,
+                         parameters, 1000, 30, {50'000});
+  State predicted(1, {.orientation = true});
+  predicted.spawn(0, 0, 0, {});
+  State target = predicted;
+  target.set_quaternion(0, turned(kNoTurn, {1 << 26, 0, 0}));
+  control.observe(predicted, target, parameters);
+  while (!control.after_frame(500, 10, parameters)) continue;
+  EXPECT_NEAR(parameters.turn_step * 127.0, 1.1 * (1 << 26), 1 << 18) << "at once";
+  EXPECT_EQ(parameters.spin_step, 970) << "down slowly";
+}
+
 TEST(Quality, StepsOfACodecThatDoesNotReadThemStay) {
   QualityControl control =
       control_of({.smallest_threshold = 1000, .largest_threshold = 1000}, StepRule::kLeave);

@@ -57,5 +57,28 @@ TEST(ResidualStatistics, WithOrientationsBodiesCountWhoseSurfaceIsBeyond) {
   EXPECT_EQ(statistics.largest_position, 50U);
 }
 
+TEST(ResidualStatistics, TurnsCountWhereTheStreamHasThem) {
+  State predicted(2, {.orientation = true});
+  for (Slot slot = 0; slot < 2; ++slot) predicted.spawn(slot, 0, 0, {});
+  State target = predicted;
+  constexpr std::int32_t kRadian = 1 << 28;
+  target.set_quaternion(1, turned(kNoTurn, {0, -kRadian / 4, 0}));
+  target.w(2)[1] = kRadian / 100;
+  const CodecParameters in_force{.threshold = 100, .turn_step = kRadian / 40, .spin_step = kRadian / 1000};
+  ResidualStatistics statistics({1000});
+  statistics.frame(predicted, target, in_force);
+  EXPECT_EQ(statistics.bodies, 1U);
+  EXPECT_NEAR(statistics.largest_turn, kRadian / 4, kRadian / 1000);
+  EXPECT_EQ(statistics.largest_spin, static_cast<std::uint32_t>(kRadian / 100));
+  EXPECT_EQ(statistics.turn_counts[static_cast<std::uint8_t>(-10)], 1U);
+  EXPECT_EQ(statistics.turn_counts[0], 2U);
+  EXPECT_EQ(statistics.spin_counts[10], 1U);
+  const CodecParameters trained = trained_parameters(statistics, 100);
+  EXPECT_NEAR(trained.turn_step * 127.0, 1.1 * kRadian / 4, kRadian / 500);
+  EXPECT_NEAR(trained.spin_step * 127.0, 1.1 * kRadian / 100, 127);
+  EXPECT_EQ(trained_tables(statistics).size(), 1024U);
+  EXPECT_EQ(trained_tables(ResidualStatistics()).size(), 512U);
+}
+
 }  // namespace
 }  // namespace tandem::host

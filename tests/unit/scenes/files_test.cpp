@@ -194,6 +194,10 @@ TEST(TrainedTables, SurviveARoundTripAndReplaceTheirEquals) {
   const TrainedTable a{1000, 0.1, 0.25, 3.5, {1, 2, 3, 3}, {2, 2, 2, 2}};
   const TrainedTable b{1000, 0.05, 0.2, 3.25, {}, {}};
   TrainedTable better = a;
+  better.turn_range_rad = 0.5;
+  better.spin_range_rad_per_s = 6.25;
+  better.turn_code_lengths = {1, 2, 2};
+  better.spin_code_lengths = {2, 2, 1};
   better.position_range_m = 1.0 / 3;
   ASSERT_TRUE(save_trained(path, a));
   ASSERT_TRUE(save_trained(path, b));

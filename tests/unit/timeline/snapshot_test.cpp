@@ -30,7 +30,7 @@ Snapshot example() {
   snapshot.frame = 1234567890123;
   snapshot.last_input = 9;
   snapshot.drive = {{1, -2, 3}, 4};
-  snapshot.parameters = {100, 10, 20, 5, 6, 7};
+  snapshot.parameters = {{100, 10, 20, 5, 6}, {7}};
   snapshot.hash = 0xFEDCBA9876543210U;
   snapshot.region_hash = 0x0123456789ABCDEFU;
   snapshot.pending = {{8, snapshot.frame + 1, {{5, 5, 5}, 1}}, {9, snapshot.frame + 2, {{6, 6, 6}, 1}}};

@@ -1,5 +1,6 @@
 #pragma once
-// Values as they are: position and velocity, six int32 a body (`none`, `selective`; paper, section 3.3.1).
+// Values as they are: position and velocity, six int32 a body, with orientations also quaternion and angular
+// velocity, seven more (`none`, `selective`; paper, section 3.3.1).
 
 #include <array>
 #include <cstring>
@@ -14,12 +15,14 @@ template <bool EveryBody>
 class AbsoluteCoding {
  public:
   static constexpr bool kEveryBody = EveryBody;
-  static constexpr std::size_t kBodyBytes = 24;
 
-  explicit AbsoluteCoding(std::uint32_t capacity) { sections_.reserve(block_count(capacity)); }
-  [[nodiscard]] static unsigned most_bits() { return 8 * kBodyBytes; }
-  static bool measure(const State&, const State&, const CodecParameters&, Candidate& candidate) {
-    candidate.bits = 8 * kBodyBytes;
+  AbsoluteCoding(std::uint32_t capacity, const Groups& groups)
+      : turns_(groups.orientation), body_bytes_(groups.orientation ? 52 : 24) {
+    sections_.reserve(block_count(capacity));
+  }
+  [[nodiscard]] unsigned most_bits() const { return static_cast<unsigned>(8 * body_bytes_); }
+  bool measure(const State&, const State&, const CodecParameters&, Candidate& candidate) const {
+    candidate.bits = static_cast<std::uint16_t>(most_bits());
     return true;
   }
   void begin() { sections_.clear(); }
@@ -30,23 +33,29 @@ class AbsoluteCoding {
       const BodyState body = clamped(target.body(candidate.slot));
       for (const std::int32_t value : body.p) out.put(value);
       for (const std::int32_t value : body.v) out.put(value);
+      if (!turns_) continue;
+      TANDEM_ASSERT(valid_quaternion(body.q) && valid_spin(body.w));
+      for (const std::int32_t value : body.q) out.put(value);
+      for (const std::int32_t value : body.w) out.put(value);
     }
     sections_.push_back({to, first});
   }
   Result<void> parse(std::span<const std::byte> values, std::span<const Slot> slots, std::size_t first) {
-    if (values.size() != slots.size() * kBodyBytes)
+    if (values.size() != slots.size() * body_bytes_)
       return fail(ErrorCode::kMalformed, "corrections of wrong length");
     for (std::size_t i = 0; i < slots.size(); ++i) {
-      const BodyState body = read(values.subspan(i * kBodyBytes, kBodyBytes));
+      const BodyState body = read(values.subspan(i * body_bytes_, body_bytes_));
       if (body != clamped(body)) return fail(ErrorCode::kMalformed, "correction beyond the lattice");
+      if (!valid_quaternion(body.q) || !valid_spin(body.w))
+        return fail(ErrorCode::kMalformed, "correction that is no orientation or turns too fast");
     }
     sections_.push_back({values, first});
     return {};
   }
   void apply(State& state, std::span<const Slot> slots, const CodecParameters&) const {
     for (const Section& section : sections_) {
-      for (std::size_t i = 0; i < section.values.size() / kBodyBytes; ++i) {
-        state.set_body(slots[section.first + i], read(section.values.subspan(i * kBodyBytes, kBodyBytes)));
+      for (std::size_t i = 0; i < section.values.size() / body_bytes_; ++i) {
+        state.set_body(slots[section.first + i], read(section.values.subspan(i * body_bytes_, body_bytes_)));
       }
     }
   }
@@ -61,14 +70,19 @@ class AbsoluteCoding {
     for (std::int32_t& value : body.v) value = std::clamp(value, -kVelocityLimit, kVelocityLimit);
     return body;
   }
-  static BodyState read(std::span<const std::byte> bytes) {
+  [[nodiscard]] BodyState read(std::span<const std::byte> bytes) const {
     ByteReader in(bytes);
     BodyState body;
     for (std::int32_t& value : body.p) value = in.get<std::int32_t>();
     for (std::int32_t& value : body.v) value = in.get<std::int32_t>();
+    if (!turns_) return body;
+    for (std::int32_t& value : body.q) value = in.get<std::int32_t>();
+    for (std::int32_t& value : body.w) value = in.get<std::int32_t>();
     return body;
   }
 
+  bool turns_;
+  std::size_t body_bytes_;
   std::vector<Section> sections_;
 };
 

@@ -17,7 +17,7 @@ namespace tandem {
 
 /// A body that could be corrected in this frame.
 struct Candidate {
-  std::uint64_t error = 0;  ///< squared
+  std::uint64_t error = 0;  ///< what errors are compared by: squared; of surfaces as it is
   Slot slot = 0;
   std::uint16_t bits = 0;  ///< of its values
   Residual residual{};     ///< unused by codecs of absolute values
@@ -36,8 +36,12 @@ struct Candidate {
 template <class Coding>
 class BlockCodec final : public Codec {
  public:
-  BlockCodec(std::string_view name, std::uint32_t capacity, Coding coding)
-      : name_(name), capacity_(capacity), coding_(std::move(coding)), corrected_(capacity) {}
+  BlockCodec(const CodecSetup& setup, Coding coding)
+      : name_(setup.name),
+        capacity_(setup.capacity),
+        radii_(setup.radii.begin(), setup.radii.end()),
+        coding_(std::move(coding)),
+        corrected_(setup.capacity) {}
 
   [[nodiscard]] std::string_view name() const override { return name_; }
   [[nodiscard]] std::size_t bound() const override {
@@ -142,14 +146,21 @@ class BlockCodec final : public Codec {
       };
       if constexpr (Coding::kEveryBody) {
         for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
-          if (alive[slot] != 0) consider(slot, error_squared(state, target, slot));
+          if (alive[slot] != 0) consider(slot, error_of(state, target, slot));
         }
+      } else if (!radii_.empty()) {
+        for_each_surface_beyond(state, target, block, parameters.threshold, radii_, consider);
       } else {
         marks_.resize(kBlockSlots);
         for_each_beyond(state, target, block, parameters.threshold,
                         std::span<std::uint8_t, kBlockSlots>(marks_.data(), kBlockSlots), consider);
       }
     }
+  }
+
+  [[nodiscard]] std::uint64_t error_of(const State& state, const State& target, Slot slot) const {
+    return radii_.empty() ? error_squared(state, target, slot)
+                          : surface_error(state.body(slot), target.body(slot), radii_[target.type()[slot]]);
   }
 
   // Drops all candidates from the first on that does not fit, in the order of their errors.
@@ -205,6 +216,7 @@ class BlockCodec final : public Codec {
 
   std::string name_;
   std::uint32_t capacity_;
+  std::vector<std::int32_t> radii_;  // with orientations
   Coding coding_;
   std::vector<Slot> corrected_;
   // Encoder only, taken by the first encode().

@@ -2,16 +2,19 @@
 // The code tables of `entropy` and `limited`, as they travel in a session.
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "sdk/core/codec/paper/huffman.hpp"
+#include "sdk/core/lattice/state.hpp"
 
 namespace tandem {
 
-/// Code lengths for counts of residual bytes (two's complement): 256 for positions, then 256 for velocities.
-[[nodiscard]] std::vector<std::byte> code_tables(const SymbolCounts& position, const SymbolCounts& velocity);
+/// Code lengths for counts of residual bytes (two's complement): 256 for positions, then 256 for velocities;
+/// with orientations then 256 for rotation vectors and 256 for angular velocities.
+[[nodiscard]] std::vector<std::byte> code_tables(std::span<const SymbolCounts> counts);
 
 /// For a scene that was never trained: lengths for counts that fall off with the square of the residual.
-[[nodiscard]] std::vector<std::byte> default_code_tables();
+[[nodiscard]] std::vector<std::byte> default_code_tables(const Groups& groups = {});
 
 }  // namespace tandem

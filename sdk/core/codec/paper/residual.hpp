@@ -10,8 +10,12 @@
 
 namespace tandem {
 
-/// Quantised residual of a body: position x, y, z, then velocity x, y, z.
-using Residual = std::array<std::int8_t, 6>;
+/// Quantised residual of a body, x, y, z each: position, velocity; with orientations the rotation vector from
+/// predicted to target orientation and the angular velocity, without them zeros.
+using Residual = std::array<std::int8_t, 12>;
+[[nodiscard]] constexpr std::size_t residual_vectors(const Groups& groups) {
+  return groups.orientation ? 4 : 2;
+}
 inline constexpr std::int32_t kResidualLimit = 127;
 
 /// (target - from) / step, rounded half away from zero, saturated at +-127.
@@ -22,6 +26,27 @@ inline constexpr std::int32_t kResidualLimit = 127;
   return static_cast<std::int8_t>(target < from ? -q : q);
 }
 
+using WideSpin = std::array<std::int64_t, kSpinChannels>;
+/// `from` and so many steps, before limited_spin(). `q`: x, y, z.
+[[nodiscard]] inline WideSpin moved_spin(const Spin& from, const std::int8_t* q, std::int32_t step) {
+  WideSpin spin{};
+  for (std::size_t i = 0; i < spin.size(); ++i) spin[i] = from[i] + std::int64_t{q[i]} * step;
+  return spin;
+}
+
+/// quantise() of each axis; where that leads beyond the limit, so that limited_spin() would halve it, towards
+/// what is slower.
+inline void quantise_spin(const Spin& from, const Spin& target, std::int32_t step, std::int8_t* q) {
+  for (std::size_t i = 0; i < kSpinChannels; ++i) q[i] = quantise(from[i], target[i], step);
+  const WideSpin spin = moved_spin(from, q, step);
+  const Spin limited = limited_spin(spin);
+  if (std::equal(spin.begin(), spin.end(), limited.begin())) return;
+  for (std::size_t i = 0; i < kSpinChannels; ++i) {
+    if (magnitude(0, target[i]) < static_cast<std::uint64_t>(std::max(spin[i], -spin[i])))
+      q[i] = static_cast<std::int8_t>(spin[i] > 0 ? q[i] - 1 : q[i] + 1);
+  }
+}
+
 [[nodiscard]] inline Residual quantise(const State& state, const State& target, Slot slot,
                                        const CodecParameters& parameters) {
   Residual q{};
@@ -29,10 +54,15 @@ inline constexpr std::int32_t kResidualLimit = 127;
     q[i] = quantise(state.p(i)[slot], target.p(i)[slot], parameters.position_step);
     q[i + 3] = quantise(state.v(i)[slot], target.v(i)[slot], parameters.velocity_step);
   }
+  if (!has_turn_steps(parameters)) return q;
+  const BodyState from = state.body(slot), to = target.body(slot);
+  quantise_spin({}, turn_between(from.q, to.q), parameters.turn_step, &q[6]);
+  quantise_spin(from.w, to.w, parameters.spin_step, &q[9]);
   return q;
 }
 
-/// rest = 0, p += q * position_step, v += q * velocity_step, clamped to the lattice.
+/// rest = 0, p += q * position_step, v += q * velocity_step, clamped to the lattice; the orientation turned
+/// by q * turn_step, w += q * spin_step, both of them limited_spin().
 inline void apply_residual(State& state, Slot slot, const Residual& q, const CodecParameters& parameters) {
   const auto moved = [](std::int32_t from, std::int8_t steps, std::int32_t step, std::int64_t limit) {
     return static_cast<std::int32_t>(std::clamp(from + std::int64_t{steps} * step, -limit, limit));
@@ -44,6 +74,12 @@ inline void apply_residual(State& state, Slot slot, const Residual& q, const Cod
     p = moved(p, q[i], parameters.position_step, kPositionLimit);
     v = moved(v, q[i + 3], parameters.velocity_step, kVelocityLimit);
   }
+  if (!has_turn_steps(parameters)) return;
+  const BodyState from = state.body(slot);
+  const Spin turn = limited_spin(moved_spin({}, &q[6], parameters.turn_step));
+  state.set_quaternion(slot, turned(from.q, turn));
+  const Spin w = limited_spin(moved_spin(from.w, &q[9], parameters.spin_step));
+  for (std::size_t i = 0; i < kSpinChannels; ++i) state.w(i)[slot] = w[i];
 }
 
 }  // namespace tandem

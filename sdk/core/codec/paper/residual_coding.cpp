@@ -2,15 +2,19 @@
 
 namespace tandem {
 
-HuffmanResiduals::HuffmanResiduals(const CodeLengths& position, const CodeLengths& velocity)
-    : position_(position), velocity_(velocity) {}
+HuffmanResiduals::HuffmanResiduals(std::span<const CodeLengths> lengths)
+    : codes_(lengths.begin(), lengths.end()) {}
+
+unsigned HuffmanResiduals::most_bits() const {
+  unsigned sum = 0;
+  for (const HuffmanCode& code : codes_) sum += 3 * code.longest();
+  return sum;
+}
 
 unsigned HuffmanResiduals::bits(const Residual& q) const {
   unsigned sum = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    sum += position_.length(static_cast<std::uint8_t>(q[i])) +
-           velocity_.length(static_cast<std::uint8_t>(q[i + 3]));
-  }
+  for (std::size_t i = 0; i < 3 * codes_.size(); ++i)
+    sum += codes_[i / 3].length(static_cast<std::uint8_t>(q[i]));
   return sum;
 }
 
@@ -18,8 +22,8 @@ void HuffmanResiduals::write(std::span<const Candidate> chosen, std::byte* to) c
   BitWriter out(to);
   for (const Candidate& candidate : chosen) {
     const Residual& q = candidate.residual;
-    for (std::size_t i = 0; i < 3; ++i) position_.put(out, static_cast<std::uint8_t>(q[i]));
-    for (std::size_t i = 3; i < 6; ++i) velocity_.put(out, static_cast<std::uint8_t>(q[i]));
+    for (std::size_t i = 0; i < 3 * codes_.size(); ++i)
+      codes_[i / 3].put(out, static_cast<std::uint8_t>(q[i]));
   }
   out.finish();
 }
@@ -38,8 +42,9 @@ Result<void> HuffmanResiduals::read(std::span<const std::byte> values, std::span
     return true;
   };
   for (Residual& q : residuals) {
-    if (!read_three(position_, q.data()) || !read_three(velocity_, q.data() + 3)) {
-      return fail(ErrorCode::kMalformed, "truncated code stream");
+    for (std::size_t vector = 0; vector < codes_.size(); ++vector) {
+      if (!read_three(codes_[vector], q.data() + 3 * vector))
+        return fail(ErrorCode::kMalformed, "truncated code stream");
     }
   }
   if (!in.at_end()) return fail(ErrorCode::kMalformed, "bytes after the code stream");

@@ -1,6 +1,7 @@
 #pragma once
 // Quantised residuals (paper, section 3.3.2): as bytes (`quantized`) or Huffman codes (`entropy`, `limited`).
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
@@ -9,37 +10,41 @@
 
 namespace tandem {
 
-/// Bytes: 6 a body.
+/// Bytes: 3 a vector.
 class PlainResiduals {
  public:
-  [[nodiscard]] static unsigned most_bits() { return 48; }
-  [[nodiscard]] static unsigned bits(const Residual&) { return 48; }
-  static void write(std::span<const Candidate> chosen, std::byte* to) {
+  explicit PlainResiduals(std::size_t vectors) : body_bytes_(3 * vectors) {}
+  [[nodiscard]] unsigned most_bits() const { return static_cast<unsigned>(8 * body_bytes_); }
+  [[nodiscard]] unsigned bits(const Residual&) const { return most_bits(); }
+  void write(std::span<const Candidate> chosen, std::byte* to) const {
     for (const Candidate& candidate : chosen) {
-      std::memcpy(to, candidate.residual.data(), sizeof(Residual));
-      to += sizeof(Residual);
+      std::memcpy(to, candidate.residual.data(), body_bytes_);
+      to += body_bytes_;
     }
   }
-  static Result<void> read(std::span<const std::byte> values, std::span<Residual> residuals) {
-    if (values.size() != residuals.size_bytes())
+  [[nodiscard]] Result<void> read(std::span<const std::byte> values, std::span<Residual> residuals) const {
+    if (values.size() != residuals.size() * body_bytes_)
       return fail(ErrorCode::kMalformed, "corrections of wrong length");
-    std::memcpy(residuals.data(), values.data(), values.size());
+    for (std::size_t i = 0; i < residuals.size(); ++i)
+      std::memcpy(residuals[i].data(), values.data() + i * body_bytes_, body_bytes_);
     return {};
   }
+
+ private:
+  std::size_t body_bytes_;
 };
 
-/// Canonical Huffman codes, one table for positions and one for velocities.
+/// Canonical Huffman codes, a table for each vector.
 class HuffmanResiduals {
  public:
-  HuffmanResiduals(const CodeLengths& position, const CodeLengths& velocity);
-  [[nodiscard]] unsigned most_bits() const { return 3 * (position_.longest() + velocity_.longest()); }
+  explicit HuffmanResiduals(std::span<const CodeLengths> lengths);
+  [[nodiscard]] unsigned most_bits() const;
   [[nodiscard]] unsigned bits(const Residual& q) const;
   void write(std::span<const Candidate> chosen, std::byte* to) const;
   [[nodiscard]] Result<void> read(std::span<const std::byte> values, std::span<Residual> residuals) const;
 
  private:
-  HuffmanCode position_;
-  HuffmanCode velocity_;
+  std::vector<HuffmanCode> codes_;
 };
 
 /// Bodies beyond the threshold as residuals; what exceeds the range of 127 steps is finished in later frames.
@@ -54,7 +59,7 @@ class ResidualCoding {
                Candidate& candidate) const {
     candidate.residual = quantise(state, target, candidate.slot, parameters);
     candidate.bits = static_cast<std::uint16_t>(bits_.bits(candidate.residual));
-    // With steps wider than the threshold all six may round to nothing: sending that would change nothing.
+    // With steps wider than the threshold all may round to nothing: sending that would change nothing.
     return candidate.residual != Residual{};
   }
   static void begin() {}

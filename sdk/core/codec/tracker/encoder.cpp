@@ -90,12 +90,8 @@ void TrackerEncoder::scan(const TrackerFrame& frame, const State& target, const 
     for_each_beyond(predicted, target, block, early, marks, found);
     return;
   }
-  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
-    if (frame.at.alive[slot] == 0) continue;
-    const std::uint64_t error =
-        surface_error(predicted.body(slot), target.body(slot), frame.memory.radii()[target.type()[slot]]);
-    if (error > static_cast<std::uint64_t>(early)) found(slot, error * error);
-  }
+  for_each_surface_beyond(predicted, target, block, early, frame.memory.radii(),
+                          [&](Slot slot, std::uint64_t error) { found(slot, error * error); });
 }
 
 void TrackerEncoder::gather(const TrackerFrame& frame, const State& target, const Block& block) {
