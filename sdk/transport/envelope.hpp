@@ -1,0 +1,69 @@
+#pragma once
+// Messages between a gateway and its viewers: one byte that tells the kind, behind it the message's CDR
+// bytes. idl/PROTOCOL.md, "WebSocket".
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <variant>
+
+#include "sdk/transport/cdr.hpp"
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/messages.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::transport {
+
+/// What an envelope's first byte may be. Kinds below 16 come from the gateway, the others from a viewer.
+enum class MessageKind : std::uint8_t {
+  kSession = 1,
+  kDelta = 2,
+  kScheduledInput = 3,
+  kSnapshot = 4,
+  kReply = 5,
+  kServerStatus = 6,
+  kAbsent = 7,
+  kAck = 16,
+  kInput = 17,
+  kClientStatus = 18,
+};
+
+/// The session's server is gone: what was announced last does not count any more. No body.
+struct AbsentMessage {
+  bool operator==(const AbsentMessage&) const = default;
+};
+
+/// Of a kind that this build does not know: a reader goes on with the next message.
+struct UnknownMessage {
+  std::uint8_t kind = 0;
+  bool operator==(const UnknownMessage&) const = default;
+};
+
+using GatewayMessage = std::variant<SessionMessage, DeltaMessage, ScheduledInputMessage, SnapshotMessage,
+                                    ReplyMessage, ServerStatusMessage, AbsentMessage, UnknownMessage>;
+using ViewerMessage = std::variant<AckMessage, InputMessage, ClientStatusMessage>;
+
+/// Appends kind and message to `out`.
+template <class M>
+void write_envelope(const M& message, Bytes& out);
+
+/// Reads what a gateway sent. Bytes are not trusted: allocates no more than a small multiple of what is
+/// there, and what breaks a size or shape (within_limits()) is refused. Errors: kMalformed, kUnsupported
+/// (another encapsulation).
+[[nodiscard]] Result<GatewayMessage> read_gateway_envelope(std::span<const std::byte> bytes,
+                                                           const Limits& limits = {});
+/// Reads what a viewer sent, likewise. Errors: also kUnsupported for an unknown kind.
+[[nodiscard]] Result<ViewerMessage> read_viewer_envelope(std::span<const std::byte> bytes);
+
+extern template void write_envelope(const SessionMessage&, Bytes&);
+extern template void write_envelope(const DeltaMessage&, Bytes&);
+extern template void write_envelope(const ScheduledInputMessage&, Bytes&);
+extern template void write_envelope(const SnapshotMessage&, Bytes&);
+extern template void write_envelope(const ReplyMessage&, Bytes&);
+extern template void write_envelope(const ServerStatusMessage&, Bytes&);
+extern template void write_envelope(const AbsentMessage&, Bytes&);
+extern template void write_envelope(const AckMessage&, Bytes&);
+extern template void write_envelope(const InputMessage&, Bytes&);
+extern template void write_envelope(const ClientStatusMessage&, Bytes&);
+
+}  // namespace tandem::transport
