@@ -10,6 +10,7 @@
 
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/layout/layout.hpp"
+#include "tandem/body_shape.hpp"
 
 namespace tandem::transport {
 
@@ -40,15 +41,7 @@ struct ParticipantId {
   auto operator<=>(const ParticipantId&) const = default;
 };
 
-/// What a body looks like. The meaning of BodyType::shape_values depends on it: idl/PROTOCOL.md, "Fields".
-enum class Shape : std::uint32_t {
-  kNone = 0,
-  kSphere = 1,    ///< no values: the radius
-  kBox = 2,       ///< half sizes x, y, z
-  kCapsule = 3,   ///< radius, half of the length between the centres of the caps, along y
-  kCylinder = 4,  ///< radius, half of the height, along y
-  kHull = 5,      ///< convex: points x, y, z, at least four
-};
+using Shape = BodyShape;
 
 struct BodyType {
   std::string name;

@@ -20,7 +20,8 @@ endforeach()
 # The one header of that folder that knows no DDS.
 install(FILES ${PROJECT_SOURCE_DIR}/sdk/transport/dds/dds_ports.hpp
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem-host/sdk/transport/dds COMPONENT host EXCLUDE_FROM_ALL)
-install(FILES ${PROJECT_SOURCE_DIR}/sdk/include/tandem/result.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem
+install(FILES ${PROJECT_SOURCE_DIR}/sdk/include/tandem/body_shape.hpp ${PROJECT_SOURCE_DIR}/sdk/include/tandem/result.hpp
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem
   COMPONENT host EXCLUDE_FROM_ALL)
 install(EXPORT tandem_host_targets FILE tandemHostTargets.cmake NAMESPACE tandem::
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/tandem COMPONENT host EXCLUDE_FROM_ALL)

@@ -33,7 +33,7 @@ EDGES = {
     "sdk/core/codec/paper": LAYOUT + ["sdk/core/codec"],
     "sdk/core/codec/tracker": LAYOUT + ["sdk/core/codec"],
     "sdk/core/timeline": TIMELINE,
-    "sdk/transport": LAYOUT,
+    "sdk/transport": LAYOUT + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
     "sdk/transport/dds": LAYOUT + ["sdk/transport"],
     "sdk/statistics": [],

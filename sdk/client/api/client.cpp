@@ -149,8 +149,7 @@ std::vector<BodyTypeInfo> Client::types() const {
   std::vector<BodyTypeInfo> out;
   if (const auto* session = impl_->core.session()) {
     for (const auto& type : session->types) {
-      out.push_back(
-          {type.name, type.radius, type.colour_rgba, static_cast<BodyShape>(type.shape), type.shape_values});
+      out.push_back({type.name, type.radius, type.colour_rgba, type.shape, type.shape_values});
     }
   }
   return out;

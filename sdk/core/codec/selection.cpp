@@ -21,6 +21,11 @@ Block block_at(std::uint32_t index, std::uint32_t capacity) {
   return {index, first, std::min(kBlockSlots, capacity - first)};
 }
 
+std::span<const Slot> within(std::span<const Slot> slots, const Block& block) {
+  const auto first = std::lower_bound(slots.begin(), slots.end(), block.first);
+  return {first, std::lower_bound(first, slots.end(), block.first + block.slots)};
+}
+
 SelectionForm smallest_form(std::uint32_t slots, std::uint32_t chosen, std::uint32_t alive) {
   if (chosen == alive) return SelectionForm::kAll;
   return 2 + 2 * std::size_t{chosen} <= mask_bytes(slots) ? SelectionForm::kList : SelectionForm::kMask;

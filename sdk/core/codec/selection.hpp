@@ -24,6 +24,8 @@ struct Block {
   std::uint32_t slots = 0;
 };
 [[nodiscard]] Block block_at(std::uint32_t index, std::uint32_t capacity);
+/// Those of ascending slots that are in the block.
+[[nodiscard]] std::span<const Slot> within(std::span<const Slot> slots, const Block& block);
 
 /// Form with the fewest bytes; `chosen` of the block's `alive` slots are selected.
 [[nodiscard]] SelectionForm smallest_form(std::uint32_t slots, std::uint32_t chosen, std::uint32_t alive);

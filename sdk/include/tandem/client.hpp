@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tandem/body_shape.hpp"
 #include "tandem/export.hpp"
 #include "tandem/result.hpp"
 
@@ -68,16 +69,6 @@ struct ClientStatus {
   double round_trip_ms = 0, jitter_ms = 0;
   std::uint64_t inputs_sent = 0, inputs_acted = 0, inputs_refused = 0, inputs_unknown = 0;
   std::uint32_t queue_high_water = 0;  ///< deltas that waited at once, at most
-};
-
-/// What a body looks like, in its own frame; scene units.
-enum class BodyShape : std::uint32_t {
-  kNone = 0,
-  kSphere = 1,    ///< no values: the radius
-  kBox = 2,       ///< half sizes x, y, z
-  kCapsule = 3,   ///< radius, half of the length between the centres of the caps, along y
-  kCylinder = 4,  ///< radius, half of the height, along y
-  kHull = 5,      ///< convex: points x, y, z, at least four
 };
 
 struct BodyTypeInfo {

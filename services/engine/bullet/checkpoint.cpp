@@ -64,30 +64,20 @@ std::uint64_t fingerprint(const RigidWorld& world) {
 void save_columns(const RigidColumns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out) {
   const std::size_t begin = out.size();
   CheckpointWriter writer(out);
-  writer.value(kMagic);
-  writer.value(world_fingerprint);
-  writer.value(static_cast<std::uint64_t>(columns.waiting.size()));
+  writer.value(CheckpointHead{kMagic, world_fingerprint, columns.waiting.size()});
   each_column(writer, columns);
-  writer.value(checksum(std::span<const std::byte>(out).subspan(begin)));
+  seal(out, begin);
 }
 
 bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint, RigidColumns& columns) {
-  if (bytes.size() < sizeof(std::uint64_t)) return false;
-  const std::span<const std::byte> body = bytes.first(bytes.size() - sizeof(std::uint64_t));
-  std::uint64_t sum = 0;
-  CheckpointReader(bytes.last(sizeof sum)).value(sum);
-  if (sum != checksum(body)) return false;
-
-  CheckpointReader reader(body);
-  std::uint64_t magic = 0;
-  std::uint64_t world = 0;
-  std::uint64_t waiting = 0;
-  reader.value(magic);
-  reader.value(world);
-  reader.value(waiting);
-  if (!reader.ok() || magic != kMagic || world != world_fingerprint || waiting > kMaxWaiting) return false;
+  const auto body = unsealed(bytes);
+  if (!body) return false;
+  CheckpointReader reader(*body);
+  CheckpointHead head{};
+  reader.value(head);
+  if (head.magic != kMagic || head.world != world_fingerprint || head.waiting > kMaxWaiting) return false;
   RigidColumns loaded(static_cast<std::uint32_t>(columns.alive.size()));
-  loaded.waiting.resize(waiting);
+  loaded.waiting.resize(head.waiting);
   each_column(reader, loaded);
   if (!reader.at_end()) return false;
   columns = std::move(loaded);

@@ -60,32 +60,22 @@ std::uint64_t fingerprint(const World& world) {
 void save_columns(const Columns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out) {
   const std::size_t begin = out.size();
   Writer writer(out);
-  writer.value(kMagic);
-  writer.value(world_fingerprint);
-  writer.value(static_cast<std::uint64_t>(columns.pushes.size()));
+  writer.value(CheckpointHead{kMagic, world_fingerprint, columns.pushes.size()});
   each_fixed(writer, columns);
   writer.column(columns.pushes);
-  writer.value(checksum(std::span<const std::byte>(out).subspan(begin)));
+  seal(out, begin);
 }
 
 bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint, Columns& columns) {
-  if (bytes.size() < sizeof(std::uint64_t)) return false;
-  const std::span<const std::byte> body = bytes.first(bytes.size() - sizeof(std::uint64_t));
-  std::uint64_t sum = 0;
-  Reader(bytes.last(sizeof sum)).value(sum);
-  if (sum != checksum(body)) return false;
-
-  Reader reader(body);
-  std::uint64_t magic = 0;
-  std::uint64_t world = 0;
-  std::uint64_t pushes = 0;
-  reader.value(magic);
-  reader.value(world);
-  reader.value(pushes);
-  if (!reader.ok() || magic != kMagic || world != world_fingerprint || pushes > kMaxPushes) return false;
+  const auto body = unsealed(bytes);
+  if (!body) return false;
+  Reader reader(*body);
+  CheckpointHead head{};
+  reader.value(head);
+  if (head.magic != kMagic || head.world != world_fingerprint || head.waiting > kMaxPushes) return false;
   Columns loaded(static_cast<std::uint32_t>(columns.alive.size()));
   loaded.due.resize(columns.due.size());
-  loaded.pushes.resize(pushes);
+  loaded.pushes.resize(head.waiting);
   each_fixed(reader, loaded);
   reader.column(loaded.pushes);
   if (!reader.at_end()) return false;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -68,6 +69,26 @@ class CheckpointReader {
 
 [[nodiscard]] inline std::uint64_t checksum(std::span<const std::byte> bytes) {
   return XXH3_64bits(bytes.data(), bytes.size());
+}
+
+/// What every checkpoint begins with.
+struct CheckpointHead {
+  std::uint64_t magic;
+  std::uint64_t world;    ///< fingerprint()
+  std::uint64_t waiting;  ///< inputs that have not acted
+};
+
+/// Appends the checksum of what `out` holds from `begin` on.
+inline void seal(std::vector<std::byte>& out, std::size_t begin) {
+  CheckpointWriter(out).value(checksum(std::span<const std::byte>(out).subspan(begin)));
+}
+/// What is before the checksum; nothing if that is another.
+[[nodiscard]] inline std::optional<std::span<const std::byte>> unsealed(std::span<const std::byte> bytes) {
+  std::uint64_t sum = 0;
+  if (bytes.size() < sizeof sum) return std::nullopt;
+  const std::span<const std::byte> body = bytes.first(bytes.size() - sizeof sum);
+  CheckpointReader(bytes.last(sizeof sum)).value(sum);
+  return sum == checksum(body) ? std::optional(body) : std::nullopt;
 }
 
 }  // namespace tandem::engine

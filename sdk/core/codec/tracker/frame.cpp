@@ -1,17 +1,9 @@
 #include "sdk/core/codec/tracker/frame.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace tandem {
-namespace {
-
-/// The renewed slots of a block.
-std::span<const Slot> within(std::span<const Slot> renewed, const Block& block) {
-  const auto first = std::lower_bound(renewed.begin(), renewed.end(), block.first);
-  return {first, std::lower_bound(first, renewed.end(), block.first + block.slots)};
-}
-
-}  // namespace
 
 void TrackerFrame::list_flags(const Block& block) const {
   std::uint16_t* const flags = scratch.flags.data();
@@ -24,7 +16,8 @@ void TrackerFrame::list_flags(const Block& block) const {
   counts = {};
   const Slot end = block.first + block.slots;
   for (Slot slot = block.first; slot < end; ++slot) ++counts[flags[slot]][slot & 1U];
-  for (auto& [zeros, ones] : counts) zeros += std::exchange(ones, 0);
+  for (auto& [zeros, ones] : std::span(counts).first(TrackerModelIndex::kRest))
+    zeros += std::exchange(ones, 0);
   for (const Slot slot : within(at.renewed, block)) {
     if (at.alive[slot] == 0) continue;
     --counts[flags[slot]][0];

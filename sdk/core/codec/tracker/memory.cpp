@@ -5,6 +5,9 @@
 namespace tandem {
 namespace {
 
+// Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
+constexpr std::uint8_t kYoungest = 0xFF;
+
 // Models in a snapshot: each one's weight, as what it lacks of 256 (most that are used at all lack one), and
 // the probability of one that is used, as how far it is from the one before.
 class ModelsCoder {
@@ -86,13 +89,6 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   if (delta.seen != nullptr) models_.learn(*delta.seen, models_in_use());
 }
 
-namespace {
-
-// Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
-constexpr std::uint8_t kYoungest = 0xFF;
-
-}  // namespace
-
 void TrackerMemory::correct(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
                             State& state) {
   if (is_some(correction.steps)) {
@@ -118,9 +114,7 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   const TrackerDelta::Part& part = delta.blocks[block.index];
   for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i)
     correct(filter, delta.corrections[i], delta.slots[i], state);
-  const std::span<const Slot> all = corrections.renewed;
-  const auto first = std::lower_bound(all.begin(), all.end(), block.first);
-  const std::span<const Slot> renewed{first, std::lower_bound(first, all.end(), block.first + block.slots)};
+  const std::span<const Slot> renewed = within(corrections.renewed, block);
   grow_older(0, block, renewed, state);
   if (!turns()) return;
   grow_older(kColumns, block, renewed, state);
