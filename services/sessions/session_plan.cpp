@@ -52,12 +52,18 @@ bool alike(const std::vector<engine::ParticleType>& types) {
   return smallest.radius >= 0.5F * largest.radius;
 }
 
+// `field` computes everything as a sphere. Where bodies are none it costs more than it gains.
+bool are_spheres(const std::vector<scenes::BodyType>& types) {
+  return std::ranges::all_of(
+      types, [](const scenes::BodyType& type) { return type.shape.kind == engine::Shape::Kind::kSphere; });
+}
+
 // Sets the predictor and its constants.
 Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice,
                               const CodecTraits& traits, host::StreamConfig& stream) {
   const bool automatic = choice.predictor == "auto";
-  const bool field_pays =
-      !traits.is_baseline && choice.bodies <= kMostBodiesForField && alike(scene.world.types);
+  const bool field_pays = !traits.is_baseline && choice.bodies <= kMostBodiesForField &&
+                          are_spheres(scene.types) && alike(scene.world.types);
   stream.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
   if (stream.layout.predictor != "field" && stream.layout.predictor != "contact") return {};
   auto constants = contact_constants(scene, stream.lattice, stream.layout.predictor);

@@ -21,8 +21,8 @@ inline constexpr std::uint32_t kMostBodiesForField = 50'000;
 struct SessionChoice {
   std::uint32_t bodies = 0;
   std::string codec = "tracker";
-  /// auto: `field` for `tracker` with at most kMostBodiesForField bodies in a scene that has body types, else
-  /// `ballistic`
+  /// auto: `field` for `tracker` with at most kMostBodiesForField bodies in a scene whose types are spheres
+  /// of about one size, else `ballistic`
   std::string predictor = "auto";
   std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
   double threshold_scale = 1;

@@ -62,7 +62,7 @@ void add_flags(CLI::App& app, idl::ServerConfig& config) {
   flags.add(
       "--predictor", &Config::mutable_predictor,
       fmt::format("Predicted step of server and clients: ballistic, field, contact, or auto: field with "
-                  "codec tracker and at most {} bodies, else ballistic [{}]",
+                  "codec tracker and at most {} spheres of about one size, else ballistic [{}]",
                   sessions::kMostBodiesForField, defaults.choice.predictor));
   app.add_option_function<std::string>(
          "--threshold", [&config](const std::string& text) { set_threshold(config, text); },
