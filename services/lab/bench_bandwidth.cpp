@@ -165,7 +165,8 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   const std::uint64_t frames = std::min(options.frames, (*opened)->frames());
   sessions::SessionChoice choice = options.choice;
   choice.bodies = (*opened)->capacity();
-  {
+  const auto is_trained = [](const std::string& codec) { return codec_traits(codec)->reads_steps; };
+  if (std::ranges::any_of(options.codecs, is_trained)) {
     tool::Progress progress(fmt::format("{}: training, frame", options.trajectory), kTrainingPasses * frames);
     auto table = train(scene, choice, make, frames, [&](Frame frame) { progress.at(frame); });
     if (!table) return fail(table.error().code, options.trajectory + ": " + table.error().message);
@@ -285,8 +286,8 @@ void add_bandwidth(CLI::App& bench, Run& run) {
       ->check(CLI::IsMember(options->codecs));
   command
       ->add_option("--predictor", options->choice.predictor,
-                   "Predicted step of `tracker`: ballistic, field, contact, or auto; the paper's codecs have "
-                   "ballistic")
+                   "Predicted step of `tracker`: ballistic, field, contact, or auto: field for spheres, else "
+                   "ballistic; the paper's codecs have ballistic")
       ->check(CLI::IsMember({"auto", "ballistic", "field", "contact"}))
       ->capture_default_str();
   add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
