@@ -73,7 +73,13 @@ def turning_gravity(frames, dt_s, strength, seed):
 
 
 def world_text(dt_s, radius, low, high, spring, damping, shear):
-    """The scene file that tells `field` what the bodies are: spring and damping for a mass of 1."""
+    """The scene file that tells `field` what the bodies are in a closed room: see scene_text()."""
+    planes = [(axis, side, bounds[axis]) for axis in range(3) for side, bounds in ((1, low), (-1, high))]
+    return scene_text(dt_s, radius, low, high, planes, spring, damping, shear)
+
+
+def scene_text(dt_s, radius, low, high, planes, spring, damping, shear):
+    """A scene file for `field`: `planes` of axis, direction (1, -1) and place; spring and damping for a mass of 1."""
     lines = [
         f"dt_s: {dt_s!r}",
         "threshold_radii: 0.1",
@@ -82,7 +88,7 @@ def world_text(dt_s, radius, low, high, spring, damping, shear):
         f'types {{ name: "body" radius_m: {radius:g} mass_kg: 1 colour: "#808080" share: 1 }}',
         "start { proportions { x: 1 y: 1 z: 1 } spacing: 1 }",
     ]
-    for axis, name in enumerate("xyz"):
-        lines.append(f"planes {{ through {{ {name}: {low[axis]:g} }} normal {{ {name}: 1 }} }}")
-        lines.append(f"planes {{ through {{ {name}: {high[axis]:g} }} normal {{ {name}: -1 }} }}")
+    for axis, direction, place in planes:
+        name = "xyz"[axis]
+        lines.append(f"planes {{ through {{ {name}: {place:g} }} normal {{ {name}: {direction} }} }}")
     return "\n".join(lines) + "\n"

@@ -55,14 +55,27 @@ class Recording(unittest.TestCase):
             self.assertNotEqual(plan, rigid.plan(world, bodies, 4, 8)[0])
             self.assertEqual(len(info["shape_of"]), bodies)
             rows = array.array("f", [0, 1, 0, 0, 0, 0, 0.6, 0, 0.8, 0, 1, 2, 3] * (5 * bodies)).tobytes()
-            info["threshold"] = 0.01
             for kept, told in ((rows, info), rigid.halved(rows, bodies, info)):
                 npy = self.folder / f"{world}.npy"
+                told["scene"] = f"{world}.textproto"
+                npy.with_suffix(".textproto").write_text(rigid.scene(world, told["dt_s"]))
                 recording.write_pair(npy, kept, bodies, told, 13)
-                done = subprocess.run([PROGRAM, "bench", "bandwidth", "--trajectory", npy, "--codec", "tracker", "--json"],
-                                      capture_output=True, text=True, timeout=30, check=False)  # fmt: skip
-                self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertEqual(json.loads(done.stdout)["rows"][0]["frames"], len(told["gravity"]) - 1)
+                for predictor in ("ballistic", "field"):
+                    done = subprocess.run([PROGRAM, "bench", "bandwidth", "--trajectory", npy, "--codec", "tracker", "--predictor",
+                                           predictor, "--json"], capture_output=True, text=True, timeout=30, check=False)  # fmt: skip
+                    self.assertEqual(done.returncode, 0, done.stderr)
+                    self.assertEqual(json.loads(done.stdout)["rows"][0]["frames"], len(told["gravity"]) - 1)
+
+    def test_positions_are_the_first_six_of_thirteen_columns(self):
+        rows = array.array("f", [*range(13), *range(20, 33)])
+        self.assertEqual(array.array("f", rigid.positions(rows.tobytes())), array.array("f", [*range(6), *range(20, 26)]))
+
+    def test_a_scene_has_the_walls_of_its_world(self):
+        self.assertEqual(rigid.scene("towers", DT_S).count("planes {"), 1)
+        walls = [line for line in rigid.scene("mixed", DT_S).splitlines() if line.startswith("planes")]
+        self.assertEqual(walls, [f"planes {{ through {{ {wall} }} }}" for wall in (
+            "y: 0 } normal { y: 1", "x: -4.5 } normal { x: 1", "x: 4.5 } normal { x: -1", "z: -4.5 } normal { z: 1",
+            "z: 4.5 } normal { z: -1")])  # fmt: skip
 
     def test_rows_that_do_not_fit_the_bodies_are_refused(self):
         rows, info = self.falling(4, 5)

@@ -1,9 +1,14 @@
 """Plans of rigid bodies for the recorders rigid_bullet and rigid_ode; Python alone."""
 
+import array
 import math
 import random
 
+import recording
+
 GRAVITY, DT_S, SUBSTEPS, EDGE = 9.81, 1 / 60, 2, 0.4
+# A body is EDGE large: a cube's edge, and about the middle size of the others.
+ERRORS = {1: 0.01 * EDGE, 5: 0.05 * EDGE, 10: 0.1 * EDGE}
 SPHERE, BOX, CAPSULE = "sphere", "box", "capsule"
 KINDS = {SPHERE: 1, BOX: 2, CAPSULE: 3}
 CUBE = (BOX, [EDGE / 2] * 3)
@@ -94,7 +99,7 @@ WORLDS = {world.__name__: world for world in (pile, mixed, towers, dominoes, res
 
 
 def plan(world, bodies, frames, seed):
-    """What a recorder reads, and X.json without its threshold, for `frames` frames of 1/60 s."""
+    """What a recorder reads, and X.json, for `frames` frames of 1/60 s."""
     planned = WORLDS[world](random.Random(seed), bodies)
     aside = GRAVITY * math.sqrt(0.5)
     turned = None if planned["turn_s"] is None else round(planned["turn_s"] / DT_S)
@@ -112,7 +117,7 @@ def plan(world, bodies, frames, seed):
     listed(kicks)
     listed(gravity)
     sizes = [min(values) if kind == BOX else values[0] for kind, values in planned["shapes"]]
-    info = {"dt_s": DT_S, "damping_per_s": 0, "radius": min(sizes), "gravity": [gravity[0], *gravity],
+    info = {"dt_s": DT_S, "damping_per_s": 0, "radius": min(sizes), "threshold": ERRORS[5], "gravity": [gravity[0], *gravity],
             "shapes": [{"shape": kind, "values": values} for kind, values in planned["shapes"]],
             "shape_of": [body[0] for body in planned["bodies"]]}  # fmt: skip
     return "\n".join(" ".join(map(str, line)) for line in lines) + "\n", info
@@ -123,3 +128,18 @@ def halved(rows, bodies, info):
     size = bodies * 13 * 4
     kept = b"".join(rows[i : i + size] for i in range(0, len(rows), 2 * size))
     return kept, {**info, "dt_s": 2 * info["dt_s"], "gravity": info["gravity"][::2]}
+
+
+def positions(rows):
+    """The first six columns of thirteen."""
+    values, kept = array.array("f", rows), array.array("f", bytes(len(rows) // 13 * 6))
+    for column in range(6):
+        kept[column::6] = values[column::13]
+    return kept.tobytes()
+
+
+def scene(world, dt_s):
+    """What `field` is told: the planes, and springs of half of what would turn a body round in one frame."""
+    planes = [(normal.index(sum(normal)), sum(normal), offset * sum(normal))
+              for *normal, offset in WORLDS[world](random.Random(0), 1)["planes"]]  # fmt: skip
+    return recording.scene_text(dt_s, EDGE / 2, (-60, -10, -60), (60, 60, 60), planes, 0.5 / dt_s**2, 0.1 / dt_s, 0.01 / dt_s)
