@@ -92,7 +92,7 @@ void ClientCore::take_sessions(Now now) {
     port_.take_sessions(inbox_.sessions);
     for (const auto& announcement : inbox_.sessions) {
       const auto& message = announcement.message;
-      if (message.session != options_.session) continue;
+      if (!options_.session.empty() && message.session != options_.session) continue;
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
       if (!same) adopt(announcement, now);
       if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
@@ -194,7 +194,7 @@ void ClientCore::send_ack(Now now) {
 void ClientCore::send_status(Now now) {
   transport::ClientStatusMessage status = status_report_.next(statistics_, now.steady_ns);
   status.client = options_.id;
-  status.session = options_.session;
+  status.session = session_ ? session_->session : options_.session;
   statistics_.recent_cost.clear();
   if (epoch_) {
     const double period_ms = 1e3 / epoch_->session.frame_rate_hz;
@@ -250,8 +250,13 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
 }
 
 const transport::SessionMessage* ClientCore::session() const { return session_ ? &*session_ : nullptr; }
+const transport::StreamMessage* ClientCore::stream() const { return epoch_ ? &epoch_->stream : nullptr; }
 const ClientTimeline* ClientCore::timeline() const {
   return phase() == ClientPhase::kPlaying ? &epoch_->timeline : nullptr;
+}
+std::optional<std::int64_t> ClientCore::server_wall_ns(std::int64_t steady_ns) const {
+  if (!epoch_ || !epoch_->pacer.clock().known()) return std::nullopt;
+  return steady_ns + epoch_->pacer.clock().offset_ns();
 }
 std::uint32_t ClientCore::join_attempt() const { return epoch_ ? epoch_->joiner.attempt() : join_attempts_; }
 

@@ -30,7 +30,7 @@ struct Now {
 };
 
 struct CoreOptions {
-  std::string session;
+  std::string session;         ///< empty: whichever the port announces
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
@@ -79,8 +79,12 @@ class ClientCore {
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   /// Last announcement that was accepted or refused; null before the first.
   [[nodiscard]] const transport::SessionMessage* session() const;
+  /// The one of its streams that is played or joined; null while there is none.
+  [[nodiscard]] const transport::StreamMessage* stream() const;
   /// Null unless playing.
   [[nodiscard]] const ClientTimeline* timeline() const;
+  /// Wall clock of the server at a steady time of this client's, as far as known.
+  [[nodiscard]] std::optional<std::int64_t> server_wall_ns(std::int64_t steady_ns) const;
   [[nodiscard]] ClientStatus status() const;
   [[nodiscard]] std::uint32_t join_attempt() const;
 

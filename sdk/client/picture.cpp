@@ -30,7 +30,7 @@ void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps, 
 }
 
 DrawnFrame& PictureExchange::unused(const Picture& next) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto found = std::find_if(frames_.begin(), frames_.end(), [&](const DrawnFrame& frame) {
     return !uses(next, frame) && !(last_ && uses(*last_, frame)) && !(read_ && uses(*read_, frame));
   });
@@ -39,22 +39,22 @@ DrawnFrame& PictureExchange::unused(const Picture& next) {
 }
 
 void PictureExchange::show(const Picture& picture) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   last_ = picture;
 }
 
 void PictureExchange::clear() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   last_.reset();
 }
 
 PictureExchange::Reading::Reading(PictureExchange& exchange) : exchange_(exchange), turn_(exchange.readers_) {
-  const std::lock_guard lock(exchange_.mutex_);
+  const Lock lock(exchange_.mutex_);
   exchange_.read_ = exchange_.last_;
 }
 
 PictureExchange::Reading::~Reading() {
-  const std::lock_guard lock(exchange_.mutex_);
+  const Lock lock(exchange_.mutex_);
   exchange_.read_.reset();
 }
 

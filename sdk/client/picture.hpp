@@ -5,11 +5,11 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "sdk/client/mutex.hpp"
 #include "sdk/client/server_clock.hpp"
 #include "sdk/core/lattice/state.hpp"
 
@@ -81,7 +81,7 @@ class PictureExchange {
 
    private:
     PictureExchange& exchange_;
-    std::unique_lock<std::mutex> turn_;
+    Lock turn_;
   };
 
  private:
@@ -91,8 +91,8 @@ class PictureExchange {
   std::atomic<bool> wanted_ = false;
   std::uint64_t loads_ = 0;
   std::array<DrawnFrame, kFrames> frames_;  // each takes memory when it is first used
-  std::mutex readers_;                      // held while reading
-  std::mutex mutex_;                        // guards what follows
+  Mutex readers_;                           // held while reading
+  Mutex mutex_;                             // guards what follows
   std::optional<Picture> last_;
   std::optional<Picture> read_;  // being read
 };

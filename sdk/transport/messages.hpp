@@ -3,7 +3,6 @@
 // dds/. Field meanings, ranges and QoS: idl/PROTOCOL.md.
 
 #include <array>
-#include <compare>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -38,7 +37,9 @@ using Bytes = std::vector<std::byte>;
 /// Where a sample came from, as the transport knows it: the DDS participant's GUID prefix and entity.
 struct ParticipantId {
   std::array<std::uint8_t, 16> bytes{};
-  auto operator<=>(const ParticipantId&) const = default;
+  bool operator==(const ParticipantId&) const = default;
+  // No operator<=>: clang 14's library has none for arrays.
+  bool operator<(const ParticipantId& other) const { return bytes < other.bytes; }
 };
 
 using Shape = BodyShape;

@@ -27,7 +27,7 @@ struct DeltaCodec::Impl {
   std::span<const LifecycleRecord> applied;
   std::vector<Slot>
       merged;  // touched slots; used only where lifecycle or rounding adds to the corrected ones
-  std::span<const Slot> touched;
+  std::span<const Slot> touched, corrected;
 
   struct Parsed {
     int stage = 0;  // where a section belongs among the others: lifecycle, parameters, rounding, corrections
@@ -109,7 +109,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
 
 void DeltaCodec::Impl::remember(const Delta& delta) {
   applied = delta.lifecycle;
-  touched = delta.corrections.slots;
+  touched = corrected = delta.corrections.slots;
   if (delta.rounding) {
     merged.resize(capacity);
     std::iota(merged.begin(), merged.end(), 0U);
@@ -118,14 +118,14 @@ void DeltaCodec::Impl::remember(const Delta& delta) {
   }
   if (applied.empty()) return;
   merged.clear();
-  auto corrected = touched.begin();
+  auto rest = corrected.begin();
   for (const LifecycleRecord& record : applied) {
     if (!merged.empty() && merged.back() == record.slot) continue;
-    while (corrected != touched.end() && *corrected < record.slot) merged.push_back(*corrected++);
-    if (corrected != touched.end() && *corrected == record.slot) ++corrected;
+    while (rest != corrected.end() && *rest < record.slot) merged.push_back(*rest++);
+    if (rest != corrected.end() && *rest == record.slot) ++rest;
     merged.push_back(record.slot);
   }
-  merged.insert(merged.end(), corrected, touched.end());
+  merged.insert(merged.end(), rest, corrected.end());
   touched = merged;
 }
 
@@ -252,6 +252,7 @@ void DeltaCodec::apply(const Delta& delta, State& state) {
 }
 
 std::span<const Slot> DeltaCodec::touched() const { return impl_->touched; }
+std::span<const Slot> DeltaCodec::corrected() const { return impl_->corrected; }
 std::span<const LifecycleRecord> DeltaCodec::lifecycle() const { return impl_->applied; }
 Codec& DeltaCodec::codec() { return *impl_->codec; }
 const Codec& DeltaCodec::codec() const { return *impl_->codec; }

@@ -91,6 +91,8 @@ class DeltaCodec {
   /// Of the last encode() or apply(), none since a decode(): slots that records or corrections named, or all
   /// where it rounded, each once, ascending; the records.
   [[nodiscard]] std::span<const Slot> touched() const;
+  /// Those of them that corrections named.
+  [[nodiscard]] std::span<const Slot> corrected() const;
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;
   [[nodiscard]] Codec& codec();
   [[nodiscard]] const Codec& codec() const;

@@ -175,6 +175,7 @@ const State& ClientTimeline::state(Frame frame) const {
 std::uint64_t ClientTimeline::hash() const { return impl_->hash; }
 const Drive& ClientTimeline::drive() const { return impl_->at(impl_->applied).input.drive; }
 std::span<const Slot> ClientTimeline::touched() const { return impl_->parts.delta.touched(); }
+std::span<const Slot> ClientTimeline::corrected() const { return impl_->parts.delta.corrected(); }
 std::span<const LifecycleRecord> ClientTimeline::lifecycle() const { return impl_->parts.delta.lifecycle(); }
 const StreamParameters& ClientTimeline::parameters() const { return impl_->parts.delta.parameters(); }
 ClientTimeline::Timings ClientTimeline::timings() const { return impl_->timings; }

@@ -135,6 +135,7 @@ class ClientTimeline {
   [[nodiscard]] std::uint64_t hash() const;                          ///< of state(applied()), as last checked
   [[nodiscard]] const Drive& drive() const;                          ///< in force at applied()
   [[nodiscard]] std::span<const Slot> touched() const;               ///< by the last apply()
+  [[nodiscard]] std::span<const Slot> corrected() const;             ///< by the last apply()'s corrections
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< of the last apply()
   [[nodiscard]] const StreamParameters& parameters() const;          ///< in force at applied()
 

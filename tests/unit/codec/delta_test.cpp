@@ -259,6 +259,7 @@ TEST(DeltaCodec, RoundingIsAskedForOneFrameAndTouchesAllSlots) {
   }
   EXPECT_EQ(server.touched().size(), 4U);
   EXPECT_EQ(client.touched().size(), 4U);
+  EXPECT_EQ(std::vector<Slot>(client.corrected().begin(), client.corrected().end()), std::vector<Slot>{0});
   target = agreed;
   encoded = server.encode(agreed, target, {}, kNoBudget, out);
   EXPECT_EQ(encoded.size_bytes, 0U) << "once only";
@@ -320,6 +321,7 @@ TEST(DeltaCodec, TouchedNamesEachSlotOfRecordsAndCorrectionsOnce) {
   server.encode(state, target, lifecycle, kNoBudget, out);
   EXPECT_EQ(std::vector<Slot>(server.touched().begin(), server.touched().end()),
             (std::vector<Slot>{0, 1, 2}));
+  EXPECT_TRUE(std::ranges::equal(server.corrected(), std::vector<Slot>{0, 1, 2}));
   EXPECT_EQ(server.lifecycle().size(), 2U);
   EXPECT_EQ(state, target);
 }

@@ -167,6 +167,8 @@ TEST(ClientTimeline, LifecycleAndTouchedSlotsOfTheLastDeltaCanBeAsked) {
   EXPECT_EQ(pair.client.lifecycle()[0].slot, dead);
   const auto touched = pair.client.touched();
   EXPECT_TRUE(std::find(touched.begin(), touched.end(), dead) != touched.end());
+  const auto corrected = pair.client.corrected();
+  EXPECT_TRUE(std::find(corrected.begin(), corrected.end(), dead) == corrected.end());
   EXPECT_EQ(pair.client.state(pair.client.applied()).reuse()[dead], 3);
 }
 

@@ -161,7 +161,7 @@ bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& t
     std::uint32_t last = too_many - 1;
     if (i >= kMostEstimates) {
       last = fits + (too_many - fits) / 2;
-      std::nth_element(order_.begin() + fits, order_.begin() + last, order_.begin() + too_many - 1);
+      std::nth_element(order_.data() + fits, order_.data() + last, order_.data() + too_many - 1);
     }
     const Cut cut = this->cut(frame, target, fits, last, static_cast<std::int64_t>(budget) * kByte - beyond);
     if (cut.count == fits) break;
@@ -249,7 +249,7 @@ TrackerEncoder::Cut TrackerEncoder::cut(const TrackerFrame& frame, const State& 
   while (first < last) {
     const std::uint32_t more = is_limited ? (last - first + 1) / 2 : std::max(first, guess);
     const std::uint32_t tried = first + std::min(more, last - first);
-    std::nth_element(order_.begin() + first, order_.begin() + tried - 1, order_.begin() + last);
+    std::nth_element(order_.data() + first, order_.data() + tried - 1, order_.data() + last);
     const std::int64_t added = add(frame, target, first, tried);
     if (sum + added <= most || tried == 1) {
       sum += added;

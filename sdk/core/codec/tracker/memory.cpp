@@ -39,8 +39,8 @@ std::span<const Slot> TrackerDelta::join(std::uint32_t capacity, bool of_all_blo
     part.first = count;
     if (part.corrected == 0 && !of_all_blocks) continue;
     if (const Slot from = block_at(b, capacity).first; from != count) {
-      std::copy_n(slots.begin() + from, part.corrected, slots.begin() + count);
-      std::copy_n(corrections.begin() + from, part.corrected, corrections.begin() + count);
+      std::copy_n(slots.data() + from, part.corrected, slots.data() + count);
+      std::copy_n(corrections.data() + from, part.corrected, corrections.data() + count);
     }
     count += part.corrected;
     if (sum == nullptr) {
