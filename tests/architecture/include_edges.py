@@ -39,6 +39,7 @@ EDGES = {
     "sdk/statistics": [],
     "sdk/client": TIMELINE + ["public", "sdk/statistics", "sdk/transport"],
     "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
+    "sdk/web/module": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
     "sdk/examples": ["public"],
     "services/heap": [],
     "services/workers": [],
@@ -70,7 +71,7 @@ OWNERS = [
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
-    (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/lab", "services/tandemd"]),
+    (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/lab", "services/tandemd", "tests"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]

@@ -1,0 +1,87 @@
+#pragma once
+// A client whose connection, clock and screen are JavaScript's.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sdk/client/client_core.hpp"
+#include "sdk/web/module/web_port.hpp"
+#include "tandem/client.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::web {
+
+/// The client of every other transport on a WebPort, and what JavaScript asks of it, as JSON and arrays. Not
+/// thread-safe.
+class WebClient final : private client::CoreListener {
+ public:
+  struct Options {
+    transport::ClientId id = 0;  ///< random, not 0
+    ClientRole role = ClientRole::kParticipant;
+    std::uint32_t lead = 1;
+    std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
+    std::int64_t (*measure_ns)() = nullptr;               ///< as CoreOptions
+  };
+
+  explicit WebClient(Options options);
+  ~WebClient() override = default;
+  WebClient(const WebClient&) = delete;
+  WebClient& operator=(const WebClient&) = delete;
+  WebClient(WebClient&&) = delete;
+  WebClient& operator=(WebClient&&) = delete;
+
+  [[nodiscard]] WebPort& port() { return port_; }
+  [[nodiscard]] const WebPort& port() const { return port_; }
+  [[nodiscard]] const client::ClientCore& core() const { return core_; }
+
+  /// Takes what the port received and does what is due. Returns the steady time at which it wants to be
+  /// called again even if nothing arrives.
+  std::int64_t poll(client::Now now);
+  /// As ClientCore::send().
+  Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
+                             client::Now now);
+
+  /// What happened since the last call, oldest first, as a JSON list of objects:
+  /// {"type": "session", "epoch": N}, {"type": "applied", "epoch": N, "frame": N, "hash": "16 hex digits",
+  /// "bytes": N, "corrected": N}, {"type": "outcome", "number": N, "kind": "acted" | "refused" | "unknown",
+  /// "frame": N, "reason": "text", "latencyMs": X}. Empty when nothing did.
+  [[nodiscard]] std::string take_events();
+  /// Figures as a JSON object; its members are those of `ModuleStatus` in ../tandem.
+  [[nodiscard]] std::string status() const;
+  /// A JSON list of {"name", "radius", "colour": "#rrggbbaa", "shape", "shapeValues"}.
+  [[nodiscard]] std::string types() const;
+  /// Protobuf text of the session's scene; empty before one is known.
+  [[nodiscard]] std::string_view scene_description() const;
+
+  /// As Client::sample(). The arrays are valid until the next call.
+  [[nodiscard]] const Sample* sample(SampleMode mode, client::Now now);
+  /// Of each slot 1 where the last delta applied corrected the body.
+  [[nodiscard]] std::span<const std::uint8_t> corrected() const { return corrected_; }
+
+ private:
+  // Events are bounded by what one poll applies, and dropped where nobody takes them.
+  static constexpr std::size_t kMaxEventBytes = 1U << 20U;
+
+  void on_session(const transport::SessionMessage& session) override;
+  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
+  void on_outcome(const client::InputOutcome& outcome) override;
+  /// The next object of events_, for as long as there is room.
+  template <class Fill>
+  void add_event(const char* type, Fill&& fill);
+
+  WebPort port_;
+  client::ClientCore core_;
+  std::string events_;
+  std::vector<std::uint8_t> corrected_;
+  std::uint32_t corrected_count_ = 0;
+  std::int64_t polled_ns_ = 0;    ///< steady
+  std::optional<double> lag_ns_;  ///< publish to applied by the server's clock, over about half a second
+  Sample sample_;
+};
+
+}  // namespace tandem::web

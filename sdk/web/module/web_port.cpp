@@ -1,0 +1,146 @@
+#include "sdk/web/module/web_port.hpp"
+
+#include <string>
+#include <variant>
+
+namespace tandem::web {
+
+using transport::Received;
+
+void WebPort::connected() {
+  disconnected();
+  connected_ = true;
+  ++connections_;
+  for (std::size_t i = 0; i < sizeof connections_; ++i) {
+    gateway_.bytes[i] = static_cast<std::uint8_t>(connections_ >> (8U * i));
+  }
+}
+
+void WebPort::disconnected() {
+  connected_ = false;
+  server_alive_ = false;
+  session_.reset();
+  server_status_.reset();
+  close_stream();
+  out_.clear();
+}
+
+Result<void> WebPort::receive(std::span<const std::byte> bytes) {
+  auto message = bytes.size() <= kMaxMessageBytes ? transport::read_gateway_envelope(bytes, limits_)
+                                                  : fail(ErrorCode::kMalformed, "a message above 64 MiB");
+  Result<void> accepted;
+  if (!message) {
+    accepted = tl::unexpected<Error>(std::move(message.error()));
+  } else {
+    accepted = std::visit([&](auto& content) { return accept(std::move(content), bytes.size()); }, *message);
+  }
+  if (!accepted) ++dropped_;
+  return accepted;
+}
+
+std::optional<transport::Bytes> WebPort::next_message() {
+  if (out_.empty()) return std::nullopt;
+  transport::Bytes message = std::move(out_.front());
+  out_.pop_front();
+  return message;
+}
+
+Result<void> WebPort::accept(transport::SessionMessage&& message, std::size_t /*size*/) {
+  session_ = std::move(message);
+  server_alive_ = true;
+  return {};
+}
+Result<void> WebPort::accept(transport::DeltaMessage&& message, std::size_t size) {
+  return put(deltas_, std::move(message), size);
+}
+Result<void> WebPort::accept(transport::ScheduledInputMessage&& message, std::size_t size) {
+  return put(inputs_, std::move(message), size);
+}
+Result<void> WebPort::accept(transport::SnapshotMessage&& message, std::size_t size) {
+  return put(snapshots_, std::move(message), size);
+}
+Result<void> WebPort::accept(transport::ReplyMessage&& message, std::size_t size) {
+  return put(replies_, std::move(message), size);
+}
+Result<void> WebPort::accept(transport::ServerStatusMessage&& message, std::size_t /*size*/) {
+  server_status_ = std::move(message);
+  return {};
+}
+Result<void> WebPort::accept(const transport::AbsentMessage& /*message*/, std::size_t /*size*/) {
+  server_alive_ = false;
+  session_.reset();
+  return {};
+}
+Result<void> WebPort::accept(const transport::UnknownMessage& /*message*/, std::size_t /*size*/) {
+  return {};
+}
+
+template <class M>
+Result<void> WebPort::put(Queue<M>& queue, M&& message, std::size_t size) {
+  if (!queue.open) return {};
+  size += sizeof(M);
+  if (queue.bytes + size > kMaxQueuedBytes && !queue.messages.empty()) {
+    return fail(ErrorCode::kCapacity, std::string(M::kTopic) + ": too much waits to be taken");
+  }
+  queue.bytes += size;
+  queue.messages.push_back({std::move(message), gateway_});
+  return {};
+}
+
+void WebPort::take_sessions(std::vector<Received<transport::SessionMessage>>& out) {
+  if (session_) out.push_back({*std::exchange(session_, std::nullopt), gateway_});
+}
+
+Result<void> WebPort::open_stream(const transport::SessionMessage& /*session*/,
+                                  const transport::StreamMessage& stream, transport::ClientId /*client*/) {
+  close_stream();
+  limits_ = {.max_delta_bytes = stream.max_delta_bytes, .max_snapshot_bytes = stream.max_snapshot_bytes};
+  deltas_.open = inputs_.open = replies_.open = true;
+  return {};
+}
+
+void WebPort::close_stream() {
+  limits_ = {};
+  deltas_.close();
+  inputs_.close();
+  replies_.close();
+  close_snapshots();
+}
+
+Result<void> WebPort::open_snapshots() {
+  snapshots_.open = true;
+  return {};
+}
+
+void WebPort::close_snapshots() { snapshots_.close(); }
+
+namespace {
+
+template <class Q, class M>
+void move_all(Q& queue, std::vector<Received<M>>& out) {
+  for (Received<M>& received : queue.messages) out.push_back(std::move(received));
+  queue.messages.clear();
+  queue.bytes = 0;
+}
+
+}  // namespace
+
+void WebPort::take(std::vector<Received<transport::DeltaMessage>>& out) { move_all(deltas_, out); }
+void WebPort::take(std::vector<Received<transport::ScheduledInputMessage>>& out) { move_all(inputs_, out); }
+void WebPort::take(std::vector<Received<transport::SnapshotMessage>>& out) { move_all(snapshots_, out); }
+void WebPort::take(std::vector<Received<transport::ReplyMessage>>& out) { move_all(replies_, out); }
+
+template <class M>
+Result<void> WebPort::send(const M& message) {
+  // On a new connection nothing of an older session goes out before its announcement is here.
+  if (!server_alive_) return fail(ErrorCode::kTransport, "no server behind the connection");
+  if (out_.size() >= kMaxQueuedOut) return fail(ErrorCode::kTransport, "the connection takes nothing");
+  write_envelope(message, out_.emplace_back());
+  return {};
+}
+
+Result<void> WebPort::write(const transport::AckMessage& message) { return send(message); }
+Result<void> WebPort::write(const transport::InputMessage& message) { return send(message); }
+Result<void> WebPort::write(const transport::ClientStatusMessage& message) { return send(message); }
+
+}  // namespace tandem::web

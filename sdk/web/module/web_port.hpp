@@ -1,0 +1,103 @@
+#pragma once
+// A client's port onto one gateway, without a socket: bytes of WebSocket messages go in and come out.
+// idl/PROTOCOL.md, "WebSocket".
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdk/transport/envelope.hpp"
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/messages.hpp"
+#include "sdk/transport/port.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::web {
+
+/// Queues between a ClientCore and whoever holds the connection. Every queue is bounded. Not thread-safe.
+class WebPort final : public transport::ClientPort {
+ public:
+  /// No WebSocket message is larger; whoever holds the connection refuses it before it is copied.
+  static constexpr std::size_t kMaxMessageBytes = transport::kMaxSampleBytes + (1U << 16U);
+  /// Decoded bytes that wait in one queue; what comes beyond it is dropped, and the client joins again.
+  static constexpr std::size_t kMaxQueuedBytes = kMaxMessageBytes;
+  static constexpr std::size_t kMaxQueuedOut = 256;  ///< messages that wait to be sent
+
+  /// A connection was opened. It counts as a participant of its own: what came before it is void.
+  void connected();
+  /// It is closed; nothing can be written until the next one.
+  void disconnected();
+  [[nodiscard]] bool is_connected() const { return connected_; }
+
+  /// Takes in one WebSocket message. Errors: kMalformed, kUnsupported, kCapacity (a queue is full); it is
+  /// then dropped and counted.
+  Result<void> receive(std::span<const std::byte> bytes);
+  /// The oldest message to be sent, or nothing.
+  [[nodiscard]] std::optional<transport::Bytes> next_message();
+  /// Last one of this connection.
+  [[nodiscard]] const std::optional<transport::ServerStatusMessage>& server_status() const {
+    return server_status_;
+  }
+
+  [[nodiscard]] transport::ParticipantId self() const override { return {}; }
+  void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override;
+  void pass_over_session(transport::PassOver /*until*/) override {}  // a gateway has one
+  [[nodiscard]] bool server_alive() override { return server_alive_; }
+  Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
+                           transport::ClientId client) override;
+  void close_stream() override;
+  Result<void> open_snapshots() override;
+  void close_snapshots() override;
+  void take(std::vector<transport::Received<transport::DeltaMessage>>& out) override;
+  void take(std::vector<transport::Received<transport::ScheduledInputMessage>>& out) override;
+  void take(std::vector<transport::Received<transport::SnapshotMessage>>& out) override;
+  void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override;
+  Result<void> write(const transport::AckMessage& message) override;
+  Result<void> write(const transport::InputMessage& message) override;
+  Result<void> write(const transport::ClientStatusMessage& message) override;
+  [[nodiscard]] std::uint64_t dropped() const override { return dropped_; }
+  void wait(std::chrono::nanoseconds /*timeout*/) override {}
+
+ private:
+  template <class M>
+  struct Queue {
+    std::vector<transport::Received<M>> messages;
+    std::size_t bytes = 0;
+    bool open = false;  ///< what comes for one that is not is of no interest
+    void close() { *this = {}; }
+  };
+
+  Result<void> accept(transport::SessionMessage&& message, std::size_t size);
+  Result<void> accept(transport::DeltaMessage&& message, std::size_t size);
+  Result<void> accept(transport::ScheduledInputMessage&& message, std::size_t size);
+  Result<void> accept(transport::SnapshotMessage&& message, std::size_t size);
+  Result<void> accept(transport::ReplyMessage&& message, std::size_t size);
+  Result<void> accept(transport::ServerStatusMessage&& message, std::size_t size);
+  Result<void> accept(const transport::AbsentMessage& message, std::size_t size);
+  Result<void> accept(const transport::UnknownMessage& message, std::size_t size);
+  template <class M>
+  Result<void> put(Queue<M>& queue, M&& message, std::size_t size);
+  template <class M>
+  Result<void> send(const M& message);
+
+  bool connected_ = false;
+  bool server_alive_ = false;
+  transport::ParticipantId gateway_;  ///< another for each connection
+  std::uint64_t connections_ = 0;
+  transport::Limits limits_;
+  std::optional<transport::SessionMessage> session_;  ///< not yet taken
+  std::optional<transport::ServerStatusMessage> server_status_;
+  Queue<transport::DeltaMessage> deltas_;
+  Queue<transport::ScheduledInputMessage> inputs_;
+  Queue<transport::SnapshotMessage> snapshots_;
+  Queue<transport::ReplyMessage> replies_;
+  std::deque<transport::Bytes> out_;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace tandem::web

@@ -1,0 +1,344 @@
+// A client over a WebSocket: loads the module, keeps a connection, and starts anew what fails.
+
+import { compile, hasSimd, InputKind, Module } from './module';
+import { Rate } from './rate';
+import type {
+  BodyType,
+  ConnectOptions,
+  Handlers,
+  LogLevel,
+  ModuleStatus,
+  Phase,
+  Sample,
+  SampleMode,
+  SocketLike,
+  Status,
+} from './types';
+import { TandemError } from './types';
+
+const PROTOCOL = 'tandem.1';
+const FIRST_RETRY_MS = 250;
+const LAST_RETRY_MS = 5000;
+/** A connection from which nothing came for so long, while the server should be there, is taken for dead. */
+const SILENCE_MS = 10_000;
+/** The longest that timers are asked to wait. */
+const LONGEST_WAIT_MS = 1000;
+const RAW_BYTES_PER_BODY = 24;
+const BITS_PER_MBIT = 1048576;
+const OPEN = 1;
+
+/** Close codes with which a gateway says that it does not want this viewer: a violated policy, and its own. */
+const isRefusal = (code: number): boolean => code === 1002 || code === 1003 || code === 1008 || (code >= 4000 && code < 5000);
+
+type HandlerSets = { [Name in keyof Handlers]: Set<Handlers[Name]> };
+
+interface Settings extends ConnectOptions {
+  role: 'observer' | 'participant';
+  lead: number;
+}
+
+/**
+ * Follows one session through a gateway: holds its bodies bit-identically with the server, sends input, and hands out
+ * the bodies to draw. Connects again by itself until close().
+ */
+export class Client {
+  readonly #settings: Settings;
+  readonly #compiled: WebAssembly.Module;
+  readonly #simd: boolean;
+  readonly #id = randomId();
+  readonly #clock;
+  readonly #handlers: HandlerSets = { phase: new Set(), session: new Set(), outcome: new Set(), applied: new Set() };
+  #module: Module | null = null;
+  #socket: SocketLike | null = null;
+  #phase: Phase = 'connecting';
+  #wasConnected = false;
+  #closed = false;
+  /** Why the gateway closed, or the module failed; empty while there is a connection. */
+  #reason = '';
+  #isRefused = false;
+  #restarts = 0;
+  #retryMs = FIRST_RETRY_MS;
+  #retryTimer: ReturnType<typeof setTimeout> | undefined;
+  #pollTimer: ReturnType<typeof setTimeout> | undefined;
+  #heardMs = 0;
+  #payload = new Rate();
+  #received = new Rate();
+  #lastStatus: ModuleStatus | null = null;
+  #types: { json: string; types: BodyType[] } = { json: '', types: [] };
+
+  /** Resolves when the module is loaded, whether a gateway is there or not. Throws where it cannot be loaded. */
+  static async connect(options: ConnectOptions): Promise<Client> {
+    const simd = options.simd === 'on' || (options.simd !== 'off' && hasSimd());
+    const wasm = options.wasm ?? {
+      plain: new URL(/* @vite-ignore */ './tandem.wasm', import.meta.url),
+      simd: new URL(/* @vite-ignore */ './tandem-simd.wasm', import.meta.url),
+    };
+    const client = new Client(options, await compile(simd ? wasm.simd : wasm.plain), simd);
+    await client.#start();
+    return client;
+  }
+
+  private constructor(options: ConnectOptions, compiled: WebAssembly.Module, simd: boolean) {
+    this.#settings = { ...options, role: options.role ?? 'participant', lead: options.lead ?? 1 };
+    this.#compiled = compiled;
+    this.#simd = simd;
+    this.#clock = options.clock ?? { steady: () => performance.now(), wall: () => Date.now() };
+  }
+
+  status(): Status {
+    const status = this.#guard((module) => module.status()) ?? this.#lastStatus;
+    if (status === null) throw new TandemError('the module failed before it said anything');
+    this.#lastStatus = status;
+    const { serverAlive: _, ...figures } = status;
+    const now = this.#clock.steady();
+    return {
+      ...figures,
+      phase: this.#phase,
+      reason: this.#reason || status.reason,
+      mbitPerS: this.#payload.mbitPerS(now),
+      receivedMbitPerS: this.#received.mbitPerS(now),
+      rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY * 8 * status.frameRateHz) / BITS_PER_MBIT,
+      simd: this.#simd,
+      restarts: this.#restarts,
+    };
+  }
+
+  /** The bodies as they should be drawn now; null before the first snapshot. Call it once a picture. */
+  sample(mode: SampleMode = 'extrapolate'): Sample | null {
+    return this.#guard((module) => module.sample(mode)) ?? null;
+  }
+
+  /** Body types of the session; empty before one is known. */
+  types(): BodyType[] {
+    const json = this.#guard((module) => module.types()) ?? this.#types.json;
+    if (json !== this.#types.json) this.#types = { json, types: JSON.parse(json) as BodyType[] };
+    return this.#types.types;
+  }
+
+  /** The scene's geometry as protobuf text; empty before a session is known. */
+  sceneDescription(): string {
+    return this.#guard((module) => module.sceneDescription()) ?? '';
+  }
+
+  /** Sets gravity; returns the number of the input. Like the other inputs it throws TandemError unless playing. */
+  sendGravity(gravity: readonly [number, number, number]): number {
+    return this.#send(InputKind.gravity, values(gravity));
+  }
+  /** Adds `velocity` to the bodies within `radius` of `centre`. */
+  sendPush(
+    centre: readonly [number, number, number],
+    radius: number,
+    velocity: readonly [number, number, number],
+  ): number {
+    return this.#send(InputKind.push, values([...centre, radius, ...velocity]));
+  }
+  /** Bytes for the engine, 1,024 at most. */
+  sendBytes(bytes: Uint8Array): number {
+    return this.#send(InputKind.application, bytes);
+  }
+
+  /** Calls `handler` from now on; returns what ends that. */
+  on<Name extends keyof Handlers>(name: Name, handler: Handlers[Name]): () => void {
+    const handlers = this.#handlers[name] as Set<Handlers[Name]>;
+    handlers.add(handler);
+    return () => handlers.delete(handler);
+  }
+
+  /** Ends the connection; status() stays as it was. */
+  close(): void {
+    if (this.#closed) return;
+    this.#closed = true;
+    clearTimeout(this.#retryTimer);
+    clearTimeout(this.#pollTimer);
+    this.#drop(1000, 'closed by the viewer');
+    this.#setPhase('closed');
+  }
+
+  // --- module
+
+  async #start(): Promise<void> {
+    this.#module = await Module.create(this.#compiled, {
+      id: this.#id,
+      role: this.#settings.role,
+      lead: this.#settings.lead,
+      clock: this.#clock,
+      log: (level, text) => this.#log(level, text),
+    });
+    if (!this.#closed) this.#open();
+  }
+
+  /** Calls the module; undefined where there is none, or where it fails and is started anew. */
+  #guard<T>(call: (module: Module) => T): T | undefined {
+    if (this.#module === null) return undefined;
+    try {
+      return call(this.#module);
+    } catch (error) {
+      if (error instanceof TandemError) throw error;
+      this.#fail(error);
+      return undefined;
+    }
+  }
+
+  // Nothing of an instance that trapped is of use, its memory least of all.
+  #fail(error: unknown): void {
+    this.#module = null;
+    ++this.#restarts;
+    this.#reason = `the module failed and is started anew: ${error instanceof Error ? error.message : String(error)}`;
+    this.#log('error', this.#reason);
+    clearTimeout(this.#pollTimer);
+    this.#drop(1011, 'the module failed');
+    this.#setPhase('lost');
+    this.#later(() => {
+      this.#start().catch((again: unknown) => this.#fail(again));
+    });
+  }
+
+  #send(kind: number, content: Uint8Array): number {
+    if (this.#phase !== 'playing') throw new TandemError('input is possible while playing only');
+    const number = this.#guard((module) => module.send(kind, content));
+    if (number === undefined) throw new TandemError('the module failed');
+    this.#pump();
+    return number;
+  }
+
+  // --- connection
+
+  #open(): void {
+    let socket: SocketLike;
+    try {
+      socket = this.#settings.webSocket?.(this.#settings.url, PROTOCOL) ?? new WebSocket(this.#settings.url, PROTOCOL);
+    } catch (error) {
+      throw new TandemError(error instanceof Error ? error.message : String(error));
+    }
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => this.#onOpen(socket);
+    socket.onmessage = (event: MessageEvent) => this.#onMessage(event.data);
+    socket.onclose = (event: CloseEvent) => this.#onClose(event.code, event.reason);
+    this.#socket = socket;
+    this.#pump();
+  }
+
+  #onOpen(socket: SocketLike): void {
+    if (socket.protocol !== PROTOCOL) {
+      this.#drop(1002, 'another protocol');
+      this.#onClose(1002, `the server does not speak ${PROTOCOL}`);
+      return;
+    }
+    this.#wasConnected = true;
+    this.#isRefused = false;
+    this.#reason = '';
+    this.#heardMs = this.#clock.steady();
+    this.#guard((module) => module.connected());
+    this.#pump();
+  }
+
+  #onMessage(data: unknown): void {
+    this.#heardMs = this.#clock.steady();
+    if (!(data instanceof ArrayBuffer)) {
+      this.#log('warning', 'message refused: not binary');
+      return;
+    }
+    this.#received.add(this.#heardMs, data.byteLength);
+    const refused = this.#guard((module) => module.receive(new Uint8Array(data)));
+    if (refused) this.#log('warning', `message refused: ${refused}`);
+    this.#pump();
+  }
+
+  #onClose(code: number, reason: string): void {
+    this.#socket = null;
+    this.#isRefused = isRefusal(code);
+    this.#reason = reason || (this.#wasConnected ? 'the connection was lost' : 'no gateway answers');
+    this.#guard((module) => module.disconnected());
+    this.#pump();
+    if (!this.#closed && this.#module !== null) this.#later(() => this.#open());
+  }
+
+  /** Ends the connection without waiting for the other side. */
+  #drop(code: number, reason: string): void {
+    const socket = this.#socket;
+    if (socket === null) return;
+    this.#socket = null;
+    socket.onopen = socket.onmessage = socket.onclose = null;
+    // A browser allows 1000 and 3000 to 4999 only.
+    socket.close(code === 1000 ? 1000 : 3000 + (code - 1000), reason);
+  }
+
+  // Half of the wait is random, so that the viewers of a gateway that comes back do not come at once.
+  #later(action: () => void): void {
+    const wait = this.#retryMs * (0.5 + Math.random() / 2);
+    this.#retryMs = Math.min(2 * this.#retryMs, LAST_RETRY_MS);
+    clearTimeout(this.#retryTimer);
+    this.#retryTimer = setTimeout(action, wait);
+  }
+
+  // --- work
+
+  /** Lets the module do what is due, sends what it wants sent, and tells the handlers. */
+  #pump(): void {
+    if (this.#closed) return;
+    clearTimeout(this.#pollTimer);
+    const due = this.#guard((module) => module.poll());
+    if (due === undefined) return;
+    this.#guard((module) => {
+      for (let message; (message = module.nextMessage()) !== undefined; ) {
+        if (this.#socket?.readyState === OPEN) this.#socket.send(message);
+      }
+    });
+    const now = this.#clock.steady();
+    for (const event of this.#guard((module) => module.events()) ?? []) {
+      if (event.type === 'applied') this.#payload.add(now, event.bytes);
+      if (event.type === 'session') this.#retryMs = FIRST_RETRY_MS;
+      this.#tell(event.type, event as never);
+    }
+    const status = this.#guard((module) => module.status());
+    if (status === undefined || this.#closed) return;
+    this.#lastStatus = status;
+    this.#setPhase(this.#phaseOf(status));
+    if (this.#socket?.readyState === OPEN && status.serverAlive && now - this.#heardMs > SILENCE_MS) {
+      this.#drop(1001, 'silence');
+      this.#onClose(1006, 'nothing came for 10 s');
+      return;
+    }
+    this.#pollTimer = setTimeout(() => this.#pump(), Math.min(Math.max(due - now, 0), LONGEST_WAIT_MS));
+  }
+
+  #phaseOf(status: ModuleStatus): Phase {
+    if (this.#socket?.readyState !== OPEN) {
+      if (this.#isRefused) return 'refused';
+      return this.#wasConnected ? 'lost' : 'connecting';
+    }
+    const hadServer = status.epoch !== 0;
+    return hadServer && !status.serverAlive ? 'lost' : status.phase;
+  }
+
+  #setPhase(phase: Phase): void {
+    if (phase === this.#phase) return;
+    this.#phase = phase;
+    this.#tell('phase', phase as never);
+  }
+
+  #tell<Name extends keyof Handlers>(name: Name, content: Parameters<Handlers[Name]>[0]): void {
+    for (const handler of [...this.#handlers[name]]) {
+      try {
+        (handler as (content: unknown) => void)(content);
+      } catch (error) {
+        console.error(error);
+      }
+    }
+  }
+
+  #log(level: LogLevel, line: string): void {
+    if (this.#settings.log) this.#settings.log(level, line);
+    else if (level !== 'info') console.warn(`tandem: ${line}`);
+  }
+}
+
+function values(numbers: readonly number[]): Uint8Array {
+  return new Uint8Array(Float64Array.from(numbers).buffer);
+}
+
+/** 64 random bits, not 0. */
+function randomId(): bigint {
+  const words = crypto.getRandomValues(new BigUint64Array(1));
+  return (words[0] as bigint) || 1n;
+}

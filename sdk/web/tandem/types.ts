@@ -1,0 +1,217 @@
+// What an application sees. Units: scene units, milliseconds, Mbit of 2^20 bits.
+
+export type Role = 'observer' | 'participant';
+
+/**
+ * `connecting`: no connection was ever open. `searching`: no server behind the gateway yet. `refused`: by the gateway,
+ * or because this client cannot play the session; see `reason`. `joining`: waits for a snapshot. `playing`: holds the
+ * agreed state and follows it. `lost`: the connection or the session's server is gone; tried again until it is back.
+ * `closed`: after close().
+ */
+export type Phase = 'connecting' | 'searching' | 'refused' | 'joining' | 'playing' | 'lost' | 'closed';
+
+/** Where a WebAssembly module comes from. */
+export type WasmSource = URL | string | BufferSource | WebAssembly.Module;
+
+/** What the client needs of a WebSocket. */
+export interface SocketLike {
+  binaryType: string;
+  readonly protocol: string;
+  readonly readyState: number;
+  onopen: ((event: never) => void) | null;
+  onmessage: ((event: never) => void) | null;
+  onclose: ((event: never) => void) | null;
+  onerror: ((event: never) => void) | null;
+  send(data: Uint8Array): void;
+  close(code?: number, reason?: string): void;
+}
+
+/** Both in milliseconds; `steady` never goes back, `wall` counts from 1970. */
+export interface Clock {
+  steady(): number;
+  wall(): number;
+}
+
+export interface ConnectOptions {
+  /** Of the gateway: `ws://HOST:PORT/tandem`, with `?token=TOKEN` where it asks for one. */
+  url: string;
+  /** Participants may send input. Default: participant. */
+  role?: Role;
+  /** Frames to simulate beyond the last delta, 0 or 1; clamped to what the session allows. Default: 1. */
+  lead?: number;
+  /** `auto` uses SIMD where the browser has it. */
+  simd?: 'auto' | 'on' | 'off';
+  /** Default: `tandem.wasm` and `tandem-simd.wasm` beside this script. */
+  wasm?: { plain: WasmSource; simd: WasmSource };
+  /** Instead of the browser's WebSocket, where there is none. */
+  webSocket?: (url: string, protocol: string) => SocketLike;
+  /** Instead of performance.now() and Date.now(), for tests. */
+  clock?: Clock;
+  /** One line for a human. Default: warnings and errors go to the console. */
+  log?: (level: LogLevel, text: string) => void;
+}
+
+export type LogLevel = 'info' | 'warning' | 'error';
+
+/** What the gateway passes on of the server, once a second. */
+export interface ServerStatus {
+  session: string;
+  epoch: number;
+  frame: number;
+  uptimeS: number;
+  frameRateHz: number;
+  mbitPerS: number;
+  rawMbitPerS: number;
+  frameMsP50: number;
+  frameMsP99: number;
+  correctedPerFrame: number;
+  /** In force; scene units. */
+  threshold: number;
+  bodies: number;
+  atRest: number;
+  participants: number;
+  observers: number;
+  window: number;
+  stalls: number;
+  codec: string;
+  predictor: string;
+}
+
+/** What the module tells of itself; the order and the names are those of WebClient::status(). */
+export interface ModuleStatus {
+  phase: 'searching' | 'refused' | 'joining' | 'playing';
+  serverAlive: boolean;
+  /** Why phase or role are not what was asked for; empty when they are. */
+  reason: string;
+  /** As granted. */
+  role: Role;
+  /** 16 hex digits. */
+  clientId: string;
+  scene: string;
+  epoch: number;
+  /** The last one agreed with the server. */
+  frame: number;
+  /** Of that frame, 16 hex digits; empty while not playing. */
+  stateHash: string;
+  frameRateHz: number;
+  lead: number;
+  predictor: string;
+  codec: string;
+  capacity: number;
+  bodies: number;
+  atRest: number;
+  /** Bodies that the last delta corrected. */
+  corrected: number;
+  framesApplied: number;
+  /** Joins after the first one of an epoch. */
+  resyncs: number;
+  hashMismatches: number;
+  /** Messages that broke a rule of the protocol. */
+  refusedMessages: number;
+  payloadBytes: number;
+  /** Published to applied, by the estimate of the server's clock. */
+  lagMs: number;
+  roundTripMs: number;
+  jitterMs: number;
+  /** Of the last join, from learning of the session, or of the loss, to playing. */
+  joinMs: number;
+  /** Decode, apply and simulate, a frame. */
+  frameMs: { p50: number; p99: number };
+  inputsSent: number;
+  inputsActed: number;
+  inputsRefused: number;
+  inputsUnknown: number;
+  server: ServerStatus | null;
+}
+
+export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {
+  phase: Phase;
+  /** Of deltas' payload, over the last second. */
+  mbitPerS: number;
+  /** Of all messages received, over the last second. */
+  receivedMbitPerS: number;
+  /** What the bodies' positions and velocities would need uncompressed: 24 bytes a body and frame. */
+  rawMbitPerS: number;
+  /** Whether the module with SIMD runs. */
+  simd: boolean;
+  /** How often the module failed and was started anew. */
+  restarts: number;
+}
+
+export interface BodyType {
+  name: string;
+  /** Of the sphere that holds the body. */
+  radius: number;
+  /** `#rrggbbaa` */
+  colour: string;
+  shape: 'none' | 'sphere' | 'box' | 'capsule' | 'cylinder' | 'hull';
+  /** box: half sizes x, y, z; capsule: radius, half of the length between the caps' centres, along y; cylinder: radius,
+   * half of the height, along y; hull: points x, y, z. */
+  shapeValues: number[];
+}
+
+/** Values of `Sample.changes`, against the sample before. */
+export const Change = { none: 0, new: 1, gone: 2, jumped: 3 } as const;
+
+export type SampleMode = 'extrapolate' | 'interpolate';
+
+/**
+ * The bodies at one moment. The arrays are views into the module's memory, valid until the next call of any method of
+ * the client or the next turn of the event loop. Values of slots with alive = 0 are unspecified, except their change.
+ */
+export interface Sample {
+  /** The moment, in frames. */
+  frame: number;
+  capacity: number;
+  /** x, y, z of slot 0, of slot 1, ... */
+  positions: Float32Array;
+  /** Quaternions x, y, z, w from the body's frame to the world's; null where bodies do not turn. */
+  orientations: Float32Array | null;
+  alive: Uint8Array;
+  /** Counts the bodies that the slot has held, modulo 256. */
+  generation: Uint8Array;
+  /** Index into types(). */
+  types: Uint16Array;
+  changes: Uint8Array;
+  /** 1 where the last delta applied corrected the body. */
+  corrected: Uint8Array;
+}
+
+export interface SessionEvent {
+  type: 'session';
+  epoch: number;
+}
+export interface AppliedEvent {
+  type: 'applied';
+  epoch: number;
+  frame: number;
+  /** 16 hex digits. */
+  hash: string;
+  /** Of the delta's payload. */
+  bytes: number;
+  corrected: number;
+}
+export interface OutcomeEvent {
+  type: 'outcome';
+  /** What send...() returned. */
+  number: number;
+  kind: 'acted' | 'refused' | 'unknown';
+  /** The frame that it acted on. */
+  frame: number;
+  reason: string;
+  /** From sending to applying that frame. */
+  latencyMs: number;
+}
+export type ModuleEvent = SessionEvent | AppliedEvent | OutcomeEvent;
+
+export interface Handlers {
+  phase: (phase: Phase) => void;
+  session: (event: SessionEvent) => void;
+  outcome: (event: OutcomeEvent) => void;
+  applied: (event: AppliedEvent) => void;
+}
+
+/** An input that could not be sent, or a module that could not be loaded. */
+export class TandemError extends Error {
+  override name = 'TandemError';
+}

@@ -1,0 +1,172 @@
+#include "sdk/web/module/web_client.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "sdk/core/lattice/hash.hpp"
+#include "tests/unit/client/fake_server.hpp"
+
+namespace tandem::web {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kMs = client::kMs;
+
+/// A viewer, and a gateway that is the test.
+class WebClientTest : public ::testing::Test {
+ protected:
+  WebClientTest() : viewer({.id = 77, .role = ClientRole::kParticipant, .lead = 1, .log = {}}) {}
+
+  template <class M>
+  void give(const M& message) {
+    transport::Bytes bytes;
+    transport::write_envelope(message, bytes);
+    ASSERT_TRUE(viewer.port().receive(bytes));
+  }
+  client::Now now() const { return {now_ns, now_ns + 500 * kMs}; }
+  void poll(std::int64_t later_ns = kMs) {
+    now_ns += later_ns;
+    viewer.poll(now());
+    while (const auto message = viewer.port().next_message())
+      sent.push_back(*transport::read_viewer_envelope(*message));
+  }
+  void frame() {
+    give(server.advance(now_ns));
+    poll(client::kFrameNs);
+  }
+  void join() {
+    viewer.port().connected();
+    give(server.session);
+    poll();
+    ASSERT_FALSE(sent.empty());
+    give(server.advance(now_ns));
+    give(server.snapshot());
+    poll();
+    ASSERT_EQ(viewer.core().phase(), ClientPhase::kPlaying);
+  }
+
+  client::FakeServer server;
+  WebClient viewer;
+  std::vector<transport::ViewerMessage> sent;
+  std::int64_t now_ns = 1'000'000'000'000;
+};
+
+TEST_F(WebClientTest, PlaysWhateverSessionTheGatewayHas) {
+  server.session.session = "anything";
+  join();
+  const auto& ack = std::get<transport::AckMessage>(sent[0]);
+  EXPECT_EQ(ack.client, 77U);
+  EXPECT_EQ(ack.phase, transport::Phase::kJoining);
+  for (int i = 0; i < 5; ++i) frame();
+  EXPECT_EQ(viewer.core().timeline()->hash(), server.hashes[6]);
+}
+
+TEST_F(WebClientTest, TellsEachFrameOnceWithItsHash) {
+  join();
+  EXPECT_EQ(viewer.take_events(), R"([{"type":"session","epoch":1000}])");
+  frame();
+  const std::string events = viewer.take_events();
+  EXPECT_THAT(events,
+              HasSubstr(R"([{"type":"applied","epoch":1000,"frame":2,"hash":")" + to_hex(server.hashes[2])));
+  EXPECT_EQ(viewer.take_events(), "");
+  frame();
+  frame();
+  EXPECT_THAT(viewer.take_events(), HasSubstr(R"(},{"type":"applied","epoch":1000,"frame":4)"));
+}
+
+TEST_F(WebClientTest, EventsThatNobodyTakesAreBounded) {
+  join();
+  for (int i = 0; i < 20'000; ++i) frame();
+  EXPECT_LT(viewer.take_events().size(), 1'100'000U);
+  frame();
+  EXPECT_THAT(viewer.take_events(), HasSubstr(R"("frame":20002)"));
+}
+
+TEST_F(WebClientTest, MarksWhatTheLastDeltaCorrected) {
+  join();
+  frame();
+  const auto corrected = viewer.core().timeline()->corrected();
+  ASSERT_FALSE(corrected.empty());
+  std::vector<Slot> marked;
+  for (Slot slot = 0; slot < viewer.corrected().size(); ++slot) {
+    if (viewer.corrected()[slot] != 0) marked.push_back(slot);
+  }
+  EXPECT_EQ(marked, std::vector<Slot>(corrected.begin(), corrected.end()));
+  EXPECT_THAT(viewer.status(), HasSubstr("\"corrected\":" + std::to_string(marked.size())));
+}
+
+TEST_F(WebClientTest, InputsLeaveAndTheirOutcomesAreTold) {
+  join();
+  frame();
+  static_cast<void>(viewer.take_events());
+  const auto number = viewer.send(transport::InputKind::kGravity, {0, -1, 0}, {}, now());
+  ASSERT_TRUE(number);
+  poll();
+  transport::ReplyMessage reply;
+  reply.client = 77;
+  reply.epoch = 1000;
+  reply.role = transport::Role::kParticipant;
+  reply.phase = transport::Phase::kPlaying;
+  reply.highest_input = *number;
+  reply.entries = {{*number, 3, 0}};
+  give(reply);
+  frame();
+  EXPECT_THAT(viewer.take_events(),
+              HasSubstr(R"({"type":"outcome","number":1,"kind":"acted","frame":3,"reason":"")"));
+  const auto number_refused = viewer.send(transport::InputKind::kGravity, {0, -1, 0}, {}, now());
+  reply.highest_input = *number_refused;
+  reply.entries = {{*number_refused, 0, static_cast<std::uint32_t>(transport::Reason::kRateLimited)}};
+  give(reply);
+  poll();
+  EXPECT_THAT(viewer.take_events(),
+              HasSubstr(R"("kind":"refused","frame":0,"reason":"input refused: too many)"));
+}
+
+TEST_F(WebClientTest, LagIsByTheServersClock) {
+  join();
+  // Stamped 20 ms before they are applied, by a clock that is a day ahead, and echoed 20 ms on either way.
+  constexpr std::int64_t kAheadNs = 86'400'000 * kMs;
+  transport::ReplyMessage reply;
+  reply.client = 77;
+  reply.epoch = 1000;
+  for (int i = 0; i < 60; ++i) {
+    reply.client_clock_ns = now_ns - 40 * kMs;
+    reply.server_time_ns = now_ns - 20 * kMs + kAheadNs;
+    give(reply);
+    give(server.advance(now_ns + client::kFrameNs - 20 * kMs + kAheadNs));
+    poll(client::kFrameNs);
+  }
+  EXPECT_THAT(viewer.status(), HasSubstr("\"lagMs\":20,"));
+}
+
+TEST_F(WebClientTest, AnotherConnectionJoinsTheSameEpochAnew) {
+  join();
+  frame();
+  viewer.port().disconnected();
+  poll();
+  EXPECT_THAT(viewer.status(), HasSubstr(R"("serverAlive":false)"));
+  sent.clear();
+  join();
+  frame();
+  EXPECT_EQ(viewer.core().timeline()->hash(), server.hashes[server.frame()]);
+  EXPECT_EQ(viewer.core().statistics().resyncs, 0U);
+}
+
+TEST_F(WebClientTest, WhatTheSessionSaysOfItselfIsThereOnceItIsKnown) {
+  EXPECT_EQ(viewer.types(), "[]");
+  EXPECT_EQ(viewer.scene_description(), "");
+  EXPECT_EQ(viewer.sample(SampleMode::kExtrapolate, now()), nullptr);
+  server.session.scene_description = "planes {}";
+  server.session.types[0].name = "b\"all";
+  join();
+  EXPECT_THAT(viewer.types(), HasSubstr(R"([{"name":"b\u0022all","radius":0.1)"));
+  EXPECT_THAT(viewer.types(), HasSubstr(R"("colour":"#ffffffff","shape":"sphere","shapeValues":[]}])"));
+  EXPECT_EQ(viewer.scene_description(), "planes {}");
+  const Sample* const sample = viewer.sample(SampleMode::kExtrapolate, now());
+  ASSERT_NE(sample, nullptr);
+  EXPECT_EQ(sample->capacity, 40U);
+}
+
+}  // namespace
+}  // namespace tandem::web
