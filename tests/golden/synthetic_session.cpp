@@ -14,7 +14,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0xA1D3C4D17368AEE5;
+constexpr std::uint64_t kGolden = 0xC77C5A9AA05225EB;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field";
 struct Session {

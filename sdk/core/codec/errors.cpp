@@ -58,14 +58,25 @@ std::array<std::int64_t, 3> rough_turn_between(const Quaternion& from, const Qua
   return spin;
 }
 
+// The same direction, at most 2 rad long.
+Spin shortened(std::array<std::int64_t, 3> spin) {
+  std::uint64_t squared = 0;
+  for (const std::int64_t a : spin) squared += static_cast<std::uint64_t>(a * a);
+  const auto length = static_cast<std::int64_t>(square_root(squared)) + 1;
+  if (length > kSpinLimit) {
+    for (std::int64_t& a : spin) a = a * kSpinLimit / length;
+  }
+  return limited_spin(spin);
+}
+
 }  // namespace
 
 Spin turn_between(const Quaternion& from, const Quaternion& to) {
-  const Spin rough = limited_spin(rough_turn_between(from, to));
+  const Spin rough = shortened(rough_turn_between(from, to));
   // What it is off by turns about the same axis.
   std::array<std::int64_t, 3> spin = rough_turn_between(turned(from, rough), to);
   for (std::size_t i = 0; i < 3; ++i) spin[i] += rough[i];
-  return limited_spin(spin);
+  return shortened(spin);
 }
 
 void mark_suspects(const State& state, const State& target, const Block& block, std::int32_t threshold,

@@ -45,7 +45,7 @@ void for_each_surface_beyond(const State& state, const State& target, const Bloc
 }
 
 /// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes
-/// more than 2 rad, half of one or less.
+/// more than 2 rad, 2 rad of it.
 [[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
 
 /// Marks (1) the slots of a block that may be off by more than `threshold`, and none of the others (0) is.

@@ -240,5 +240,23 @@ TEST(TrackerTurns, TheErrorOfASurfaceIsThatOfItsWorstPoint) {
   }
 }
 
+TEST(TrackerTurns, OfATurnBeyondTheLimitAsMuchAsOneFrameCanTakeIsFound) {
+  Random random(7);
+  for (int i = 0; i < 1000; ++i) {
+    const BodyState a = tumbling_body(random);
+    // Twice by up to 1.5 rad about one axis.
+    const Spin by = limited_spin({random.value(1 << 29), random.value(1 << 29), random.value(1 << 29)});
+    const auto length_of = [](const Spin& spin) {
+      return std::ldexp(std::hypot(1.0 * spin[0], 1.0 * spin[1], 1.0 * spin[2]), -28);
+    };
+    if (length_of(by) < 1.001 || length_of(by) > 1.5) continue;
+    const Spin turn = turn_between(a.q, turned(turned(a.q, by), by));
+    EXPECT_TRUE(valid_spin(turn));
+    EXPECT_NEAR(length_of(turn), 2, 1e-6);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(turn[axis], 2 / length_of(by) * by[axis], kSpinLimit * 1e-3) << "axis " << axis;
+  }
+}
+
 }  // namespace
 }  // namespace tandem
