@@ -38,6 +38,12 @@ def surface(row, which):
     return row[f"{which}_surface_error"] / row["threshold"]
 
 
+def largest(row):
+    """Bold where it is beyond the threshold."""
+    most = surface(row, "max")
+    return f"{most:.2f}" if most < 1.005 else f"**{most:.2f}**"
+
+
 def gains(measured, percent, predictor):
     """Of `tracker` over `entropy`, by recording."""
     return {f"{name}-{hz}": own[hz, percent, "entropy"]["bytes"] / own[hz, percent, predictor]["bytes"]
@@ -74,12 +80,11 @@ def gain_table(measured):
         for hz in RATES:
             for percent, error in rigid.ERRORS.items():
                 entropy, ballistic, field = (own[hz, percent, what] for what in ("entropy", *PREDICTORS))
-                most = surface(entropy, "max")
                 line = [f"`{name}-{hz}`", f"{1000 * error:g}", f"{entropy['bytes']:.0f}", f"{surface(entropy, 'rms'):.2f}",
-                        f"{most:.2f}" if most < 1.005 else f"**{most:.2f}**"]  # fmt: skip
+                        largest(entropy)]  # fmt: skip
                 for row in (ballistic, field):
                     line += [f"{row['bytes']:.1f}", at_least(entropy["bytes"] / row["bytes"], FLOORS[percent][1]),
-                             f"{surface(row, 'rms'):.2f}", f"{surface(row, 'max'):.3f}"]  # fmt: skip
+                             f"{surface(row, 'rms'):.2f}", largest(row)]  # fmt: skip
                 lines.append([*line, f"{ballistic['at_rest_per_frame']:.0f}", own[hz, "auto"]])
     columns = [f"{predictor}{what}" for predictor in PREDICTORS for what in ("", ": gain", ": RMS", ": max")]
     return table(["recording", "mm", "entropy", "RMS", "max", *columns, "at rest", "auto"], lines)
@@ -116,8 +121,8 @@ of that: {errors} mm. Gain: bytes of `entropy` over those of `tracker`; bold whe
 surface error over the threshold; at most {MOST_RMS} is asked. None of the seeds anything was tuned on.
 
 {summary_table(measured)}
-Bytes a frame. RMS and max: of the surface error over the threshold. At rest: bodies with `ballistic`, in the mean. Where the
-max of `entropy` is bold it does not keep to the threshold ([README.md](README.md)). Auto: what `--predictor auto` takes.
+Bytes a frame. RMS and max: of the surface error over the threshold. At rest: bodies with `ballistic`, in the mean. A max
+in bold is beyond the threshold; why, says [README.md](README.md). Auto: what `--predictor auto` takes.
 
 {gain_table(measured)}
 ### Positions alone
