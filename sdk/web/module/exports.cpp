@@ -32,6 +32,7 @@ struct SampleView {
   const TypeId* types = nullptr;
   const BodyChange* changes = nullptr;
   const std::uint8_t* corrected = nullptr;
+  const std::uint32_t* corrected_in = nullptr;
 };
 
 struct Instance {
@@ -146,7 +147,8 @@ const SampleView* tandem_sample(Instance* instance, std::uint32_t mode, double s
                     .generation = sample->generation.data(),
                     .types = sample->types.data(),
                     .changes = sample->changes.data(),
-                    .corrected = instance->client.corrected().data()};
+                    .corrected = instance->client.corrected().data(),
+                    .corrected_in = instance->client.corrected_in().data()};
   return &instance->view;
 }
 

@@ -56,6 +56,16 @@ const char* name_of(transport::Shape shape) {
 
 std::string colour(std::uint32_t rgba) { return "#" + to_hex(rgba).substr(8); }
 
+/// In force, scene units / s^2; zero before a snapshot.
+std::array<double, 3> gravity(const client::ClientCore& core) {
+  std::array<double, 3> result{};
+  if (core.timeline() == nullptr || core.session() == nullptr) return result;
+  const double rate_hz = core.session()->frame_rate_hz;
+  const double scale = core.session()->lattice_unit / 64 * rate_hz * rate_hz;
+  for (std::size_t axis = 0; axis < 3; ++axis) result[axis] = core.timeline()->drive().gravity[axis] * scale;
+  return result;
+}
+
 void write(JsonWriter& json, const transport::ServerStatusMessage& server) {
   json.begin_object()
       .member("session", server.session)
@@ -106,6 +116,7 @@ void WebClient::add_event(const char* type, Fill&& fill) {
 
 void WebClient::on_session(const transport::SessionMessage& session) {
   corrected_.assign(session.capacity, 0);
+  corrected_in_.assign(session.capacity, 0);
   lag_ns_.reset();
   add_event("session", [&](JsonWriter& json) { json.member("epoch", session.epoch); });
 }
@@ -113,7 +124,10 @@ void WebClient::on_session(const transport::SessionMessage& session) {
 void WebClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
   const std::span<const Slot> corrected = core_.timeline()->corrected();
   std::fill(corrected_.begin(), corrected_.end(), std::uint8_t{0});
-  for (const Slot slot : corrected) corrected_[slot] = 1;
+  for (const Slot slot : corrected) {
+    corrected_[slot] = 1;
+    corrected_in_[slot] = static_cast<std::uint32_t>(delta.frame);
+  }
   corrected_count_ = static_cast<std::uint32_t>(corrected.size());
   if (const auto server_ns = core_.server_wall_ns(polled_ns_)) {
     const auto lag_ns = static_cast<double>(*server_ns) - static_cast<double>(delta.server_time_ns);
@@ -187,7 +201,10 @@ std::string WebClient::status() const {
       .member("inputsActed", status.inputs_acted)
       .member("inputsRefused", status.inputs_refused)
       .member("inputsUnknown", status.inputs_unknown)
-      .name("server");
+      .name("gravity")
+      .begin_list();
+  for (const double axis : gravity(core_)) json.value(axis);
+  json.end_list().name("server");
   server ? write(json, *server) : static_cast<void>(json.null());
   json.end_object();
   return out;

@@ -62,6 +62,9 @@ class WebClient final : private client::CoreListener {
   [[nodiscard]] const Sample* sample(SampleMode mode, client::Now now);
   /// Of each slot 1 where the last delta applied corrected the body.
   [[nodiscard]] std::span<const std::uint8_t> corrected() const { return corrected_; }
+  /// Of each slot the frame, modulo 2^32, of the last delta that corrected it; 0 where none of this epoch
+  /// did.
+  [[nodiscard]] std::span<const std::uint32_t> corrected_in() const { return corrected_in_; }
 
  private:
   // Events are bounded by what one poll applies, and dropped where nobody takes them.
@@ -78,6 +81,7 @@ class WebClient final : private client::CoreListener {
   client::ClientCore core_;
   std::string events_;
   std::vector<std::uint8_t> corrected_;
+  std::vector<std::uint32_t> corrected_in_;
   std::uint32_t corrected_count_ = 0;
   std::int64_t polled_ns_ = 0;    ///< steady
   std::optional<double> lag_ns_;  ///< publish to applied by the server's clock, over about half a second

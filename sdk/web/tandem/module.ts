@@ -134,9 +134,9 @@ export class Module {
     // SampleView: f64, then words of 32 bits.
     const buffer = this.#exports.memory.buffer;
     const frame = new Float64Array(buffer, at, 1)[0] as number;
-    const words = new Uint32Array(buffer, at + 8, 8);
-    const [capacity, positions, orientations, alive, generation, types, changes, corrected] = words as unknown as [
-      number, number, number, number, number, number, number, number,
+    const words = new Uint32Array(buffer, at + 8, 9);
+    const [capacity, positions, orientations, alive, generation, types, changes, corrected, correctedIn] = words as unknown as [
+      number, number, number, number, number, number, number, number, number,
     ];
     return {
       frame,
@@ -148,6 +148,7 @@ export class Module {
       types: new Uint16Array(buffer, types, capacity),
       changes: new Uint8Array(buffer, changes, capacity),
       corrected: new Uint8Array(buffer, corrected, capacity),
+      correctedIn: new Uint32Array(buffer, correctedIn, capacity),
     };
   }
 

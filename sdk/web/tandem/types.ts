@@ -121,6 +121,8 @@ export interface ModuleStatus {
   inputsActed: number;
   inputsRefused: number;
   inputsUnknown: number;
+  /** In force, scene units / s^2; zero before a snapshot. */
+  gravity: [number, number, number];
   server: ServerStatus | null;
 }
 
@@ -175,6 +177,8 @@ export interface Sample {
   changes: Uint8Array;
   /** 1 where the last delta applied corrected the body. */
   corrected: Uint8Array;
+  /** The frame, modulo 2^32, of the last delta that corrected the body; 0 where none of this epoch did. */
+  correctedIn: Uint32Array;
 }
 
 export interface SessionEvent {

@@ -96,6 +96,26 @@ TEST_F(WebClientTest, MarksWhatTheLastDeltaCorrected) {
   EXPECT_THAT(viewer.status(), HasSubstr("\"corrected\":" + std::to_string(marked.size())));
 }
 
+TEST_F(WebClientTest, RemembersTheFrameOfEachBodysLastCorrection) {
+  join();
+  std::vector<std::uint32_t> expected(server.session.capacity);
+  for (std::uint32_t i = 2; i < 8; ++i) {
+    frame();
+    for (const Slot slot : viewer.core().timeline()->corrected()) expected[slot] = i;
+  }
+  EXPECT_EQ(expected, std::vector<std::uint32_t>(viewer.corrected_in().begin(), viewer.corrected_in().end()));
+  EXPECT_NE(expected, std::vector<std::uint32_t>(server.session.capacity));
+}
+
+TEST_F(WebClientTest, TellsTheGravityInForceInSceneUnits) {
+  EXPECT_THAT(viewer.status(), HasSubstr(R"("gravity":[0,0,0])"));
+  join();
+  give(server.schedule(-300));
+  for (int i = 0; i < 4; ++i) frame();
+  // 300 / 64 lattice units of 0.001 a frame^2, at 30 frames a second.
+  EXPECT_THAT(viewer.status(), HasSubstr(R"("gravity":[0,-4.21875,0])"));
+}
+
 TEST_F(WebClientTest, InputsLeaveAndTheirOutcomesAreTold) {
   join();
   frame();
