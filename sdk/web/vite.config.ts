@@ -6,5 +6,5 @@ export default defineConfig({
     target: 'es2022',
     lib: { entry: 'tandem/index.ts', formats: ['es'], fileName: 'tandem' },
   },
-  test: { include: ['tandem/test/**/*.test.ts'], testTimeout: 60_000 },
+  test: { include: ['tandem/test/**/*.test.ts', 'viewer/test/**/*.test.ts'], testTimeout: 60_000 },
 });

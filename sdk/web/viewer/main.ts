@@ -1,0 +1,211 @@
+// The page: joins the session of the gateway that served it, draws its bodies, and sends what the user does to them.
+
+import { Client, type LogLevel, type OutcomeEvent, type SampleMode, type Status } from '../tandem';
+import { chooseColours, showLegend } from './choices';
+import type { ColourMode } from './colours';
+import { GravityControls } from './gravity_controls';
+import { noticeOf, ripple, showNotice, toast, type Notice } from './notices';
+import { element, Panel, threeDigits, type Drawing } from './panel';
+import { pick } from './pick';
+import type { Vec3 } from './scene_text';
+import { Stage } from './stage';
+import { World } from './world';
+
+const figuresEveryMs = 250;
+const tapMs = 350;
+const tapPixels = 8;
+/** A push takes the neighbours along: its reach in radii of the body. */
+const pushReachRadii = 3;
+/** Radii a second; the server's own limit, where the scene names none, is 100. */
+const pushRadiiPerS = 30;
+
+/** Of the page's own address, with its token. */
+function gatewayUrl(): string {
+  const url = new URL(`tandem${location.search}`, document.baseURI);
+  url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
+  return url.href;
+}
+
+class Page {
+  private readonly stage: Stage;
+  private readonly panel = new Panel();
+  private readonly gravity: GravityControls;
+  private world: World | null = null;
+  private sceneShown = '';
+  private sessionChanged = true;
+  private epoch = 0;
+  private applied = 0;
+  private colourMode: ColourMode = 'type';
+  private radii: number[] = [];
+  private readonly sent = new Map<number, string>();
+  private readonly drawn: { at: number; ms: number }[] = [];
+  private figuresAt = 0;
+  private seen = false;
+
+  constructor(private readonly client: Client) {
+    const canvas = element<HTMLCanvasElement>('world');
+    this.stage = new Stage(canvas);
+    this.gravity = new GravityControls(
+      () => this.stage.axes().map((axis) => axis.toArray()) as [Vec3, Vec3, Vec3],
+      (gravity) => this.send('gravity', () => this.client.sendGravity(gravity)),
+    );
+    chooseColours((mode) => {
+      this.colourMode = mode;
+      this.panelsChanged();
+    });
+    this.followTaps(canvas);
+    element('reframe').addEventListener('click', () => this.world && this.stage.frame(this.world.extent));
+    new ResizeObserver(() => this.panelsChanged()).observe(element('panel'));
+    new ResizeObserver(() => this.panelsChanged()).observe(element('controls'));
+    client.on('session', ({ epoch }) => this.sessionBegan(epoch));
+    client.on('applied', ({ frame }) => (this.applied = frame));
+    client.on('outcome', (outcome) => this.showOutcome(outcome));
+    client.on('phase', () => (this.figuresAt = 0));
+    requestAnimationFrame((now) => this.draw(now));
+  }
+
+  /** What scripts and tests see as globalThis.tandem. */
+  readonly forScripts = {
+    status: (): Status & { drawing: Drawing } => ({ ...this.client.status(), drawing: this.drawing() }),
+    sample: (mode?: SampleMode) => this.client.sample(mode),
+    project: (point: Vec3) => this.stage.project(point),
+  };
+
+  private sessionBegan(epoch: number): void {
+    if (this.epoch !== 0 && epoch !== this.epoch) toast('The server was restarted: a new run has begun');
+    this.epoch = epoch;
+    this.sessionChanged = true;
+    this.applied = 0;
+    this.panel.clear();
+    this.sent.clear();
+  }
+
+  private draw(now: number): void {
+    requestAnimationFrame((next) => this.draw(next));
+    const began = performance.now();
+    this.updateWorld();
+    this.gravity.draw();
+    this.world?.beforeRender();
+    this.stage.render(now);
+    if (this.world && !this.seen) performance.mark('tandem-first-picture');
+    this.seen = this.world !== null;
+    this.drawn.push({ at: now, ms: performance.now() - began });
+    while (this.drawn.length > 1 && this.drawn[0].at <= now - 1000) this.drawn.shift();
+    if (now >= this.figuresAt + figuresEveryMs) {
+      this.figuresAt = now;
+      this.showFigures();
+    }
+  }
+
+  private updateWorld(): void {
+    const types = this.sessionChanged ? this.client.types() : [];
+    const description = this.sessionChanged ? this.client.sceneDescription() : '';
+    const sample = this.client.sample('extrapolate');
+    if (!sample) return;
+    if (this.sessionChanged || this.world?.bodies.capacity !== sample.capacity) {
+      this.world?.dispose();
+      this.world = new World(this.stage, types, description, sample);
+      this.sessionChanged = false;
+      this.radii = types.map((type) => type.radius);
+      this.gravity.setScene(this.world.scene);
+      if (this.world.sceneError) toast(`The scene’s geometry cannot be drawn: ${this.world.sceneError}`, true);
+      if (description !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
+      this.sceneShown = description;
+    }
+    this.world.colours.mode = this.colourMode;
+    this.world.update(sample, this.applied);
+  }
+
+  private showFigures(): void {
+    const status = this.client.status();
+    this.panel.update(status, this.drawing());
+    if (Math.hypot(...status.gravity) > 0) this.gravity.show(status.gravity);
+    this.gravity.setAllowed(status.phase === 'playing' && status.role === 'participant');
+    if (this.world) showLegend(this.world.colours, this.world.types);
+    showNotice(noticeOf(status));
+  }
+
+  private drawing(): Drawing {
+    const sorted = this.drawn.map(({ ms }) => ms).sort((a, b) => a - b);
+    const span = this.drawn.length > 1 ? this.drawn[this.drawn.length - 1].at - this.drawn[0].at : 0;
+    const framesPerSecond = span > 0 ? (1000 * (this.drawn.length - 1)) / span : 0;
+    return { framesPerSecond, msP50: sorted[sorted.length >> 1] ?? 0 };
+  }
+
+  private followTaps(canvas: HTMLCanvasElement): void {
+    let down: { id: number; x: number; y: number; at: number } | null = null;
+    canvas.addEventListener('pointerdown', (event) => {
+      down = event.isPrimary && event.button === 0 ? { id: event.pointerId, x: event.clientX, y: event.clientY, at: event.timeStamp } : null;
+    });
+    canvas.addEventListener('pointerup', (event) => {
+      const tapped = down && down.id === event.pointerId && event.timeStamp - down.at < tapMs;
+      if (tapped && Math.hypot(event.clientX - down!.x, event.clientY - down!.y) < tapPixels) {
+        this.push(event.clientX, event.clientY, event.pointerType === 'touch' ? 14 : 3);
+      }
+      down = null;
+    });
+  }
+
+  /** Pushes the body under a place of the page away from the viewer. */
+  private push(x: number, y: number, slackPixels: number): void {
+    const sample = this.client.sample('extrapolate');
+    if (!sample || !this.world) return;
+    const { origin, direction, pixel } = this.stage.ray(x, y);
+    const slot = pick(sample, this.radii, origin, direction, slackPixels * pixel);
+    if (slot < 0) return;
+    const centre = Array.from(sample.positions.subarray(3 * slot, 3 * slot + 3)) as Vec3;
+    const radius = this.radii[sample.types[slot]];
+    const limit = this.world.scene.maxPush || Infinity;
+    const speed = Math.min(pushRadiiPerS * radius, limit);
+    const velocity = direction.map((c) => c * speed) as Vec3;
+    ripple(x, y);
+    this.send(`push of ${threeDigits(speed)} m/s at body ${slot}`, () => this.client.sendPush(centre, pushReachRadii * radius, velocity));
+  }
+
+  private send(what: string, send: () => number): void {
+    try {
+      this.sent.set(send(), what);
+    } catch (error) {
+      toast(`${what}: ${error instanceof Error ? error.message : error}`, true);
+    }
+  }
+
+  private showOutcome({ number, kind, frame, reason, latencyMs }: OutcomeEvent): void {
+    const what = this.sent.get(number) ?? 'input';
+    this.sent.delete(number);
+    if (kind !== 'acted') toast(`${what}: ${kind === 'refused' ? `refused, ${reason}` : 'outcome unknown'}`, true);
+    else if (what !== 'gravity') toast(`${what} acted in frame ${frame.toLocaleString('en')}, after ${latencyMs.toFixed(0)} ms`);
+  }
+
+  /** The world keeps to what the panels leave free. */
+  private panelsChanged(): void {
+    const panel = element('panel').getBoundingClientRect();
+    const controls = element('controls').getBoundingClientRect();
+    const narrow = matchMedia('(max-width: 720px)').matches;
+    const open = element('panel').classList.contains('open');
+    if (narrow && open) return;
+    this.stage.setInsets(
+      narrow
+        ? { top: panel.bottom, right: 0, bottom: innerHeight - controls.top, left: 0 }
+        : { top: 0, right: innerWidth - panel.left, bottom: innerHeight - element('look').getBoundingClientRect().top, left: 0 },
+    );
+  }
+}
+
+async function start(): Promise<void> {
+  if (typeof WebAssembly !== 'object') {
+    throw new Error('This browser has no WebAssembly, in which the client is written.');
+  }
+  const role = new URLSearchParams(location.search).has('observe') ? 'observer' : 'participant';
+  const wasm = { plain: new URL('tandem.wasm', document.baseURI), simd: new URL('tandem-simd.wasm', document.baseURI) };
+  const log = (level: LogLevel, text: string) => void (level !== 'info' && toast(text, true));
+  const client = await Client.connect({ url: gatewayUrl(), role, wasm, log });
+  Object.assign(globalThis, { tandem: new Page(client).forScripts });
+}
+
+showNotice(noticeOf({ phase: 'connecting', reason: '' }));
+start().catch((error: unknown) => {
+  const notice: Notice = { title: 'This page cannot run', text: error instanceof Error ? error.message : String(error), kind: 'bad' };
+  showNotice(notice);
+  throw error;
+});

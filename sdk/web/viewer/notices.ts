@@ -1,0 +1,67 @@
+// What the page says in words: a card while there is nothing to see or something is wrong, and a line that passes.
+
+import type { Status } from '../tandem';
+import { element } from './panel';
+
+export interface Notice {
+  title: string;
+  text: string;
+  kind: 'wait' | 'bad';
+}
+
+/** What to say about a status; null while all is well. */
+export function noticeOf(status: Pick<Status, 'phase' | 'reason'>): Notice | null {
+  const { phase, reason } = status;
+  switch (phase) {
+    case 'connecting':
+      return { title: 'Connecting', text: reason || 'to the gateway …', kind: 'wait' };
+    case 'searching':
+      return { title: 'Waiting for the server', text: reason || 'The gateway sees no running session. This page goes on by itself.', kind: 'wait' };
+    case 'refused':
+      return { title: 'Refused', text: reason || 'The gateway does not let this page in.', kind: 'bad' };
+    case 'joining':
+      return { title: 'Joining', text: reason || 'A snapshot is on its way …', kind: 'wait' };
+    case 'lost':
+      // Without a reason the gateway is there, and says that its server is not.
+      return reason
+        ? { title: 'Connection lost', text: `${reason}; trying again`, kind: 'wait' }
+        : { title: 'The server is gone', text: 'This page goes on as soon as it is back.', kind: 'wait' };
+    case 'closed':
+      return { title: 'Closed', text: reason, kind: 'bad' };
+    case 'playing':
+      return null;
+  }
+}
+
+export function showNotice(notice: Notice | null): void {
+  const state = element('state');
+  state.hidden = notice === null;
+  if (!notice) return;
+  state.dataset.kind = notice.kind;
+  for (const [id, text] of [['stateTitle', notice.title], ['stateText', notice.text]]) {
+    if (element(id).textContent !== text) element(id).textContent = text;
+  }
+}
+
+const toastMs = 4000;
+let toastTimer: ReturnType<typeof setTimeout> | undefined;
+
+/** One line that goes away again. */
+export function toast(text: string, bad = false): void {
+  const line = element('toast');
+  line.textContent = text;
+  line.classList.toggle('bad', bad);
+  line.classList.add('shown');
+  clearTimeout(toastTimer);
+  toastTimer = setTimeout(() => line.classList.remove('shown'), toastMs);
+}
+
+/** A ring that spreads from a place of the page. */
+export function ripple(x: number, y: number): void {
+  const ring = document.createElement('div');
+  ring.className = 'ripple';
+  ring.style.left = `${x}px`;
+  ring.style.top = `${y}px`;
+  ring.addEventListener('animationend', () => ring.remove());
+  document.body.append(ring);
+}

@@ -1,0 +1,101 @@
+// The figures beside the world.
+
+import type { Status } from '../tandem';
+import { History } from './history';
+
+const historyLength = 240;
+const plots = { rate: '#7cc7ff', corrected: '#ffb03b', lag: '#5fd38d', work: '#c3a6ff' };
+type Plot = keyof typeof plots;
+
+export function element<T extends HTMLElement = HTMLElement>(id: string): T {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`the page has no #${id}`);
+  return found as T;
+}
+
+/** Three digits that matter, without an exponent. */
+export function threeDigits(value: number): string {
+  if (!Number.isFinite(value)) return '–';
+  const digits = value === 0 ? 0 : 2 - Math.floor(Math.log10(Math.abs(value)));
+  return value.toFixed(Math.min(Math.max(digits, 0), 3));
+}
+
+const count = (value: number) => value.toLocaleString('en');
+
+/** Frames drawn in the last second and how long drawing them took. */
+export interface Drawing {
+  framesPerSecond: number;
+  msP50: number;
+}
+
+export class Panel {
+  private readonly histories = Object.fromEntries(
+    Object.keys(plots).map((plot) => [plot, new History(historyLength)]),
+  ) as Record<Plot, History>;
+
+  constructor() {
+    const more = element('more');
+    more.addEventListener('click', () => {
+      const open = element('panel').classList.toggle('open');
+      more.setAttribute('aria-expanded', String(open));
+    });
+  }
+
+  /** A new run of the server: what was before is not compared with it. */
+  clear(): void {
+    for (const history of Object.values(this.histories)) history.clear();
+  }
+
+  update(status: Status, drawing: Drawing): void {
+    const playing = status.phase === 'playing';
+    const phase = element('phase');
+    phase.textContent = status.phase;
+    phase.dataset.phase = status.phase;
+    text('scene', status.scene);
+    text('rate', threeDigits(status.mbitPerS));
+    const share = status.rawMbitPerS > 0 ? (100 * status.mbitPerS) / status.rawMbitPerS : 0;
+    text('raw', status.rawMbitPerS > 0 ? `${threeDigits(share)} % of ${threeDigits(status.rawMbitPerS)} raw` : '');
+    text('corrected', count(status.corrected));
+    text('bodies', `of ${count(status.bodies)} bodies, ${count(status.atRest)} at rest`);
+    text('lag', threeDigits(status.lagMs));
+    text('roundTrip', `round trip ${threeDigits(status.roundTripMs)} ms`);
+    text('work', threeDigits(status.frameMs.p50));
+    text('drawing', `p99 ${threeDigits(status.frameMs.p99)} · ${drawing.framesPerSecond.toFixed(0)} pictures a second`);
+    text('hashHex', status.stateHash || '–');
+    const good = status.hashMismatches === 0;
+    element('hash').dataset.good = status.framesApplied === 0 ? '' : good ? 'yes' : 'no';
+    text('hashState', status.framesApplied === 0 ? '–' : good ? 'equal to the server’s' : `${count(status.hashMismatches)} mismatches`);
+    text('hashNote', `${count(status.framesApplied)} frames applied, ${count(status.hashMismatches)} mismatches${status.resyncs ? `, ${status.resyncs} rejoins` : ''}`);
+    text('session', sessionLine(status));
+    if (playing) {
+      this.histories.rate.add(status.mbitPerS);
+      this.histories.corrected.add(status.corrected);
+      this.histories.lag.add(status.lagMs);
+      this.histories.work.add(status.frameMs.p50);
+    }
+    for (const figure of document.querySelectorAll<HTMLElement>('[data-plot]')) {
+      const plot = figure.dataset.plot as Plot;
+      const canvas = figure.querySelector('canvas');
+      if (canvas) this.histories[plot].draw(canvas, plots[plot]);
+    }
+  }
+}
+
+function sessionLine(status: Status): string {
+  const parts = [`frame ${count(status.frame)} at ${threeDigits(status.frameRateHz)} Hz`, `${status.codec}, ${status.predictor}`];
+  if (status.server) {
+    const { participants, observers } = status.server;
+    parts.push(`${several(participants, 'participant')}, ${several(observers, 'observer')}`);
+  }
+  parts.push(`here: ${status.role}${status.simd ? ', with SIMD' : ''}`);
+  return parts.join(' · ');
+}
+
+function several(number: number, what: string): string {
+  return `${count(number)} ${what}${number === 1 ? '' : 's'}`;
+}
+
+function text(id: string, value: string): void {
+  const target = element(id);
+  if (target.textContent !== value) target.textContent = value;
+}

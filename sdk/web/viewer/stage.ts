@@ -1,0 +1,165 @@
+// Camera, controls and renderer.
+
+import { PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type Object3D } from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { add, type Extent } from './room';
+import type { Vec3 } from './scene_text';
+import { background, shadingUniforms } from './shading';
+
+/** Pixels at the edges that panels cover. */
+export interface Insets {
+  top: number;
+  right: number;
+  bottom: number;
+  left: number;
+}
+
+const maxPixelRatio = 2;
+const slowFrameMs = 40;
+const viewFrom = new Vector3(0.5, 0.42, 1).normalize();
+
+/**
+ * How far from the extent's centre a camera that looks along -`back` must be for all of it to be seen: every corner
+ * lies within both opening angles. `tanX`, `tanY`: tangents of the half angles.
+ */
+export function framingDistance(extent: Extent, back: Vector3, right: Vector3, up: Vector3, tanX: number, tanY: number): number {
+  const half = add(extent.high, extent.low, -1).map((x) => x / 2);
+  let distance = 0;
+  for (let corner = 0; corner < 8; ++corner) {
+    const at = new Vector3(...half.map((x, axis) => (corner & (1 << axis) ? x : -x)));
+    const needed = Math.max(Math.abs(at.dot(right)) / tanX, Math.abs(at.dot(up)) / tanY) + at.dot(back);
+    distance = Math.max(distance, needed);
+  }
+  return distance;
+}
+
+/** Throws where there is no WebGL 2. */
+export class Stage {
+  readonly camera = new PerspectiveCamera(40);
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly controls: OrbitControls;
+  private insets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
+  private pixelRatio = Math.min(window.devicePixelRatio, maxPixelRatio);
+  private slowFrames = 0;
+  private lastRender = 0;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: !drawsInSoftware(), powerPreference: 'high-performance' });
+    this.scene.background = background;
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+  }
+
+  add(object: Object3D): void {
+    this.scene.add(object);
+  }
+
+  remove(object: Object3D): void {
+    this.scene.remove(object);
+  }
+
+  /** What is looked at lies in the middle of what the panels leave free. */
+  setInsets(insets: Insets): void {
+    this.insets = insets;
+    this.resize();
+  }
+
+  /** Looks at all of the extent. */
+  frame(extent: Extent): void {
+    const { camera, controls } = this;
+    controls.target.set(...(add(extent.low, extent.high).map((x) => x / 2) as Vec3));
+    camera.position.copy(controls.target).add(viewFrom);
+    camera.lookAt(controls.target);
+    const [right, up, back] = this.axes();
+    const tan = Math.tan((camera.fov * Math.PI) / 360);
+    const { width, height, free } = this.sizes();
+    const distance = 1.04 * framingDistance(extent, back, right, up, (tan * free.x) / height, (tan * free.y) / height);
+    const size = Math.hypot(...add(extent.high, extent.low, -1));
+    camera.position.copy(controls.target).addScaledVector(viewFrom, distance);
+    camera.near = Math.max(size, distance) / 1000;
+    camera.far = distance + 20 * size;
+    controls.minDistance = 5 * camera.near;
+    controls.maxDistance = distance + 8 * size;
+    shadingUniforms.hazeFrom.value = distance;
+    shadingUniforms.hazeTo.value = distance + 2.5 * size;
+    if (width > 0) camera.updateProjectionMatrix();
+    controls.update();
+  }
+
+  /** Unit vectors of the world that point right, up and towards the viewer on the screen. */
+  axes(): [Vector3, Vector3, Vector3] {
+    const [right, up, back] = [new Vector3(), new Vector3(), new Vector3()];
+    this.camera.updateMatrixWorld();
+    this.camera.matrixWorld.extractBasis(right, up, back);
+    return [right, up, back];
+  }
+
+  /** The ray through a place of the page: origin, unit direction, and what a pixel spans at distance 1. */
+  ray(clientX: number, clientY: number): { origin: Vec3; direction: Vec3; pixel: number } {
+    const area = this.canvas.getBoundingClientRect();
+    const at = new Vector2(((clientX - area.left) / area.width) * 2 - 1, 1 - ((clientY - area.top) / area.height) * 2);
+    const caster = new Raycaster();
+    caster.setFromCamera(at, this.camera);
+    const pixel = 2 / (this.camera.projectionMatrix.elements[5] * area.height);
+    return { origin: caster.ray.origin.toArray(), direction: caster.ray.direction.toArray(), pixel };
+  }
+
+  /** Where on the page a point of the world is drawn, how far it is from the camera, and pixels to the unit there. */
+  project(point: Vec3): { x: number; y: number; distance: number; scale: number } {
+    const area = this.canvas.getBoundingClientRect();
+    const distance = this.camera.position.distanceTo(new Vector3(...point));
+    const at = new Vector3(...point).project(this.camera);
+    return {
+      x: area.left + ((at.x + 1) / 2) * area.width,
+      y: area.top + ((1 - at.y) / 2) * area.height,
+      distance,
+      scale: (this.camera.projectionMatrix.elements[5] * area.height) / 2 / distance,
+    };
+  }
+
+  render(nowMs: number): void {
+    this.controls.update();
+    this.camera.updateMatrixWorld();
+    shadingUniforms.skyUp.value.set(0, 1, 0).transformDirection(this.camera.matrixWorldInverse);
+    this.renderer.render(this.scene, this.camera);
+    this.keepUp(nowMs - this.lastRender);
+    this.lastRender = nowMs;
+  }
+
+  /** Fewer pixels, down to one of the page's, where many frames in a row are slow. */
+  private keepUp(frameMs: number): void {
+    this.slowFrames = frameMs > slowFrameMs ? this.slowFrames + 1 : 0;
+    if (this.slowFrames < 20 || this.pixelRatio <= 1) return;
+    this.slowFrames = 0;
+    this.pixelRatio = Math.max(1, this.pixelRatio * 0.75);
+    this.resize();
+  }
+
+  private sizes(): { width: number; height: number; free: Vector2 } {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { top, right, bottom, left } = this.insets;
+    return { width, height, free: new Vector2(Math.max(width - left - right, 80), Math.max(height - top - bottom, 80)) };
+  }
+
+  private resize(): void {
+    const { width, height } = this.sizes();
+    if (width === 0 || height === 0) return;
+    const { top, right, bottom, left } = this.insets;
+    this.renderer.setPixelRatio(this.pixelRatio);
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
+  }
+}
+
+function drawsInSoftware(): boolean {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  const info = gl?.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? String(gl?.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}

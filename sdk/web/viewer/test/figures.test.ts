@@ -1,0 +1,92 @@
+import { PerspectiveCamera, Vector3 } from 'three';
+import { describe, expect, it } from 'vitest';
+import type { Sample } from '../../tandem';
+import { Colours, packed, parseColour, rampColour } from '../colours';
+import { niceTop } from '../history';
+import { noticeOf } from '../notices';
+import { threeDigits } from '../panel';
+import { framingDistance } from '../stage';
+
+it('figures have three digits', () => {
+  expect([0, 0.0771, 0.3, 5.4321, 54.93, 549.3, 5493].map(threeDigits)).toEqual(['0', '0.077', '0.300', '5.43', '54.9', '549', '5493']);
+  expect(threeDigits(NaN)).toBe('–');
+});
+
+it('scales of plots are 1, 2 or 5 times a power of ten', () => {
+  expect([0, 0.03, 1, 1.1, 6].map(niceTop)).toEqual([1, 0.05, 1, 2, 10]);
+});
+
+it('every phase but playing says something', () => {
+  const phases = ['connecting', 'searching', 'refused', 'joining', 'lost', 'closed'] as const;
+  for (const phase of phases) expect(noticeOf({ phase, reason: '' })?.title).toBeTruthy();
+  expect(noticeOf({ phase: 'playing', reason: '' })).toBeNull();
+  expect(noticeOf({ phase: 'refused', reason: 'token missing or wrong' })?.text).toContain('token');
+});
+
+describe('colours', () => {
+  const type = { name: 'red', radius: 0.5, colour: '#102030ff', shape: 'sphere' as const, shapeValues: [] };
+  const sample = (frame: number, x: number, corrected: number): Sample => ({
+    frame,
+    capacity: 2,
+    positions: Float32Array.of(x, 0, 0, 0, 0, 0),
+    orientations: null,
+    alive: Uint8Array.of(1, 1),
+    generation: new Uint8Array(2),
+    types: new Uint16Array(2),
+    changes: new Uint8Array(2),
+    corrected: Uint8Array.of(corrected, 0),
+    correctedIn: Uint32Array.of(1, 0),
+  });
+
+  it('are parsed, and packed with red lowest', () => {
+    expect(parseColour('#102030ff')).toEqual([16, 32, 48]);
+    expect(packed([16, 32, 48])).toBe(0xff302010);
+    expect(parseColour('blue')).toEqual(parseColour(''));
+  });
+
+  it('tell type, speed, corrections and their age', () => {
+    const colours = new Colours(2, [type], 1 / 30);
+    const tints = new Uint32Array(2);
+    const after = (mode: typeof colours.mode, applied: number, last: Sample) => {
+      colours.mode = mode;
+      colours.fill(last, applied, tints);
+      return [...tints];
+    };
+    colours.follow(sample(1, 0, 1));
+    colours.follow(sample(2, 1, 0));
+    const last = sample(2, 1, 0);
+    expect(after('type', 2, last)).toEqual([0xff302010, 0xff302010]);
+    expect(after('speed', 2, last)).toEqual([packed(rampColour(1)), packed(rampColour(0))]);
+    const [first, second] = after('corrected', 1, sample(1, 0, 1));
+    expect(first).not.toBe(second);
+    const ages = after('age', 2, last);
+    expect(ages[1]).toBe(packed(rampColour(0)));
+    expect(ages[0]).not.toBe(ages[1]);
+  });
+});
+
+it('the camera is framed so that all corners are seen, and barely', () => {
+  const extent = { low: [-30, 0, -15], high: [30, 50, 15] } as const;
+  const camera = new PerspectiveCamera(40, 0.5);
+  const back = new Vector3(0.5, 0.42, 1).normalize();
+  camera.position.copy(back);
+  camera.lookAt(0, 0, 0);
+  const [right, up, towards] = [new Vector3(), new Vector3(), new Vector3()];
+  camera.updateMatrixWorld();
+  camera.matrixWorld.extractBasis(right, up, towards);
+  const tan = Math.tan((20 * Math.PI) / 180);
+  const box = { low: [...extent.low], high: [...extent.high] } as { low: [number, number, number]; high: [number, number, number] };
+  const distance = framingDistance(box, towards, right, up, tan * 0.5, tan);
+  camera.position.set(0, 25, 0).addScaledVector(towards, distance);
+  camera.updateMatrixWorld();
+  let most = 0;
+  for (const x of [-30, 30]) {
+    for (const y of [0, 50]) {
+      for (const z of [-15, 15]) {
+        const at = new Vector3(x, y, z).project(camera);
+        most = Math.max(most, Math.abs(at.x), Math.abs(at.y));
+      }
+    }
+  }
+  expect(most).toBeCloseTo(1);
+});

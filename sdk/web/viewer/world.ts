@@ -1,0 +1,96 @@
+// One session as it is drawn: its bodies, its scenery, its colours.
+
+import type { BodyType, Sample } from '../tandem';
+import { Bodies } from './bodies';
+import { Colours } from './colours';
+import { add, extentOf, grown, join, meet, roomFaces, type Extent } from './room';
+import { Scenery } from './scenery';
+import { emptyScene, readScene, type Scene, type Vec3 } from './scene_text';
+import type { Stage } from './stage';
+
+export class World {
+  readonly bodies: Bodies;
+  readonly colours: Colours;
+  readonly scene: Scene;
+  /** Why nothing of the scene's geometry is drawn; empty when it is. */
+  readonly sceneError: string = '';
+  /** What the camera shows at first. */
+  readonly extent: Extent;
+  private readonly scenery: Scenery;
+
+  /** From the first sample of a session. */
+  constructor(
+    private readonly stage: Stage,
+    readonly types: BodyType[],
+    sceneDescription: string,
+    sample: Sample,
+  ) {
+    try {
+      this.scene = readScene(sceneDescription);
+    } catch (error) {
+      this.scene = emptyScene;
+      this.sceneError = error instanceof Error ? error.message : String(error);
+    }
+    const { shown, walls } = extentsOf(this.scene, bodiesExtent(sample, types));
+    this.extent = shown;
+    this.scenery = new Scenery(this.scene, walls);
+    this.bodies = new Bodies(sample.capacity, types);
+    this.colours = new Colours(sample.capacity, types, this.scene.dt);
+    stage.add(this.scenery.group);
+    stage.add(this.bodies.group);
+  }
+
+  /** `applied` is the frame of the last delta. */
+  update(sample: Sample, applied: number): void {
+    this.colours.follow(sample);
+    this.colours.fill(sample, applied, this.bodies.tints);
+    this.bodies.update(sample);
+  }
+
+  beforeRender(): void {
+    this.scenery.update(this.stage.camera);
+  }
+
+  dispose(): void {
+    this.stage.remove(this.scenery.group);
+    this.stage.remove(this.bodies.group);
+    this.scenery.dispose();
+    this.bodies.dispose();
+  }
+}
+
+function bodiesExtent(sample: Sample, types: BodyType[]): Extent | null {
+  let extent: Extent | null = null;
+  for (let slot = 0; slot < sample.capacity; ++slot) {
+    if (!sample.alive[slot]) continue;
+    const at = Array.from(sample.positions.subarray(3 * slot, 3 * slot + 3)) as Vec3;
+    const radius = types[sample.types[slot]]?.radius ?? 0;
+    const body = { low: at.map((x) => x - radius) as Vec3, high: at.map((x) => x + radius) as Vec3 };
+    extent = extent ? join(extent, body) : body;
+  }
+  return extent;
+}
+
+/** Everything within these walls is drawn; `shown` is what the camera looks at first. */
+export function extentsOf(scene: Scene, bodies: Extent | null): { shown: Extent; walls: Extent } {
+  const bounds = scene.bounds ?? grown(bodies ?? { low: [-1, -1, -1], high: [1, 1, 1] }, 4);
+  const corners = roomFaces(scene.planes, bounds).flatMap((face) => face.corners);
+  const inner = grown(bounds, -1e-6);
+  const closed = corners.every((corner) => corner.every((x, i) => x > inner.low[i] && x < inner.high[i]));
+  const solids = extentOf([
+    ...scene.boxes.flatMap(({ centre, size }) => around(centre, Math.hypot(...size) / 2)),
+    ...scene.spheres.flatMap(({ centre, radius }) => around(centre, radius)),
+  ]);
+  const core = bodies && solids ? join(bodies, solids) : (bodies ?? solids ?? bounds);
+  const room = extentOf(corners);
+  if (!room || !closed) return { shown: core, walls: meet(bounds, grown(core, 0.6)) };
+  // Rooms may be far higher than anything in them will jump.
+  const near = grown(core, 1.5);
+  near.low[1] = room.low[1];
+  near.high[1] = core.high[1] + 0.5 * Math.max(...add(core.high, core.low, -1));
+  return { shown: meet(room, near), walls: bounds };
+}
+
+function around(centre: Vec3, radius: number): Vec3[] {
+  return [add(centre, [radius, radius, radius], -1), add(centre, [radius, radius, radius])];
+}
