@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The tests of sdk/web/tandem in node, with the WebAssembly modules just built and sessions recorded just now.
+"""The tests of sdk/web in node, with the WebAssembly modules just built and sessions recorded just now.
 
 web_module_test.py --recorder PATH --wasm FOLDER --folder FOLDER
 
@@ -7,15 +7,12 @@ A copy of sdk/web with its npm packages stays in FOLDER. Exit 0 passed, 1 failed
 """
 
 import argparse
-import os
 import pathlib
-import shutil
 import subprocess
 import sys
 
-WEB = pathlib.Path(__file__).resolve().parents[2] / "sdk" / "web"
-FILES = ("package.json", "package-lock.json", "tsconfig.json", "vite.config.ts", "tandem")
-NOT_RUN = 77
+import npm
+
 SESSIONS = {
     "field": ["--scene", "half_pipe", "--bodies", "300", "--predictor", "field"],
     "orientations": ["--scene", "rubble", "--bodies", "60"],
@@ -24,46 +21,20 @@ SESSIONS = {
 }
 
 
-def copy(folder):
-    """sdk/web as it is now; what npm installed stays."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in FILES:
-        source, target = WEB / name, folder / name
-        if source.is_dir():
-            shutil.rmtree(target, ignore_errors=True)
-            shutil.copytree(source, target)
-        else:
-            shutil.copy(source, target)
-
-
-def install(folder):
-    """The npm packages, as locked. Exits where they cannot be had."""
-    for program in ("npm", "node"):
-        if shutil.which(program) is None:
-            print(f"not run: {program} is not installed")
-            sys.exit(NOT_RUN)
-    done = subprocess.run(
-        ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=folder, capture_output=True, text=True, check=False
-    )  # fmt: skip
-    if done.returncode != 0:
-        print(f"not run: npm cannot install the packages: {done.stderr.strip()[-300:]}")
-        sys.exit(NOT_RUN)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for option in ("--recorder", "--wasm", "--folder"):
         parser.add_argument(option, type=pathlib.Path, required=True)
     options = parser.parse_args()
-    copy(options.folder)
-    install(options.folder)
+    npm.copy(options.folder)
+    npm.install(options.folder)
     traces = options.folder / "traces"
     traces.mkdir(exist_ok=True)
-    environment = {**os.environ, "TANDEM_WASM": str(options.wasm), "TANDEM_TRACES": str(traces)}
+    environment = {**npm.environment(options.wasm), "TANDEM_TRACES": str(traces)}
     try:
         for name, arguments in SESSIONS.items():
             subprocess.run([options.recorder, *arguments, traces / name], check=True)
-        for command in (["tsc", "--noEmit"], ["vitest", "run"]):
+        for command in (["tsc", "--noEmit"], ["tsc", "--noEmit", "-p", "viewer"], ["vitest", "run"]):
             subprocess.run(["npx", "--no-install", *command], cwd=options.folder, env=environment, check=True)
     except subprocess.CalledProcessError as failure:
         print(f"FAILED: {failure}", file=sys.stderr)
