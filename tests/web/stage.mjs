@@ -129,13 +129,13 @@ export function visibleBodies(page, most = 200, radius = 0.5) {
   return page.evaluate(async ({ limit, radius }) => {
     const { tandem } = globalThis;
     await new Promise((resolve) => requestAnimationFrame(resolve));
-    // This runs after the page has drawn, before the browser takes the picture.
+    // This runs after the page has drawn, before the browser takes the picture; reading pixels may take its time.
+    const sample = tandem.sample('extrapolate');
     const canvas = document.getElementById('world');
     const gl = canvas.getContext('webgl2');
     const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
     gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
     const scale = gl.drawingBufferWidth / canvas.clientWidth;
-    const sample = tandem.sample('extrapolate');
     const bodies = [];
     for (let slot = 0; slot < sample.capacity; ++slot) {
       if (!sample.alive[slot]) continue;

@@ -3,6 +3,7 @@
 import { colourModes, css, rampColour, type ColourMode, type Colours } from './colours';
 import type { BodyType } from '../tandem';
 import { element } from './panel';
+import { speeds, type Speed } from './slow_motion';
 
 /** Fills a group with one button for each choice; the first is on. */
 export function choose<T extends string>(id: string, choices: readonly { value: T; label: string; title: string }[], chosen: (value: T) => void): void {
@@ -27,6 +28,12 @@ const titles: Record<ColourMode, string> = {
 
 export function chooseColours(chosen: (mode: ColourMode) => void): void {
   choose('colours', colourModes.map((value) => ({ value, label: value, title: titles[value] })), chosen);
+}
+
+export function chooseSpeed(chosen: (speed: Speed) => void): void {
+  const titles: Record<Speed, string> = { '1': 'As it happens', '1/2': 'At half the speed', '1/4': 'At a quarter of the speed' };
+  const labels: Record<Speed, string> = { '1': '1×', '1/2': '½', '1/4': '¼' };
+  choose('speeds', speeds.map((value) => ({ value, label: labels[value], title: titles[value] })), chosen);
 }
 
 /** Says what the colours mean. */

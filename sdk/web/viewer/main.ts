@@ -1,13 +1,14 @@
 // The page: joins the session of the gateway that served it, draws its bodies, and sends what the user does to them.
 
 import { Client, type LogLevel, type OutcomeEvent, type SampleMode, type Status } from '../tandem';
-import { chooseColours, showLegend } from './choices';
+import { chooseColours, chooseSpeed, showLegend } from './choices';
 import type { ColourMode } from './colours';
 import { GravityControls } from './gravity_controls';
 import { noticeOf, ripple, showNotice, toast, type Notice } from './notices';
 import { element, Panel, threeDigits, type Drawing } from './panel';
 import { pick } from './pick';
 import type { Vec3 } from './scene_text';
+import type { Speed } from './slow_motion';
 import { Stage } from './stage';
 import { World } from './world';
 
@@ -27,7 +28,6 @@ function gatewayUrl(): string {
 }
 
 class Page {
-  private readonly stage: Stage;
   private readonly panel = new Panel();
   private readonly gravity: GravityControls;
   private world: World | null = null;
@@ -36,15 +36,18 @@ class Page {
   private epoch = 0;
   private applied = 0;
   private colourMode: ColourMode = 'type';
+  private speed: Speed = '1';
   private radii: number[] = [];
   private readonly sent = new Map<number, string>();
   private readonly drawn: { at: number; ms: number }[] = [];
   private figuresAt = 0;
   private seen = false;
 
-  constructor(private readonly client: Client) {
-    const canvas = element<HTMLCanvasElement>('world');
-    this.stage = new Stage(canvas);
+  constructor(
+    private readonly client: Client,
+    private readonly stage: Stage,
+    canvas: HTMLCanvasElement,
+  ) {
     this.gravity = new GravityControls(
       () => this.stage.axes().map((axis) => axis.toArray()) as [Vec3, Vec3, Vec3],
       (gravity) => this.send('gravity', () => this.client.sendGravity(gravity)),
@@ -52,6 +55,10 @@ class Page {
     chooseColours((mode) => {
       this.colourMode = mode;
       this.panelsChanged();
+    });
+    chooseSpeed((speed) => {
+      this.speed = speed;
+      this.world?.slowMotion.setSpeed(speed);
     });
     this.followTaps(canvas);
     element('reframe').addEventListener('click', () => this.world && this.stage.frame(this.world.extent));
@@ -83,7 +90,7 @@ class Page {
   private draw(now: number): void {
     requestAnimationFrame((next) => this.draw(next));
     const began = performance.now();
-    this.updateWorld();
+    this.updateWorld(now);
     this.gravity.draw();
     this.world?.beforeRender();
     this.stage.render(now);
@@ -97,7 +104,7 @@ class Page {
     }
   }
 
-  private updateWorld(): void {
+  private updateWorld(now: number): void {
     const types = this.sessionChanged ? this.client.types() : [];
     const description = this.sessionChanged ? this.client.sceneDescription() : '';
     const sample = this.client.sample('extrapolate');
@@ -105,6 +112,7 @@ class Page {
     if (this.sessionChanged || this.world?.bodies.capacity !== sample.capacity) {
       this.world?.dispose();
       this.world = new World(this.stage, types, description, sample);
+      this.world.slowMotion.setSpeed(this.speed);
       this.sessionChanged = false;
       this.radii = types.map((type) => type.radius);
       this.gravity.setScene(this.world.scene);
@@ -113,7 +121,8 @@ class Page {
       this.sceneShown = description;
     }
     this.world.colours.mode = this.colourMode;
-    this.world.update(sample, this.applied);
+    const shown = this.world.slowMotion.play(sample, this.applied, now);
+    this.world.update(shown.sample, shown.applied);
   }
 
   private showFigures(): void {
@@ -199,8 +208,19 @@ async function start(): Promise<void> {
   const role = new URLSearchParams(location.search).has('observe') ? 'observer' : 'participant';
   const wasm = { plain: new URL('tandem.wasm', document.baseURI), simd: new URL('tandem-simd.wasm', document.baseURI) };
   const log = (level: LogLevel, text: string) => void (level !== 'info' && toast(text, true));
-  const client = await Client.connect({ url: gatewayUrl(), role, wasm, log });
-  Object.assign(globalThis, { tandem: new Page(client).forScripts });
+  const connecting = Client.connect({ url: gatewayUrl(), role, wasm, log });
+  connecting.catch(() => undefined); // told below, where it is waited for
+  const canvas = element<HTMLCanvasElement>('world');
+  const stage = stageOn(canvas); // takes its time too
+  Object.assign(globalThis, { tandem: new Page(await connecting, stage, canvas).forScripts });
+}
+
+function stageOn(canvas: HTMLCanvasElement): Stage {
+  try {
+    return new Stage(canvas);
+  } catch {
+    throw new Error('This browser has no WebGL 2, with which the bodies are drawn.');
+  }
 }
 
 showNotice(noticeOf({ phase: 'connecting', reason: '' }));

@@ -6,11 +6,13 @@ import { Colours } from './colours';
 import { add, extentOf, grown, join, meet, roomFaces, type Extent } from './room';
 import { Scenery } from './scenery';
 import { emptyScene, readScene, type Scene, type Vec3 } from './scene_text';
+import { SlowMotion } from './slow_motion';
 import type { Stage } from './stage';
 
 export class World {
   readonly bodies: Bodies;
   readonly colours: Colours;
+  readonly slowMotion: SlowMotion;
   readonly scene: Scene;
   /** Why nothing of the scene's geometry is drawn; empty when it is. */
   readonly sceneError: string = '';
@@ -36,6 +38,7 @@ export class World {
     this.scenery = new Scenery(this.scene, walls);
     this.bodies = new Bodies(sample.capacity, types);
     this.colours = new Colours(sample.capacity, types, this.scene.dt);
+    this.slowMotion = new SlowMotion(this.scene.dt);
     stage.add(this.scenery.group);
     stage.add(this.bodies.group);
   }
