@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -95,6 +96,8 @@ class ClientPort {
   virtual void take(std::vector<Received<ScheduledInputMessage>>& out) = 0;
   virtual void take(std::vector<Received<SnapshotMessage>>& out) = 0;
   virtual void take(std::vector<Received<ReplyMessage>>& out) = 0;
+  /// The newest figures of a server, since the last call; for who shows them. A port may have none.
+  [[nodiscard]] virtual std::optional<Received<ServerStatusMessage>> take_status() { return std::nullopt; }
 
   virtual Result<void> write(const AckMessage&) = 0;
   virtual Result<void> write(const InputMessage&) = 0;

@@ -55,6 +55,8 @@ struct ClientTimeline::Impl {
   TypeId type_count;
   std::uint32_t max_lead;
   std::vector<Held> ring;  // frames applied .. now, by frame modulo size
+  Epoch epoch = 0;
+  StreamId stream;
   Frame applied = 0;
   Frame now = 0;
   bool playing = false;
@@ -104,6 +106,8 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   m.at(read->frame).input.drive = read->drive;
   m.parts.delta.restore_parameters(read->parameters);
   m.inputs.reset(read->last_input, read->pending);
+  m.epoch = read->epoch;
+  m.stream = read->stream;
   m.applied = m.now = read->frame;
   m.hash = hash;
   m.playing = true;
@@ -157,6 +161,25 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
                                           ", the server has " + to_hex(hash));
   }
   return {};
+}
+
+void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
+  const Impl& m = *impl_;
+  TANDEM_ASSERT(m.playing);
+  Snapshot snapshot{.epoch = m.epoch,
+                    .stream = m.stream,
+                    .frame = m.applied,
+                    .last_input = m.inputs.held_to(),
+                    .drive = drive(),
+                    .parameters = parameters(),
+                    .hash = m.hash,
+                    .region_hash = m.parts.hasher.region_hash(),
+                    .pending = {}};
+  // What lies beyond a gap is not promised by the number.
+  for (const ScheduledDrive& input : m.inputs.pending()) {
+    if (input.number <= snapshot.last_input && input.frame > m.applied) snapshot.pending.push_back(input);
+  }
+  write_snapshot(snapshot, state(m.applied), m.parts.delta.codec(), out);
 }
 
 bool ClientTimeline::step(std::uint32_t lead) {

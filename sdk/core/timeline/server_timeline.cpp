@@ -121,11 +121,7 @@ void ServerTimeline::snapshot(std::vector<std::byte>& out) {
                           .hash = impl_->hash,
                           .region_hash = impl_->parts.hasher.region_hash(),
                           .pending = {pending.begin(), pending.end()}};
-  out.resize(snapshot_bound());
-  ByteWriter writer(out);
-  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), writer);
-  TANDEM_ASSERT(!writer.overflow());
-  out.resize(writer.size());
+  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), out);
 }
 
 std::size_t ServerTimeline::snapshot_bound() const {

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/layout/sections.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
 #include "sdk/core/timeline/region.hpp"
@@ -93,6 +94,15 @@ void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& c
   }
   put_section(SectionType::kRegion, out,
               [&](ByteWriter& body) { write_region(snapshot.region_hash, state, codec, body); });
+}
+
+void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
+                    std::vector<std::byte>& out) {
+  out.resize(snapshot_bytes_bound(state, codec));
+  ByteWriter writer(out);
+  write_snapshot(snapshot, state, codec, writer);
+  TANDEM_ASSERT(!writer.overflow());
+  out.resize(writer.size());
 }
 
 Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count, State& state,

@@ -29,6 +29,10 @@ struct Snapshot {
 /// Writes `snapshot`, `state` and the codec's state.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out);
 
+/// The same into a vector, whose content it replaces.
+void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
+                    std::vector<std::byte>& out);
+
 /// Reads untrusted bytes: fills `state` (whose capacity must match) and loads `codec`. Checks every range;
 /// the hashes are the caller's to check. On error `state` and `codec` hold anything. Errors: kMalformed,
 /// kUnsupported (version).

@@ -125,6 +125,9 @@ class ClientTimeline {
   /// kMalformed, kUnsupported: state untouched. kMismatch: applied but wrong; load() again.
   [[nodiscard]] Result<void> apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload);
+  /// The agreed state at applied(), as the server would cut it there: for who serves further clients. While
+  /// playing() only. Replaces the content of `out`.
+  void snapshot(std::vector<std::byte>& out) const;
   /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead); returns whether it did.
   bool step(std::uint32_t lead);
 

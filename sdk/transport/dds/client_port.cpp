@@ -92,6 +92,9 @@ class DdsClientPort final : public ClientPort {
   void take(std::vector<Received<ReplyMessage>>& out) override {
     if (stream_) stream_->reply.take(dropped_, out);
   }
+  [[nodiscard]] std::optional<Received<ServerStatusMessage>> take_status() override {
+    return std::exchange(server_status_, std::nullopt);
+  }
 
   Result<void> write(const AckMessage& message) override { return endpoints_.ack.write(message); }
   Result<void> write(const InputMessage& message) override { return endpoints_.input.write(message); }
@@ -112,13 +115,16 @@ class DdsClientPort final : public ClientPort {
     endpoints_.servers.refresh(options_.session, dropped_, [this](const ParticipantId& server) {
       return stream_ && (stream_->delta.alive(server) || stream_->reply.alive(server));
     });
-    endpoints_.servers.statuses().clear();
+    auto& statuses = endpoints_.servers.statuses();
+    if (!statuses.empty()) server_status_ = std::move(statuses.back());
+    statuses.clear();
   }
 
   Endpoints endpoints_;
   DdsOptions options_;
   std::optional<Stream> stream_;
   std::optional<Reader<SnapshotMessage>> snapshots_;
+  std::optional<Received<ServerStatusMessage>> server_status_;
   std::optional<Epoch> epoch_;  // of the open stream
   Limits limits_;               // of the open stream
   std::atomic<std::uint64_t> dropped_ = 0;

@@ -37,6 +37,32 @@ TEST(ClientTimeline, FollowsTheServerWithEveryCodec) {
   }
 }
 
+TEST(ClientTimeline, ItsSnapshotIsTheServersToTheByte) {
+  for (const std::string_view codec : codec_names()) {
+    SCOPED_TRACE(codec);
+    Pair pair(1, codec);
+    for (int i = 0; i < 5; ++i) {
+      const Drive drive{{0, -100 * i, 0}, 10};
+      const std::uint64_t number = pair.server.last_input() + 1;
+      ASSERT_TRUE(pair.server.schedule({number, pair.server.frame() + 2, drive}));
+      ASSERT_TRUE(pair.client.schedule({number, pair.server.frame() + 2, drive}));
+      pair.client.step(1);
+      ASSERT_TRUE(apply(pair.client, pair.frame()));
+      std::vector<std::byte> bytes;
+      pair.client.snapshot(bytes);
+      ASSERT_EQ(bytes, snapshot_of(pair.server));
+    }
+  }
+}
+
+TEST(ClientTimeline, ItsSnapshotLeavesOutInputsBeyondAGap) {
+  Pair pair;
+  ASSERT_TRUE(pair.client.schedule({2, 13, {}}));
+  std::vector<std::byte> bytes;
+  pair.client.snapshot(bytes);
+  EXPECT_EQ(bytes, snapshot_of(pair.server));
+}
+
 TEST(ClientTimeline, HoldsNothingBeforeASnapshot) {
   auto client = client_of(layout_for("entropy", 4));
   EXPECT_FALSE(client.playing());
