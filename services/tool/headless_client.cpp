@@ -43,9 +43,9 @@ Result<void> HeadlessClient::open() {
     if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
   }
   if (!options_.capture.empty()) {
-    auto capture = CaptureFile::create(options_.capture);
-    if (!capture) return tl::unexpected<Error>(capture.error());
-    capture_.emplace(std::move(*capture));
+    auto recorder = recording::Recorder::create(options_.capture, options_.compression);
+    if (!recorder) return tl::unexpected<Error>(recorder.error());
+    recorder_ = std::make_unique<recording::Recorder>(std::move(*recorder));
   }
   client::CoreOptions core;
   core.session = options_.session;
@@ -62,7 +62,10 @@ Result<void> HeadlessClient::open() {
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());
   port_ = std::move(*port);
-  core_ = std::make_unique<client::ClientCore>(std::move(core), *port_, this);
+  if (recorder_) recording_port_ = std::make_unique<RecordingPort>(*port_, *recorder_);
+  transport::ClientPort& used =
+      recording_port_ ? static_cast<transport::ClientPort&>(*recording_port_) : *port_;
+  core_ = std::make_unique<client::ClientCore>(std::move(core), used, this);
   return {};
 }
 
@@ -85,6 +88,8 @@ void HeadlessClient::run(const std::atomic<bool>& stop) {
     const std::int64_t due_ns = core_->poll(now);
     const client::Statistics& figures = core_->statistics();
     send_script(now);
+    record(now);
+    if (recorder_ && !recorder_->good()) break;
     tell_waiting(now);
     tell_live(now);
     const auto over = [&](std::int64_t since_ns, const std::optional<double>& limit_s) {
@@ -111,10 +116,11 @@ void HeadlessClient::finish() {
     const bool written = std::ferror(hash_log_.get()) == 0 && std::fflush(hash_log_.get()) == 0;
     if (!written) failure_ = "could not write all of the hash log " + options_.hash_log;
   }
-  if (capture_) {
-    if (auto committed = capture_->commit(); !committed) failure_ = committed.error().message;
+  if (recorder_) {
+    if (auto finished = recorder_->finish(); !finished) failure_ = finished.error().message;
   }
-  if (!failure_.empty()) print_error(fmt::format("tandem join: {}{}\n", options_.name, failure_));
+  if (!failure_.empty())
+    print_error(fmt::format("tandem {}: {}{}\n", options_.command, options_.name, failure_));
 }
 
 void HeadlessClient::on_session(const transport::SessionMessage& session) {
@@ -124,15 +130,15 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
       if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
     }
   }
-  if (capture_) capture_->add(session, transport::wall_ns());
+  if (recorder_) recorder_->add(session, transport::wall_ns());
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  if (capture_) capture_->add(snapshot, transport::wall_ns());
+  if (recorder_) recorder_->add(snapshot, transport::wall_ns());
 }
 
 void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
-  if (capture_) capture_->add(input, transport::wall_ns());
+  if (recorder_) recorder_->add(input, transport::wall_ns());
 }
 
 void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
@@ -143,7 +149,14 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
     std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch, delta.frame,
                  to_hex(delta.hash).c_str());
   }
-  if (capture_) capture_->add(epoch, delta, transport::wall_ns());
+  if (recorder_) recorder_->add(epoch, delta, transport::wall_ns());
+}
+
+void HeadlessClient::record(client::Now now) {
+  if (!recorder_) return;
+  static_cast<void>(recording_port_->take_status());
+  if (core_->timeline() != nullptr && recorder_->snapshot_due(now.wall_ns))
+    recorder_->cut_snapshot(*core_->timeline(), now.wall_ns);
 }
 
 void HeadlessClient::send_script(client::Now now) {
@@ -191,7 +204,7 @@ void HeadlessClient::tell_live(client::Now now) {
 }
 
 void HeadlessClient::tell(const std::string& line) const {
-  if (!options_.quiet) print_error(fmt::format("tandem join: {}{}\n", options_.name, line));
+  if (!options_.quiet) print_error(fmt::format("tandem {}: {}{}\n", options_.command, options_.name, line));
 }
 
 bool HeadlessClient::succeeded() const {

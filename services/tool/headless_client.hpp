@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
-#include "services/tool/capture.hpp"
+#include "services/recording/recorder.hpp"
+#include "services/tool/recording_port.hpp"
 
 namespace tandem::tool {
 
@@ -23,10 +24,12 @@ struct HeadlessOptions {
   std::optional<double> timeout_s;              ///< until the first applied frame; empty: waits for ever
   std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
   std::string hash_log, capture, input_script;  ///< paths; empty: none
-  bool live = false;                            ///< a JSON line a second on stderr
-  bool quiet = false;                           ///< no lines for humans on stderr
-  std::uint32_t index = 0;                      ///< of several clients, in live lines
-  std::string name;                             ///< in front of lines for humans; may be empty
+  recording::Compression compression = recording::Compression::kNone;  ///< of the capture
+  const char* command = "join";                                        ///< in front of lines for humans
+  bool live = false;                                                   ///< a JSON line a second on stderr
+  bool quiet = false;                                                  ///< no lines for humans on stderr
+  std::uint32_t index = 0;                                             ///< of several clients, in live lines
+  std::string name;  ///< in front of lines for humans; may be empty
 };
 
 /// Runs in one thread of the caller's.
@@ -47,6 +50,8 @@ class HeadlessClient final : public client::CoreListener {
   [[nodiscard]] bool succeeded() const;
   /// The JSON object of the result, valid after run().
   [[nodiscard]] nlohmann::ordered_json report() const;
+  /// Of the capture, valid after run(); null without one.
+  [[nodiscard]] const recording::Recorder* recorder() const { return recorder_.get(); }
   /// The same in a few lines for humans.
   [[nodiscard]] std::string summary() const;
 
@@ -69,6 +74,7 @@ class HeadlessClient final : public client::CoreListener {
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void send_script(client::Now now);
+  void record(client::Now now);
   void tell_waiting(client::Now now);
   void tell_live(client::Now now);
   void tell(const std::string& line) const;
@@ -78,7 +84,8 @@ class HeadlessClient final : public client::CoreListener {
   std::unique_ptr<transport::ClientPort> port_;
   std::unique_ptr<client::ClientCore> core_;
   std::unique_ptr<std::FILE, Closer> hash_log_;
-  std::optional<CaptureFile> capture_;
+  std::unique_ptr<recording::Recorder> recorder_;
+  std::unique_ptr<RecordingPort> recording_port_;
   std::vector<ScriptEntry> script_;
   std::size_t script_at_ = 0;
 

@@ -8,10 +8,9 @@
 #include <thread>
 #include <vector>
 
-#include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/port.hpp"
 #include "services/heap/heap.hpp"
 #include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
 
 namespace tandem::tool {
@@ -80,15 +79,7 @@ void add_join(CLI::App& app, Run& run) {
   CLI::App* command = app.add_subcommand("join", "Joins a session as a client without a picture.");
   const auto options = std::make_shared<JoinOptions>();
   HeadlessOptions& client = options->client;
-  command->add_option("--domain", client.domain, "DDS domain")
-      ->check(CLI::Range(0U, transport::kMaxDomain))
-      ->capture_default_str();
-  command->add_option("--session", client.session, "Session name")
-      ->check([](const std::string& name) {
-        const auto ok = transport::check_session_name(name);
-        return ok ? std::string() : ok.error().message;
-      })
-      ->capture_default_str();
+  add_endpoint_options(*command, client.domain, client.session);
   command->add_flag("--observe", client.observe, "Only watch: the server does not wait for this client");
   command
       ->add_option("--count", options->count, "Clients in this process; log files get the suffix .0, .1, ...")
@@ -104,7 +95,8 @@ void add_join(CLI::App& app, Run& run) {
       ->check(CLI::PositiveNumber);
   command->add_option("--hash-log", client.hash_log,
                       "Write a line `epoch,frame,hash` for every applied frame");
-  command->add_option("--capture", client.capture, "Write what was received and applied (MCAP)");
+  command->add_option("--capture", client.capture,
+                      "Record into this file, without compression (MCAP; see `tandem record`)");
   command
       ->add_option("--seconds", client.seconds,
                    "How long, from the first applied frame (default: until stopped)")

@@ -1,4 +1,5 @@
-// The command line tool: join, bench, export, top, doctor. Exit 0 done, 1 failed, 2 wrong usage.
+// The command line tool: join, record, replay, bench, export, top, doctor. Exit 0 done, 1 failed, 2 wrong
+// usage.
 
 #include <cstdio>
 #include <exception>
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage. With --json, stdout holds one JSON object.");
   tandem::tool::Run run;
   tandem::tool::add_join(app, run);
+  tandem::tool::add_record(app, run);
 #ifdef TANDEM_LAB
   tandem::lab::add_bench(app, run);
   tandem::lab::add_export(app, run);

@@ -50,13 +50,14 @@ EDGES = {
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/particles", "services/engine/shape"]
     + SIMULATION,
     "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
+    "services/recording": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
     "services/tandemd": LAYOUT
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
     "services/tandemd/main.cpp": ["services/tandemd", "services/heap"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
-    + ["services/heap", "services/scenes"],
+    + ["services/heap", "services/recording", "services/scenes"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]

@@ -7,6 +7,8 @@
 
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/cdr.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/recording/mcap_writer.hpp"
 #include "tests/property/synthetic.hpp"
 #include "tests/unit/transport/random_messages.hpp"
 
@@ -129,6 +131,78 @@ bool write_snapshots(const std::filesystem::path& folder, bool turning) {
   return true;
 }
 
+// A session of a few frames; of two files, one has no checksums, so that what is changed in its chunk is
+// read.
+bool write_recordings(const std::filesystem::path& folder) {
+  transport::SessionMessage session;
+  session.session = "fuzz";
+  session.epoch = 1;
+  session.capacity = kCapacity;
+  session.lattice_unit = 0.001;
+  session.types.resize(1);
+  transport::StreamMessage stream;
+  stream.max_delta_bytes = stream.max_snapshot_bytes = 10'000;
+  stream.layout.codec = "quantized";
+  stream.layout.parameters = kParameters;
+  session.streams = {stream};
+  transport::complete_layouts(session);
+  session.streams[0].layout_hash = transport::layout_hash(session, session.streams[0]);
+  for (const auto compression : {recording::Compression::kNone, recording::Compression::kZstd}) {
+    auto server = ServerTimeline::create(session.streams[0].layout, 1);
+    if (!server) return false;
+    synthetic::Random random(3);
+    server->start(0, synthetic::random_state(random, kCapacity, 0), Drive{{0, -640, 0}, 10});
+    transport::Bytes file;
+    recording::McapWriter writer(
+        [&file](std::span<const std::byte> bytes) -> Result<void> {
+          file.insert(file.end(), bytes.begin(), bytes.end());
+          return {};
+        },
+        compression);
+    // Readers take the types for granted: without the text a seed is a twentieth.
+    for (const char* topic : {transport::SessionMessage::kTopic, transport::SnapshotMessage::kTopic,
+                              transport::ScheduledInputMessage::kTopic, transport::DeltaMessage::kTopic}) {
+      writer.declare({.topic = topic,
+                      .message_encoding = "cdr",
+                      .schema_name = topic,
+                      .schema_encoding = "",
+                      .schema = ""});
+    }
+    writer.add(session, 1, 1);
+    transport::SnapshotMessage snapshot;
+    snapshot.epoch = 1;
+    server->snapshot(snapshot.bytes);
+    snapshot.total_bytes = static_cast<std::uint32_t>(snapshot.bytes.size());
+    writer.add(snapshot, 2, 2);
+    const ScheduledDrive drive{.number = 1, .frame = 2, .drive = {{0, -64, 0}, 10}};
+    if (!server->schedule(drive)) return false;
+    writer.add(transport::ScheduledInputMessage{.epoch = 1,
+                                                .number = 1,
+                                                .frame = 2,
+                                                .source_client = 0,
+                                                .source_number = 0,
+                                                .kind = 1,
+                                                .values = {0, -64, 0, 10}},
+               3, 3);
+    for (int i = 0; i < 3; ++i) {
+      const auto frame = server->advance(server->state(), {});
+      transport::DeltaMessage delta;
+      delta.epoch = 1;
+      delta.frame = frame.frame;
+      delta.last_input = frame.last_input;
+      delta.hash = frame.hash;
+      delta.payload.assign(frame.payload.begin(), frame.payload.end());
+      writer.add(delta, 4 + i, 4);
+    }
+    writer.end_chunk();
+    const bool plain = compression == recording::Compression::kNone;
+    const std::size_t header_bytes = 8 + 9 + 4 + 4 + std::string_view("tandem " TANDEM_VERSION).size();
+    if (plain) std::fill_n(&file[header_bytes + 9 + 24], 4, std::byte{0});
+    if (!write_file(folder / "recording" / (plain ? "plain" : "zstd"), file)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 }  // namespace tandem
 
@@ -139,7 +213,8 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path folder(argv[1]);
   if (tandem::write_messages(folder) && tandem::write_deltas(folder) && tandem::write_streams(folder) &&
-      tandem::write_snapshots(folder, false) && tandem::write_snapshots(folder, true))
+      tandem::write_snapshots(folder, false) && tandem::write_snapshots(folder, true) &&
+      tandem::write_recordings(folder))
     return 0;
   std::fprintf(stderr, "could not write to %s\n", argv[1]);
   return 1;

@@ -182,6 +182,11 @@ void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
   write_snapshot(snapshot, state(m.applied), m.parts.delta.codec(), out);
 }
 
+void ClientTimeline::rename(Epoch epoch, StreamId stream) {
+  impl_->epoch = epoch;
+  impl_->stream = stream;
+}
+
 bool ClientTimeline::step(std::uint32_t lead) {
   Impl& m = *impl_;
   if (!m.playing || m.now >= m.applied + std::min(lead, m.max_lead)) return false;

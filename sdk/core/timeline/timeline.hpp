@@ -128,6 +128,8 @@ class ClientTimeline {
   /// The agreed state at applied(), as the server would cut it there: for who serves further clients. While
   /// playing() only. Replaces the content of `out`.
   void snapshot(std::vector<std::byte>& out) const;
+  /// What snapshot() says from now on until load(), for who serves them as a session of his own.
+  void rename(Epoch epoch, StreamId stream);
   /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead); returns whether it did.
   bool step(std::uint32_t lead);
 

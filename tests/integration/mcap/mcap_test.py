@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Captures are MCAP files that tools which know nothing of Tandem read, types included.
+"""Recordings are MCAP files that tools which know nothing of Tandem read, types included.
 
 mcap_test.py --writer PATH --tandemd PATH --tandem PATH --modules FOLDER
 
@@ -49,11 +49,13 @@ def read(file, folder):
     return json.loads(done.stdout)
 
 
-def check_fixed(writer, folder, scratch):
+def check_fixed(writer, compression, folder, scratch):
     """The messages of write_capture.cpp, decoded by their schema alone."""
-    file = scratch / "fixed.mcap"
-    subprocess.run([writer, file], check=True)
+    file = scratch / f"{compression}.mcap"
+    subprocess.run([writer, file, compression], check=True)
     found = read(file, folder)
+    assert found["compression"] == ("zstd" if compression == "zstd" else ""), found["compression"]
+    assert found["indexed"] == 4, found["indexed"]
     assert found["profile"] == "" and found["library"].startswith("tandem "), found["library"]
     assert found["statistics"] == {"messages": "4", "channels": 4}, found["statistics"]
     session, delta, scheduled, ack = found["messages"]
@@ -74,7 +76,7 @@ def check_fixed(writer, folder, scratch):
     assert delta["content"]["hash"] == str(0x0123456789ABCDEF) and delta["content"]["payload"] == "11" * 5
     assert scheduled["content"]["values"] == [0, -980, 0, 12]
     assert ack["content"]["clock_ns"] == "-5" and ack["content"]["missing"] == [1, 2]
-    print(f"fixed messages: {len(found['messages'])} read")
+    print(f"fixed messages, compression {compression}: {len(found['messages'])} read")
 
 
 def check_live(options, folder, scratch):
@@ -86,7 +88,7 @@ def check_live(options, folder, scratch):
     )
     try:
         subprocess.run(
-            [options.tandem, "join", "--session", "mcap", "--observe", "--timeout", "60", "--seconds", "2", "--capture", file],
+            [options.tandem, "record", file, "--session", "mcap", "--timeout", "60", "--seconds", "3"],
             env=environment, check=True,
         )  # fmt: skip
     finally:
@@ -94,13 +96,16 @@ def check_live(options, folder, scratch):
         server.wait(60)
     found = read(file, folder)
     topics = [message["topic"] for message in found["messages"]]
-    assert topics[0] == "TandemSession" and "TandemSnapshot" in topics, topics[:5]
+    of_the_state = [topic for topic in topics if topic in ("TandemSession", "TandemSnapshot", "TandemDelta")]
+    assert of_the_state[:3] == ["TandemSession", "TandemSession", "TandemSnapshot"], topics[:9]
     start = next(message["content"] for message in found["messages"] if message["topic"] == "TandemSnapshot")
     assert start["part"] == 0 and start["parts"] == 1 and start["total_bytes"] == len(start["bytes"]) // 2
     frames = [int(message["content"]["frame"]) for message in found["messages"] if message["topic"] == "TandemDelta"]
     first = int(start["frame"]) + 1
     assert len(frames) >= 30 and frames == list(range(first, first + len(frames))), frames
-    assert found["statistics"]["messages"] == str(len(topics))
+    assert found["statistics"]["messages"] == str(len(topics)) == str(found["indexed"])
+    assert found["compression"] == "zstd" and found["chunks"] >= 3, found["chunks"]
+    assert {"TandemAck", "TandemReply", "TandemServerStatus", "TandemClientStatus"} <= set(topics), set(topics)
     print(f"live session: {len(frames)} deltas read")
 
 
@@ -112,7 +117,8 @@ def main():
     install(options.modules)
     with tempfile.TemporaryDirectory() as scratch:
         try:
-            check_fixed(options.writer, options.modules, pathlib.Path(scratch))
+            for compression in ("none", "zstd"):
+                check_fixed(options.writer, compression, options.modules, pathlib.Path(scratch))
             check_live(options, options.modules, pathlib.Path(scratch))
         except (AssertionError, subprocess.SubprocessError) as failure:
             print(f"FAILED: {failure!r}", file=sys.stderr)

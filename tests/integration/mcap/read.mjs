@@ -3,10 +3,13 @@
 import { readFileSync } from "node:fs";
 import { parseIDL } from "@foxglove/omgidl-parser";
 import { MessageReader } from "@foxglove/omgidl-serialization";
-import { McapStreamReader } from "@mcap/core";
+import { McapIndexedReader, McapStreamReader } from "@mcap/core";
+import { decompress } from "fzstd";
 
-const stream = new McapStreamReader();
-stream.append(readFileSync(process.argv[2]));
+const file = readFileSync(process.argv[2]);
+const decompressHandlers = { zstd: (chunk, size) => decompress(chunk, new Uint8Array(Number(size))) };
+const stream = new McapStreamReader({ decompressHandlers, validateCrcs: true });
+stream.append(file);
 const schemas = new Map();
 const channels = new Map();
 const out = { messages: [] };
@@ -37,12 +40,31 @@ for (let record; (record = stream.nextRecord()); ) {
       });
       break;
     }
+    case "ChunkIndex":
+      out.compression = record.compression;
+      break;
     case "Statistics":
       out.statistics = { messages: record.messageCount, channels: record.channelCount };
       break;
   }
 }
 if (!stream.done()) throw new Error("the file has no proper end");
+// Once more by the index at its end, which orders by time.
+const indexed = await McapIndexedReader.Initialize({
+  readable: {
+    size: async () => BigInt(file.length),
+    read: async (offset, size) => new Uint8Array(file.subarray(Number(offset), Number(offset + size))),
+  },
+  decompressHandlers,
+});
+out.chunks = indexed.chunkIndexes.length;
+out.indexed = 0;
+let lastTime = 0n;
+for await (const message of indexed.readMessages({ validateCrcs: true })) {
+  if (message.logTime < lastTime) throw new Error("messages out of order");
+  lastTime = message.logTime;
+  ++out.indexed;
+}
 const plain = (key, value) => {
   if (typeof value === "bigint") return value.toString();
   if (value instanceof Uint8Array) return Buffer.from(value).toString("hex");

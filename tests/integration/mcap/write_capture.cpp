@@ -1,13 +1,15 @@
-// Writes a capture of fixed messages: write_capture FILE. mcap_test.py knows what they say.
+// Writes a recording of fixed messages: write_capture FILE none|zstd. mcap_test.py knows what they say.
 
 #include <cstdio>
 #include <memory>
+#include <string_view>
 
-#include "sdk/transport/mcap.hpp"
+#include "services/recording/mcap_writer.hpp"
 
 namespace {
 
 using namespace tandem::transport;
+using tandem::recording::Compression;
 
 constexpr tandem::Epoch kEpoch = 1'700'000'000'123;
 
@@ -61,13 +63,15 @@ AckMessage acknowledgement() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 2;
+  if (argc != 3) return 2;
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(argv[1], "wb"), std::fclose);
   if (!file) return 1;
-  McapWriter writer([&](std::span<const std::byte> bytes) -> tandem::Result<void> {
+  const auto sink = [&](std::span<const std::byte> bytes) -> tandem::Result<void> {
     if (std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size()) return {};
     return tandem::fail(tandem::ErrorCode::kIo, "not written");
-  });
+  };
+  tandem::recording::McapWriter writer(
+      sink, std::string_view(argv[2]) == "zstd" ? Compression::kZstd : Compression::kNone);
   writer.add(session(), 10, 10);
   writer.add(delta(), 1'700'000'001'005'000'000, delta().server_time_ns);
   writer.add(input(), 30, 30);

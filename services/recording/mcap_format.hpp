@@ -1,0 +1,34 @@
+#pragma once
+// What writer and reader of MCAP files (mcap.dev) share.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace tandem::recording {
+
+inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
+
+enum Opcode : std::uint8_t {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kChunkIndex = 0x08,
+  kStatistics = 0x0B,
+  kDataEnd = 0x0F,
+};
+
+/// Before the content of a record: opcode and length.
+inline constexpr std::size_t kRecordHead = 1 + 8;
+/// What a checksum field holds where there is none.
+inline constexpr std::uint32_t kNoChecksum = 0;
+
+/// CRC-32 as in IEEE 802.3 and zlib. `before`: the checksum of the bytes in front.
+[[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t before = 0);
+
+}  // namespace tandem::recording

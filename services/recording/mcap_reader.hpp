@@ -1,0 +1,101 @@
+#pragma once
+// Messages out of an MCAP file (mcap.dev), whole or cut short.
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tandem/result.hpp"
+
+struct ZSTD_DCtx_s;
+
+namespace tandem::recording {
+
+struct McapMessage {
+  std::string_view topic, encoding;
+  std::uint64_t log_time_ns = 0, publish_time_ns = 0;
+  std::span<const std::byte> content;  ///< until the next call
+};
+
+/// Reads chunks without compression and with zstd; what stands outside of chunks too. Bytes are untrusted:
+/// memory is bounded by kMostChunkBytes, the names of channels, and a small share of the file. Not
+/// thread-safe.
+class McapReader {
+ public:
+  static constexpr std::uint64_t kMostChunkBytes = 128U << 20U;
+
+  /// `file` must outlive the reader. Looks at the head of every record. Errors: kMalformed (not MCAP),
+  /// kUnsupported (another version of it).
+  static Result<McapReader> open(std::span<const std::byte> file);
+  McapReader(McapReader&&) noexcept;
+  McapReader& operator=(McapReader&&) = delete;
+  McapReader(const McapReader&) = delete;
+  McapReader& operator=(const McapReader&) = delete;
+  ~McapReader();
+
+  /// The next message; false at the end of the data. Errors: kMalformed (a record's fields, a checksum),
+  /// kUnsupported (compression); nothing can be read behind one.
+  [[nodiscard]] Result<bool> next(McapMessage& out);
+
+  /// Where to read from on.
+  struct Place {
+    std::uint64_t at = 0;
+    std::uint64_t first_ns = 0;  ///< log time, by the chunk's head
+  };
+  /// The chunks that hold messages of a topic, by their indexes, in the file's order.
+  [[nodiscard]] std::vector<Place> chunks_with(std::string_view topic) const;
+  void go_to(const Place& place);
+  void rewind();
+
+  /// The first and the last log time of all chunks, by their heads; 0 without any.
+  [[nodiscard]] std::uint64_t first_ns() const { return first_ns_; }
+  [[nodiscard]] std::uint64_t last_ns() const { return last_ns_; }
+  /// Where the file is cut short: the first byte that belongs to no whole record.
+  [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return torn_at_; }
+
+ private:
+  struct Channel {
+    std::string topic, encoding;
+  };
+  struct Record {
+    std::uint8_t opcode = 0;
+    std::span<const std::byte> content;
+  };
+  struct FreeContext {
+    void operator()(ZSTD_DCtx_s* context) const;
+  };
+
+  explicit McapReader(std::span<const std::byte> file) : file_(file) {}
+  [[nodiscard]] static std::optional<Record> record_at(std::span<const std::byte> bytes, std::uint64_t& at);
+  void survey();
+  void note_chunk(std::uint64_t at, std::span<const std::byte> content);
+  [[nodiscard]] Result<void> learn(const Record& record);
+  [[nodiscard]] Result<void> open_chunk(std::span<const std::byte> content);
+  [[nodiscard]] Result<void> read_message(std::span<const std::byte> content, McapMessage& out) const;
+  [[nodiscard]] tl::unexpected<Error> malformed(const std::string& what) const;
+
+  std::span<const std::byte> file_;
+  std::uint64_t data_at_ = 0;    // behind the magic
+  std::uint64_t end_ = 0;        // of the whole records
+  std::uint64_t at_ = 0;         // of the next record in the file
+  std::uint64_t record_at_ = 0;  // of the one at hand, for errors
+  std::map<std::uint16_t, Channel> channels_;
+  std::vector<Place> chunks_;
+  std::vector<std::pair<std::uint32_t, std::uint16_t>> indexes_;  // place in chunks_, channel
+  std::uint64_t first_ns_ = 0, last_ns_ = 0;
+  std::optional<std::uint64_t> torn_at_;
+
+  std::span<const std::byte> chunk_;  // being read: in the file, or in unpacked_
+  std::uint64_t chunk_at_ = 0;
+  std::unique_ptr<std::byte[]> unpacked_;
+  std::size_t unpacked_bytes_ = 0;
+  std::unique_ptr<ZSTD_DCtx_s, FreeContext> zstd_;
+};
+
+}  // namespace tandem::recording

@@ -1,0 +1,92 @@
+#pragma once
+// A recording, frame by frame: what a client of the recorded session would hold.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/scheduled_inputs.hpp"
+#include "sdk/client/session_check.hpp"
+#include "sdk/client/snapshot_assembly.hpp"
+#include "services/recording/mapped_file.hpp"
+#include "services/recording/mcap_reader.hpp"
+
+namespace tandem::recording {
+
+/// Follows the messages of a file as a client does, and checks every hash. A *run* is a snapshot and the
+/// frames that follow it without a gap; a file has several where the recorder had to join again, or where the
+/// server was restarted. What is in a file is untrusted. Not thread-safe.
+class Playback {
+ public:
+  /// Errors, naming the file: kIo, kMalformed, kUnsupported.
+  static Result<std::unique_ptr<Playback>> open(const std::string& path);
+  /// Of bytes that outlive it; errors name none.
+  static Result<std::unique_ptr<Playback>> open(std::span<const std::byte> file);
+
+  enum class Step : std::uint8_t {
+    kStarted,  ///< a run begins: the state of its snapshot is held
+    kFrame,    ///< one more frame is applied
+    kEnd,      ///< of the file, or of what is left of it
+  };
+  /// Errors: kMalformed, kUnsupported, kMismatch (a frame's hash); nothing can be read behind one.
+  [[nodiscard]] Result<Step> next();
+  /// To the last snapshot that has one, so that next() begins a run no later than `from_s` where the file
+  /// permits; from there on call next() until time_s() is late enough.
+  void seek(double from_s);
+
+  /// When the message at hand was recorded, and the last one; seconds since the first.
+  [[nodiscard]] double time_s() const { return seconds_since_first(time_ns_); }
+  [[nodiscard]] double length_s() const { return seconds_since_first(reader_.last_ns()); }
+  /// Where the file is cut short, if it is.
+  [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return reader_.torn_at(); }
+
+  // Of the run at hand, after the first kStarted:
+  [[nodiscard]] const transport::SessionMessage& session() const { return run_->session; }
+  [[nodiscard]] const transport::StreamMessage& stream() const { return run_->session.streams[run_->stream]; }
+  [[nodiscard]] ClientTimeline& timeline() { return run_->timeline; }
+  // Of the last kFrame:
+  [[nodiscard]] const client::CompleteDelta& delta() const { return delta_; }
+  /// The scheduled inputs that its delta is the first to promise, by number.
+  [[nodiscard]] const std::vector<transport::ScheduledInputMessage>& inputs() const { return inputs_; }
+
+ private:
+  // What is held of one epoch.
+  struct Run {
+    Run(transport::SessionMessage announced, client::Playable playable);
+    template <class M>
+    [[nodiscard]] bool holds(const M& message) const {
+      return message.epoch == session.epoch && message.stream == session.streams[stream].id;
+    }
+    transport::SessionMessage session;
+    std::size_t stream;
+    ClientTimeline timeline;
+    client::DeltaAssembly deltas;
+    client::SnapshotAssembly snapshots;
+    client::ScheduledInputs drives;
+    std::map<std::uint64_t, transport::ScheduledInputMessage> inputs;  // beyond those of the last frame
+  };
+
+  explicit Playback(McapReader reader) : reader_(std::move(reader)) {}
+  static Result<std::unique_ptr<Playback>> open(std::optional<MappedFile> mapped,
+                                                std::span<const std::byte> file);
+  [[nodiscard]] double seconds_since_first(std::uint64_t ns) const;
+  // Each returns what the message brought about, if anything.
+  [[nodiscard]] Result<std::optional<Step>> take(const McapMessage& message);
+  [[nodiscard]] Result<void> take(transport::SessionMessage message);
+  [[nodiscard]] Result<void> take(const transport::ScheduledInputMessage& message);
+  [[nodiscard]] Result<std::optional<Step>> take(transport::SnapshotMessage message);
+  [[nodiscard]] Result<std::optional<Step>> apply_next();
+
+  std::optional<MappedFile> mapped_;
+  McapReader reader_;
+  std::uint64_t time_ns_ = 0;
+  std::unique_ptr<Run> run_;
+  client::CompleteDelta delta_;
+  std::vector<transport::ScheduledInputMessage> inputs_;
+};
+
+}  // namespace tandem::recording

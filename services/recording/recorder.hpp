@@ -1,0 +1,88 @@
+#pragma once
+// `tandem record` and `tandem join --capture`: what a client received, applied and sent, in an MCAP file
+// (idl/PROTOCOL.md, "Recordings").
+
+#include <cstdint>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "sdk/client/client_core.hpp"
+#include "services/recording/mcap_writer.hpp"
+
+namespace tandem::recording {
+
+/// Writes messages in the order in which the client took them in. The file is there under its name from the
+/// start, and readable up to the last chunk however the process ends. Times are wall clock in ns. Not
+/// thread-safe.
+class Recorder {
+ public:
+  /// Between the snapshots that a recorder cuts itself: how much a replay computes at most to get anywhere.
+  static constexpr std::int64_t kSnapshotNs = 60'000'000'000;
+
+  /// Errors: kIo.
+  static Result<Recorder> create(const std::string& path, Compression compression);
+
+  void add(const transport::SessionMessage& session, std::int64_t wall_ns);
+  /// From which the client started, again perhaps.
+  void add(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns);
+  void add(const transport::ScheduledInputMessage& input, std::int64_t wall_ns);
+  /// Of the stream of the snapshot before; as one part, whatever it came in.
+  void add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns);
+  /// What bears on no state.
+  void add(const transport::ReplyMessage& reply, std::int64_t wall_ns);
+  void add(const transport::ServerStatusMessage& status, std::int64_t wall_ns);
+  void add(const transport::AckMessage& ack, std::int64_t wall_ns);
+  void add(const transport::InputMessage& input, std::int64_t wall_ns);
+  void add(const transport::ClientStatusMessage& status, std::int64_t wall_ns);
+
+  /// kSnapshotNs have passed since the last snapshot in the file.
+  [[nodiscard]] bool snapshot_due(std::int64_t wall_ns) const;
+  /// Writes the agreed state of a timeline whose last delta was added.
+  void cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns);
+
+  /// False after an error: nothing more is written.
+  [[nodiscard]] bool good() const { return writer_->written().has_value(); }
+  /// Ends the file. Errors: kIo, also of anything written before.
+  [[nodiscard]] Result<void> finish();
+
+  /// By topic: messages, and their bytes before compression.
+  struct Share {
+    std::uint64_t messages = 0, bytes = 0;
+  };
+  struct Totals {
+    std::uint64_t frames = 0, payload_bytes = 0;
+    std::uint64_t snapshots_cut = 0;
+    std::uint64_t file_bytes = 0;   ///< of all
+    std::uint64_t start_bytes = 0;  ///< of these, the chunks of snapshots and their sessions
+    std::uint64_t fixed_bytes = 0;  ///< of these, what a file without messages has
+    std::map<std::string, Share> topics;
+  };
+  /// Valid after finish().
+  [[nodiscard]] const Totals& totals() const { return totals_; }
+
+ private:
+  struct Closer {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  using File = std::unique_ptr<std::FILE, Closer>;
+  Recorder(std::string path, File file, Compression compression);
+  template <class M>
+  void write(const M& message, std::int64_t wall_ns, std::int64_t publish_ns);
+  void start(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns);
+
+  std::string path_;
+  File file_;
+  std::unique_ptr<McapWriter> writer_;  // stays where it is
+  std::optional<transport::SessionMessage> session_;
+  StreamId stream_;
+  /// Those that no delta in the file has promised yet: whoever starts from a snapshot needs them behind it.
+  std::map<std::uint64_t, transport::ScheduledInputMessage> unpromised_;
+  std::optional<std::int64_t> started_ns_;  // the last snapshot
+  Totals totals_;
+  transport::Bytes snapshot_;
+};
+
+}  // namespace tandem::recording

@@ -1,0 +1,26 @@
+#pragma once
+// --domain and --session, as every command that speaks DDS has them.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/port.hpp"
+
+namespace tandem::tool {
+
+/// Both outlive `command`.
+inline void add_endpoint_options(CLI::App& command, std::uint32_t& domain, std::string& session) {
+  command.add_option("--domain", domain, "DDS domain")
+      ->check(CLI::Range(0U, transport::kMaxDomain))
+      ->capture_default_str();
+  command.add_option("--session", session, "Session name")
+      ->check([](const std::string& name) {
+        const auto ok = transport::check_session_name(name);
+        return ok ? std::string() : ok.error().message;
+      })
+      ->capture_default_str();
+}
+
+}  // namespace tandem::tool

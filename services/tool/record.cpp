@@ -1,0 +1,94 @@
+// `tandem record`: a session into a file, as an observer that writes down what it receives.
+
+#include <fmt/format.h>
+
+#include <csignal>
+#include <memory>
+
+#include "services/heap/heap.hpp"
+#include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
+#include "services/tool/headless_client.hpp"
+
+namespace tandem::tool {
+namespace {
+
+struct RecordOptions {
+  HeadlessOptions client;
+  bool plain = false;
+  bool json = false;
+};
+
+std::atomic<bool> stopped = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+nlohmann::ordered_json report(const HeadlessClient& client) {
+  const recording::Recorder::Totals& totals = client.recorder()->totals();
+  nlohmann::ordered_json out = client.report();
+  // Behind the payloads themselves: what the file adds to them, and what is no delta.
+  out["file_bytes"] = totals.file_bytes;
+  out["frames_recorded"] = totals.frames;
+  out["payload_recorded_bytes"] = totals.payload_bytes;
+  out["start_bytes"] = totals.start_bytes;
+  out["fixed_bytes"] = totals.fixed_bytes;
+  out["snapshots_cut"] = totals.snapshots_cut;
+  for (const auto& [topic, share] : totals.topics) {
+    out["topics"][topic] = {{"messages", share.messages}, {"bytes", share.bytes}};
+  }
+  return out;
+}
+
+int run_record(RecordOptions options) {
+  std::signal(SIGINT, [](int) { stopped = true; });
+  std::signal(SIGTERM, [](int) { stopped = true; });
+  const HeapTrimmer trimmer;
+  options.client.observe = true;
+  options.client.lead = 0;  // nothing is drawn
+  options.client.command = "record";
+  if (!options.plain) options.client.compression = recording::Compression::kZstd;
+  auto client = HeadlessClient::create(options.client);
+  if (!client) {
+    fmt::print(stderr, "tandem record: {}\n", client.error().message);
+    return 1;
+  }
+  (*client)->run(stopped);
+  if (options.json) {
+    fmt::print("{}\n", report(**client).dump());
+  } else {
+    const recording::Recorder::Totals& totals = (*client)->recorder()->totals();
+    fmt::print("{}: {} frames, {} bytes, {} of them deltas\n", options.client.capture, totals.frames,
+               totals.file_bytes, totals.payload_bytes);
+  }
+  return (*client)->succeeded() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_record(CLI::App& app, Run& run) {
+  CLI::App* command =
+      app.add_subcommand("record", "Records a session into a file (MCAP), for `tandem replay`.");
+  const auto options = std::make_shared<RecordOptions>();
+  HeadlessOptions& client = options->client;
+  command->add_option("file", client.capture, "The file, FILE.mcap")->required();
+  add_endpoint_options(*command, client.domain, client.session);
+  command
+      ->add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--seconds", client.seconds,
+                   "How long, from the first applied frame (default: until stopped)")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--no-compression", options->plain, "Chunks as they are, not in zstd");
+  command->add_option("--hash-log", client.hash_log,
+                      "Write a line `epoch,frame,hash` for every applied frame");
+  command->add_flag("--json", options->json, "Print the result as one JSON object");
+  command->footer(
+      "Recorded are what a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, TandemDelta, "
+      "TandemReply to it,\n"
+      "TandemServerStatus), what it sends, and a snapshot of the agreed state once a minute. The file is "
+      "readable while it grows.\n"
+      "Exit 1 on any hash mismatch, when no frame came, or when the file could not be written.");
+  command->callback([options, &run] { run = [options] { return run_record(*options); }; });
+}
+
+}  // namespace tandem::tool

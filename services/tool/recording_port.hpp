@@ -1,0 +1,70 @@
+#pragma once
+// A client's port that records what a listener does not hear: replies, and what the client writes.
+
+#include <cstddef>
+#include <vector>
+
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/recording/recorder.hpp"
+
+namespace tandem::tool {
+
+/// Hands every call on to another port.
+class RecordingPort final : public transport::ClientPort {
+ public:
+  /// Both must outlive it.
+  RecordingPort(transport::ClientPort& port, recording::Recorder& recorder)
+      : port_(&port), recorder_(&recorder) {}
+
+  [[nodiscard]] transport::ParticipantId self() const override { return port_->self(); }
+  void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
+    port_->take_sessions(out);
+  }
+  void pass_over_session(transport::PassOver until) override { port_->pass_over_session(until); }
+  [[nodiscard]] bool server_alive() override { return port_->server_alive(); }
+  Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
+                           transport::ClientId client) override {
+    return port_->open_stream(session, stream, client);
+  }
+  void close_stream() override { port_->close_stream(); }
+  Result<void> open_snapshots() override { return port_->open_snapshots(); }
+  void close_snapshots() override { port_->close_snapshots(); }
+
+  void take(std::vector<transport::Received<transport::DeltaMessage>>& out) override { port_->take(out); }
+  void take(std::vector<transport::Received<transport::ScheduledInputMessage>>& out) override {
+    port_->take(out);
+  }
+  void take(std::vector<transport::Received<transport::SnapshotMessage>>& out) override { port_->take(out); }
+  void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override {
+    const std::size_t before = out.size();
+    port_->take(out);
+    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, transport::wall_ns());
+  }
+  [[nodiscard]] std::optional<transport::Received<transport::ServerStatusMessage>> take_status() override {
+    auto status = port_->take_status();
+    if (status) recorder_->add(status->message, transport::wall_ns());
+    return status;
+  }
+
+  Result<void> write(const transport::AckMessage& message) override { return record(message); }
+  Result<void> write(const transport::InputMessage& message) override { return record(message); }
+  Result<void> write(const transport::ClientStatusMessage& message) override { return record(message); }
+
+  [[nodiscard]] std::uint64_t dropped() const override { return port_->dropped(); }
+  void wait(std::chrono::nanoseconds timeout) override { port_->wait(timeout); }
+  void wake() override { port_->wake(); }
+
+ private:
+  template <class M>
+  Result<void> record(const M& message) {
+    auto written = port_->write(message);
+    if (written) recorder_->add(message, transport::wall_ns());
+    return written;
+  }
+
+  transport::ClientPort* port_;
+  recording::Recorder* recorder_;
+};
+
+}  // namespace tandem::tool
