@@ -30,6 +30,8 @@ std::string describe(std::uint32_t reason) {
       return "the server is full";
     case transport::Reason::kNoStream:
       return "the server does not play this stream any more";
+    case transport::Reason::kRecording:
+      return "input refused: the session is a recording";
   }
   return "refused for reason " + std::to_string(reason);
 }

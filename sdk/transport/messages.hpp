@@ -25,8 +25,9 @@ enum class Reason : std::uint32_t {
   kNotPlaying = 7,     ///< the client has not finished joining
   kForeignClient = 8,  ///< the client id belongs to another DDS participant
   kProtocolVersion = 9,
-  kFull = 10,      ///< the server's client limit is reached
-  kNoStream = 11,  ///< the stream or generation named is not played here
+  kFull = 10,       ///< the server's client limit is reached
+  kNoStream = 11,   ///< the stream or generation named is not played here
+  kRecording = 12,  ///< the session is a recording: nothing can act on it
 };
 
 // After Reason, or g++ 12 warns that its enumerator shadows this.

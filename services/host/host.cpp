@@ -12,6 +12,7 @@
 #include "services/host/claim.hpp"
 #include "services/host/inputs.hpp"
 #include "services/host/joins.hpp"
+#include "services/host/live_source.hpp"
 #include "services/host/pacing.hpp"
 #include "services/host/publication.hpp"
 #include "services/host/replies.hpp"
@@ -31,14 +32,14 @@ constexpr std::int64_t kLookNs = kSecond / 4;  // between looks for rivals and f
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
 
-Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
+tl::unexpected<Error> refuse(std::string message) {
+  return fail(ErrorCode::kInvalidArgument, std::move(message));
+}
+
+Result<void> check(const ServiceConfig& config) {
   if (auto named = transport::check_session_name(config.session); !named) return named;
-  const auto refuse = [](std::string message) {
-    return fail(ErrorCode::kInvalidArgument, std::move(message));
-  };
   if (!(config.frame_rate_hz >= 1 && config.frame_rate_hz <= 1000))
     return refuse("frame rate must lie in 1..1000 Hz");
-  if (config.stream.layout.lead > 1) return refuse("lead must be 0 or 1");
   if (config.window_ceiling < 1 || config.window_ceiling > 64)
     return refuse("window ceiling must lie in 1..64");
   if (config.window && (*config.window < 1 || *config.window > config.window_ceiling)) {
@@ -46,10 +47,16 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   }
   if (config.client_limit == 0 || config.participant_limit == 0)
     return refuse("client limits must be positive");
+  if (config.epoch == 0) return refuse("epoch must not be 0");
+  return {};
+}
+
+Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
+  if (auto good = check(config); !good) return good;
+  if (config.stream.layout.lead > 1) return refuse("lead must be 0 or 1");
   if (config.types.size() != config.stream.layout.type_count)
     return refuse(
         fmt::format("{} body types, {} described", config.stream.layout.type_count, config.types.size()));
-  if (config.epoch == 0) return refuse("epoch must not be 0");
   static_assert(engine::kMaxBodies == kMaxCapacity);
   const std::uint32_t capacity = simulation.capacity();
   if (capacity != config.stream.layout.capacity)
@@ -60,11 +67,10 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
 }  // namespace
 
 struct Host::Impl {
-  Impl(HostConfig configuration, engine::Simulation& full, transport::ServerPort& endpoints, Stream started)
+  Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames, transport::ServerPort& endpoints)
       : config(std::move(configuration)),
-        simulation(&full),
         port(&endpoints),
-        stream(std::move(started)),
+        source(std::move(frames)),
         outbox(config.outbox),
         roster({.epoch = config.epoch,
                 .client_limit = config.client_limit,
@@ -72,28 +78,30 @@ struct Host::Impl {
                 .stall_timeout_ns = config.stall_timeout_ns,
                 .fixed_window = config.window,
                 .window_ceiling = config.window_ceiling}),
-        inputs(config.epoch, full, stream, outbox),
+        inputs(config.epoch, *source, outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate),
         status(config.session, config.epoch, outbox) {
-    stream.set_clock(config.clock_ns);
-    session = session_message(config, stream);
-    report.frame = config.start_frame;
-    report.hash = stream.hash();
+    report.frame = source->frame();
+    report.hash = source->hash();
   }
 
   // --- What the rules see ---
   [[nodiscard]] Roster::Now moment() const {
     const Frame unwritten = outbox.unwritten_frames();
     return {.ns = now_ns,
-            .frame = stream.frame(),
-            .written = stream.frame() - std::min(stream.frame(), unwritten),
+            .frame = source->frame(),
+            .written = source->frame() - std::min(source->frame(), unwritten),
             .period_ns = pacing.period_ns()};
   }
   // A snapshot waits for a frame, which is rounded for it; not while the session is suspended.
   [[nodiscard]] std::int64_t frame_awaited_until_ns() const {
     return state == State::kRunning ? pacing.suspended_from_ns() + pacing.period_ns() : INT64_MIN;
+  }
+  [[nodiscard]] const Layout& layout() const { return source->session().streams[0].layout; }
+  [[nodiscard]] double threshold_m() const {
+    return source->parameters().codec.threshold * source->session().lattice_unit;
   }
   [[nodiscard]] std::int64_t clock() const { return config.clock_ns == nullptr ? 0 : config.clock_ns(); }
 
@@ -110,7 +118,7 @@ struct Host::Impl {
 
   void digest(const transport::Received<transport::AckMessage>& ack);
   void digest(const transport::Received<transport::InputMessage>& input);
-  void produce_frame(bool snapshot_due);
+  bool produce_frame(bool snapshot_due);
   [[nodiscard]] HostTotals totals_now() const;
   void note(std::string notice);
   void note_foreigner(transport::ClientId client);
@@ -119,10 +127,10 @@ struct Host::Impl {
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
 
-  HostConfig config;
-  engine::Simulation* simulation;
+  ServiceConfig config;
   transport::ServerPort* port;
-  Stream stream;
+  std::unique_ptr<FrameSource> source;
+  LiveSource* live = nullptr;  // the same, where a simulation runs
   Outbox outbox;
   Roster roster;
   InputDesk inputs;
@@ -133,7 +141,6 @@ struct Host::Impl {
   Pacing pacing;
   PublishTimes times;
   StatusDesk status;
-  transport::SessionMessage session;
 
   State state = State::kClaiming;
   std::optional<Error> error;
@@ -186,7 +193,7 @@ void Host::Impl::claim_name() {
     state = State::kRefused;
     return;
   }
-  if (now_ns - *first_poll_ns < config.claim_ns || !outbox.push(session)) return;
+  if (now_ns - *first_poll_ns < config.claim_ns || !outbox.push(source->session())) return;
   state = State::kWaiting;
   claim.announced(now_ns);
   last_look_ns = now_ns;
@@ -254,7 +261,7 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
 }
 
 void Host::Impl::note_mishaps() {
-  const engine::Mishaps now = simulation->mishaps();
+  const engine::Mishaps now = live->simulation().mishaps();
   if (now == noted_mishaps || now_ns - last_mishap_note_ns < kSecond) return;
   last_mishap_note_ns = now_ns;
   noted_mishaps = now;
@@ -263,13 +270,14 @@ void Host::Impl::note_mishaps() {
 }
 
 void Host::Impl::note_target() {
-  const QualityGoal& goal = *config.stream.quality;
+  const Stream& stream = live->stream();
+  const QualityGoal& goal = *stream.config().quality;
   if (!stream.target_out_of_reach()) {
     note(fmt::format("the target of {} Mbit/s is kept again", goal.target_mbit_per_s));
     return;
   }
   note(fmt::format("the target of {} Mbit/s is exceeded even at the largest threshold, {:.3g} m",
-                   goal.target_mbit_per_s, goal.largest_threshold * config.stream.lattice.unit));
+                   goal.target_mbit_per_s, goal.largest_threshold * stream.config().lattice.unit));
 }
 
 void Host::Impl::look_around() {
@@ -299,41 +307,42 @@ bool Host::Impl::advance_if_due(bool snapshot_due) {
   pacing.frame_started(now_ns, config.free_rate ? stalled : held);
   held = false;
   stalled = false;
-  produce_frame(snapshot_due);
-  return true;
+  return produce_frame(snapshot_due);
 }
 
-// One stream so far. A second one would be produced from the same step, side by side with the first.
-void Host::Impl::produce_frame(bool snapshot_due) {
+bool Host::Impl::produce_frame(bool snapshot_due) {
   roster.frame_starts(moment());
   const std::int64_t start = clock();
-  inputs.apply(stream.frame() + 1);
-  simulation->step();
-  const std::int64_t stepped = clock();
-  const bool was_out_of_reach = stream.target_out_of_reach();
-  if (snapshot_due) stream.round_next();
-  const Stream::FrameResult frame = stream.produce(simulation->bodies(), simulation->events());
+  const bool was_out_of_reach = live != nullptr && live->stream().target_out_of_reach();
+  const auto frame = source->next(snapshot_due, outbox);
+  if (!frame) {
+    state = State::kEnded;
+    return false;
+  }
   const std::int64_t produced = clock();
-  push_delta(outbox, config.epoch, frame, wall_ns + (produced - start));
-  times.published(frame.frame, now_ns);
-  if (stream.target_out_of_reach() != was_out_of_reach) note_target();
-  note_mishaps();
-  report = {.frame = frame.frame,
-            .hash = frame.hash,
-            .payload_bytes = frame.payload.size(),
-            .corrected = frame.corrected,
+  push_delta(outbox, config.epoch, *frame, wall_ns + (produced - start));
+  times.published(frame->frame, now_ns);
+  if (live != nullptr) {
+    if (live->stream().target_out_of_reach() != was_out_of_reach) note_target();
+    note_mishaps();
+  }
+  report = {.frame = frame->frame,
+            .hash = frame->hash,
+            .payload_bytes = frame->payload.size(),
+            .corrected = frame->corrected,
             .frame_ms = static_cast<double>(produced - start) * 1e-6,
-            .step_ms = static_cast<double>(stepped - start) * 1e-6};
+            .step_ms = static_cast<double>(frame->step_ns) * 1e-6};
   ++totals.frames;
   totals.payload_bytes += report.payload_bytes;
   totals.corrected += report.corrected;
   frame_durations.add(produced - start);
   status.frame_took(produced - start);
+  return true;
 }
 
 void Host::Impl::make_snapshot() {
-  stream.snapshot(snapshot);
-  transfer.start(config.epoch, {}, stream.frame(), snapshot, joins.ready(), now_ns);
+  source->snapshot(snapshot);
+  transfer.start(config.epoch, {}, source->frame(), snapshot, joins.ready(), now_ns);
   joins.served(roster, now_ns);
   ++totals.snapshots;
 }
@@ -356,15 +365,15 @@ HostTotals Host::Impl::totals_now() const {
 void Host::Impl::publish_status() {
   if (!status.due(now_ns)) return;
   status.publish(totals_now(),
-                 {.frame = stream.frame(),
-                  .bodies = stream.bodies(),
-                  .at_rest = stream.agreed().rest_count(),
+                 {.frame = source->frame(),
+                  .bodies = source->agreed().alive_count(),
+                  .at_rest = source->agreed().rest_count(),
                   .participants = roster.counted(),
                   .observers = roster.watching(),
                   .window = roster.window(),
-                  .threshold_m = stream.threshold_m(),
-                  .codec = config.stream.layout.codec,
-                  .predictor = config.stream.layout.predictor},
+                  .threshold_m = threshold_m(),
+                  .codec = layout().codec,
+                  .predictor = layout().predictor},
                  now_ns);
 }
 
@@ -399,10 +408,20 @@ Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation
                                                .frame = config.start_frame,
                                                .frame_rate_hz = config.frame_rate_hz});
   if (!stream) return tl::unexpected(stream.error());
-  if (auto good = transport::check_announcement(session_message(config, *stream)); !good)
+  auto source = std::make_unique<LiveSource>(config, simulation, std::move(*stream));
+  LiveSource* const live = source.get();
+  return create(std::move(config), std::move(source), port).map([live](std::unique_ptr<Host> host) {
+    host->impl_->live = live;
+    return host;
+  });
+}
+
+Result<std::unique_ptr<Host>> Host::create(ServiceConfig config, std::unique_ptr<FrameSource> source,
+                                           transport::ServerPort& port) {
+  if (auto good = check(config); !good) return tl::unexpected(good.error());
+  if (auto good = transport::check_announcement(source->session()); !good)
     return tl::unexpected(good.error());
-  auto impl = std::make_unique<Impl>(std::move(config), simulation, port, std::move(*stream));
-  return std::unique_ptr<Host>(new Host(std::move(impl)));
+  return std::unique_ptr<Host>(new Host(std::make_unique<Impl>(std::move(config), std::move(source), port)));
 }
 
 Host::Host(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -419,15 +438,19 @@ Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
-Result<Frame> Host::inject(const engine::Input& input) { return impl_->inputs.inject(input); }
-Result<void> Host::set_parameters(const StreamParameters& parameters) {
-  return impl_->stream.set_parameters(parameters);
+Result<Frame> Host::inject(const engine::Input& input) {
+  if (impl_->live == nullptr) return fail(ErrorCode::kUnsupported, "nothing is simulated here");
+  return impl_->live->inject(input, impl_->outbox);
 }
-const StreamParameters& Host::parameters() const { return impl_->stream.parameters(); }
-double Host::threshold_m() const { return impl_->stream.threshold_m(); }
-const transport::SessionMessage& Host::session() const { return impl_->session; }
-Frame Host::frame() const { return impl_->stream.frame(); }
-const tandem::State& Host::agreed() const { return impl_->stream.agreed(); }
+Result<void> Host::set_parameters(const StreamParameters& parameters) {
+  if (impl_->live == nullptr) return fail(ErrorCode::kUnsupported, "nothing is simulated here");
+  return impl_->live->stream().set_parameters(parameters);
+}
+const StreamParameters& Host::parameters() const { return impl_->source->parameters(); }
+double Host::threshold_m() const { return impl_->threshold_m(); }
+const transport::SessionMessage& Host::session() const { return impl_->source->session(); }
+Frame Host::frame() const { return impl_->source->frame(); }
+const tandem::State& Host::agreed() const { return impl_->source->agreed(); }
 std::uint64_t Host::hash() const { return impl_->report.hash; }
 std::uint32_t Host::window() const { return impl_->roster.window(); }
 std::uint32_t Host::participants() const { return impl_->roster.counted(); }

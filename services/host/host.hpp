@@ -1,6 +1,7 @@
 #pragma once
-// The host: drives a full simulation, publishes its stream, and answers its clients. All rules of behaviour
-// over time (idl/STATES.md) live behind it; it owns no thread, reads no clock and writes to no socket.
+// The host: drives a full simulation, or whatever else frames come from, publishes its stream, and answers
+// its clients. All rules of behaviour over time (idl/STATES.md) live behind it; it owns no thread, reads no
+// clock and writes to no socket.
 
 #include <cstdint>
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include "sdk/transport/port.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/host/frame_source.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/simulation.hpp"
 #include "services/host/stream.hpp"
@@ -17,10 +19,10 @@
 
 namespace tandem::host {
 
-struct HostConfig {
+/// What a host decides by itself, whatever its frames come from.
+struct ServiceConfig {
   std::string session = "default";
   Epoch epoch = 1;  ///< ms of wall clock at the process's start
-  Frame start_frame = 0;
 
   double frame_rate_hz = 30;            ///< nominal; decides the period and what a client is blamed for
   bool free_rate = false;               ///< as fast as window and queue allow (--rate max)
@@ -33,6 +35,14 @@ struct HostConfig {
   std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
   Outbox::Limits outbox;
 
+  /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
+  /// stamped with the time at which their frame started.
+  std::int64_t (*clock_ns)() = nullptr;
+};
+
+/// The same with a simulation that runs.
+struct HostConfig : ServiceConfig {
+  Frame start_frame = 0;
   /// Of all bodies; layout.capacity is the simulation's, its lead 0 or 1.
   StreamConfig stream;
 
@@ -40,10 +50,6 @@ struct HostConfig {
   std::string scene_description;
   /// layout.type_count of them: what clients draw.
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
-
-  /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
-  /// stamped with the time at which their frame started.
-  std::int64_t (*clock_ns)() = nullptr;
 };
 
 /// One frame that was just produced.
@@ -76,6 +82,7 @@ class Host {
     kWaiting,   ///< announced; joiners are served, frame 1 waits for participants
     kRunning,
     kRefused,  ///< another server owns the session: see error()
+    kEnded,    ///< the source has no frame any more
   };
 
   /// `simulation` and `port` must outlive the host. `simulation` was not stepped yet; its bodies now are the
@@ -83,6 +90,10 @@ class Host {
   /// announcement; body columns not `capacity` long), kUnsupported
   /// (codec, predictor), kMalformed (tables).
   static Result<std::unique_ptr<Host>> create(HostConfig config, engine::Simulation& simulation,
+                                              transport::ServerPort& port);
+  /// Of other frames than those of a simulation. What `source` announces is of `config`'s session, epoch and
+  /// frame rate. Errors: kInvalidArgument.
+  static Result<std::unique_ptr<Host>> create(ServiceConfig config, std::unique_ptr<FrameSource> source,
                                               transport::ServerPort& port);
   ~Host();
   Host(const Host&) = delete;
@@ -102,11 +113,11 @@ class Host {
   [[nodiscard]] Outbox& outbox();
 
   /// Applies an input of the server's own, as if a participant had sent it now. Returns the frame it acts on.
-  /// Errors: kInvalidArgument (refused by the simulation), kCapacity.
+  /// Errors: kInvalidArgument (refused by the simulation), kCapacity, kUnsupported (no simulation).
   Result<Frame> inject(const engine::Input& input);
 
   /// What decoder and predicted step read (threshold, quantisation steps, gains, decay): see
-  /// Stream::set_parameters().
+  /// Stream::set_parameters(); kUnsupported without a simulation.
   [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
   [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units

@@ -31,7 +31,7 @@ transport::SessionMessage session_message(const HostConfig& config, const Stream
   return session;
 }
 
-void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, std::int64_t wall_ns) {
+void push_delta(Outbox& outbox, Epoch epoch, const FrameSource::Made& frame, std::int64_t wall_ns) {
   const std::size_t size = frame.payload.size();
   const std::size_t parts =
       std::max<std::size_t>((size + transport::kPartBytes - 1) / transport::kPartBytes, 1);

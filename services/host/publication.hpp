@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "sdk/transport/messages.hpp"
+#include "services/host/frame_source.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/stream.hpp"
@@ -15,6 +16,6 @@ namespace tandem::host {
 [[nodiscard]] transport::SessionMessage session_message(const HostConfig& config, const Stream& stream);
 
 /// Queues a delta, cut into parts of kPartBytes. There must be room for a frame.
-void push_delta(Outbox& outbox, Epoch epoch, const Stream::FrameResult& frame, std::int64_t wall_ns);
+void push_delta(Outbox& outbox, Epoch epoch, const FrameSource::Made& frame, std::int64_t wall_ns);
 
 }  // namespace tandem::host
