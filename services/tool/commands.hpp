@@ -13,6 +13,7 @@ using Run = std::function<int()>;
 /// Each adds one subcommand to `app`; when the command line chooses it, its callback sets `run`.
 void add_join(CLI::App& app, Run& run);
 void add_record(CLI::App& app, Run& run);
+void add_replay(CLI::App& app, Run& run);
 void add_top(CLI::App& app, Run& run);
 void add_doctor(CLI::App& app, Run& run);
 

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   tandem::tool::Run run;
   tandem::tool::add_join(app, run);
   tandem::tool::add_record(app, run);
+  tandem::tool::add_replay(app, run);
 #ifdef TANDEM_LAB
   tandem::lab::add_bench(app, run);
   tandem::lab::add_export(app, run);

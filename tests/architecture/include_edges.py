@@ -57,7 +57,7 @@ EDGES = {
     "services/tandemd/main.cpp": ["services/tandemd", "services/heap"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
-    + ["services/heap", "services/recording", "services/scenes"],
+    + ["services/heap", "services/host", "services/recording", "services/scenes"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]

@@ -41,7 +41,7 @@ class CommandLine(unittest.TestCase):
     def test_help_and_version_are_no_errors(self):
         self.assertEqual(run("--help").returncode, 0)
         self.assertRegex(run("--version").stdout, r"^tandem \d+\.\d+\.\d+\n$")
-        for command in ("join", "record", "bench", "export", "top", "doctor"):
+        for command in ("join", "record", "replay", "bench", "export", "top", "doctor"):
             self.assertEqual(run(command, "--help").returncode, 0, command)
 
     def test_wrong_usage_exits_2_and_says_what_is_expected(self):

@@ -1,0 +1,44 @@
+#pragma once
+// A recording in the place of a simulation: the frames of one of its runs.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "services/host/frame_source.hpp"
+#include "services/host/host.hpp"
+#include "services/recording/playback.hpp"
+
+namespace tandem::tool {
+
+/// Publishes a run of a playback as a session of its own; what was recorded of payloads, hashes and scheduled
+/// inputs goes out as it is. Every input is refused.
+class RecordedSource final : public host::FrameSource {
+ public:
+  /// `playback` holds a state, outlives this, and is stepped by nobody else meanwhile.
+  RecordedSource(recording::Playback& playback, const host::ServiceConfig& config);
+
+  [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
+  [[nodiscard]] Frame frame() const override { return timeline().applied(); }
+  [[nodiscard]] const State& agreed() const override { return timeline().state(frame()); }
+  [[nodiscard]] std::uint64_t hash() const override { return timeline().hash(); }
+  [[nodiscard]] const StreamParameters& parameters() const override { return timeline().parameters(); }
+  std::optional<Made> next(bool snapshot_follows, host::Outbox& outbox) override;
+  void snapshot(std::vector<std::byte>& out) override { timeline().snapshot(out); }
+  transport::Reason accept(const engine::Input& /*input*/, const host::InputOrigin& /*origin*/,
+                           host::Outbox& /*outbox*/, Frame& /*acts_on*/) override {
+    return transport::Reason::kRecording;
+  }
+
+  /// After next() had nothing: what the playback said instead, kStarted where another run begins.
+  [[nodiscard]] const Result<recording::Playback::Step>& ending() const { return ending_; }
+
+ private:
+  [[nodiscard]] const ClientTimeline& timeline() const { return playback_->timeline(); }
+
+  recording::Playback* playback_;
+  transport::SessionMessage session_;
+  Result<recording::Playback::Step> ending_ = recording::Playback::Step::kFrame;
+};
+
+}  // namespace tandem::tool

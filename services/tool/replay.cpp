@@ -1,0 +1,157 @@
+// `tandem replay`: a recorded session over DDS again, as a server that computes nothing new.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <memory>
+#include <thread>
+
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/units.hpp"
+#include "services/heap/heap.hpp"
+#include "services/host/publisher.hpp"
+#include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
+#include "services/tool/recorded_source.hpp"
+
+namespace tandem::tool {
+namespace {
+
+using recording::Playback;
+using Step = Playback::Step;
+using transport::steady_ns;
+using transport::wall_ns;
+
+struct ReplayOptions {
+  std::string file;
+  std::uint32_t domain = 0;
+  std::string session = "default";
+  double rate = 1;
+  double from_s = 0;
+  bool loop = false;
+  std::uint32_t wait_for = 0;
+};
+
+std::atomic<bool> stopped = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+// What was queued last goes out, and whoever reads has the time to take it.
+void let_go(const host::Outbox& outbox) {
+  constexpr int kMostTicks = 200;
+  constexpr std::chrono::milliseconds kTick(5), kTaking(500);
+  for (int i = 0; i < kMostTicks && outbox.size() > 0; ++i) std::this_thread::sleep_for(kTick);
+  if (!stopped) std::this_thread::sleep_for(kTaking);
+}
+
+/// Publishes the run at hand to its end. Returns what comes behind it, kFrame when it was stopped before.
+Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch) {
+  host::ServiceConfig config;
+  config.session = options.session;
+  config.epoch = epoch;
+  config.frame_rate_hz = std::clamp(playback.session().frame_rate_hz * options.rate, 1.0, 1000.0);
+  config.window_ceiling = std::min(playback.session().window_ceiling, config.window_ceiling);
+  config.wait_for = options.wait_for;
+  config.clock_ns = &steady_ns;
+  transport::DdsOptions dds;
+  dds.domain = options.domain;
+  dds.session = options.session;
+  dds.delta_depth =
+      transport::delta_depth(config.frame_rate_hz, config.window_ceiling, playback.stream().max_delta_bytes);
+  dds.stop = &stopped;
+  const auto port = transport::make_dds_server_port(dds);
+  if (!port) return tl::unexpected(port.error());
+  auto frames = std::make_unique<RecordedSource>(playback, config);
+  const RecordedSource& source = *frames;
+  const auto host = host::Host::create(config, std::move(frames), **port);
+  if (!host) return tl::unexpected(host.error());
+  fmt::print(
+      stderr, "tandem replay: session '{}' on domain {}, epoch {}, {} slots, from frame {} ({:.1f} s)\n",
+      options.session, options.domain, epoch, playback.session().capacity, source.frame(), playback.time_s());
+  host::Publisher publisher((*host)->outbox(), **port);
+  while (!stopped && (*host)->state() != host::Host::State::kEnded) {
+    (*host)->poll(steady_ns(), wall_ns());
+    if ((*host)->error()) return tl::unexpected(*(*host)->error());
+    if (publisher.gave_up())
+      return fail(ErrorCode::kTransport,
+                  "a frame could not be written for 10 s: " + publisher.last_failure());
+    for (const std::string& notice : (*host)->take_notices())
+      fmt::print(stderr, "tandem replay: {}\n", notice);
+    const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
+    if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
+  }
+  let_go((*host)->outbox());
+  return source.ending();
+}
+
+// To the first frame that was recorded at `from_s` or later.
+Result<Step> go_to(Playback& playback, double from_s) {
+  playback.seek(from_s);
+  auto step = playback.next();
+  while (step && *step != Step::kEnd && playback.time_s() < from_s) step = playback.next();
+  if (step && *step == Step::kEnd)
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("no frame at {:.1f} s or later; the recording has {:.1f} s", from_s,
+                            playback.length_s()));
+  return step;
+}
+
+Result<void> replay(const ReplayOptions& options) {
+  auto playback = Playback::open(options.file);
+  if (!playback) return tl::unexpected(playback.error());
+  if (const auto torn = (*playback)->torn_at())
+    fmt::print(stderr, "tandem replay: {} is cut short at byte {}; replayed up to there\n", options.file,
+               *torn);
+  Epoch epoch = 0;
+  do {
+    auto step = go_to(**playback, options.from_s);
+    // An epoch of its own for each run, as frames follow one another within one.
+    while (step && *step != Step::kEnd && !stopped) {
+      epoch = std::max<Epoch>(epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
+      step = serve(**playback, options, epoch);
+    }
+    if (!step) return fail(step.error().code, options.file + ": " + step.error().message);
+  } while (options.loop && !stopped);
+  return {};
+}
+
+int run_replay(const ReplayOptions& options) {
+  std::signal(SIGINT, [](int) { stopped = true; });
+  std::signal(SIGTERM, [](int) { stopped = true; });
+  const HeapTrimmer trimmer;
+  const auto done = replay(options);
+  if (done) return 0;
+  fmt::print(stderr, "tandem replay: {}\n", done.error().message);
+  return 1;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, Run& run) {
+  CLI::App* command = app.add_subcommand("replay", "Publishes a recorded session again.");
+  const auto options = std::make_shared<ReplayOptions>();
+  command->add_option("file", options->file, "What `tandem record` wrote")->required();
+  add_endpoint_options(*command, options->domain, options->session);
+  command
+      ->add_option("--rate", options->rate, "Speed; 1 is that of the session, frames a second at most 1000")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  command->add_option("--from", options->from_s, "Seconds into the recording")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--loop", options->loop, "Again from there at its end, until stopped");
+  command->add_option("--wait-for", options->wait_for, "Participants that must play before the first frame")
+      ->check(CLI::Range(0U, 256U))
+      ->capture_default_str();
+  command->footer(
+      "Clients join at any frame. Each run of the recording (where it has a gap, or the server was restarted, another "
+      "begins) is\n"
+      "an epoch of its own; inputs are refused. A file that is cut short is replayed up to there. Exit 1 when it cannot "
+      "be read.");
+  command->callback([options, &run] { run = [options] { return run_replay(*options); }; });
+}
+
+}  // namespace tandem::tool

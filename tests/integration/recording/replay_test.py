@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""A session is recorded, and clients of its replay hold the same states.
+
+replay_test.py --tandemd PATH --tandem PATH
+
+Exit 0 passed, 1 failed.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+
+LOOPBACK = (
+    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
+    f"</General><Discovery><Tag>replay-test-{os.getpid()}</Tag></Discovery></Domain></CycloneDDS>"
+)
+ENVIRONMENT = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
+INPUTS = "".join(f"inputs {{ frame: {frame} gravity {{ x: 3 y: -9 z: 0 }} }}\n" for frame in (5, 10, 15))
+
+
+class Programs:
+    """The programs under test, in a folder for their files."""
+
+    def __init__(self, options, folder):
+        self.tandemd, self.tandem, self.folder = options.tandemd, options.tandem, pathlib.Path(folder)
+
+    def start(self, *arguments):
+        return subprocess.Popen(
+            list(map(str, arguments)), env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def join(self, name, *arguments):
+        log = self.folder / f"{name}.csv"
+        return self.start(self.tandem, "join", "--timeout", 60, "--json", "--hash-log", log, *arguments)
+
+    def hashes(self, name):
+        """By frame."""
+        lines = (self.folder / f"{name}.csv").read_text(encoding="utf-8").split()
+        return {int(frame): value for _, frame, value in (line.split(",") for line in lines)}
+
+
+def finish(process, what, code=0):
+    out, errors = process.communicate(timeout=120)
+    assert process.returncode == code, f"{what}: exit {process.returncode}: {errors[-800:]}"
+    return out, errors
+
+
+def record(programs):
+    """Six seconds of a session with scripted gravity."""
+    file = programs.folder / "session.mcap"
+    server = programs.start(programs.tandemd, "--scene", "half_pipe", "--bodies", 500, "--scripted", "--rate", 60)
+    try:
+        recorder = programs.start(
+            programs.tandem, "record", file, "--timeout", 60, "--seconds", 6, "--json",
+            "--hash-log", programs.folder / "recorded.csv",
+        )  # fmt: skip
+        report = json.loads(finish(recorder, "record")[0])
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=60)
+    assert report["frames_recorded"] == report["frames_applied"] == len(programs.hashes("recorded")), report
+    assert report["file_bytes"] == file.stat().st_size
+    assert report["topics"]["TandemDelta"]["messages"] == report["frames_recorded"]
+    print(f"recorded {report['frames_recorded']} frames", flush=True)
+    return file
+
+
+def expect_same(programs, name, truth, least):
+    found = programs.hashes(name)
+    assert len(found) >= least, f"{name}: only {len(found)} frames"
+    assert found.items() <= truth.items(), f"{name} holds other states than were recorded"
+    assert sorted(found) == list(range(min(found), max(found) + 1)), f"{name} has gaps"
+    print(f"{name}: frames {min(found)} to {max(found)} agree", flush=True)
+    return found
+
+
+def check_whole(programs, file, truth):
+    """A participant from the first frame on, whose inputs are refused, and one that comes late."""
+    script = programs.folder / "inputs.textproto"
+    script.write_text(INPUTS, encoding="utf-8")
+    first = programs.join("first", "--input-script", script, "--seconds", 4)
+    replay = programs.start(programs.tandem, "replay", file, "--wait-for", 1)
+    late = programs.join("late", "--observe", "--seconds", 2)
+    report = json.loads(finish(first, "the first client")[0])
+    finish(late, "the late client")
+    finish(replay, "replay")
+    assert report["hash_mismatches"] == 0 and report["resyncs"] == 0, report
+    assert report["inputs_sent"] == report["inputs_refused"] == 3 and report["inputs_acted"] == 0, report
+    found = expect_same(programs, "first", truth, 100)
+    assert min(found) == min(truth), "the first frame is not there"
+    expect_same(programs, "late", truth, 20)
+
+
+def check_jump(programs, file, truth):
+    """From the middle, at half the rate."""
+    client = programs.join("jumped", "--observe", "--seconds", 1)
+    replay = programs.start(programs.tandem, "replay", file, "--from", 2, "--rate", 0.5)
+    finish(client, "the client of a jump")
+    replay.send_signal(signal.SIGINT)
+    finish(replay, "replay")
+    found = expect_same(programs, "jumped", truth, 5)
+    assert min(found) > min(truth) + 60, f"from frame {min(found)}"
+
+
+def check_torn(programs, file, truth):
+    """A file cut in the middle of its deltas."""
+    torn = programs.folder / "torn.mcap"
+    # Behind the last chunk stands the summary, with nine copies of the types.
+    torn.write_bytes(file.read_bytes()[: file.stat().st_size - 9 * 7000])
+    client = programs.join("torn", "--seconds", 1)
+    replay = programs.start(programs.tandem, "replay", torn, "--wait-for", 1)
+    finish(client, "the client of a torn file")
+    _, errors = finish(replay, "replay")
+    assert "cut short at byte" in errors, errors
+    expect_same(programs, "torn", truth, 10)
+
+
+def check_refusals(programs, file):
+    bad = programs.folder / "bad.mcap"
+    whole = file.read_bytes()
+    for content, said in (
+        (b"", "not an MCAP file"),
+        (b"no recording at all", "not an MCAP file"),
+        (whole[:5] + b"1" + whole[6:], "another version"),
+        (whole[:100] + bytes([whole[100] ^ 255]) + whole[101:], "damaged chunk"),
+        (whole[:60], "no frame"),
+    ):
+        bad.write_bytes(content)
+        _, errors = finish(programs.start(programs.tandem, "replay", bad), "replay", 1)
+        lines = [line for line in errors.splitlines() if "cut short" not in line]
+        assert len(lines) == 1 and said in lines[0], errors
+    _, errors = finish(programs.start(programs.tandem, "replay", programs.folder / "none.mcap"), "replay", 1)
+    assert "No such file" in errors, errors
+    _, errors = finish(programs.start(programs.tandem, "replay", file, "--from", 1000), "replay", 1)
+    assert "no frame at 1000.0 s or later" in errors, errors
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for option in ("--tandemd", "--tandem"):
+        parser.add_argument(option, type=pathlib.Path, required=True)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        programs = Programs(options, folder)
+        try:
+            file = record(programs)
+            truth = programs.hashes("recorded")
+            check_whole(programs, file, truth)
+            check_jump(programs, file, truth)
+            check_torn(programs, file, truth)
+            check_refusals(programs, file)
+        except (AssertionError, subprocess.SubprocessError) as failure:
+            print(f"FAILED: {failure}", file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
