@@ -61,7 +61,7 @@ export class GravityControls {
   private showValue(gravity: Vec3): void {
     const strength = Math.hypot(...gravity);
     element('gravityValue').textContent = threeDigits(strength);
-    element('dial').setAttribute('aria-valuetext', gravity.map((x) => `${x.toFixed(1)}`).join(', '));
+    element('dial').title = `gravity ${gravity.map((x) => x.toFixed(2)).join(', ')} m/s²`;
     if (document.activeElement !== this.strength) this.strength.value = String(strength);
   }
 

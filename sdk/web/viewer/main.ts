@@ -71,7 +71,7 @@ class Page {
     requestAnimationFrame((now) => this.draw(now));
   }
 
-  /** What scripts and tests see as globalThis.tandem. */
+  /** What scripts see as globalThis.tandem. */
   readonly forScripts = {
     status: (): Status & { drawing: Drawing } => ({ ...this.client.status(), drawing: this.drawing() }),
     sample: (mode?: SampleMode) => this.client.sample(mode),
@@ -109,13 +109,14 @@ class Page {
     const description = this.sessionChanged ? this.client.sceneDescription() : '';
     const sample = this.client.sample('extrapolate');
     if (!sample) return;
-    if (this.sessionChanged || this.world?.bodies.capacity !== sample.capacity) {
+    if (this.sessionChanged || !this.world) {
       this.world?.dispose();
       this.world = new World(this.stage, types, description, sample);
       this.world.slowMotion.setSpeed(this.speed);
       this.sessionChanged = false;
       this.radii = types.map((type) => type.radius);
       this.gravity.setScene(this.world.scene);
+      element('scene').title = this.world.scene.description;
       if (this.world.sceneError) toast(`The scene’s geometry cannot be drawn: ${this.world.sceneError}`, true);
       if (description !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
       this.sceneShown = description;

@@ -62,14 +62,17 @@ export class World {
   }
 }
 
-function bodiesExtent(sample: Sample, types: BodyType[]): Extent | null {
-  let extent: Extent | null = null;
-  for (let slot = 0; slot < sample.capacity; ++slot) {
-    if (!sample.alive[slot]) continue;
-    const at = Array.from(sample.positions.subarray(3 * slot, 3 * slot + 3)) as Vec3;
-    const radius = types[sample.types[slot]]?.radius ?? 0;
-    const body = { low: at.map((x) => x - radius) as Vec3, high: at.map((x) => x + radius) as Vec3 };
-    extent = extent ? join(extent, body) : body;
+/** Of nearly all bodies: the few that have flown far away do not count. */
+export function bodiesExtent(sample: Sample, types: BodyType[]): Extent | null {
+  const slots = Array.from({ length: sample.capacity }, (_, slot) => slot).filter((slot) => sample.alive[slot]);
+  if (slots.length === 0) return null;
+  const extent: Extent = { low: [0, 0, 0], high: [0, 0, 0] };
+  const left = Math.floor(slots.length / 50);
+  const radius = Math.max(...types.map((type) => type.radius), 0);
+  for (let axis = 0; axis < 3; ++axis) {
+    const sorted = Float32Array.from(slots, (slot) => sample.positions[3 * slot + axis]).sort();
+    extent.low[axis] = sorted[left] - radius;
+    extent.high[axis] = sorted[sorted.length - 1 - left] + radius;
   }
   return extent;
 }

@@ -1,7 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import { clip, extentOf, gridLines, roomFaces, tangents, type Extent } from '../room';
+import type { Sample } from '../../tandem';
 import type { Plane, Vec3 } from '../scene_text';
-import { extentsOf } from '../world';
+import { bodiesExtent, extentsOf } from '../world';
 import { emptyScene } from '../scene_text';
 
 const bounds: Extent = { low: [-10, -10, -10], high: [10, 10, 10] };
@@ -65,6 +66,17 @@ describe('what the camera shows', () => {
     const { shown } = extentsOf({ ...emptyScene, planes: unitRoom, bounds }, { low: [-1, -1, -1], high: [0, 0, 0] });
     expect(shown.low).toEqual([-1, -1, -1]);
     expect(shown.high[0]).toBeCloseTo(1);
+  });
+
+  it('leaves out the few bodies that have flown away', () => {
+    const positions = new Float32Array(300);
+    for (let slot = 0; slot < 99; ++slot) positions[3 * slot] = slot / 98;
+    positions[297] = 1000;
+    const alive = new Uint8Array(100).fill(1);
+    const type = { name: '', radius: 0.5, colour: '', shape: 'sphere' as const, shapeValues: [] };
+    const extent = bodiesExtent({ capacity: 100, positions, alive } as unknown as Sample, [type]);
+    expect(extent?.high[0]).toBeLessThan(1.6);
+    expect(extent?.low[1]).toBe(-0.5);
   });
 
   it('is the bodies where there is only ground', () => {
