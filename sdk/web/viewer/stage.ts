@@ -45,7 +45,14 @@ export class Stage {
   private lastRender = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: !drawsInSoftware(), powerPreference: 'high-performance' });
+    const context = canvas.getContext('webgl2', {
+      alpha: false,
+      antialias: !drawsInSoftware(),
+      stencil: false,
+      powerPreference: 'high-performance',
+    });
+    if (!context) throw new Error('there is no WebGL 2');
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.scene.background = background;
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
