@@ -1,4 +1,5 @@
-"""Runs one server and three clients over loopback DDS, shows them live and compares their hash logs frame by frame.
+"""Runs one server and three clients over loopback DDS, shows them live and compares their hash logs frame by frame. With
+--view: a server, two participants and a gateway for browsers, until Ctrl-C.
 
 Started by deploy/quickstart, which builds the programs first. Standard library only.
 """
@@ -7,12 +8,18 @@ import argparse
 import json
 import os
 import pathlib
+import random
+import re
+import secrets
 import signal
+import socket
+import ssl
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import urllib.request
 
 OBSERVER_DELAY_S = 5
 START_LIMIT_S = 30  # for discovery and joining, for a slow machine's frames and, at the end, for leaving
@@ -41,6 +48,10 @@ def free_domain():
         if not used.intersection(range(first, first + 250)):
             return domain
     raise Failure("no free DDS domain between 20 and 99: is the machine full of DDS programs?")
+
+
+class Stopped(Failure):
+    """By a signal."""
 
 
 class Session:
@@ -89,20 +100,21 @@ class Session:
         """Seconds after which server and clients end by themselves, should nobody be left to end them."""
         return self.options.seconds + 3 * START_LIMIT_S
 
+    def logging(self, name):
+        return ["--hash-log", str(self.file(name, "hashes"))]
+
     def start_server(self):
         self.start(
             "server", "services/tandemd/tandemd",
             "--scene", self.options.scene, "--bodies", str(self.options.bodies),
-            "--wait-for", "2", "--duration", str(self.longest()), "--json",
-            "--hash-log", str(self.file("server", "hashes")),
+            "--wait-for", "2", "--duration", str(self.longest()), "--json", *self.logging("server"),
         )  # fmt: skip
 
     def start_client(self, name, flags):
         flags = [str(self.inputs / flag) if flag.endswith(".textproto") else flag for flag in flags]
         self.start(
             name, "services/tool/tandem", "join", *flags,
-            "--seconds", str(self.longest()), "--timeout", str(START_LIMIT_S), "--json",
-            "--hash-log", str(self.file(name, "hashes")),
+            "--seconds", str(self.longest()), "--timeout", str(START_LIMIT_S), "--json", *self.logging(name),
         )  # fmt: skip
 
     def start_top(self):
@@ -157,6 +169,121 @@ class Session:
                 epoch, frame, value = line.strip().split(",")
                 log[int(epoch), int(frame)] = value
         return log
+
+
+class View(Session):
+    """A server, two participants that tilt it, and a gateway that serves the viewer."""
+
+    participants = ("participant 1", "participant 2")
+
+    def __init__(self, options, folder):
+        super().__init__(options, folder)
+        self.token = secrets.token_urlsafe(16)
+
+    def longest(self):
+        return 12 * 3600
+
+    def logging(self, name):
+        return []
+
+    def start_all(self):
+        self.start_server()
+        for place, name in enumerate(self.participants):
+            script = self.file(name, "textproto")
+            script.write_text(tilts(place, scene_strength(self.options.scene), self.longest()), encoding="ascii")
+            self.start_client(name, ["--input-script", str(script)])
+        self.start("gateway", "services/gateway/tandem-gateway", *self.gateway_flags())
+
+    def gateway_flags(self):
+        flags = ["--port", str(self.options.port), "--viewer", str(self.build / "sdk/web/viewer")]
+        if self.options.lan:
+            certificate, key = self.file("gateway", "crt"), self.file("gateway", "key")
+            make_certificate(certificate, key, lan_address())
+            token = self.file("gateway", "token")
+            token.write_text(self.token + "\n", encoding="ascii")
+            flags += ["--listen", "0.0.0.0", "--tls-cert", str(certificate), "--tls-key", str(key), "--token-file", str(token)]
+        return flags
+
+    def address(self):
+        """What to open in a browser."""
+        if not self.options.lan:
+            return f"http://localhost:{self.options.port}/"
+        return f"https://{lan_address()}:{self.options.port}/?token={self.token}"
+
+    def plays(self):
+        """Whether the gateway says that it follows the session."""
+        scheme = "https" if self.options.lan else "http"
+        trusting = ssl.create_default_context()
+        trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE  # of this machine and this run
+        try:
+            with urllib.request.urlopen(f"{scheme}://127.0.0.1:{self.options.port}/healthz", timeout=2, context=trusting) as health:
+                return json.load(health)["phase"] == "playing"
+        except (OSError, ValueError, KeyError):
+            return False
+
+
+def scene_strength(scene):
+    """Gravity of a scene of services/scenes, m/s^2."""
+    path = pathlib.Path(__file__).resolve().parents[1] / "services" / "scenes" / f"{scene}.textproto"
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    found = re.search(r"^gravity \{ y: -([0-9.]+) \}", text, re.MULTILINE)
+    return float(found[1]) if found else 9.81
+
+
+TILT_PERIOD_S = 24
+
+
+def tilts(place, strength, seconds):
+    """An input script of the participant at a place, from 0: gravity leans to some side, and now and then turns over."""
+    dice = random.Random(place)
+    lines = []
+    for i in range(int(seconds / TILT_PERIOD_S)):
+        x, z = dice.uniform(-0.5, 0.5), dice.uniform(-0.5, 0.5)
+        y = (1 if i % 4 == 3 else -1) * (1 - x * x - z * z) ** 0.5
+        gravity = " ".join(f"{axis}: {strength * value:.3f}" for axis, value in zip("xyz", (x, y, z)))
+        lines.append(f"inputs {{ time_s: {4 + TILT_PERIOD_S * (i + place / 2):.1f} gravity {{ {gravity} }} }}\n")
+    return "".join(lines)
+
+
+def lan_address():
+    """The address by which others on the network see this machine."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing: asks which interface would
+            return probe.getsockname()[0]
+        except OSError:
+            return "127.0.0.1"
+
+
+def make_certificate(certificate, key, address):
+    """A self-signed one for a week."""
+    command = [
+        "openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "7",
+        "-subj", "/CN=tandem quickstart", "-addext", f"subjectAltName=IP:{address},IP:127.0.0.1,DNS:localhost",
+        "-keyout", str(key), "-out", str(certificate),
+    ]  # fmt: skip
+    made = subprocess.run(command, capture_output=True, text=True, check=False)
+    if made.returncode != 0:
+        raise Failure(f"openssl made no certificate:\n{made.stderr.strip()}")
+
+
+def view(session):
+    """Runs until somebody ends it."""
+    session.start_all()
+    deadline = time.monotonic() + START_LIMIT_S
+    while not session.plays():
+        session.check_running()
+        if time.monotonic() > deadline:
+            raise Failure(f"the gateway does not play after {START_LIMIT_S} s:\n{session.errors_of('gateway')}")
+        time.sleep(0.1)
+    address = session.address()
+    if session.options.lan:
+        subprocess.run(["qrencode", "-t", "ANSIUTF8", "-m", "2", address], check=False)
+        print("The certificate is of this run, so browsers ask whether to go on.")
+    print(f"open {address}\nCtrl-C ends it", flush=True)
+    while True:
+        session.check_running()
+        time.sleep(0.2)
 
 
 def server_of(top):
@@ -272,15 +399,22 @@ def main():
     parser.add_argument("--seconds", type=int, required=True)
     parser.add_argument("--bodies", type=int, required=True)
     parser.add_argument("--scene", required=True)
+    parser.add_argument("--view", action="store_true")
+    parser.add_argument("--lan", action="store_true")
+    parser.add_argument("--port", type=int, default=8080)
     options = parser.parse_args()
 
     def stop(number, _):
-        raise Failure(f"stopped by {signal.Signals(number).name}")
+        raise Stopped(f"stopped by {signal.Signals(number).name}")
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop)
     try:
         with tempfile.TemporaryDirectory(prefix="tandem-quickstart-") as folder:
+            if options.view:
+                with View(options, folder) as session:
+                    print(f"{options.scene}, {options.bodies} bodies, on DDS domain {session.common[1]}, loopback only", flush=True)
+                    view(session)
             with Session(options, folder) as session:
                 print(f"{options.scene}, {options.bodies} bodies, {options.seconds} s: tandemd and three `tandem join` on DDS"
                       f" domain {session.common[1]}, loopback only", flush=True)  # fmt: skip
@@ -290,6 +424,8 @@ def main():
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Failure as failure:
+        if options.view and isinstance(failure, Stopped):
+            return 0
         print(f"quickstart: {failure}", file=sys.stderr)
         return 1
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import pathlib
+import re
 import unittest
 
 path = pathlib.Path(__file__).resolve().parents[3] / "deploy" / "quickstart-session.py"
@@ -69,6 +70,22 @@ class LiveLine(unittest.TestCase):
         line = quickstart.live_line(2, top)
         self.assertIn("1.50 of 50.00 Mbit/s (3.00 %)", line)
         self.assertIn("participant 2 ms, observer 3 ms", line)
+
+
+class Tilts(unittest.TestCase):
+    def test_the_gravity_of_a_scene_is_read(self):
+        self.assertEqual(quickstart.scene_strength("half_pipe"), 3)
+        self.assertEqual(quickstart.scene_strength("no_such_scene"), 9.81)
+
+    def test_gravity_keeps_its_strength_and_the_participants_take_turns(self):
+        times = []
+        for place in (0, 1):
+            for line in quickstart.tilts(place, 3, 600).splitlines():
+                time, x, y, z = map(float, re.findall(r": (-?[0-9.]+)", line))
+                self.assertAlmostEqual((x * x + y * y + z * z) ** 0.5, 3, places=2)
+                times.append(time)
+        times.sort()
+        self.assertEqual({round(after - before) for before, after in zip(times, times[1:])}, {quickstart.TILT_PERIOD_S // 2})
 
 
 if __name__ == "__main__":
