@@ -191,13 +191,15 @@ class Page {
   private panelsChanged(): void {
     const panel = element('panel').getBoundingClientRect();
     const controls = element('controls').getBoundingClientRect();
+    const look = element('look').getBoundingClientRect();
     const narrow = matchMedia('(max-width: 720px)').matches;
     const open = element('panel').classList.contains('open');
     if (narrow && open) return;
+    if (panel.width === 0) return; // ?bare
     this.stage.setInsets(
       narrow
         ? { top: panel.bottom, right: 0, bottom: innerHeight - controls.top, left: 0 }
-        : { top: 0, right: innerWidth - panel.left, bottom: innerHeight - element('look').getBoundingClientRect().top, left: 0 },
+        : { top: 0, right: innerWidth - panel.left, bottom: innerHeight - look.top, left: 0 },
     );
   }
 }
@@ -206,7 +208,9 @@ async function start(): Promise<void> {
   if (typeof WebAssembly !== 'object') {
     throw new Error('This browser has no WebAssembly, in which the client is written.');
   }
-  const role = new URLSearchParams(location.search).has('observe') ? 'observer' : 'participant';
+  const asked = new URLSearchParams(location.search);
+  const role = asked.has('observe') ? 'observer' : 'participant';
+  document.body.classList.toggle('bare', asked.has('bare'));
   const wasm = { plain: new URL('tandem.wasm', document.baseURI), simd: new URL('tandem-simd.wasm', document.baseURI) };
   const log = (level: LogLevel, text: string) => void (level !== 'info' && toast(text, true));
   const connecting = Client.connect({ url: gatewayUrl(), role, wasm, log });
