@@ -16,14 +16,18 @@ using FourBits = std::uint32_t __attribute__((vector_size(16)));
 
 constexpr std::int32_t kForceLimit = 1 << 26;  // times a mobility of 16 a velocity stays below 2^31
 
+// The count of a shift, read anew: once clang 14 has moved a vector of it out of a loop, it does not know any
+// more that all counts are the same, and for WebAssembly shifts element by element.
+inline std::int32_t here(std::int32_t count) {
+#ifdef __wasm_simd128__
+  __asm__ volatile("" : "+r"(count));
+#endif
+  return count;
+}
 inline Four same(std::int32_t x) { return Four{x, x, x, x}; }
-// Element by element: from this the compiler makes the minimum and maximum of vectors, where there is one.
 inline Four clamped(Four x, Four limit) {
-  const Four low = -limit;
-  Four result;
-  for (int i = 0; i < 4; ++i) result[i] = x[i] < low[i] ? low[i] : x[i];
-  for (int i = 0; i < 4; ++i) result[i] = result[i] > limit[i] ? limit[i] : result[i];
-  return result;
+  x = x < -limit ? -limit : x;
+  return x > limit ? limit : x;
 }
 template <class T>
 inline Four load(const T& from) {
@@ -40,8 +44,9 @@ inline Four share_of(Four x, Four share, std::uint32_t bits, std::uint32_t half)
 }
 
 inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
-  const FourWords places = __builtin_convertvector(p_and_radius >> shift, FourWords);
-  const FourWords speeds = __builtin_convertvector(clamped(v >> (shift + 6), same(kMostSpeed)), FourWords);
+  const FourWords places = __builtin_convertvector(p_and_radius >> here(shift), FourWords);
+  const FourWords speeds =
+      __builtin_convertvector(clamped(v >> here(shift + 6), same(kMostSpeed)), FourWords);
   ContactView view{};
   std::memcpy(&view.q, &places, sizeof places);
   std::memcpy(&view.v, &speeds, sizeof speeds);
@@ -71,7 +76,7 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
       force.f = {};
       continue;
     }
-    const Four f = clamped(load(force.f), most_force) << force_shift;
+    const Four f = clamped(load(force.f), most_force) << here(force_shift);
     const Four p_and_radius = load(body.p);
     const Four v_and_slot = load(body.v);
     Four v = (v_and_slot & axes) + gravity;
@@ -85,7 +90,7 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
     if (move.damping != 0) v -= share_of(v, damping, 0, 1U << 15U);
     v = clamped(v, same(kVelocityLimit));
     // The same where N is a power of two.
-    const Four way = halved ? (v + half) >> halvings : share_of(v, share, 5, 1U << 20U);
+    const Four way = halved ? (v + half) >> here(halvings) : share_of(v, share, 5, 1U << 20U);
     const Four p = clamped(p_and_radius + way, same(kPositionLimit));
     const Four new_v = (v & axes) | (v_and_slot & ~axes);
     const Four new_p = (p & axes) | (p_and_radius & ~axes);
@@ -105,8 +110,9 @@ TANDEM_VECTOR_CLONES void place_bodies(std::span<const ContactBody> bodies, cons
     const Four p = load(bodies[k].p);
     const Four v = load(bodies[k].v) & Four{-1, -1, -1, 0};
     views[k] = view(p, v, shift);
-    const FourWords now = __builtin_convertvector(p >> near_shift, FourWords);
-    const FourWords later = __builtin_convertvector((p + share_of(v, share, 5, 0)) >> near_shift, FourWords);
+    const FourWords now = __builtin_convertvector(p >> here(near_shift), FourWords);
+    const FourWords later =
+        __builtin_convertvector((p + share_of(v, share, 5, 0)) >> here(near_shift), FourWords);
     std::memcpy(&places.xy[k], &now, sizeof(std::uint32_t));
     std::memcpy(&places.later_xy[k], &later, sizeof(std::uint32_t));
     places.z[k] = static_cast<std::uint16_t>(now[2]) | std::uint32_t{static_cast<std::uint16_t>(later[2])}
