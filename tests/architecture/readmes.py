@@ -9,7 +9,7 @@ import pathlib
 import sys
 
 SOURCES = {".cpp", ".hpp", ".c", ".h", ".py", ".proto", ".idl"}
-SKIPPED = {"build", ".git"}
+SKIPPED = {"build", ".git", "node_modules"}
 
 
 def folders_without(root):
@@ -20,7 +20,7 @@ def folders_without(root):
     return sorted(
         folder.as_posix()
         for folder in folders
-        if not SKIPPED & set(folder.parts[:1]) and not (root / folder / "README.md").is_file()
+        if not SKIPPED & set(folder.parts) and not (root / folder / "README.md").is_file()
     )
 
 

@@ -68,13 +68,19 @@ export class Client {
 
   /** Resolves when the module is loaded, whether a gateway is there or not. Throws where it cannot be loaded. */
   static async connect(options: ConnectOptions): Promise<Client> {
+    if (typeof WebAssembly === 'undefined') throw new TandemError('there is no WebAssembly here');
     const simd = options.simd === 'on' || (options.simd !== 'off' && hasSimd());
     const wasm = options.wasm ?? {
       plain: new URL(/* @vite-ignore */ './tandem.wasm', import.meta.url),
       simd: new URL(/* @vite-ignore */ './tandem-simd.wasm', import.meta.url),
     };
-    const client = new Client(options, await compile(simd ? wasm.simd : wasm.plain), simd);
-    await client.#start();
+    const compiled = await compile(simd ? wasm.simd : wasm.plain).catch((error: unknown) => {
+      throw new TandemError(`the WebAssembly module cannot be loaded: ${text(error)}`);
+    });
+    const client = new Client(options, compiled, simd);
+    await client.#start().catch((error: unknown) => {
+      throw new TandemError(text(error));
+    });
     return client;
   }
 
@@ -94,7 +100,7 @@ export class Client {
     return {
       ...figures,
       phase: this.#phase,
-      reason: this.#reason || status.reason,
+      reason: this.#reason || status.reason || (this.#phase === 'lost' ? 'the server is gone' : ''),
       mbitPerS: this.#payload.mbitPerS(now),
       receivedMbitPerS: this.#received.mbitPerS(now),
       rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY * 8 * status.frameRateHz) / BITS_PER_MBIT,
@@ -183,7 +189,7 @@ export class Client {
   #fail(error: unknown): void {
     this.#module = null;
     ++this.#restarts;
-    this.#reason = `the module failed and is started anew: ${error instanceof Error ? error.message : String(error)}`;
+    this.#reason = `the module failed and is started anew: ${text(error)}`;
     this.#log('error', this.#reason);
     clearTimeout(this.#pollTimer);
     this.#drop(1011, 'the module failed');
@@ -204,12 +210,8 @@ export class Client {
   // --- connection
 
   #open(): void {
-    let socket: SocketLike;
-    try {
-      socket = this.#settings.webSocket?.(this.#settings.url, PROTOCOL) ?? new WebSocket(this.#settings.url, PROTOCOL);
-    } catch (error) {
-      throw new TandemError(error instanceof Error ? error.message : String(error));
-    }
+    const { url, webSocket } = this.#settings;
+    const socket = webSocket?.(url, PROTOCOL) ?? new WebSocket(url, PROTOCOL);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => this.#onOpen(socket);
     socket.onmessage = (event: MessageEvent) => this.#onMessage(event.data);
@@ -287,7 +289,6 @@ export class Client {
     const now = this.#clock.steady();
     for (const event of this.#guard((module) => module.events()) ?? []) {
       if (event.type === 'applied') this.#payload.add(now, event.bytes);
-      if (event.type === 'session') this.#retryMs = FIRST_RETRY_MS;
       this.#tell(event.type, event as never);
     }
     const status = this.#guard((module) => module.status());
@@ -314,6 +315,7 @@ export class Client {
   #setPhase(phase: Phase): void {
     if (phase === this.#phase) return;
     this.#phase = phase;
+    if (phase === 'playing') this.#retryMs = FIRST_RETRY_MS;
     this.#tell('phase', phase as never);
   }
 
@@ -331,6 +333,10 @@ export class Client {
     if (this.#settings.log) this.#settings.log(level, line);
     else if (level !== 'info') console.warn(`tandem: ${line}`);
   }
+}
+
+function text(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
 }
 
 function values(numbers: readonly number[]): Uint8Array {
