@@ -16,7 +16,8 @@ constexpr std::int64_t kStart = 1'000'000'000'000;
 
 /// What an honest server publishes: made once, so that a run costs the client's work only.
 struct Honest {
-  Honest() : server(1000, kCapacity, 1) {
+  explicit Honest(const Groups& groups)
+      : server(1000, kCapacity, 1, groups), successor(~std::uint64_t{0} >> 1U, kCapacity, 1, groups) {
     server.advance();
     snapshot = server.snapshot();
     for (int i = 0; i < 6; ++i) {
@@ -34,7 +35,7 @@ struct Honest {
   transport::ScheduledInputMessage input;
   std::vector<transport::DeltaMessage> deltas;
   // The next run of the server, of a higher epoch than any that a program is likely to make up.
-  FakeServer successor{~std::uint64_t{0} >> 1U, kCapacity, 1};
+  FakeServer successor;
   std::vector<transport::DeltaMessage> successor_deltas;
   std::vector<transport::SnapshotMessage> successor_snapshots;
 };
@@ -86,7 +87,7 @@ class Run {
   transport::SessionMessage damaged_session() {
     auto session = honest_.server.session;
     auto& stream = session.streams[0];
-    switch (program_.u8() % 20) {
+    switch (program_.u8() % 24) {
       case 0:
         session.epoch = program_.number();
         break;
@@ -144,6 +145,18 @@ class Run {
       case 18:
         session.streams.insert(session.streams.begin(), stream);
         session.streams[0].layout.predictor = "nonsense";
+        break;
+      case 19:
+        stream.layout.radii.assign(program_.u8() % 3, program_.i32());
+        break;
+      case 20:
+        stream.layout.parameters.codec.turn_step = program_.i32();
+        break;
+      case 21:
+        stream.layout.parameters.codec.spin_step = program_.i32();
+        break;
+      case 22:
+        stream.layout.groups.pop_back();
         break;
       default:
         stream.max_snapshot_bytes = static_cast<std::uint32_t>(program_.number());
@@ -277,8 +290,10 @@ class Run {
 }  // namespace tandem::client
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const tandem::client::Honest honest;
-  tandem::fuzz::Program program(std::as_bytes(std::span(data, size)));
-  tandem::client::Run(honest, program).play();
+  static const tandem::client::Honest honest({}), turning(tandem::synthetic::kTurning);
+  for (const auto* server : {&honest, &turning}) {
+    tandem::fuzz::Program program(std::as_bytes(std::span(data, size)));
+    tandem::client::Run(*server, program).play();
+  }
   return 0;
 }

@@ -11,7 +11,6 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kCapacity = 24;
-constexpr StreamParameters kParameters{{200, 16, 64}};
 
 void require(bool holds) {
   if (!holds) std::abort();
@@ -19,11 +18,13 @@ void require(bool holds) {
 
 struct Target {
   explicit Target(const synthetic::Coded& coded)
-      : delta(synthetic::make_delta(coded.codec, kCapacity, kParameters, {}, coded.groups)) {
+      : parameters(synthetic::with_turn_steps({{200, 16, 64}}, coded.codec, coded.groups)),
+        delta(synthetic::make_delta(coded.codec, kCapacity, parameters, {}, coded.groups)) {
     synthetic::Random random(1);
     before = synthetic::random_state(random, kCapacity, 4, coded.groups);
     state = before;
   }
+  StreamParameters parameters;
   DeltaCodec delta;
   State before;
   State state;
@@ -37,7 +38,7 @@ void try_payload(std::span<const std::byte> input) {
   }();
   if (input.empty()) return;
   Target& target = targets[std::to_integer<std::size_t>(input[0]) % targets.size()];
-  target.delta.restore_parameters(kParameters);
+  target.delta.restore_parameters(target.parameters);
   target.state = target.before;
   const auto held = synthetic::coder_state(target.delta.codec());
   if (synthetic::receive(target.delta, target.state, input.subspan(1))) {
@@ -50,7 +51,7 @@ void try_payload(std::span<const std::byte> input) {
     }
   } else {
     require(target.state == target.before);
-    require(target.delta.parameters() == kParameters);
+    require(target.delta.parameters() == target.parameters);
     require(synthetic::coder_state(target.delta.codec()) == held);
   }
 }

@@ -1,5 +1,5 @@
-// Whatever clients may write, in any order, to a server: it keeps its frames, and a client that behaves does
-// not notice.
+// Whatever clients may write, in any order, to a server, and whatever its engine says of a body's
+// orientation: it keeps its frames, and a client that behaves does not notice.
 
 #include "tests/fuzz/program.hpp"
 #include "tests/unit/host/fakes.hpp"
@@ -12,9 +12,12 @@ using fuzz::require;
 
 constexpr transport::ClientId kHonest = 200;  // the strangers' ids are 0 .. 7 and anything above 2^32
 
+constexpr std::uint32_t kBodies = 2;
+
 class Run {
  public:
-  explicit Run(Program& program) : program_(program), bench_(test_config(), 2) {
+  Run(Program& program, bool turning)
+      : program_(program), turning_(turning), bench_(turning ? turning_config() : test_config(), kBodies) {
     bench_.poll();
     behave(transport::Phase::kJoining);
     bench_.run_to(3);
@@ -62,13 +65,17 @@ class Run {
   }
 
   void event() {
-    switch (program_.u8() % 4) {
+    switch (program_.u8() % (turning_ ? 6 : 4)) {
       case 0:
         return arrive(bench_.port.acks, an_ack());
       case 1:
         return arrive(bench_.port.inputs, an_input());
       case 2:
         return toggle(program_.u8() % 2 == 0 ? bench_.port.dead : bench_.port.unmatched);
+      case 4:
+        return say(bench_.simulation.orientation);
+      case 5:
+        return say(bench_.simulation.angular_velocity);
       default:
         return poll(std::int64_t{program_.u8()} * kMillisecond);
     }
@@ -76,6 +83,12 @@ class Run {
   void toggle(std::set<transport::ParticipantId>& members) {
     const auto who = somebody();
     if (members.erase(who) == 0) members.insert(who);
+  }
+
+  // The engine has a new number for a body.
+  template <std::size_t N>
+  void say(std::array<std::vector<float>, N>& columns) {
+    columns[program_.u8() % N][program_.u8() % kBodies] = static_cast<float>(program_.real());
   }
 
   transport::AckMessage an_ack() {
@@ -104,6 +117,7 @@ class Run {
   }
 
   Program& program_;
+  bool turning_;
   Bench bench_;
   std::uint64_t honest_inputs_ = 0;
 };
@@ -112,7 +126,9 @@ class Run {
 }  // namespace tandem::host
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  tandem::fuzz::Program program(std::as_bytes(std::span(data, size)));
-  tandem::host::Run(program).play();
+  for (const bool turning : {false, true}) {
+    tandem::fuzz::Program program(std::as_bytes(std::span(data, size)));
+    tandem::host::Run(program, turning).play();
+  }
   return 0;
 }

@@ -43,6 +43,6 @@ void try_snapshot(std::span<const std::byte> input, std::string_view name, const
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   tandem::try_snapshot(std::as_bytes(std::span(data, size)), "quantized", {});
-  tandem::try_snapshot(std::as_bytes(std::span(data, size)), "tracker", {.orientation = true});
+  tandem::try_snapshot(std::as_bytes(std::span(data, size)), "tracker", tandem::synthetic::kTurning);
   return 0;
 }

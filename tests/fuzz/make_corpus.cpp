@@ -37,8 +37,14 @@ bool write_deltas(const std::filesystem::path& folder) {
         State target = synthetic::random_target(random, state, moved_one_in);
         std::vector<LifecycleRecord> lifecycle;
         if (lively) lifecycle = synthetic::random_lifecycle(random, state, target, 4);
-        DeltaCodec delta = synthetic::make_delta(codec, kCapacity, kParameters, {}, groups);
-        if (lively) delta.set_parameters({{100, 8, 32, 30000, 5000}, {900}});
+        DeltaCodec delta = synthetic::make_delta(
+            codec, kCapacity, synthetic::with_turn_steps(kParameters, codec, groups), {}, groups);
+        if (lively) {
+          StreamParameters changed = delta.parameters();
+          changed.codec = {100, 8, 32, 30000, 5000, changed.codec.turn_step / 2, changed.codec.spin_step / 3};
+          changed.step.decay = 900;
+          delta.set_parameters(changed);
+        }
         if (lively) delta.round_next();
         std::vector<std::byte> bytes(1 + delta.bound());
         bytes[0] = static_cast<std::byte>(which);
@@ -71,12 +77,12 @@ bool write_messages(const std::filesystem::path& folder) {
 }
 
 // Streams for fuzz_tracker: a few deltas in a row, with an edit of the coder's state between them.
-bool write_streams(const std::filesystem::path& folder) {
+bool write_streams(const std::filesystem::path& folder, const Groups& groups) {
   constexpr std::uint32_t kBodies = 12;  // as in fuzz_tracker
   for (const std::uint64_t moved_one_in : {2U, 6U}) {
     synthetic::Random random(1);
-    State state = synthetic::random_state(random, kBodies);
-    DeltaCodec delta = synthetic::make_delta("tracker", kBodies, kParameters);
+    State state = synthetic::random_state(random, kBodies, 4, groups);
+    DeltaCodec delta = synthetic::make_delta("tracker", kBodies, kParameters, {}, groups);
     std::vector<std::byte> payload(delta.bound());
     std::vector<std::byte> stream;
     for (int frame = 0; frame < 4; ++frame) {
@@ -85,6 +91,7 @@ bool write_streams(const std::filesystem::path& folder) {
         if (state.alive()[slot] == 0 || !random.one_in(moved_one_in)) continue;
         BodyState body = state.body(slot);
         for (std::int32_t& p : body.p) p = std::clamp(p + random.even(500), -kPositionLimit, kPositionLimit);
+        if (groups.orientation) body.q = turned(body.q, {random.even(1 << 26), random.even(1 << 26), 0});
         target.set_body(slot, body);
       }
       if (frame == 2) delta.set_parameters({{100, 16, 64, 30000, 5000}, {900}});
@@ -95,22 +102,26 @@ bool write_streams(const std::filesystem::path& folder) {
       stream.insert(stream.end(), payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(size));
       for (const int byte : {129, frame, 0, 7}) stream.push_back(static_cast<std::byte>(byte));
     }
-    if (!write_file(folder / "tracker" / ("moved-one-in-" + std::to_string(moved_one_in)), stream))
+    if (!write_file(
+            folder / "tracker" /
+                ((groups.orientation ? "turning-" : "moved-") + ("one-in-" + std::to_string(moved_one_in))),
+            stream))
       return false;
   }
   return true;
 }
 
-bool write_snapshots(const std::filesystem::path& folder, bool turning) {
+bool write_snapshots(const std::filesystem::path& folder, const synthetic::Coded& coded,
+                     const std::string& name) {
   Layout layout;
   layout.capacity = kCapacity;
   layout.type_count = synthetic::kTypes;
-  layout.codec = turning ? "tracker" : "quantized";
-  if (turning) {
+  layout.codec = coded.codec;
+  if (coded.groups.orientation) {
     layout.groups = {kPositionGroup, kOrientationGroup};
     layout.radii = {synthetic::kRadii.begin(), synthetic::kRadii.end()};
   }
-  layout.parameters = kParameters;
+  layout.parameters = synthetic::with_turn_steps(kParameters, coded.codec, coded.groups);
   layout.predictor = "ballistic";
   for (const std::uint64_t dead_one_in : {0U, 1U, 3U}) {
     synthetic::Random random(2);
@@ -123,9 +134,7 @@ bool write_snapshots(const std::filesystem::path& folder, bool turning) {
     }
     std::vector<std::byte> bytes;
     server->snapshot(bytes);
-    if (!write_file(folder / "snapshot" /
-                        ((turning ? "turning-" : "") + ("dead-one-in-" + std::to_string(dead_one_in))),
-                    bytes))
+    if (!write_file(folder / "snapshot" / (name + "dead-one-in-" + std::to_string(dead_one_in)), bytes))
       return false;
   }
   return true;
@@ -212,8 +221,11 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder(argv[1]);
-  if (tandem::write_messages(folder) && tandem::write_deltas(folder) && tandem::write_streams(folder) &&
-      tandem::write_snapshots(folder, false) && tandem::write_snapshots(folder, true) &&
+  if (tandem::write_messages(folder) && tandem::write_deltas(folder) && tandem::write_streams(folder, {}) &&
+      tandem::write_streams(folder, tandem::synthetic::kTurning) &&
+      tandem::write_snapshots(folder, {"quantized", {}}, "") &&
+      tandem::write_snapshots(folder, {"tracker", tandem::synthetic::kTurning}, "turning-") &&
+      tandem::write_snapshots(folder, {"quantized", tandem::synthetic::kTurning}, "quantized-turning-") &&
       tandem::write_recordings(folder))
     return 0;
   std::fprintf(stderr, "could not write to %s\n", argv[1]);

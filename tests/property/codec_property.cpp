@@ -22,12 +22,7 @@ struct Session {
 
   [[nodiscard]] bool is_exact() const { return codec == "none" || codec == "selective"; }
   [[nodiscard]] StreamParameters start() const {
-    StreamParameters parameters{{200, 16, 64}};
-    if (groups.orientation && codec_traits(codec)->reads_steps) {
-      parameters.codec.turn_step = 1 << 20;
-      parameters.codec.spin_step = 1 << 18;
-    }
-    return parameters;
+    return synthetic::with_turn_steps({{200, 16, 64}}, codec, groups);
   }
   [[nodiscard]] DeltaCodec delta(const StreamParameters& parameters) const {
     return synthetic::make_delta(codec, capacity, parameters, {}, groups);

@@ -144,6 +144,15 @@ inline DeltaCodec make_delta(std::string_view codec, std::uint32_t capacity,
   return {codec_of(codec, capacity, run_blocks, groups), capacity, parameters, kTypes, groups};
 }
 
+/// `parameters` of a stream that lists the steps of turns if its codec reads them.
+inline StreamParameters with_turn_steps(StreamParameters parameters, std::string_view codec,
+                                        const Groups& groups) {
+  if (!groups.orientation || !codec_traits(codec)->reads_steps) return parameters;
+  parameters.codec.turn_step = 1 << 20;
+  parameters.codec.spin_step = 1 << 18;
+  return parameters;
+}
+
 /// A codec and the groups of a stream that it can code.
 struct Coded {
   std::string_view codec;

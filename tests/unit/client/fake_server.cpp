@@ -4,7 +4,8 @@
 
 namespace tandem::client {
 
-transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead) {
+transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead,
+                                                   const Groups& groups) {
   transport::SessionMessage s;
   s.session = "default";
   s.epoch = epoch;
@@ -21,6 +22,12 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
   stream.layout.parameters.codec.threshold = 50;
   stream.layout.parameters.codec.position_step = 40;
   stream.layout.parameters.codec.velocity_step = 40;
+  if (groups.orientation) {
+    stream.layout.groups.emplace_back(kOrientationGroup);
+    stream.layout.radii = {100};
+    stream.layout.parameters.codec.turn_step = 1 << 20;
+    stream.layout.parameters.codec.spin_step = 1 << 18;
+  }
   stream.layout_hash = transport::layout_hash(s, stream);
   s.streams.push_back(stream);
   return s;
@@ -30,11 +37,15 @@ ServerTimeline FakeServer::make(const transport::SessionMessage& s) {
   return std::move(*ServerTimeline::create(s.streams[0].layout, s.epoch));
 }
 
-FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead)
-    : session(make_session(epoch, capacity, lead)), timeline_(make(session)), target_(capacity) {
+FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead, const Groups& groups)
+    : session(make_session(epoch, capacity, lead, groups)),
+      timeline_(make(session)),
+      target_(capacity, groups) {
   for (Slot slot = 0; slot < capacity; ++slot) {
     const auto place = static_cast<std::int32_t>(slot * 1000);
-    target_.spawn(slot, 0, 0, {{place, 100'000, -place}, {64, 0, 128}});
+    BodyState body{{place, 100'000, -place}, {64, 0, 128}};
+    if (groups.orientation) body.w = {1 << 20, 0, static_cast<std::int32_t>(slot) << 16};
+    target_.spawn(slot, 0, 0, body);
   }
   timeline_.start(0, target_, {{0, -20, 0}, 300});
   hashes[0] = timeline_.hash();
@@ -51,7 +62,9 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
     if (random_ % 3 == 0) {
       body.p[random_ % 3] += static_cast<std::int32_t>(random_ % 3000) - 1500;
       body.v[random_ % 2] += static_cast<std::int32_t>(random_ % 900) - 450;
+      body.w[random_ % 3] /= 2;
     }
+    if (target_.groups().orientation) body.q = turned(body.q, body.w);
     target_.set_body(slot, body);
   }
   std::vector<LifecycleRecord> records;
@@ -60,6 +73,7 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
     LifecycleRecord record;
     record.kind = LifecycleKind::kTeleport;
     record.slot = slot;
+    record.groups = moves_all(target_.groups());
     record.body = {{900'000, 900'000, 900'000}, {}};
     target_.set_body(slot, record.body);
     records.push_back(record);

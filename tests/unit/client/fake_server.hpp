@@ -18,10 +18,11 @@ inline constexpr std::int64_t kFrameNs = 33'333'333;
 inline constexpr transport::ParticipantId kServerId{{1, 2, 3}};
 inline constexpr transport::ClientId kClient = 77;
 
-/// A few bodies that fall and are pushed about by a seeded generator.
+/// A few bodies that fall, turn if there are orientations, and are pushed about by a seeded generator.
 class FakeServer {
  public:
-  explicit FakeServer(Epoch epoch = 1000, std::uint32_t capacity = 40, std::uint32_t lead = 1);
+  explicit FakeServer(Epoch epoch = 1000, std::uint32_t capacity = 40, std::uint32_t lead = 1,
+                      const Groups& groups = {});
 
   /// The next frame. Its delta is what a writer would publish.
   transport::DeltaMessage advance(std::int64_t server_time_ns = 0);
@@ -37,7 +38,8 @@ class FakeServer {
 
  private:
   static ServerTimeline make(const transport::SessionMessage& session);
-  static transport::SessionMessage make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead);
+  static transport::SessionMessage make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead,
+                                                const Groups& groups);
 
   ServerTimeline timeline_;
   State target_;

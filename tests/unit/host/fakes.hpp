@@ -170,6 +170,15 @@ class FakePort final : public transport::ServerPort {
   return config;
 }
 
+/// The same for bodies that turn.
+[[nodiscard]] inline HostConfig turning_config() {
+  HostConfig config = test_config();
+  config.stream.layout.codec = "tracker";
+  config.stream.layout.groups = {kPositionGroup, kOrientationGroup};
+  config.stream.layout.radii.assign(config.stream.layout.type_count, 1000);
+  return config;
+}
+
 /// A host, its neighbours and a clock. Clients are imitated by ack() and input().
 class Bench {
  public:
@@ -178,6 +187,7 @@ class Bench {
   explicit Bench(HostConfig config = test_config(), std::uint32_t capacity = 4)
       : simulation(capacity), port(participant(0xAA)) {
     config.stream.layout.capacity = capacity;
+    if (groups_of(config.stream.layout).orientation) simulation.turn();
     auto made = Host::create(std::move(config), simulation, port);
     if (!made) throw std::runtime_error(made.error().message);
     host = std::move(*made);

@@ -97,15 +97,6 @@ TEST(Stream, CountsWhatItCorrectsForTraining) {
   EXPECT_EQ(statistics.bodies, corrected);
 }
 
-HostConfig turning_config() {
-  HostConfig config = test_config();
-  config.stream.layout.codec = "tracker";
-  config.stream.layout.codec_tables.clear();
-  config.stream.layout.groups = {kPositionGroup, kOrientationGroup};
-  config.stream.layout.radii.assign(config.stream.layout.type_count, 1000);
-  return config;
-}
-
 TEST(Stream, ShowsHowBodiesTurn) {
   const HostConfig config = turning_config();
   FakeSimulation simulation(4);
