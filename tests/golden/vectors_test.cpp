@@ -92,17 +92,10 @@ std::optional<Layout> layout_of(const std::map<std::string, std::vector<std::str
   return layout;
 }
 
-/// As make_parts(). Vectors of orientations alone correct nothing, so that their codec need not know any.
 Result<TimelineParts> parts_of(const Layout& layout) {
   auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
   if (!predictor) return tl::unexpected<Error>(predictor.error());
-  if (!groups_of(layout).orientation || layout.codec != "none")
-    return make_parts(layout, {}, std::move(*predictor));
-  return TimelineParts{std::move(*predictor),
-                       DeltaCodec(std::move(*make_codec({.name = layout.codec, .capacity = layout.capacity})),
-                                  layout.capacity, layout.parameters, layout.type_count, groups_of(layout)),
-                       {},
-                       StateHasher()};
+  return make_parts(layout, {}, std::move(*predictor));
 }
 
 /// A stream as a vector tells it: unlike a timeline, it may be asked for any step in any order.

@@ -3,10 +3,11 @@
 import struct
 import unittest
 
+import numpy as np
 import worlds
 import writer
 from refusals import RefusalCase
-from tandem_reference import huffman, payload
+from tandem_reference import huffman, payload, turn
 
 
 class CodecCase(RefusalCase):
@@ -89,6 +90,60 @@ class Values(CodecCase):
         self.before.state.p[0, 2], self.before.state.v[2, 2] = -(2**30), 2**28
         state = self.apply(bytes.fromhex("00 01 04 80 00 00 00 00 7f"))
         self.assertEqual((state.p[0, 2], state.v[2, 2]), (-(2**30), 2**28))
+
+
+class Turns(CodecCase):
+    """Values of bodies with orientations."""
+
+    def turning(self, codec, tables=b""):
+        self.stream = worlds.stream(codec, tables=tables, turns=True)
+        self.before = worlds.world(self.stream, {2: ((0, 0, 0), (0, 0, 0))})
+        self.before.state.w[:, 2] = 10, 20, 30
+
+    def test_absolute_values_have_orientations(self):
+        for codec in ("none", "selective"):
+            self.turning(codec)
+            numbers = [1, 2, 3, 4, 5, 6, 0, turn.ONE, 0, 0, 7, -8, turn.MOST_W - 9]
+            state = self.apply(bytes.fromhex("00 02") + struct.pack("<13i", *numbers))
+            self.assertEqual([*state.p[:, 2], *state.v[:, 2], *state.q[:, 2], *state.w[:, 2]], numbers)
+            self.refused("length", self.apply, bytes.fromhex("00 02") + struct.pack("<6i", *numbers[:6]))
+            for at, bad in ((7, 0), (7, turn.ONE + 1), (6, turn.ONE), (10, turn.MOST_W), (12, -(2**31))):
+                broken = [*numbers[:at], bad, *numbers[at + 1 :]]
+                self.refused("values", self.apply, bytes.fromhex("00 02") + struct.pack("<13i", *broken))
+
+    def test_residuals_turn_and_change_w(self):
+        self.turning("quantized")
+        state = self.apply(bytes.fromhex("00 02 010000 000000 00007f 80ff01"))
+        by = np.array([[0], [0], [127 * worlds.TURN_PARAMETERS[7]]])
+        self.assertEqual(state.q[:, 2].tolist(), turn.turned(self.before.state.q[:, [2]], by)[:, 0].tolist())
+        step = worlds.TURN_PARAMETERS[8]
+        self.assertEqual(state.w[:, 2].tolist(), [10 - 128 * step, 20 - step, 30 + step])
+        self.assertEqual(state.p[:, 2].tolist(), [3, 0, 0])
+
+    def test_what_leads_out_of_range_is_halved_together(self):
+        self.turning("quantized")
+        self.before.parameters.update({7: 2**24, 8: 2**24})
+        self.before.state.w[:, 2] = 0, 1, turn.MOST_W
+        state = self.apply(bytes.fromhex("00 02 000000 000000 804000 800004"))
+        # w would be (-2^31, 1, 2^29 + 2^26): three halvings
+        self.assertEqual(state.w[:, 2].tolist(), [-(2**28), 0, (2**29 + 2**26) >> 3])
+        by = np.array([[-(2**28)], [2**27], [0]])
+        self.assertEqual(state.q[:, 2].tolist(), turn.turned(self.before.state.q[:, [2]], by)[:, 0].tolist())
+
+    def test_each_vector_has_a_table(self):
+        flat, steep = bytes([8]) * 256, worlds.huffman_lengths()
+        self.turning("limited", steep + flat + flat + steep)
+        # p 0 1 -1; v 1 -1 0 and r -128 0 2 of flat tables; w 0 0 1
+        bits = "0 100 101 00000001 11111111 00000000 10000000 00000000 00000010 0 0 100".replace(" ", "")
+        bits += "0" * (-len(bits) % 8)
+        data = int(bits, 2).to_bytes(len(bits) // 8, "big")
+        state = self.apply(b"\0\2" + data)
+        self.assertEqual(state.p[:, 2].tolist(), [0, 3, -3])
+        self.assertEqual(state.v[:, 2].tolist(), [5, -5, 0])
+        self.assertEqual(state.w[:, 2].tolist(), [10, 20, 30 + worlds.TURN_PARAMETERS[8]])
+        by = np.array([[-128], [0], [2]]) * worlds.TURN_PARAMETERS[7]
+        self.assertEqual(state.q[:, 2].tolist(), turn.turned(self.before.state.q[:, [2]], by)[:, 0].tolist())
+        self.refused("length", self.apply, b"\0\2" + data + b"\0")
 
 
 class Huffman(CodecCase):

@@ -59,7 +59,7 @@ class Hashes(unittest.TestCase):
 
 class Parameters(unittest.TestCase):
     def read(self, text):
-        return parameters.read(Reader(bytes.fromhex(text), "test"))
+        return parameters.read(Reader(bytes.fromhex(text), "test"), worlds.PARAMETERS)
 
     def test_id_and_zigzag_value(self):
         self.assertEqual(self.read("01c801 0400"), {1: 100, 4: 0})
@@ -70,10 +70,31 @@ class Parameters(unittest.TestCase):
                 self.read(bad)
             self.assertEqual(caught.exception.rule, "parameters")
 
-    def test_a_session_names_all_six(self):
-        self.assertEqual(parameters.complete(list(worlds.PARAMETERS.items())), worlds.PARAMETERS)
-        with self.assertRaises(Refused):
-            parameters.complete(list(worlds.PARAMETERS.items())[:5])
+    def test_a_session_names_all_that_its_stream_lists(self):
+        both = ["position", "orientation"]
+        turning = {**worlds.PARAMETERS, **worlds.TURN_PARAMETERS}
+        for codec, groups, named in (
+            ("quantized", ["position"], worlds.PARAMETERS),
+            ("tracker", both, worlds.PARAMETERS),
+            ("selective", both, worlds.PARAMETERS),
+            ("quantized", both, turning),
+            ("entropy", both, turning),
+            ("limited", both, turning),
+        ):
+            known = parameters.listed(codec, groups)
+            self.assertEqual(parameters.complete(list(named.items()), known), named)
+            for wrong in (turning if named is worlds.PARAMETERS else worlds.PARAMETERS, {**named, 9: 1}):
+                with self.assertRaises(Refused):
+                    parameters.complete(list(wrong.items()), known)
+            with self.assertRaises(Refused):
+                parameters.complete(list(named.items())[:5], known)
+
+    def test_steps_of_turns_are_known_where_they_are_listed(self):
+        turning = {**worlds.PARAMETERS, **worlds.TURN_PARAMETERS}
+        self.assertEqual(parameters.read(Reader(bytes.fromhex("0702 0880808010"), "test"), turning), {7: 1, 8: 2**24})
+        for bad in ("0700", "0802 0702", "0882808010", "0902"):
+            with self.subTest(bytes=bad), self.assertRaises(Refused):
+                parameters.read(Reader(bytes.fromhex(bad), "test"), turning)
 
 
 class Sessions(unittest.TestCase):
@@ -86,6 +107,8 @@ class Sessions(unittest.TestCase):
             {"codec": "entropy"},
             {"codec": "limited", "tables": bytes([8]) * 511 + b"\7"},
             {"codec": "limited", "tables": bytes([9]) * 512},
+            {"codec": "entropy", "tables": bytes([8]) * 1024},
+            {"codec": "entropy", "tables": bytes([8]) * 512, "turns": True},
         ):
             with self.subTest(changes=changes), self.assertRaises(Refused) as caught:
                 worlds.stream(**changes)

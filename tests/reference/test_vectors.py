@@ -4,7 +4,7 @@ import pathlib
 import random
 import unittest
 
-import write_vectors
+import tracker_vectors
 from tandem_reference import payload, snapshot, vectors
 from tandem_reference.errors import Refused
 
@@ -83,7 +83,9 @@ class Faults(unittest.TestCase):
         return bytes(data)
 
     def test_vectors_with_faults(self):
-        for seed, name in enumerate(("absolute", "quantized", "huffman", "lifecycle", "sections", "tracker_contact", "orientation")):
+        names = ("absolute", "quantized", "huffman", "lifecycle", "sections", "tracker_contact", "orientation",
+                 "absolute_turns", "quantized_turns", "huffman_turns", "tracker_turns")  # fmt: skip
+        for seed, name in enumerate(names):
             dice = random.Random(seed)
             vector = vectors.Vector((FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
             of = vector.stream()
@@ -114,7 +116,7 @@ class Faults(unittest.TestCase):
 
 class Written(unittest.TestCase):
     def test_the_same_vectors_are_written_each_time(self):
-        self.assertEqual(write_vectors.tracker("ballistic", 3).text(), write_vectors.tracker("ballistic", 3).text())
+        self.assertEqual(tracker_vectors.deltas("ballistic", 3).text(), tracker_vectors.deltas("ballistic", 3).text())
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from tandem_reference import parameters as reference_parameters
 from tandem_reference import payload
 from tandem_reference.predict import Drive
 from tandem_reference.state import State
@@ -11,6 +12,8 @@ from tandem_reference.stream import Stream
 from tandem_reference.timeline import Timeline
 
 PARAMETERS = {1: 100, 2: 3, 3: 5, 4: 800, 5: 26214, 6: 9830}
+# Beside them, of the paper's codecs with residuals where bodies turn.
+TURN_PARAMETERS = {7: 2**20, 8: 3 * 2**14}
 ONE = 2**30
 # Two sub-steps, two types, a plane, a box and a ball.
 CONTACT = [
@@ -25,7 +28,10 @@ def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=
     constants = [] if predictor == "ballistic" else CONTACT
     groups = ["position", "orientation"] if turns else ["position"]
     radii = [500 + kind for kind in range(types)] if turns else []
-    return Stream(capacity, types, codec, predictor, dict(parameters or PARAMETERS), tables, constants, groups, radii)
+    values = dict(parameters or PARAMETERS)
+    if turns and codec in reference_parameters.STEPPING:
+        values |= TURN_PARAMETERS
+    return Stream(capacity, types, codec, predictor, values, tables, constants, groups, radii)
 
 
 def world(of, bodies=()):

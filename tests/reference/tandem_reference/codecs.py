@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import huffman, parameters
+from . import huffman, parameters, turn
 from .errors import Refused, require
 from .integers import clamp
 from .state import MOST_P, MOST_V
@@ -51,21 +51,31 @@ def apply_corrections(world, stream, corrections):
 
 
 def set_values(state, slots, body):
-    """p and v as they stand in the section; c becomes 0."""
-    values = np.frombuffer(body.take(24 * len(slots)), "<i4").astype(np.int64).reshape(-1, 6).T
-    require(np.all(np.abs(values[:3]) <= MOST_P), "values", "a position out of range")
-    require(np.all(np.abs(values[3:]) <= MOST_V), "values", "a velocity out of range")
-    state.p[:, slots], state.v[:, slots], state.c[:, slots] = values[:3], values[3:], 0
+    """p, v, q and w as they stand in the section; c becomes 0."""
+    numbers = 13 if state.orientation else 6
+    values = np.frombuffer(body.take(4 * numbers * len(slots)), "<i4").astype(np.int64).reshape(-1, numbers).T
+    p, v, q, w = np.split(values, (3, 6, 10)) if state.orientation else (values[:3], values[3:], None, None)
+    require(np.all(np.abs(p) <= MOST_P), "values", "a position out of range")
+    require(np.all(np.abs(v) <= MOST_V), "values", "a velocity out of range")
+    if state.orientation:
+        require(turn.is_quaternion(q).all(), "values", "a quaternion that is none")
+        require(turn.is_spin(w).all(), "values", "an angular velocity out of range")
+        state.q[:, slots], state.w[:, slots] = q, w
+    state.p[:, slots], state.v[:, slots], state.c[:, slots] = p, v, 0
 
 
 def residuals(stream, body, bodies):
-    """Six residuals for each body, one column a body."""
+    """Six residuals for each body, twelve with orientations, one column a body."""
+    numbers = 12 if stream.orientation else 6
     if stream.codec == "quantized":
-        return np.frombuffer(body.take(6 * bodies), np.int8).astype(np.int64).reshape(-1, 6).T
+        return np.frombuffer(body.take(numbers * bodies), np.int8).astype(np.int64).reshape(-1, numbers).T
     return np.array(huffman.decode(body.rest(), stream.tables, bodies), np.int64).T
 
 
 def add_residuals(state, slots, steps, values):
-    """p and v move by steps of the sizes in force."""
+    """p, v, q and w change by steps of the sizes in force."""
     state.p[:, slots] = clamp(state.p[:, slots] + steps[:3] * values["position_step"], MOST_P)
-    state.v[:, slots] = clamp(state.v[:, slots] + steps[3:] * values["velocity_step"], MOST_V)
+    state.v[:, slots] = clamp(state.v[:, slots] + steps[3:6] * values["velocity_step"], MOST_V)
+    if state.orientation:
+        state.q[:, slots] = turn.turned(state.q[:, slots], turn.limited(steps[6:9] * values["turn_step"]))
+        state.w[:, slots] = turn.limited(state.w[:, slots] + steps[9:] * values["spin_step"])

@@ -24,10 +24,10 @@ class Table:
             code += 1
 
 
-def two_tables(data):
-    """The tables of position and velocity residuals in 512 bytes."""
-    require(len(data) == 512, "session", f"codec tables of {len(data)} bytes instead of 512")
-    return Table(data[:256]), Table(data[256:])
+def tables(data, count):
+    """So many tables of 256 bytes: of the residuals of p and of v, with orientations also of the turn and of w."""
+    require(len(data) == 256 * count, "session", f"codec tables of {len(data)} bytes instead of {256 * count}")
+    return [Table(data[at : at + 256]) for at in range(0, len(data), 256)]
 
 
 class Bits:
@@ -58,13 +58,13 @@ class Bits:
         require(self.number(left) == 0, "padding", f"{self.what}: bits behind the last that are not zero")
 
 
-def decode(data, tables, bodies):
-    """Six residuals for each body, to the end of the data."""
+def decode(data, of_vectors, bodies):
+    """Three residuals of each table for each body, to the end of the data."""
     bits = Bits(data, "corrections")
     result = []
     for _ in range(bodies):
         residuals = []
-        for table in (tables[0],) * 3 + (tables[1],) * 3:
+        for table in (table for table in of_vectors for _ in range(3)):
             code, length = bits.one(), 1
             while (length, code) not in table.residual_of:
                 code, length = code << 1 | bits.one(), length + 1

@@ -1,4 +1,4 @@
-"""The six parameters of a stream, which may change from delta to delta."""
+"""The parameters of a stream, which may change from delta to delta."""
 
 from .errors import require
 
@@ -10,34 +10,44 @@ PARAMETERS = {
     4: ("decay", 0, 65535),
     5: ("velocity_gain", 0, 65535),
     6: ("acceleration_gain", 0, 65535),
+    7: ("turn_step", 1, 2**24),
+    8: ("spin_step", 1, 2**24),
 }
+OF_TURNS = 7, 8
+STEPPING = "quantized", "entropy", "limited"
 
 
-def check(identity, value):
-    """Refuse an unknown id and a value out of range."""
-    require(identity in PARAMETERS, "parameters", f"unknown parameter {identity}")
+def listed(codec, groups):
+    """The ids of the parameters that a stream has."""
+    turns = codec in STEPPING and "orientation" in groups
+    return [identity for identity in PARAMETERS if turns or identity not in OF_TURNS]
+
+
+def check(identity, value, known):
+    """Refuse an id that the stream does not list and a value out of range."""
+    require(identity in known, "parameters", f"unknown parameter {identity}")
     name, least, most = PARAMETERS[identity]
     require(least <= value <= most, "parameters", f"{name} {value} is not in {least} .. {most}")
 
 
-def read(reader):
-    """What the rest of a section names: {id: value}."""
+def read(reader, known):
+    """What the rest of a section of a stream that lists the ids `known` names: {id: value}."""
     found, before = {}, 0
     while reader.left():
         identity = reader.u8()
         value = reader.zigzag(5)
-        check(identity, value)
+        check(identity, value, known)
         require(identity > before, "parameters", f"parameter {identity} behind {before}")
         found[identity] = value
         before = identity
     return found
 
 
-def complete(pairs):
-    """All six from (id, value) pairs in ascending order, as a session names them."""
+def complete(pairs, known):
+    """All that a stream lists from (id, value) pairs in ascending order, as a session names them."""
     for identity, value in pairs:
-        check(identity, value)
-    require([identity for identity, _ in pairs] == list(PARAMETERS), "parameters", "not each of the six, ascending")
+        check(identity, value, known)
+    require([identity for identity, _ in pairs] == list(known), "parameters", "not each that the stream has, ascending")
     return dict(pairs)
 
 

@@ -66,8 +66,9 @@ def sections(reader, known):
             require(kind < 0x80, "critical", f"unknown critical section 0x{kind:02x}")
 
 
-def parse(data, state):
+def parse(data, world):
     """The known sections of a payload, in the order that the protocol asks for."""
+    state = world.state
     known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", ROUNDING: "rounding", CORRECTIONS: "corrections"}
     known[LAST_CORRECTIONS] = "corrections of the last block"
     parsed = Parsed([], {}, (0, 0, 0), [])
@@ -79,7 +80,7 @@ def parse(data, state):
         if kind == LIFECYCLE:
             parsed.records = read_records(body, state.orientation)
         elif kind == PARAMETERS:
-            parsed.parameters = parameters.read(body)
+            parsed.parameters = parameters.read(body, world.parameters)
         elif kind == ROUNDING:
             parsed.rounding = read_rounding(body)
         else:
@@ -182,7 +183,7 @@ def apply_delta(world, stream, data, gravity=(0, 0, 0)):
 
     gravity is that of the drive in force at the frame.
     """
-    parsed = parse(data, world.state)
+    parsed = parse(data, world)
     after = world.copy()
     after.parameters.update(parsed.parameters)
     state = after.state

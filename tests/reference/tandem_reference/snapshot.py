@@ -148,7 +148,7 @@ def read(data, stream):
         require(kind > before, "order", f"snapshot: section 0x{kind:02x} behind 0x{before:02x}")
         before = kind
         if kind == PARAMETERS:
-            values = parameters.complete(list(parameters.read(body).items()))
+            values = parameters.complete(list(parameters.read(body, stream.parameters).items()), stream.parameters)
         elif kind == INPUTS:
             inputs = read_inputs(body, frame, last_input)
         else:

@@ -41,9 +41,10 @@ class Stream:
         needed = self.types if self.orientation else 0
         require(len(self.radii) == needed, "session", f"{len(self.radii)} radii where the groups need {needed}")
         require(all(1 <= radius <= MOST_RADIUS for radius in self.radii), "session", f"radii {self.radii}")
-        self.parameters = parameters.complete(list(self.parameters.items()))
+        known = parameters.listed(self.codec, self.groups)
+        self.parameters = parameters.complete(list(self.parameters.items()), known)
         if self.codec in ("entropy", "limited"):
-            self.tables = huffman.two_tables(self.codec_tables)
+            self.tables = huffman.tables(self.codec_tables, 2 + 2 * self.orientation)
         else:
             require(self.codec_tables == b"", "session", f"codec {self.codec} has no tables")
         if self.predictor == "ballistic":
@@ -90,7 +91,10 @@ def of_session(session, announced):
         types=len(session.types),
         codec=announced.codec,
         predictor=announced.predictor,
-        parameters=parameters.complete([(entry.id, entry.value) for entry in announced.parameters]),
+        parameters=parameters.complete(
+            [(entry.id, entry.value) for entry in announced.parameters],
+            parameters.listed(announced.codec, announced.groups),
+        ),
         codec_tables=announced.codec_tables,
         predictor_constants=announced.predictor_constants,
         groups=announced.groups,

@@ -125,15 +125,17 @@ class Vector:
         def one(line):
             return line.integers(1)[0]
 
+        codec = self.get("codec", Line.word)
+        groups = self.get("groups", lambda line: line.values, ["position"])
         return Stream(
             capacity=self.get("capacity", one),
             types=self.get("types", one),
-            codec=self.get("codec", Line.word),
+            codec=codec,
             predictor=self.get("predictor", Line.word),
-            parameters=parameters.complete(self.get("parameters", self.pairs)),
+            parameters=parameters.complete(self.get("parameters", self.pairs), parameters.listed(codec, groups)),
             codec_tables=self.get("codec_tables", Line.hex, b""),
             predictor_constants=self.get("predictor_constants", Line.integers, []),
-            groups=self.get("groups", lambda line: line.values, ["position"]),
+            groups=groups,
             radii=self.get("radii", Line.integers, []),
             region_blocks=self.get("region_blocks", one, 0),
             lattice_unit=self.get("lattice_unit", Line.double, 1.0),

@@ -1,0 +1,224 @@
+"""The vectors of the codec `tracker`, and of rounding."""
+
+import worlds
+import writer
+from tandem_reference.predict import Drive
+from tandem_reference.tracker import Correction
+from vector_text import Vector, scattered
+
+
+def vectors():
+    """All of them by name."""
+    return {
+        "tracker": deltas("ballistic", 3),
+        "tracker_contact": deltas("contact", 4),
+        "tracker_snapshot": middle(),
+        "tracker_blocks": blocks(),
+        "tracker_rest": rests(),
+        "tracker_turns": turns(),
+        "tracker_refused": refused(),
+        "rounding": rounding(),
+    }
+
+
+def deltas(predictor, seed):
+    """Several deltas in a row, so that the models learn; with renewed bodies and parameters that change."""
+    slots = [slot for slot in range(30) if slot % 5 != 4]
+    line = scattered("tracker", predictor, slots, 30, b"", seed)
+    vector = Vector(f"codec tracker with {predictor}: twelve frames", line)
+    following = worlds.random_numbers(seed + 1)
+    place = writer.position((500, 600, 700), (9999, -9999, 0))
+    born = writer.section(0x81, writer.record(3, 2, b"\1", place) + writer.record(1, 1, b"\1\1", place))
+    for frame in range(1, 13):
+        vector.predict()
+        steps = some_steps(slots, following, (1, 2, 3) if frame < 9 else (20, 200, 3000))
+        if frame == 4:
+            vector.say("slot 3 teleported, not corrected; slot 4 spawned and corrected")
+            vector.track({**{s: v for s, v in steps.items() if s != 3}, 4: [1, 0, -1]}, born, (3, 4))
+        elif frame == 6:
+            vector.say("nobody is corrected")
+            vector.delta(b"")
+        elif frame == 8:
+            vector.say("threshold, decay and gains change; threshold and gains hold at once")
+            vector.track(steps, writer.section(0x82, writer.parameters({1: 77, 4: 2000, 5: 30000, 6: 20000})))
+        else:
+            vector.track(steps)
+    return vector
+
+
+def some_steps(slots, following, sizes):
+    """Steps, not all of them 0, of some of the slots."""
+    steps = {slot: [following(size) for size in sizes] for slot in slots if following(100) > 20}
+    return {slot: value for slot, value in steps.items() if any(value)}
+
+
+def middle():
+    """Ages, intervals, last steps and models of every kind, from a snapshot."""
+    line = scattered("tracker", "contact", range(60), 60, b"", 8)
+    following = worlds.random_numbers(9)
+    state, models = line.world.state, line.world.models
+    for slot in range(60):
+        small = 40 if slot % 2 else 127
+        state.codec[:, slot] = [following(small) % 255, following(small) % 256] + [following(3) for _ in range(3)]
+        state.c[:, slot] = [following(9) for _ in range(3)]
+        state.v[:, slot] = [following(300) for _ in range(3)]
+    for model in range(len(models.p)):
+        models.weight[model] = 128 + following(127)
+        models.p[model] = 32768 + following(32000)
+    start = writer.snapshot(line)
+    vector = Vector("codec tracker: a start in the middle, with columns and models of every kind", line, start)
+    for _ in range(3):
+        vector.predict()
+        vector.track(some_steps(range(60), following, (2, 30, 2)))
+    vector.say("a snapshot of this frame holds the same state, parameters, drive and models")
+    vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
+def blocks():
+    """Two blocks that share the models."""
+    line = scattered("tracker", "ballistic", (0, 16383, 16384, 16389), 16390)
+    vector = Vector("codec tracker: two blocks share the models, each has a code stream of its own", line)
+    for steps in ({0: [1, 0, 0], 16389: [0, -2, 16]}, {16384: [0, 0, 1]}, {16383: [-1, -1, -1], 16384: [15, 0, 0]}):
+        vector.predict()
+        vector.track(steps)
+    return vector
+
+
+def rests():
+    """Bodies put to rest, corrected where they rest, woken by gravity; one at rest from the start of a snapshot on."""
+    slots = [slot for slot in range(20) if slot != 7]
+    line = scattered("tracker", "ballistic", slots, 20, b"", 12)
+    vector = Vector("codec tracker: bodies put to rest, and woken", line)
+    following = worlds.random_numbers(13)
+    for frame in range(1, 13):
+        if frame == 7:
+            vector.input(1, 8, Drive((40, -700, 3), 300))
+        vector.predict()
+        rests = [slot for slot in slots if following(100) > (20 if frame % 4 else -60)]
+        if frame == 5:
+            vector.say("slots 0 and 1 spawned and teleported where bodies rest; both are corrected, 0 is put to rest")
+            place = writer.position((5, 6, 7), (640, -640, 0))
+            born = writer.record(0, 0) + writer.record(0, 1, b"\1\1", place) + writer.record(1, 2, b"\1", place)
+            vector.track({0: [1, 0, 0], 1: [0, 2, 0]}, writer.section(0x81, born), (0, 1), rests=(0,))
+        else:
+            vector.track(some_steps(slots, following, (2, 2, 3)), rests=rests)
+    vector.say("a snapshot of this frame holds the same state")
+    vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
+def turns():
+    """Corrections of both groups and of one, fine and not, rests, renewed bodies, a snapshot."""
+    slots = [slot for slot in range(24) if slot % 6 != 5]
+    line = scattered("tracker", "ballistic", slots, 24, b"", 31, turns=True)
+    line.world.state.type[::3] = 1
+    vector = Vector("codec tracker: orientations", line)
+    following = worlds.random_numbers(32)
+
+    def some_corrections(sizes):
+        corrections = {}
+        for slot in slots:
+            rest = int(following(100) > 70)
+            steps = [following(size) for size in sizes] if following(100) > -40 else None
+            turn_by = [following(size) for size in sizes] if following(100) > -40 else None
+            correction = correction_of(rest, steps, turn_by, following(2) & 1)
+            if correction:
+                corrections[slot] = correction
+        return corrections
+
+    content = writer.position((500, 600, 700), (9999, -9999, 0)) + turned_content(following)
+    for frame in range(1, 15):
+        if frame == 9:
+            vector.input(1, 10, Drive((40, -2800, 3), 300))
+        vector.predict()
+        if frame == 4:
+            vector.say("slot 3 teleported, orientation alone, not corrected; slot 5 spawned and corrected")
+            born = writer.section(
+                0x81, writer.record(3, 2, b"\2", turned_content(following)) + writer.record(2, 1, b"\1\1", content)
+            )
+            corrections = {slot: how for slot, how in some_corrections((2, 2, 2)).items() if slot != 3}
+            corrections[5] = Correction(0, [1, 0, 0], [0, 1, -2], 1)
+            vector.track(corrections, born, (3, 5))
+        elif frame == 6:
+            vector.say("nobody is corrected")
+            vector.delta(b"")
+        elif frame == 8:
+            vector.say("p, v and c rounded; a new threshold")
+            changed = writer.section(0x82, writer.parameters({1: 77}))
+            vector.track(some_corrections((2, 3, 2)), changed, rounding=writer.section(0x87, bytes([2, 5, 3])))
+        else:
+            vector.track(some_corrections((1, 2, 3) if frame < 11 else (20, 200, 3000)))
+    vector.say("a snapshot of this frame holds the same state")
+    vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
+def correction_of(rest, steps, turn_by, fine):
+    """A correction of the groups that have steps other than 0; None if none has."""
+    steps = steps if steps and any(steps) else None
+    turn_by = turn_by if turn_by and any(turn_by) else None
+    if not steps and not turn_by:
+        return None
+    return Correction(rest, steps, turn_by, fine if steps and turn_by else 0)
+
+
+def turned_content(following):
+    """What a record says of an orientation."""
+    return writer.orientation(worlds.some_quaternion(following), worlds.some_spin(following))
+
+
+def refused():
+    """Code streams that must be refused, for a body whose one correction is the byte 0e."""
+    of = worlds.stream("tracker")
+    vector = Vector("codec tracker: code streams that are refused", worlds.timeline(of, {0: ((0, 0, 0), (0, 0, 0))}))
+    for why, data in (
+        ("an empty code stream", "830100"),
+        ("a zero at the end", "8303000e00"),
+        ("a byte left over behind the last decision", "8307000e0000000001"),
+        ("nobody is corrected", "83020010"),
+        ("more than 2^31 - 1 steps", "8305000100000e"),
+    ):
+        vector.refuse(bytes.fromhex(data), why)
+    vector.refuse(bytes.fromhex("86"), "an empty code stream without length and block")
+    vector.refuse(bytes.fromhex("8302000e860e"), "the same block twice")
+    vector.say("one step down z, and again as a section without length and block")
+    vector.delta(bytes.fromhex("8302000e"))
+    vector.track({0: [0, 0, -1]})
+    return vector
+
+
+def rounding():
+    """Whole states that are rounded."""
+    slots = [slot for slot in range(12) if slot != 4]
+    line = scattered("tracker", "ballistic", slots, 12, b"", 8)
+    state = line.world.state
+    state.rest[:2], state.c[1, :2] = 1, 3000
+    state.p[:, 11], state.v[:, 11] = (2**30, -(2**30), 2**30 - 1), (2**28, -(2**28), 1 - 2**28)
+    vector = Vector("rounding, of bodies at rest (0 and 1) and at the limits (11) too", line)
+    place = writer.position((555, -555, 555), (777, -777, 777))
+    born = writer.section(0x81, writer.record(3, 2, b"\1", place) + writer.record(1, 1, b"\1\1", place))
+    vector.predict()
+    vector.say("nothing else")
+    vector.delta(writer.section(0x87, bytes([2, 6, 3])))
+    vector.predict()
+    vector.say("by no bits, which changes nothing")
+    vector.delta(writer.section(0x87, bytes(3)))
+    vector.say("and corrections: 0 wakes")
+    steps = {0: [1, 0, 0], 2: [0, 1, -1], 5: [1, 1, 1], 7: [-2, 300, 0], 11: [9, -9, 0]}
+    vector.track(steps, rounding=writer.section(0x87, bytes([3, 7, 4])))
+    vector.predict(2)
+    vector.say("3 teleported, 4 spawned and corrected, a new threshold")
+    changed = born + writer.section(0x82, writer.parameters({1: 4000}))
+    vector.track({4: [1, 0, 0], 6: [0, 0, -3]}, changed, (3, 4), writer.section(0x87, bytes([7, 11, 8])))
+    vector.predict(2)
+    vector.say("by more than a step is worth")
+    vector.track({8: [1, 0, 0], 9: [2, -1, 0]}, rounding=writer.section(0x87, bytes([24, 24, 24])))
+    vector.predict()
+    vector.refuse(writer.section(0x87, bytes([25, 0, 0])), "by too many bits")
+    vector.refuse(writer.section(0x87, bytes([1, 1])), "too short")
+    vector.refuse(writer.section(0x87, bytes(4)), "too long")
+    vector.refuse(2 * writer.section(0x87, bytes(3)), "twice")
+    vector.refuse(writer.section(0x87, bytes(3)) + writer.section(0x82, writer.parameters({1: 9})), "before parameters")
+    vector.refuse(writer.section(0x83, b"\0\x0e") + writer.section(0x87, bytes(3)), "behind corrections")
+    return vector
