@@ -261,7 +261,10 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
 }
 
 void Host::Impl::note_mishaps() {
-  const engine::Mishaps now = live->simulation().mishaps();
+  engine::Mishaps now = live->simulation().mishaps();
+  const engine::Mishaps shown = live->stream().mishaps();
+  now.removed += shown.removed;
+  now.clamped += shown.clamped;
   if (now == noted_mishaps || now_ns - last_mishap_note_ns < kSecond) return;
   last_mishap_note_ns = now_ns;
   noted_mishaps = now;

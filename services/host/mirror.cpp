@@ -72,6 +72,7 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
     }
     const double unit = kQuaternionOne / std::sqrt(norm);
     const double kept = std::min(1.0, kMostSpin / std::sqrt(std::max(speed, 1.0)));
+    mishaps_.clamped += kept < 1 ? 1 : 0;
     for (std::size_t i = 0; i < q.size(); ++i)
       target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
     // Towards zero, so that no rounding leads out of the limit.
@@ -90,7 +91,7 @@ void Mirror::start(const engine::Bodies& bodies) {
   quantise(bodies);
   for (Slot s = 0; s < target_.capacity(); ++s) {
     expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
-    expelled_count_ += expelled_[s];
+    mishaps_.removed += expelled_[s];
     target_.alive()[s] = shown_[s];
     target_.reuse()[s] = 0;
     target_.type()[s] = bodies.type[s];
@@ -123,7 +124,7 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
   const bool shown = shown_[slot] != 0 && expelled_[slot] == 0;
   if (lives && shown_[slot] == 0 && expelled_[slot] == 0) {
     expelled_[slot] = 1;
-    ++expelled_count_;
+    ++mishaps_.removed;
   }
   shown_[slot] = static_cast<std::uint8_t>(shown);
 

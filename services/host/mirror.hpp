@@ -21,8 +21,9 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
 
 /// Follows a simulation. A body is shown to clients while it is alive, finite, on the lattice and of a listed
 /// type; one that stops being so is despawned and stays away until the engine despawns, spawns or teleports
-/// it. Velocities saturate. With orientations they must be some too: a quaternion that is not finite or far
-/// from norm 1 takes a body off. Allocates nothing after construction. Not thread-safe.
+/// it. Velocities saturate, and what turns by more than kMaxTurn in a step is slowed. With orientations they
+/// must be some too: a quaternion that is not finite or far from norm 1 takes a body off. Allocates nothing
+/// after construction. Not thread-safe.
 class Mirror {
  public:
   /// `type_count`: types the session lists, 1 or more.
@@ -37,8 +38,8 @@ class Mirror {
   [[nodiscard]] const State& target() const { return target_; }
   /// Of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
-  /// Bodies taken off because they left the lattice or were not finite, since the start.
-  [[nodiscard]] std::uint64_t expelled() const { return expelled_count_; }
+  /// What it mended since the start: bodies taken off, and turns that were slowed, each once a frame.
+  [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
 
  private:
   void quantise(const engine::Bodies& bodies);
@@ -56,7 +57,7 @@ class Mirror {
   std::vector<std::uint8_t> marks_;        // bits of Event::Kind, this frame
   std::vector<std::uint8_t> generations_;  // of the next spawn in the slot
   std::vector<LifecycleRecord> lifecycle_;
-  std::uint64_t expelled_count_ = 0;
+  engine::Mishaps mishaps_;
 };
 
 }  // namespace tandem::host

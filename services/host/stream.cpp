@@ -174,6 +174,7 @@ Frame Stream::frame() const { return impl_->timeline.frame(); }
 const State& Stream::agreed() const { return impl_->timeline.state(); }
 std::uint64_t Stream::hash() const { return impl_->timeline.hash(); }
 std::uint64_t Stream::last_input() const { return impl_->timeline.last_input(); }
+engine::Mishaps Stream::mishaps() const { return impl_->mirror.mishaps(); }
 std::uint32_t Stream::bodies() const { return impl_->bodies; }
 std::size_t Stream::payload_bound() const { return impl_->timeline.payload_bound(); }
 std::size_t Stream::snapshot_bound() const { return impl_->timeline.snapshot_bound(); }

@@ -89,6 +89,8 @@ class Stream {
   [[nodiscard]] std::uint64_t hash() const;        ///< of agreed()
   [[nodiscard]] std::uint64_t last_input() const;  ///< highest number scheduled
   [[nodiscard]] std::uint32_t bodies() const;      ///< alive in agreed()
+  /// Bodies that it could not show as the engine had them: not finite, off the lattice, no orientation.
+  [[nodiscard]] engine::Mishaps mishaps() const;
   [[nodiscard]] std::size_t payload_bound() const;
   [[nodiscard]] std::size_t snapshot_bound() const;
 

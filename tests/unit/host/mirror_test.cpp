@@ -72,7 +72,7 @@ TEST_F(MirrorTest, ABodyThatLeavesTheLatticeIsDespawned) {
   EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 3}}));
   EXPECT_EQ(mirror.target().alive()[3], 0);
   EXPECT_EQ(mirror.target().p(2)[3], 0);
-  EXPECT_EQ(mirror.expelled(), 1U);
+  EXPECT_EQ(mirror.mishaps().removed, 1U);
 }
 
 TEST_F(MirrorTest, NanAndInfinityDespawnTheBodyAndTouchNoOther) {

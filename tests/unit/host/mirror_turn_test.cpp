@@ -71,13 +71,26 @@ TEST_F(MirrorTurnTest, WhatIsNoTurnTakesTheBodyOffAndTouchesNoOther) {
     update({{Event::Kind::kSpawned, 0}});
     ASSERT_TRUE(shown(0));
     orient(0, q);
-    const std::uint64_t before = mirror.expelled();
+    const std::uint64_t before = mirror.mishaps().removed;
     update();
     EXPECT_FALSE(shown(0)) << q[0] << ' ' << q[1] << ' ' << q[2] << ' ' << q[3];
-    EXPECT_EQ(mirror.expelled(), before + 1);
+    EXPECT_EQ(mirror.mishaps().removed, before + 1);
     EXPECT_EQ(mirror.target().quaternion(0), Quaternion{});
     EXPECT_TRUE(shown(1) && shown(2) && shown(3));
   }
+}
+
+TEST_F(MirrorTurnTest, ABodyThatIsNotTurnedAtTheStartIsNotShownUntilItIsSpawned) {
+  orient(0, {0, 0, 0, 0});
+  Mirror late(lattice, 4, 3, kTurns);
+  late.start(simulation.bodies());
+  EXPECT_EQ(late.target().alive_count(), 3U);
+  EXPECT_EQ(late.mishaps().removed, 1U);
+  orient(0, {0, 0, 0, 1});
+  late.update(simulation.bodies(), {});
+  EXPECT_EQ(late.target().alive_count(), 3U);
+  late.update(simulation.bodies(), std::vector<Event>{{Event::Kind::kSpawned, 0}});
+  EXPECT_EQ(late.target().alive_count(), 4U);
 }
 
 TEST_F(MirrorTurnTest, AnAngularVelocityThatIsNotFiniteTakesTheBodyOff) {
@@ -100,6 +113,7 @@ TEST_F(MirrorTurnTest, TooFastATurnIsSlowedAboutItsAxis) {
   EXPECT_NEAR(mirror.target().w(0)[2], 0.6 * kSpinLimit, 2);
   EXPECT_NEAR(mirror.target().w(1)[2], 0.8 * kSpinLimit, 2);
   EXPECT_TRUE(mirror.lifecycle().empty());
+  EXPECT_EQ(mirror.mishaps(), (engine::Mishaps{.removed = 0, .clamped = 3}));
 }
 
 TEST_F(MirrorTurnTest, ATurnThatIsTooFastByARoundingIsSlowedToo) {
@@ -153,7 +167,7 @@ TEST_F(MirrorTurnTest, DeadSlotsAreZeroWhateverTheEngineLeavesInThem) {
   update();
   EXPECT_EQ(mirror.target().quaternion(3), Quaternion{});
   EXPECT_EQ(mirror.target().body(3).w, Spin{});
-  EXPECT_EQ(mirror.expelled(), 0U);
+  EXPECT_EQ(mirror.mishaps().removed, 0U);
 }
 
 TEST_F(MirrorTurnTest, AStreamWithoutOrientationsIsNotConcernedByThem) {

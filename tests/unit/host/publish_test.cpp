@@ -1,6 +1,9 @@
 // What leaves the host, and what happens when it can not.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/cdr.hpp"
 #include "tests/unit/host/fakes.hpp"
@@ -48,6 +51,27 @@ TEST(Publish, AnEngineThatExplodesIsSaidOnceASecond) {
   };
   EXPECT_EQ(said("explodes"), 3) << "the first, then after one second, then the rest";
   EXPECT_EQ(said("40 bodies removed"), 1);
+}
+
+TEST(Publish, BodiesThatAreNoneAnyMoreAreTakenOffAndSaidAndTheSessionGoesOn) {
+  Bench bench(turning_config());
+  FakeSimulation& engine = bench.simulation;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  engine.on_step = [&](std::uint64_t step) {
+    if (step == 2) engine.orientation[3][0] = 0;  // of norm 0
+    if (step == 3) engine.position[1][1] = nan;
+    if (step == 4) engine.angular_velocity[2][2] = 1e9F;
+    engine.position[0][3] = static_cast<float>(step);
+  };
+  bench.poll();
+  bench.enter(7);
+  bench.run_to(100);
+  EXPECT_EQ(bench.host->agreed().alive_count(), 2U);
+  EXPECT_NE(bench.host->agreed().body(3).p[0], 0);
+  EXPECT_EQ(bench.port.deltas.back().hash, bench.host->hash());
+  const std::vector<std::string> notices = bench.host->take_notices();
+  EXPECT_TRUE(std::ranges::any_of(
+      notices, [](const auto& line) { return line.find("2 bodies removed") != line.npos; }));
 }
 
 TEST(Publish, FramesContinueFromAStartFrame) {
