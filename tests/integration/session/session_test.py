@@ -175,10 +175,14 @@ def compare(stage, servers, client, least, resyncs=0):
     print(f"{client}: {compared} frames agree, {holes} holes, {resyncs} resyncs")
 
 
-def check_capture(path, logged):
-    """Lets the reference decoder reproduce every state of a capture; its frames must be those of the hash log."""
+def check_capture(path, logged, changes=0):
+    """Lets the reference decoder reproduce every state of a capture; its frames must be those of the hash log.
+
+    At least so many of its deltas change parameters.
+    """
     try:
-        from tandem_reference import capture
+        from tandem_reference import capture, payload
+        from tandem_reference.reader import Reader
     except ImportError as error:
         print(f"  the capture is not checked: {error}")
         return
@@ -186,6 +190,10 @@ def check_capture(path, logged):
     hashes = {(key[0], key[3]): f"{first.hash:016x}" for key, first, _ in file.deltas.whole()}
     if hashes != logged:
         raise Failed("the capture and the hash log differ")
+    known = {kind: "section" for kind in payload.ORDER}
+    told = [[kind for kind, _ in payload.sections(Reader(data, "payload"), known)] for _, _, data in file.deltas.whole()]
+    if sum(payload.PARAMETERS in kinds for kinds in told) < changes:
+        raise Failed(f"fewer than {changes} deltas change parameters")
     if not file.snapshots.held:
         raise Failed("the capture has no snapshot")
     checked = subprocess.run(
@@ -296,6 +304,23 @@ def rigid(stage):
     stage.stop("after")
 
 
+def rigid_codecs(stage):
+    """Bodies of Bullet that turn, by the paper's codecs and with automatic quality; the reference decoder reproduces all."""
+    auto = ("--threshold", "auto", "--target-bandwidth", 0.1)
+    rows = [("dominoes", codec, ()) for codec in ("entropy", "limited")]
+    rows += [("rubble", codec, auto) for codec in ("tracker", "quantized")]
+    for i, (scene, codec, options) in enumerate(rows):
+        print(" ".join(map(str, (scene, codec, *options))), flush=True)
+        file = stage.folder / f"{i}.mcap"
+        stage.server(f"server{i}", "--codec", codec, *options, "--scripted", scene=scene, bodies=200)
+        stage.client(f"client{i}", "--observe", "--capture", file)
+        stage.wait_live([f"client{i}"], lambda live: live.get("frame", 0) > 240, "frame 240")
+        check_report(stage.stop(f"client{i}"))
+        stage.stop(f"server{i}")
+        compare(stage, [f"server{i}"], f"client{i}", 100)
+        check_capture(file, stage.hashes(f"client{i}"), changes=3 if options else 0)
+
+
 def no_server(stage):
     """A client without a server says so, waits, gives up when told to; then one starts late and it plays."""
     stage.client("alone", "--timeout", 3, "--seconds", 1)
@@ -401,7 +426,7 @@ def reference(stage):
 # 2,000 bodies reserves 5 MB.
 MEMORY_SLACK_KB = 4096
 SCENARIOS = {
-    f.__name__: f for f in (two_thousand_frames, server_restart, rigid, no_server, endings, emitter, reference)
+    f.__name__: f for f in (two_thousand_frames, server_restart, rigid, rigid_codecs, no_server, endings, emitter, reference)
 }
 
 
