@@ -288,6 +288,38 @@ TEST_F(AutomaticQuality, TheHostFollowsItsTargetAndClientsFollowTheHost) {
       << "nobody else decides then";
 }
 
+HostConfig automatic_turns() {
+  HostConfig config = turning_config();
+  config.stream.layout.codec = "quantized";
+  config.stream.layout.radii.assign(config.stream.layout.type_count, 100'000);
+  CodecParameters& start = config.stream.layout.parameters.codec;
+  start.turn_step = start.spin_step = kMaxStep;
+  config.stream.quality = QualityGoal{0.001, start.threshold, 64 * start.threshold};
+  return config;
+}
+
+class AutomaticTurns : public RuntimeQuality {
+ protected:
+  AutomaticTurns() : RuntimeQuality(automatic_turns()) {
+    bench.simulation.on_step = [this](std::uint64_t step) {
+      angle_ += 0.05F * static_cast<float>(step % 7) - 0.15F;
+      bench.simulation.orientation[2][1] = std::sin(angle_);
+      bench.simulation.orientation[3][1] = std::cos(angle_);
+    };
+  }
+  float angle_ = 0;
+};
+
+TEST_F(AutomaticTurns, TheHostFollowsItsTargetWhereBodiesOnlyTurn) {
+  bench.run_ms(20'000);
+  follow();
+  const CodecParameters before = automatic_turns().stream.layout.parameters.codec;
+  const CodecParameters now = bench.host->parameters().codec;
+  EXPECT_GT(now.threshold, before.threshold);
+  EXPECT_LT(now.turn_step, before.turn_step / 2) << "down slowly";
+  EXPECT_EQ(client->parameters(), bench.host->parameters());
+}
+
 TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedError) {
   const auto scene = scenes::load_scene("cube");
   ASSERT_TRUE(scene);
