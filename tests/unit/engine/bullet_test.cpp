@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <random>
 
+#include "services/engine/bullet/check.hpp"
 #include "services/engine/bullet/inputs.hpp"
 #include "tests/unit/engine/worlds.hpp"
 
@@ -378,6 +380,51 @@ TEST(Bullet, BodiesPressedIntoOneAnotherDoNotEndTheSession) {
       ASSERT_LE(std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) / 60, kMaxTurn);
     }
   }
+}
+
+TEST(Bullet, InputsAtTheirLimitsLeaveBodiesThatASessionMayShow) {
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  const auto within = [&random](double limit) {
+    return limit * (std::ldexp(static_cast<double>(random() >> 11U), -52) - 1);
+  };
+  RigidWorld world = heap_world(80);
+  world.restitution = 1;
+  const World& limits = world.world;
+  const auto s = make(world);
+  const MotionLimits allowed = motion_limits(limits);
+  const auto push = limits.max_push / std::sqrt(3.0);
+  const auto gravity = limits.max_gravity / std::sqrt(3.0);
+  const auto act = [&](const Input& input) {
+    const Classification c = s->classify(input);
+    ASSERT_NE(c.effect, Classification::Effect::kRefused) << c.reason;
+    s->apply(input);
+  };
+  for (int frame = 0; frame < 400; ++frame) {
+    const Vec3 centre{within(2), 1 + within(1), within(2)};
+    const Vec3f place{static_cast<float>(centre[0]), static_cast<float>(centre[1]),
+                      static_cast<float>(centre[2])};
+    if (frame % 3 == 0) act(push_input(centre, 2, {within(push), within(push), within(push)}));
+    if (frame % 50 == 0) act(gravity_input(within(gravity), within(gravity), within(gravity)));
+    // Bodies inside of others, as fast as they may be.
+    for (int i = 0; i < 3; ++i)
+      act(to_input(Spawn{.position = place,
+                         .velocity = {static_cast<float>(within(push)), 0, static_cast<float>(push)},
+                         .angular_velocity = {0, 0.999F * allowed.turn_per_s, 0}}));
+    s->step();
+    for (std::uint32_t slot = 0; slot < limits.capacity; ++slot) {
+      if (s->bodies().alive[slot] == 0) continue;
+      Motion motion;
+      for (std::size_t i = 0; i < 3; ++i) {
+        motion.position[i] = s->bodies().position[i][slot];
+        motion.velocity[i] = s->bodies().velocity[i][slot];
+        motion.angular_velocity[i] = s->bodies().angular_velocity[i][slot];
+      }
+      for (std::size_t i = 0; i < 4; ++i) motion.orientation[i] = s->bodies().orientation[i][slot];
+      ASSERT_NE(mend(motion, allowed), Condition::kLost) << "frame " << frame << ", slot " << slot;
+    }
+  }
+  EXPECT_GT(s->mishaps().removed, 0U);
 }
 
 TEST(Bullet, AWorldThatBreaksARuleIsRefusedWithTheRule) {
