@@ -254,6 +254,9 @@ const transport::StreamMessage* ClientCore::stream() const { return epoch_ ? &ep
 const ClientTimeline* ClientCore::timeline() const {
   return phase() == ClientPhase::kPlaying ? &epoch_->timeline : nullptr;
 }
+const transport::ReplyMessage* ClientCore::reply() const {
+  return epoch_ && epoch_->reply ? &*epoch_->reply : nullptr;
+}
 std::optional<std::int64_t> ClientCore::server_wall_ns(std::int64_t steady_ns) const {
   if (!epoch_ || !epoch_->pacer.clock().known()) return std::nullopt;
   return steady_ns + epoch_->pacer.clock().offset_ns();

@@ -87,6 +87,8 @@ class ClientCore {
   [[nodiscard]] std::optional<std::int64_t> server_wall_ns(std::int64_t steady_ns) const;
   [[nodiscard]] ClientStatus status() const;
   [[nodiscard]] std::uint32_t join_attempt() const;
+  /// The newest of this epoch; null before the first.
+  [[nodiscard]] const transport::ReplyMessage* reply() const;
 
   /// Once before the first sample(): from now on each frame is made ready to be drawn.
   void start_sampling();
