@@ -395,7 +395,7 @@ void Host::Impl::plan_wake() {
     at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
   for (const auto& [id, account] : roster.accounts()) {
     const bool unmatched = account.present && account.phase == transport::Phase::kJoining;
-    if (unmatched || account.reply.due) at(now_ns + kShortWakeNs);
+    if (unmatched || account.reply.schedule.changed()) at(now_ns + kShortWakeNs);
   }
   wake_ns = std::max(wake_ns, now_ns);
 }

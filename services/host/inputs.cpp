@@ -11,16 +11,6 @@ namespace {
 
 using transport::Reason;
 
-void remember(InputAccount& account, const transport::ReplyEntry& entry, std::int64_t now_ns) {
-  if (account.outcomes.size() == transport::kReplyRing) account.outcomes.erase(account.outcomes.begin());
-  account.outcomes.push_back({entry, now_ns});
-}
-
-bool remembers(const InputAccount& account, std::uint64_t number) {
-  return std::ranges::any_of(account.outcomes,
-                             [number](const Outcome& outcome) { return outcome.entry.number == number; });
-}
-
 bool well_formed(const transport::InputMessage& input) {
   return input.values.size() <= transport::kMaxInputValues &&
          input.bytes.size() <= transport::kMaxInputBytes &&
@@ -36,7 +26,7 @@ bool may_play(const Account& account) {
 }  // namespace
 
 Reason InputDesk::handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns) {
-  account.reply.outcomes_due = true;
+  account.reply.schedule.on_outcome();
   if (input.epoch != epoch_) {
     // Its number belongs to another epoch's count, so it must not enter this one's outcomes.
     ++refused_;
@@ -48,14 +38,14 @@ Reason InputDesk::handle(Account& account, const transport::InputMessage& input,
     // The first outcome of a number is the one that counts; the reply tells it again.
     ++refused_;
     entry.code = static_cast<std::uint32_t>(Reason::kDuplicate);
-    if (!remembers(account.inputs, input.number)) remember(account.inputs, entry, now_ns);
+    if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
     return Reason::kDuplicate;
   }
   const Reason reason = decide(account, input, now_ns, entry.frame);
   if (reason != Reason::kNone) ++refused_;
   entry.code = static_cast<std::uint32_t>(reason);
   account.inputs.highest = input.number;
-  remember(account.inputs, entry, now_ns);
+  account.inputs.outcomes.add(entry, now_ns);
   return reason;
 }
 

@@ -2,7 +2,7 @@
 # servers' and clients' ports, tandem::transport_dds and tandem::transport_simulated. Static libraries and the headers
 # below include/tandem-host, included by the same paths as here. Only `cmake --install BUILD --component host` installs it.
 include(GNUInstallDirs)
-set(libraries host simulation workers statistics timeline codec predict layout lattice
+set(libraries host accounts simulation workers statistics timeline codec predict layout lattice
   transport transport_simulated transport_dds topics)
 foreach(library ${libraries})
   set_target_properties(tandem_${library} PROPERTIES EXPORT_NAME ${library})
@@ -12,7 +12,7 @@ list(TRANSFORM libraries PREPEND tandem_)
 install(TARGETS ${libraries} EXPORT tandem_host_targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT host EXCLUDE_FROM_ALL
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem-host ${CMAKE_INSTALL_INCLUDEDIR})
-foreach(folder sdk/core sdk/statistics sdk/transport services/host)
+foreach(folder sdk/core sdk/statistics sdk/transport services/accounts services/host)
   get_filename_component(parent ${folder} DIRECTORY)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem-host/${parent}
     COMPONENT host EXCLUDE_FROM_ALL FILES_MATCHING PATTERN *.hpp PATTERN dds EXCLUDE)

@@ -18,7 +18,7 @@ void Notices::add(std::string line, std::int64_t now_ns) {
   lines_.push_back(std::move(line));
 }
 
-void Notices::add(std::string line, TokenBucket& of_client, std::int64_t now_ns) {
+void Notices::add(std::string line, accounts::TokenBucket& of_client, std::int64_t now_ns) {
   if (of_client.take(now_ns)) return add(std::move(line), now_ns);
   ++left_out_;
 }

@@ -7,12 +7,12 @@
 #include <string_view>
 #include <vector>
 
-#include "services/host/token_bucket.hpp"
+#include "services/accounts/token_bucket.hpp"
 
 namespace tandem::host {
 
 /// What one client may say: by joining and leaving in turn it would fill a disk.
-inline constexpr TokenBucket kNoticesOfClient{0.1, 8};
+inline constexpr accounts::TokenBucket kNoticesOfClient{0.1, 8};
 
 /// Collects lines until somebody takes them; what is too much is counted, and a line says how much. Not
 /// thread-safe.
@@ -26,12 +26,12 @@ class Notices {
 
   void add(std::string line, std::int64_t now_ns);
   /// A line about a client, which `of_client` has to permit, too.
-  void add(std::string line, TokenBucket& of_client, std::int64_t now_ns);
+  void add(std::string line, accounts::TokenBucket& of_client, std::int64_t now_ns);
   /// Oldest first; forgets them.
   [[nodiscard]] std::vector<std::string> take();
 
  private:
-  TokenBucket all_{kPerSecond, kBurst};
+  accounts::TokenBucket all_{kPerSecond, kBurst};
   std::vector<std::string> lines_;
   std::uint64_t left_out_ = 0;
   std::int64_t told_ns_ = INT64_MIN / 2;

@@ -12,18 +12,6 @@ Reason standing_reason(const Account& account) {
   return account.demoted ? Reason::kDemoted : Reason::kNone;
 }
 
-bool elapsed(std::int64_t last_ns, std::int64_t now_ns, std::int64_t gap_ns) {
-  return last_ns == INT64_MIN || now_ns - last_ns >= gap_ns;
-}
-
-std::vector<transport::ReplyEntry> told(const InputAccount& inputs, std::int64_t now_ns) {
-  std::vector<transport::ReplyEntry> entries;
-  for (const Outcome& outcome : inputs.outcomes) {
-    if (now_ns - outcome.at_ns <= ReplyDesk::kToldNs) entries.push_back(outcome.entry);
-  }
-  return entries;
-}
-
 }  // namespace
 
 // False while there is no room: a writer has to end before its client's next one is opened.
@@ -40,11 +28,7 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
   if (!close_forgotten(roster)) return;
   for (auto& [id, account] : roster.accounts()) {
     ReplyAccount& reply = account.reply;
-    if (!account.present || !elapsed(reply.last_ns, now_ns, kChangeNs)) continue;
-    const std::int64_t echo_ns = account.role() == transport::Role::kObserver ? 2 * kEchoNs : kEchoNs;
-    const bool echo = reply.clock_moved && elapsed(reply.last_ns, now_ns, echo_ns);
-    // Only a reply that goes out for nothing but outcomes spends of their rate.
-    if (!reply.due && !echo && !(reply.outcomes_due && reply.outcomes.take(now_ns))) continue;
+    if (!account.present || !reply.schedule.due(account.role(), now_ns)) continue;
     if (!reply.open && !outbox_->push(OpenReplies{id})) return;
     reply.open = true;
     const bool queued =
@@ -56,18 +40,18 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
                                               .highest_input = account.inputs.highest,
                                               .client_clock_ns = account.clock_ns,
                                               .server_time_ns = wall_ns,
-                                              .entries = told(account.inputs, now_ns)});
+                                              .entries = account.inputs.outcomes.told(now_ns)});
     if (!queued) return;
-    reply.due = reply.outcomes_due = reply.clock_moved = false;
+    reply.schedule.sent(account.role(), now_ns);
     reply.once = Reason::kNone;
-    reply.last_ns = now_ns;
   }
 }
 
 void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t now_ns, std::int64_t wall_ns) {
   auto stranger = std::ranges::find(strangers_, client, &Stranger::client);
   if (stranger == strangers_.end()) stranger = std::ranges::min_element(strangers_, {}, &Stranger::last_ns);
-  if (stranger->client == client && !elapsed(stranger->last_ns, now_ns, kEchoNs)) return;
+  const bool answered = stranger->client == client && stranger->last_ns != INT64_MIN;
+  if (answered && now_ns - stranger->last_ns < kStrangerNs) return;
   if (!strangers_rate_.take(now_ns)) return;
   *stranger = {client, now_ns};
   transport::ReplyMessage reply;

@@ -7,23 +7,18 @@
 
 #include "sdk/transport/messages.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/accounts/token_bucket.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/roster.hpp"
-#include "services/host/token_bucket.hpp"
 
 namespace tandem::host {
 
-/// Queues replies: on a change, otherwise once a second at most. A reply that finds no room is tried again.
+/// Queues replies when they are due (accounts::ReplySchedule). A reply that finds no room is tried again.
 /// A client with an account is answered through a writer of its own, opened with its first reply.
 class ReplyDesk {
  public:
-  static constexpr std::int64_t kEchoNs =
-      kSecond;  ///< between replies that only echo the clock; twice for observers
-  static constexpr std::int64_t kChangeNs = 10 * kMillisecond;  ///< between replies to one client at all
-  /// An outcome is told for so long; the topic is reliable, so the newest reply is what may be lost with a
-  /// link.
-  static constexpr std::int64_t kToldNs = 5 * kSecond;
-  static constexpr double kStrangersPerSecond = 20;  ///< and as many at once
+  static constexpr std::int64_t kStrangerNs = kSecond;  ///< between two answers to the same one
+  static constexpr double kStrangersPerSecond = 20;     ///< and as many at once
 
   ReplyDesk(Epoch epoch, Outbox& outbox) : epoch_(epoch), outbox_(&outbox) {}
 
@@ -43,7 +38,7 @@ class ReplyDesk {
   Epoch epoch_;
   Outbox* outbox_;
   std::array<Stranger, 64> strangers_{};  // the longest silent one makes room
-  TokenBucket strangers_rate_{kStrangersPerSecond, kStrangersPerSecond};
+  accounts::TokenBucket strangers_rate_{kStrangersPerSecond, kStrangersPerSecond};
 };
 
 }  // namespace tandem::host

@@ -70,7 +70,7 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (account == nullptr) return Reason::kFull;
 
   const bool starts_over = account->phase == Phase::kJoining || account->attempt != ack.join_attempt;
-  if (account->phase != ack.phase || account->wanted != ack.role_wanted) account->reply.due = true;
+  if (account->phase != ack.phase || account->wanted != ack.role_wanted) account->reply.schedule.on_change();
   if (plays && starts_over) {
     account->timed_from = now.frame;
     const std::int64_t frames = transport::ack_spacing(rules_.fixed_window.value_or(rules_.window_ceiling));
@@ -90,7 +90,7 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   account->attempt = ack.join_attempt;
   account->applied = ack.applied;
   account->clock_ns = ack.clock_ns;
-  account->reply.clock_moved = true;
+  account->reply.schedule.on_clock();
   account->heard_ns = now.ns;
   account->present = true;
   return Reason::kNone;
@@ -143,7 +143,7 @@ void Roster::charge(std::int64_t duration_ns, const Now& now) {
     account.demoted = true;
     account.counted = false;
     account.kept_up = false;
-    account.reply.due = true;
+    account.reply.schedule.on_change();
     ++demotions_;
     note(account, "held the others up for too long: observer until it keeps up for 10 s", now.ns);
   }
@@ -183,7 +183,7 @@ void Roster::refresh(const Now& now) {
       account.kept_up = account.plays() && (account.kept_up || abreast);
       if (account.kept_up && abreast && now.ns - account.kept_up_since_ns >= kReturnNs) {
         account.demoted = false;
-        account.reply.due = true;
+        account.reply.schedule.on_change();
         note(account, "kept up for 10 s: participant again", now.ns);
       }
     }

@@ -10,9 +10,11 @@
 
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/port.hpp"
+#include "services/accounts/outcomes.hpp"
+#include "services/accounts/reply_schedule.hpp"
+#include "services/accounts/token_bucket.hpp"
 #include "services/host/notices.hpp"
 #include "services/host/stall_meter.hpp"
-#include "services/host/token_bucket.hpp"
 #include "services/host/window.hpp"
 
 namespace tandem::host {
@@ -20,17 +22,11 @@ namespace tandem::host {
 inline constexpr double kInputsPerSecond = 60;  ///< per client, on average
 inline constexpr double kInputBurst = 60;       ///< per client, at once
 
-/// What became of an input, and when that was decided.
-struct Outcome {
-  transport::ReplyEntry entry;
-  std::int64_t at_ns = 0;
-};
-
-/// The last outcomes of a client's inputs, oldest first, and how fast it may send.
+/// The last outcomes of a client's inputs, and how fast it may send.
 struct InputAccount {
   std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
-  std::vector<Outcome> outcomes;
-  TokenBucket rate{kInputsPerSecond, kInputBurst};
+  accounts::Outcomes outcomes;
+  accounts::TokenBucket rate{kInputsPerSecond, kInputBurst};
 };
 
 struct JoinAccount {
@@ -39,13 +35,9 @@ struct JoinAccount {
 };
 
 struct ReplyAccount {
-  bool open = false;          ///< the client has a reply writer of its own
-  bool due = true;            ///< something changed
-  bool outcomes_due = false;  ///< only outcomes of inputs are new
-  TokenBucket outcomes{5, 4};
-  bool clock_moved = false;                           ///< only the echo of the client's clock is new
+  bool open = false;  ///< the client has a reply writer of its own
+  accounts::ReplySchedule schedule;
   transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
-  std::int64_t last_ns = INT64_MIN;
 };
 
 /// One client id. Survives rejoins; forgotten with its DDS participant, or a minute after the client was last
@@ -69,7 +61,7 @@ struct Account {
   InputAccount inputs;
   JoinAccount join;
   ReplyAccount reply;
-  TokenBucket notices = kNoticesOfClient;
+  accounts::TokenBucket notices = kNoticesOfClient;
 
   [[nodiscard]] transport::Role role() const { return demoted ? transport::Role::kObserver : wanted; }
   [[nodiscard]] bool plays() const { return present && phase == transport::Phase::kPlaying; }
@@ -78,7 +70,7 @@ struct Account {
 /// What all clients of one DDS participant may cost together, or ids would multiply it.
 struct Peer {
   StallMeter stalls;
-  TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
+  accounts::TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
 };
 
 /// It is there, and on its way into the session.

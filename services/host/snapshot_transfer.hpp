@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
+#include "services/accounts/transfer_window.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/roster.hpp"
-#include "services/host/transfer_window.hpp"
 
 namespace tandem::host {
 
@@ -73,7 +73,7 @@ class SnapshotTransfer {
   std::size_t part_bytes_ = kLeastPartBytes;
   std::vector<Part> parts_;
   std::map<transport::ClientId, Receiver> receivers_;
-  TransferWindow window_;
+  accounts::TransferWindow window_;
   std::int64_t started_ns_ = 0;
   std::uint64_t bytes_ = 0;
 };

@@ -43,7 +43,8 @@ EDGES = {
     "sdk/examples": ["public"],
     "services/heap": [],
     "services/workers": [],
-    "services/host": TIMELINE + ["sdk/statistics", "sdk/transport", "services/workers"],
+    "services/accounts": LAYOUT + ["sdk/transport"],
+    "services/host": TIMELINE + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"],
     "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
     "services/engine/shape": ["public/result.hpp"],
     "services/engine/bullet": ["public/result.hpp", "services/engine/particles", "services/engine/shape"] + SIMULATION,
@@ -54,7 +55,11 @@ EDGES = {
     "services/tandemd": LAYOUT
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
-    "services/tandemd/main.cpp": ["services/tandemd", "services/heap"],
+    "services/tandemd/main.cpp": ["services/tandemd", "services/heap", "services/signals"],
+    "services/signals": [],
+    "services/gateway": TIMELINE
+    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "services/accounts"],
+    "services/gateway/main.cpp": ["services/gateway", "services/heap", "services/signals"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
     + ["services/heap", "services/host", "services/recording", "services/scenes"],
@@ -72,7 +77,9 @@ OWNERS = [
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
-    (re.compile(r"^CLI/"), "CLI11", ["services/tool", "services/lab", "services/tandemd", "tests"]),
+    (re.compile(r"^CLI/"), "CLI11", ["services/gateway", "services/tool", "services/lab", "services/tandemd", "tests"]),
+    (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
+    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]

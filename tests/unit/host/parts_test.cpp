@@ -1,16 +1,18 @@
 // The small parts by themselves.
 #include <gtest/gtest.h>
 
+#include "services/accounts/token_bucket.hpp"
 #include "services/host/notices.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/pacing.hpp"
 #include "services/host/stall_meter.hpp"
-#include "services/host/token_bucket.hpp"
 #include "services/host/window.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
 namespace {
+
+using accounts::TokenBucket;
 
 TEST(StallMeter, ForgetsAChargeAfterTenSeconds) {
   StallMeter meter;

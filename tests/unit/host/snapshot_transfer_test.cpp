@@ -8,6 +8,8 @@
 namespace tandem::host {
 namespace {
 
+using accounts::TransferWindow;
+
 constexpr Epoch kEpoch = 5;
 constexpr StreamId kStream{2, 3};
 constexpr std::size_t kPart = SnapshotTransfer::kLeastPartBytes;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace tandem::host {
+namespace tandem::accounts {
 
 /// `burst` at once, and `per_second` on average. Starts full. Time never goes back.
 class TokenBucket {
@@ -31,4 +31,4 @@ class TokenBucket {
   std::int64_t at_ns_ = 0;
 };
 
-}  // namespace tandem::host
+}  // namespace tandem::accounts

@@ -7,7 +7,7 @@
 
 #include "sdk/transport/units.hpp"
 
-namespace tandem::host {
+namespace tandem::accounts {
 
 /// Bytes in flight that fill a link of unknown rate without filling the queues in front of it, where deltas
 /// wait too. Follows the delay, as FAST TCP does (Jin, Wei, Low 2004), because DDS repairs what is lost
@@ -55,4 +55,4 @@ class TransferWindow {
   std::int64_t sum_ns_ = 0, arrivals_ = 0;  // of this round
 };
 
-}  // namespace tandem::host
+}  // namespace tandem::accounts

@@ -1,0 +1,31 @@
+#pragma once
+// What became of the inputs of one client.
+
+#include <cstdint>
+#include <vector>
+
+#include "sdk/transport/messages.hpp"
+#include "sdk/transport/units.hpp"
+
+namespace tandem::accounts {
+
+/// The last kReplyRing outcomes, oldest first. Not thread-safe.
+class Outcomes {
+ public:
+  /// An outcome is told for so long; replies are reliable, so the newest one is what may be lost with a link.
+  static constexpr std::int64_t kToldNs = 5 * kSecond;
+
+  void add(const transport::ReplyEntry& entry, std::int64_t now_ns);
+  [[nodiscard]] bool has(std::uint64_t number) const;
+  /// What a reply of now holds.
+  [[nodiscard]] std::vector<transport::ReplyEntry> told(std::int64_t now_ns) const;
+
+ private:
+  struct Outcome {
+    transport::ReplyEntry entry;
+    std::int64_t at_ns = 0;
+  };
+  std::vector<Outcome> outcomes_;
+};
+
+}  // namespace tandem::accounts

@@ -1,0 +1,48 @@
+#pragma once
+// When one client is written a reply.
+
+#include <cstdint>
+
+#include "sdk/transport/messages.hpp"
+#include "sdk/transport/units.hpp"
+#include "services/accounts/token_bucket.hpp"
+
+namespace tandem::accounts {
+
+/// On a change, otherwise once a second at most. Not thread-safe.
+class ReplySchedule {
+ public:
+  /// Between replies that only echo the clock; twice for observers.
+  static constexpr std::int64_t kEchoNs = kSecond;
+  static constexpr std::int64_t kChangeNs = 10 * kMillisecond;  ///< between replies at all
+
+  /// Role, phase or reason changed.
+  void on_change() { changed_ = true; }
+  void on_outcome() { outcomes_due_ = true; }
+  /// An acknowledgement brought a newer clock to echo.
+  void on_clock() { clock_moved_ = true; }
+
+  /// Something changed that was not told yet.
+  [[nodiscard]] bool changed() const { return changed_; }
+  /// Whether a reply is to go out now.
+  [[nodiscard]] bool due(transport::Role role, std::int64_t now_ns);
+  /// It is on its way. One that goes out for nothing but outcomes spends of their rate.
+  void sent(transport::Role role, std::int64_t now_ns);
+
+ private:
+  [[nodiscard]] bool elapsed(std::int64_t now_ns, std::int64_t gap_ns) const {
+    return last_ns_ == INT64_MIN || now_ns - last_ns_ >= gap_ns;
+  }
+  [[nodiscard]] bool for_more_than_outcomes(transport::Role role, std::int64_t now_ns) const {
+    const std::int64_t echo_ns = role == transport::Role::kObserver ? 2 * kEchoNs : kEchoNs;
+    return changed_ || (clock_moved_ && elapsed(now_ns, echo_ns));
+  }
+
+  bool changed_ = true;
+  bool outcomes_due_ = false;
+  bool clock_moved_ = false;
+  TokenBucket outcomes_{5, 4};
+  std::int64_t last_ns_ = INT64_MIN;
+};
+
+}  // namespace tandem::accounts
