@@ -1,0 +1,77 @@
+#include "services/gateway/command_line.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <utility>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/gateway/admission.hpp"
+
+namespace tandem::gateway {
+namespace {
+
+constexpr std::size_t kMostViewers = 16'384;
+constexpr std::size_t kLeastQueueBytes = 64U << 10U, kMostQueueBytes = 1U << 30U;
+
+Result<void> check(const Options& options) {
+  if (auto named = transport::check_session_name(options.session); !named) return named;
+  if (options.web.tls_cert.empty() != options.web.tls_key.empty())
+    return fail(ErrorCode::kInvalidArgument, "--tls-cert and --tls-key go together");
+  for (const std::string& origin : options.origins) {
+    if (auto good = check_origin(origin); !good) return good;
+  }
+  return {};
+}
+
+}  // namespace
+
+CommandLine parse_command_line(int argc, const char* const* argv) {
+  CLI::App app{"Serves a session to browsers, over HTTP and WebSocket.", "tandem-gateway"};
+  app.set_version_flag("--version", "tandem-gateway " TANDEM_VERSION);
+  app.footer(
+      "Paths: / the viewer, /tandem the WebSocket, /healthz. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT "
+      "and SIGTERM end it cleanly.");
+  Options options;
+  app.add_option("--session", options.session, "Name of the session")->capture_default_str();
+  app.add_option("--domain", options.domain, "DDS domain")
+      ->check(CLI::Range(0U, transport::kMaxDomain))
+      ->capture_default_str();
+  app.add_option("--listen", options.web.address, "IPv4 or IPv6 address; 0.0.0.0 or :: for all of the host's")
+      ->capture_default_str();
+  app.add_option("--port", options.web.port, "TCP port; 0 for any free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  app.add_option("--viewer", options.viewer, "Folder with the viewer's files, read once at the start");
+  app.add_option("--token-file", options.token_file,
+                 "File whose first line is a token that viewers have to name: ?token=TOKEN");
+  app.add_option("--tls-cert", options.web.tls_cert, "Certificate chain, PEM");
+  app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM");
+  app.add_option(
+      "--origin", options.origins,
+      "Origin of pages that may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that came "
+      "from here by an address may always");
+  app.add_option("--max-viewers", options.limits.viewers, "Viewers at once")
+      ->check(CLI::Range(std::size_t{1}, kMostViewers))
+      ->capture_default_str();
+  app.add_option("--queue-bytes", options.limits.queue_bytes,
+                 "Deltas and scheduled inputs held for viewers that are slow, once for all of them")
+      ->check(CLI::Range(kLeastQueueBytes, kMostQueueBytes))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return {.options = std::nullopt, .exit_code = app.exit(error) == 0 ? 0 : 2};
+  }
+  if (const auto good = check(options); !good) {
+    std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
+    return {.options = std::nullopt, .exit_code = 2};
+  }
+  // As many again for files, and for those who are refused.
+  options.web.connections = 2 * options.limits.viewers + 64;
+  return {.options = std::move(options), .exit_code = 0};
+}
+
+}  // namespace tandem::gateway

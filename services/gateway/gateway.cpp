@@ -1,0 +1,236 @@
+#include "services/gateway/gateway.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "sdk/transport/envelope.hpp"
+
+namespace tandem::gateway {
+
+using transport::Reason;
+using transport::Role;
+
+Gateway::Gateway(const Limits& limits, World& world)
+    : limits_(limits), world_(world), log_(limits.queue_bytes) {
+  announce(make_outgoing(transport::AbsentMessage{}));
+}
+
+void Gateway::announce(OutgoingPtr announcement) {
+  announcement_ = std::move(announcement);
+  ++announcement_number_;
+}
+
+void Gateway::on_session(const transport::SessionMessage& session) {
+  session_ = session;
+  alive_ = true;
+  announce(make_outgoing(session));
+  log_.clear();
+  newest_delta_.reset();
+  frame_ = 0;
+  coming_inputs_.clear();
+  collecting_since_ns_.reset();
+  snapshot_bytes_ = 0;
+  status_.reset();
+  merger_.clear();
+  for (auto& [id, viewer] : viewers_) viewer.now = {};
+}
+
+void Gateway::on_server_alive(bool alive) {
+  if (alive == alive_ || !session_) return;
+  alive_ = alive;
+  if (alive) return announce(make_outgoing(*session_));
+  announce(make_outgoing(transport::AbsentMessage{}));
+}
+
+void Gateway::on_status(const transport::ServerStatusMessage& status) {
+  if (!session_ || status.epoch != session_->epoch) return;
+  status_ = make_outgoing(status);
+  ++status_number_;
+}
+
+void Gateway::on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) {
+  OutgoingPtr message = make_outgoing(input);
+  coming_inputs_.push_back({input.number, message});
+  if (coming_inputs_.size() > kMostComingInputs) coming_inputs_.pop_front();
+  log_.push(std::move(message), now_ns);
+}
+
+void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) {
+  frame_ = delta.frame;
+  std::erase_if(coming_inputs_,
+                [&delta](const ComingInput& input) { return input.number <= delta.last_input; });
+  transport::DeltaMessage message;
+  message.epoch = session_->epoch;
+  message.stream = session_->streams.front().id;
+  message.frame = delta.frame;
+  message.last_input = delta.last_input;
+  message.server_time_ns = delta.server_time_ns;
+  message.hash = delta.hash;
+  message.payload = delta.payload;
+  newest_delta_ = log_.end();
+  log_.push(make_outgoing(message), now_ns);
+}
+
+void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) {
+  merger_.on_outcome(outcome, verdicts_);
+  tell(verdicts_, now_ns);
+}
+
+std::optional<ViewerId> Gateway::admit() {
+  if (viewers_.size() >= limits_.viewers) return std::nullopt;
+  ++last_id_;
+  viewers_[last_id_].id = last_id_;
+  ++counts_.joined;
+  return last_id_;
+}
+
+void Gateway::leave(ViewerId id) { counts_.left += viewers_.erase(id); }
+
+bool Gateway::reply_due(Viewer& viewer, std::int64_t now_ns) const {
+  return viewer.now.heard && viewer.now.reply.due(role_of(viewer), now_ns);
+}
+
+// A snapshot on its way lies in front of the queue, so that alone does not make a viewer slow.
+bool Gateway::is_behind(const Viewer& viewer, std::int64_t now_ns) const {
+  const Viewer::InEpoch& state = viewer.now;
+  if (state.place < log_.begin()) return true;
+  if (state.place == log_.end() || state.passage.unfinished()) return false;
+  return now_ns - log_.time_ns(state.place) > kBehindNs && snapshot_bytes_ > 0 &&
+         log_.bytes_from(state.place) > snapshot_bytes_;
+}
+
+void Gateway::skip(Viewer& viewer) {
+  ++counts_.skips;
+  Viewer::InEpoch& state = viewer.now;
+  if (state.passage.unfinished()) {
+    // It joins, and would wait for what it cannot use any more.
+    state.passage = {};
+    state.flow = Viewer::Flow::kWaiting;
+    return;
+  }
+  // The gap tells it to join again.
+  state.place = newest_delta_ && *newest_delta_ >= log_.begin() ? *newest_delta_ : log_.end();
+}
+
+bool Gateway::ready(Viewer& viewer, std::int64_t now_ns) const {
+  if (viewer.told_announcement != announcement_number_ || reply_due(viewer, now_ns)) return true;
+  if (viewer.now.passage.has_next()) return true;
+  if (viewer.now.flow == Viewer::Flow::kFollowing && viewer.now.place != log_.end()) return true;
+  return status_ && viewer.told_status != status_number_;
+}
+
+void Gateway::list_ready(std::int64_t now_ns, std::vector<ViewerId>& out) {
+  out.clear();
+  for (auto& [id, viewer] : viewers_) {
+    if (!ready(viewer, now_ns)) continue;
+    if (!viewer.waiting_since_ns) viewer.waiting_since_ns = now_ns;
+    out.push_back(id);
+  }
+}
+
+void Gateway::list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const {
+  out.clear();
+  for (const auto& [id, viewer] : viewers_) {
+    if (viewer.waiting_since_ns && now_ns - *viewer.waiting_since_ns > kNotReadingNs) out.push_back(id);
+  }
+}
+
+Gateway::Next Gateway::next(ViewerId id, std::int64_t now_ns) {
+  const auto found = viewers_.find(id);
+  if (found == viewers_.end()) return {};
+  Viewer& viewer = found->second;
+  viewer.waiting_since_ns.reset();
+  if (viewer.now.flow == Viewer::Flow::kFollowing && is_behind(viewer, now_ns)) skip(viewer);
+  OutgoingPtr message = take_next(viewer, now_ns);
+  if (!message) return {};
+  ++counts_.messages;
+  counts_.bytes += message->size();
+  return {std::move(message), ready(viewer, now_ns)};
+}
+
+OutgoingPtr Gateway::take_next(Viewer& viewer, std::int64_t now_ns) {
+  Viewer::InEpoch& state = viewer.now;
+  if (viewer.told_announcement != announcement_number_) {
+    viewer.told_announcement = announcement_number_;
+    return announcement_;
+  }
+  if (reply_due(viewer, now_ns)) return reply(viewer, now_ns);
+  if (state.passage.has_next()) return state.passage.next(now_ns);
+  if (state.flow == Viewer::Flow::kFollowing && state.place != log_.end()) return log_.at(state.place++);
+  if (!status_ || viewer.told_status == status_number_) return nullptr;
+  viewer.told_status = status_number_;
+  return status_;
+}
+
+OutgoingPtr Gateway::reply(Viewer& viewer, std::int64_t now_ns) const {
+  Viewer::InEpoch& state = viewer.now;
+  transport::ReplyMessage reply;
+  reply.client = viewer.client;
+  reply.epoch = session_->epoch;
+  reply.role = role_of(viewer);
+  reply.phase = state.phase;
+  const bool demoted = reply.role != state.wanted && state.phase == transport::Phase::kPlaying;
+  const Reason standing = demoted ? Reason::kDemoted : Reason::kNone;
+  reply.reason = static_cast<std::uint32_t>(state.once != Reason::kNone ? state.once : standing);
+  reply.highest_input = state.decided();
+  // Without the server's time an echo would say something wrong.
+  if (const auto server_ns = world_.server_time_ns(now_ns)) {
+    reply.client_clock_ns = state.clock_ns;
+    reply.server_time_ns = *server_ns;
+  }
+  reply.entries = state.outcomes.told(now_ns);
+  state.reply.sent(reply.role, now_ns);
+  state.once = Reason::kNone;
+  return make_outgoing(reply);
+}
+
+std::optional<std::int64_t> Gateway::cut_due_ns() const {
+  if (!collecting_since_ns_) return std::nullopt;
+  const std::int64_t spaced_ns = cut_at_ns_ ? *cut_at_ns_ + kSpacingNs : INT64_MIN;
+  return std::max(*collecting_since_ns_ + kCollectNs, spaced_ns);
+}
+
+// Whoever waits gets the same one: what is live follows from here on.
+void Gateway::cut(std::int64_t now_ns) {
+  const auto made = world_.cut();
+  if (!made) return;
+  std::vector<OutgoingPtr> inputs;
+  for (const ComingInput& input : coming_inputs_) {
+    if (input.number > made->last_input) inputs.push_back(input.message);
+  }
+  const auto snapshot = std::make_shared<SnapshotParts>(*made, session_->epoch, std::move(inputs));
+  snapshot_bytes_ = snapshot->bytes;
+  ++counts_.snapshots;
+  for (auto& [id, viewer] : viewers_) {
+    Viewer::InEpoch& state = viewer.now;
+    if (state.flow != Viewer::Flow::kWaiting) continue;
+    state.flow = Viewer::Flow::kFollowing;
+    state.place = log_.end();
+    state.passage = SnapshotPassage(snapshot, now_ns);
+    state.served_attempt = state.attempt;
+  }
+  collecting_since_ns_.reset();
+  cut_at_ns_ = now_ns;
+}
+
+std::int64_t Gateway::poll(std::int64_t now_ns) {
+  const Role granted = world_.role();
+  const bool role_changed = std::exchange(granted_, granted) != granted;
+  for (auto& [id, viewer] : viewers_) {
+    if (role_changed) viewer.now.reply.on_change();
+    if (viewer.now.passage.unfinished() && now_ns - viewer.now.passage.began_ns() > kLongestPassageNs)
+      viewer.now.passage = {};
+    if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
+  }
+  merger_.flush(world_, now_ns, verdicts_);
+  tell(verdicts_, now_ns);
+  if (const auto due_ns = cut_due_ns(); due_ns && now_ns >= *due_ns) cut(now_ns);
+  counts_.inputs_sent = merger_.sent();
+  // A cut that was not possible is tried again when the world moves on.
+  const auto due_ns = cut_due_ns();
+  std::int64_t wake_ns = due_ns && *due_ns > now_ns ? *due_ns : INT64_MAX;
+  if (merger_.waiting()) wake_ns = std::min(wake_ns, now_ns + 10 * kMillisecond);
+  return wake_ns;
+}
+
+}  // namespace tandem::gateway

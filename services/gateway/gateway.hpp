@@ -1,0 +1,146 @@
+#pragma once
+// A session for viewers that have no DDS.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/sent_inputs.hpp"
+#include "sdk/transport/messages.hpp"
+#include "sdk/transport/units.hpp"
+#include "services/gateway/counts.hpp"
+#include "services/gateway/input_merger.hpp"
+#include "services/gateway/live_log.hpp"
+#include "services/gateway/outgoing.hpp"
+#include "services/gateway/viewer.hpp"
+#include "services/gateway/world.hpp"
+
+namespace tandem::gateway {
+
+/// No message of a viewer is longer.
+inline constexpr std::size_t kMostViewerBytes = 2048;
+
+struct Limits {
+  std::size_t viewers = 256;
+  std::size_t queue_bytes = 1U << 20U;  ///< of deltas and scheduled inputs, held once for all viewers
+};
+
+/// The rules of idl/STATES.md, "The gateway", for all viewers: without a clock, a thread or a socket. Towards
+/// a viewer it stands where the server stands towards a client. Every buffer is bounded. Not thread-safe.
+class Gateway {
+ public:
+  static constexpr std::int64_t kCollectNs = 100 * kMillisecond;  ///< joiners of one snapshot
+  static constexpr std::int64_t kSpacingNs = 250 * kMillisecond;  ///< between two snapshots at least
+  /// A viewer that is this far behind gets a snapshot where that is smaller than what is queued for it.
+  static constexpr std::int64_t kBehindNs = kSecond;
+  /// One that takes nothing for so long is let go.
+  static constexpr std::int64_t kNotReadingNs = 30 * kSecond;
+  /// One snapshot may take so long.
+  static constexpr std::int64_t kLongestPassageNs = 60 * kSecond;
+  /// Inputs of a viewer without an outcome; what a reply can tell of.
+  static constexpr std::size_t kMostUndecided = transport::kReplyRing;
+
+  /// `world` must outlive it.
+  Gateway(const Limits& limits, World& world);
+
+  // What viewers do.
+  /// A new connection; nothing where there are too many.
+  [[nodiscard]] std::optional<ViewerId> admit();
+  void leave(ViewerId id);
+  /// Takes one message. Untrusted. Returns why the connection has to end, if it has to.
+  [[nodiscard]] std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message,
+                                               std::int64_t now_ns);
+  struct Next {
+    OutgoingPtr message;  ///< null: nothing to send
+    bool more = false;    ///< there is another behind it
+  };
+  /// The next message to send to a viewer, who can take one.
+  [[nodiscard]] Next next(ViewerId id, std::int64_t now_ns);
+  /// Those next() has something for. `out` is replaced.
+  void list_ready(std::int64_t now_ns, std::vector<ViewerId>& out);
+  /// Those that have to be let go, as they take nothing. `out` is replaced.
+  void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
+
+  // What happens in the session.
+  /// The one followed, with the one stream that is played. Everything of another epoch is dropped.
+  void on_session(const transport::SessionMessage& session);
+  void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns);
+  /// Applied, so that a cut has it.
+  void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns);
+  void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns);
+  void on_status(const transport::ServerStatusMessage& status);
+  void on_server_alive(bool alive);
+
+  /// Does what is due; returns when it wants to be called again, INT64_MAX: not before something happens.
+  std::int64_t poll(std::int64_t now_ns);
+
+  [[nodiscard]] const Counts& counts() const { return counts_; }
+  [[nodiscard]] Counts& counts() { return counts_; }
+  [[nodiscard]] std::size_t viewers() const { return viewers_.size(); }
+  [[nodiscard]] Frame frame() const { return frame_; }
+  [[nodiscard]] const std::optional<transport::SessionMessage>& session() const { return session_; }
+
+ private:
+  // gateway.cpp: announcements, what is sent next, snapshots
+  [[nodiscard]] bool reply_due(Viewer& viewer, std::int64_t now_ns) const;
+  [[nodiscard]] bool is_behind(const Viewer& viewer, std::int64_t now_ns) const;
+  [[nodiscard]] bool ready(Viewer& viewer, std::int64_t now_ns) const;
+  [[nodiscard]] OutgoingPtr take_next(Viewer& viewer, std::int64_t now_ns);
+  [[nodiscard]] OutgoingPtr reply(Viewer& viewer, std::int64_t now_ns) const;
+  void skip(Viewer& viewer);
+  void announce(OutgoingPtr announcement);
+  [[nodiscard]] std::optional<std::int64_t> cut_due_ns() const;
+  void cut(std::int64_t now_ns);
+
+  // viewers.cpp: what viewers say
+  [[nodiscard]] std::optional<Refusal> take(Viewer& viewer, transport::ViewerMessage&& message,
+                                            std::int64_t now_ns);
+  [[nodiscard]] std::optional<Refusal> take(Viewer& viewer, const transport::AckMessage& ack,
+                                            std::int64_t now_ns);
+  void take(Viewer& viewer, transport::InputMessage&& input, std::int64_t now_ns);
+  void on_joining(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns);
+  [[nodiscard]] transport::Reason check(Viewer& viewer, const transport::InputMessage& input,
+                                        std::int64_t now_ns) const;
+  [[nodiscard]] transport::Role role_of(const Viewer& viewer) const;
+  void tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now_ns);
+  void refuse_input(Viewer& viewer, std::uint64_t number, transport::Reason reason, std::int64_t now_ns);
+
+  Limits limits_;
+  World& world_;
+  Counts counts_;
+  std::map<ViewerId, Viewer> viewers_;
+  ViewerId last_id_ = 0;
+
+  std::optional<transport::SessionMessage> session_;
+  bool alive_ = false;
+  OutgoingPtr announcement_;  // the session, or that it is absent
+  std::uint64_t announcement_number_ = 0;
+  OutgoingPtr status_;  // the server's newest
+  std::uint64_t status_number_ = 0;
+
+  LiveLog log_;
+  std::optional<LiveLog::Place> newest_delta_;
+  Frame frame_ = 0;  // applied last
+  /// Scheduled inputs whose number no applied delta has named yet.
+  struct ComingInput {
+    std::uint64_t number = 0;
+    OutgoingPtr message;
+  };
+  std::deque<ComingInput> coming_inputs_;
+  static constexpr std::size_t kMostComingInputs = 4096;
+
+  std::optional<std::int64_t> collecting_since_ns_;  // joiners of the next snapshot
+  std::optional<std::int64_t> cut_at_ns_;
+  std::size_t snapshot_bytes_ = 0;  // of the last one
+
+  InputMerger merger_;
+  std::vector<InputMerger::Verdict> verdicts_;            // kept to reuse its memory
+  transport::Role granted_ = transport::Role::kObserver;  // to the gateway, as replies told it last
+};
+
+}  // namespace tandem::gateway

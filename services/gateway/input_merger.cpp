@@ -1,0 +1,64 @@
+#include "services/gateway/input_merger.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::gateway {
+
+using transport::InputKind;
+using transport::Reason;
+
+namespace {
+
+void decide(const std::vector<InputMerger::Claim>& claims, Reason reason,
+            std::vector<InputMerger::Verdict>& out) {
+  for (const InputMerger::Claim& claim : claims) out.push_back({.claim = claim, .reason = reason});
+}
+
+}  // namespace
+
+void InputMerger::add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
+                      std::vector<Verdict>& out) {
+  if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity)) {
+    gravity_ = std::move(input);
+    gravity_claims_.push_back(claim);
+    return flush(world, now_ns, out);
+  }
+  if (!others_.take(now_ns)) return decide({claim}, Reason::kRateLimited, out);
+  send(input, {claim}, world, now_ns, out);
+}
+
+void InputMerger::flush(World& world, std::int64_t now_ns, std::vector<Verdict>& out) {
+  if (gravity_claims_.empty() || !gravities_.take(now_ns)) return;
+  send(gravity_, std::exchange(gravity_claims_, {}), world, now_ns, out);
+}
+
+void InputMerger::send(const transport::InputMessage& input, std::vector<Claim> claims, World& world,
+                       std::int64_t now_ns, std::vector<Verdict>& out) {
+  const auto number = world.send(static_cast<InputKind>(input.kind), input.values, input.bytes, now_ns);
+  if (!number) {
+    const bool invalid = number.error().code == ErrorCode::kInvalidArgument;
+    return decide(claims, invalid ? Reason::kInvalid : Reason::kNotPlaying, out);
+  }
+  ++sent_;
+  unanswered_.emplace(*number, std::move(claims));
+}
+
+void InputMerger::on_outcome(const client::InputOutcome& outcome, std::vector<Verdict>& out) {
+  const auto claims = unanswered_.extract(outcome.number);
+  if (claims.empty()) return;
+  using Kind = client::InputOutcome::Kind;
+  const auto reason =
+      outcome.kind == Kind::kRefused ? static_cast<Reason>(outcome.reason) : transport::Reason::kNone;
+  for (const Claim& claim : claims.mapped()) {
+    out.push_back(
+        {.claim = claim, .known = outcome.kind != Kind::kUnknown, .reason = reason, .frame = outcome.frame});
+  }
+}
+
+void InputMerger::clear() {
+  gravity_claims_.clear();
+  unanswered_.clear();
+}
+
+}  // namespace tandem::gateway

@@ -1,0 +1,63 @@
+#pragma once
+// The inputs of all viewers as those of one client.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "sdk/client/sent_inputs.hpp"
+#include "sdk/transport/messages.hpp"
+#include "services/accounts/token_bucket.hpp"
+#include "services/gateway/world.hpp"
+
+namespace tandem::gateway {
+
+using ViewerId = std::uint64_t;
+
+/// Gravities are coalesced: the last one wins, and those before it share its fate. Everything else goes as it
+/// is, at a rate that all viewers share. Together they stay below what a server takes of one client. Not
+/// thread-safe.
+class InputMerger {
+ public:
+  static constexpr double kGravitiesPerSecond = 20;
+  static constexpr double kOthersPerSecond = 30;  ///< and as many at once
+
+  /// Which input of which viewer.
+  struct Claim {
+    ViewerId viewer = 0;
+    std::uint64_t number = 0;
+  };
+  /// What became of it. `known` is false where nobody can tell.
+  struct Verdict {
+    Claim claim;
+    bool known = true;
+    transport::Reason reason = transport::Reason::kNone;
+    Frame frame = 0;
+  };
+
+  /// Takes one well-formed input. Verdicts that are known at once are appended to `out`, here as below.
+  void add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
+           std::vector<Verdict>& out);
+  /// Sends what waits and is due.
+  void flush(World& world, std::int64_t now_ns, std::vector<Verdict>& out);
+  void on_outcome(const client::InputOutcome& outcome, std::vector<Verdict>& out);
+  /// A new epoch: nobody is told of the old one's inputs.
+  void clear();
+
+  [[nodiscard]] bool waiting() const { return !gravity_claims_.empty(); }
+  [[nodiscard]] std::uint64_t sent() const { return sent_; }
+
+ private:
+  void send(const transport::InputMessage& input, std::vector<Claim> claims, World& world,
+            std::int64_t now_ns, std::vector<Verdict>& out);
+
+  transport::InputMessage gravity_;  // the last one
+  std::vector<Claim> gravity_claims_;
+  accounts::TokenBucket gravities_{kGravitiesPerSecond, 1};
+  accounts::TokenBucket others_{kOthersPerSecond, kOthersPerSecond};
+  std::map<std::uint64_t, std::vector<Claim>> unanswered_;  // by the gateway's number
+  std::uint64_t sent_ = 0;
+};
+
+}  // namespace tandem::gateway

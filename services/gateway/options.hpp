@@ -1,0 +1,23 @@
+#pragma once
+// What tandem-gateway was asked to do, checked and complete.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "services/gateway/gateway.hpp"
+#include "services/gateway/web_server.hpp"
+
+namespace tandem::gateway {
+
+struct Options {
+  std::uint32_t domain = 0;
+  std::string session = "default";
+  WebOptions web;
+  Limits limits;
+  std::string viewer;      ///< folder of its files; empty: none
+  std::string token_file;  ///< empty: no token
+  std::vector<std::string> origins;
+};
+
+}  // namespace tandem::gateway

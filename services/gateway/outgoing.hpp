@@ -1,0 +1,38 @@
+#pragma once
+// Messages on their way to viewers.
+
+#include <cstddef>
+#include <memory>
+#include <span>
+
+#include "sdk/transport/envelope.hpp"
+
+namespace tandem::gateway {
+
+/// One envelope, made once and shared by all viewers that it goes to. In front of it is room for the framing
+/// of whoever sends it, so that nobody has to copy it.
+class Outgoing {
+ public:
+  static constexpr std::size_t kHeadroom = 32;
+
+  template <class M>
+  explicit Outgoing(const M& message) : buffer_(kHeadroom) {
+    transport::write_envelope(message, buffer_);
+  }
+  [[nodiscard]] std::size_t size() const { return buffer_.size() - kHeadroom; }
+  [[nodiscard]] std::span<const std::byte> envelope() const { return std::span(buffer_).subspan(kHeadroom); }
+  /// For the one thread that sends: it may write into the kHeadroom bytes before. A server's frames are
+  /// framed alike for every viewer.
+  [[nodiscard]] std::byte* to_send() { return buffer_.data() + kHeadroom; }
+
+ private:
+  transport::Bytes buffer_;
+};
+using OutgoingPtr = std::shared_ptr<Outgoing>;
+
+template <class M>
+[[nodiscard]] OutgoingPtr make_outgoing(const M& message) {
+  return std::make_shared<Outgoing>(message);
+}
+
+}  // namespace tandem::gateway

@@ -1,0 +1,198 @@
+// One thread for the session, one for the connections, and a lock around what both see.
+#include "services/gateway/run.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <utility>
+
+#include "sdk/client/api/client_id.hpp"
+#include "sdk/client/api/clock.hpp"
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "services/gateway/admission.hpp"
+#include "services/gateway/session_client.hpp"
+#include "services/gateway/site.hpp"
+#include "services/gateway/web_server.hpp"
+
+namespace tandem::gateway {
+namespace {
+
+using transport::steady_ns;
+
+client::CoreOptions core_options(const Options& options) {
+  client::CoreOptions core;
+  core.session = options.session;
+  core.id = client::random_client_id();
+  core.log = [](LogLevel level, std::string_view line) {
+    constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
+    spdlog::log(kLevels[static_cast<std::size_t>(level)], line);
+  };
+  core.measure_ns = steady_ns;
+  return core;
+}
+
+std::string_view phase_name(ClientPhase phase) {
+  constexpr std::array<std::string_view, 4> kNames{"searching", "refused", "joining", "playing"};
+  return kNames[static_cast<std::size_t>(phase)];
+}
+
+/// The port waits without the lock, so that no viewer waits for the network.
+class Service final : public WebServer::Handler {
+ public:
+  Service(const Options& options, Admission admission, transport::ClientPort& port)
+      : admission_(std::move(admission)),
+        port_(port),
+        client_(core_options(options), port),
+        gateway_(options.limits, client_) {}
+
+  /// Follows the session, in a thread of its own.
+  void follow(const std::stop_token& stop, WebServer& server) {
+    constexpr std::int64_t kLongestNs = 100 * kMillisecond;
+    while (!stop.stop_requested()) {
+      std::int64_t due_ns = 0;
+      bool ready = false;
+      {
+        const std::lock_guard lock(mutex_);
+        due_ns = client_.poll(gateway_, client::now());
+        gateway_.list_ready(steady_ns(), ready_);
+        ready = !ready_.empty();
+      }
+      if (ready) server.wake();
+      const std::int64_t wait_ns = std::min(kLongestNs, due_ns - steady_ns());
+      if (wait_ns > 0) port_.wait(std::chrono::nanoseconds(wait_ns));
+    }
+  }
+
+  std::variant<ViewerId, Refusal> open(const Request& request) override {
+    const std::lock_guard lock(mutex_);
+    std::optional<Refusal> refusal;
+    if (!admission_.origin_fits(request.origin, request.host)) {
+      refusal = Refusal::kOrigin;
+    } else if (!admission_.token_fits(request.token)) {
+      refusal = Refusal::kToken;
+    } else if (const auto id = gateway_.admit()) {
+      return *id;
+    }
+    const Refusal why = refusal.value_or(Refusal::kFull);
+    ++gateway_.counts().of(why);
+    return why;
+  }
+  std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) override {
+    const std::lock_guard lock(mutex_);
+    return gateway_.receive(id, message, steady_ns());
+  }
+  Gateway::Next next(ViewerId id) override {
+    const std::lock_guard lock(mutex_);
+    return gateway_.next(id, steady_ns());
+  }
+  void closed(ViewerId id) override {
+    const std::lock_guard lock(mutex_);
+    gateway_.leave(id);
+  }
+  void list_ready(std::vector<ViewerId>& out) override {
+    const std::lock_guard lock(mutex_);
+    gateway_.list_ready(steady_ns(), out);
+  }
+  void list_not_reading(std::vector<ViewerId>& out) override {
+    const std::lock_guard lock(mutex_);
+    gateway_.list_not_reading(steady_ns(), out);
+    gateway_.counts().of(Refusal::kNotReading) += out.size();
+  }
+  void tick() override {
+    const std::lock_guard lock(mutex_);
+    if (const auto line = log_.line(gateway_.counts(), gateway_.viewers(), steady_ns())) spdlog::info(*line);
+  }
+  std::string health() override {
+    const std::lock_guard lock(mutex_);
+    const Counts& counts = gateway_.counts();
+    nlohmann::ordered_json refused = nlohmann::ordered_json::object();
+    for (std::size_t i = 0; i < kClosings.size(); ++i)
+      refused[std::string(kClosings[i].reason)] = counts.refused[i];
+    const nlohmann::ordered_json health{{"phase", phase_name(client_.core().phase())},
+                                        {"epoch", gateway_.session() ? gateway_.session()->epoch : 0},
+                                        {"frame", gateway_.frame()},
+                                        {"viewers", gateway_.viewers()},
+                                        {"joined", counts.joined},
+                                        {"left", counts.left},
+                                        {"snapshots", counts.snapshots},
+                                        {"fell_behind", counts.skips},
+                                        {"messages", counts.messages},
+                                        {"bytes", counts.bytes},
+                                        {"inputs", counts.inputs},
+                                        {"inputs_sent", counts.inputs_sent},
+                                        {"inputs_refused", counts.inputs_refused},
+                                        {"stale", counts.stale},
+                                        {"refused", refused}};
+    return health.dump() + '\n';
+  }
+
+ private:
+  const Admission admission_;
+  transport::ClientPort& port_;
+  std::mutex mutex_;  // guards all below; port_.wait() and wake() need no guard
+  SessionClient client_;
+  Gateway gateway_;
+  CountLog log_;
+  std::vector<ViewerId> ready_;  // kept to reuse its memory
+};
+
+bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
+
+void warn_of_open_doors(const Options& options) {
+  if (is_loopback(options.web.address)) return;
+  if (options.token_file.empty()) {
+    spdlog::warn("whoever reaches {} may watch and send inputs: no --token-file", options.web.address);
+  } else if (options.web.tls_cert.empty()) {
+    spdlog::warn("the token can be read on the way to {}: no --tls-cert", options.web.address);
+  }
+}
+
+int report_error(const Error& error, int exit_code) {
+  spdlog::error(error.message);
+  return exit_code;
+}
+
+}  // namespace
+
+int run(const Options& options, const std::atomic<bool>& stop) {
+  std::string token;
+  if (!options.token_file.empty()) {
+    auto read = read_token(options.token_file);
+    if (!read) return report_error(read.error(), 2);
+    token = std::move(*read);
+  }
+  Site site;
+  if (!options.viewer.empty()) {
+    auto loaded = Site::load(options.viewer);
+    if (!loaded) return report_error(loaded.error(), 2);
+    site = std::move(*loaded);
+  }
+  transport::DdsOptions dds;
+  dds.domain = options.domain;
+  dds.session = options.session;
+  dds.stop = &stop;
+  auto port = transport::make_dds_client_port(dds);
+  if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+
+  Service service(options, Admission(std::move(token), options.origins), **port);
+  auto server = WebServer::create(options.web, site, service);
+  if (!server) return report_error(server.error(), 1);
+  const bool v6 = options.web.address.find(':') != std::string::npos;
+  warn_of_open_doors(options);
+  spdlog::info("session '{}' on domain {}: {}://{}:{}/", options.session, options.domain,
+               options.web.tls_cert.empty() ? "http" : "https",
+               v6 ? fmt::format("[{}]", options.web.address) : options.web.address, (*server)->port());
+  std::jthread follower([&](const std::stop_token& done) { service.follow(done, **server); });
+  (*server)->run(stop);
+  follower.request_stop();
+  (*port)->wake();
+  follower.join();
+  return 0;
+}
+
+}  // namespace tandem::gateway

@@ -1,0 +1,68 @@
+#include "services/gateway/session_client.hpp"
+
+#include <utility>
+
+#include "sdk/client/session_check.hpp"
+
+namespace tandem::gateway {
+
+SessionClient::SessionClient(client::CoreOptions options, transport::ClientPort& port)
+    : port_(port), core_(std::move(options), port, this) {}
+
+std::int64_t SessionClient::poll(Gateway& gateway, client::Now now) {
+  gateway_ = &gateway;
+  now_ns_ = now.steady_ns;
+  const std::int64_t due_ns = core_.poll(now);
+  gateway.on_server_alive(port_.server_alive());
+  if (const auto status = port_.take_status()) gateway.on_status(status->message);
+  gateway_ = nullptr;
+  return std::min(due_ns, gateway.poll(now.steady_ns));
+}
+
+// Until the server says otherwise: what it refuses, it says itself.
+transport::Role SessionClient::role() const {
+  const transport::ReplyMessage* reply = core_.reply();
+  return reply != nullptr ? reply->role : transport::Role::kParticipant;
+}
+
+std::optional<std::int64_t> SessionClient::server_time_ns(std::int64_t now_ns) const {
+  return core_.server_wall_ns(now_ns);
+}
+
+std::optional<World::Cut> SessionClient::cut() {
+  const ClientTimeline* timeline = core_.timeline();
+  if (timeline == nullptr) return std::nullopt;
+  Cut cut{
+      .stream = stream_, .frame = timeline->applied(), .last_input = timeline->inputs_held(), .bytes = {}};
+  timeline->snapshot(cut.bytes);
+  return cut;
+}
+
+Result<std::uint64_t> SessionClient::send(transport::InputKind kind, std::vector<double> values,
+                                          transport::Bytes bytes, std::int64_t now_ns) {
+  return core_.send(kind, std::move(values), std::move(bytes), {.steady_ns = now_ns, .wall_ns = 0});
+}
+
+// Viewers are told of the stream that is there for them; where none can be played, they say why themselves.
+void SessionClient::on_session(const transport::SessionMessage& session) {
+  transport::SessionMessage told = session;
+  if (const auto playable = client::choose_stream(session)) {
+    told.streams = {session.streams[playable->stream]};
+    stream_ = told.streams.front().id;
+  }
+  gateway_->on_session(told);
+}
+
+void SessionClient::on_scheduled(const transport::ScheduledInputMessage& input) {
+  gateway_->on_scheduled(input, now_ns_);
+}
+
+void SessionClient::on_applied(Epoch /*epoch*/, const client::CompleteDelta& delta) {
+  gateway_->on_applied(delta, now_ns_);
+}
+
+void SessionClient::on_outcome(const client::InputOutcome& outcome) {
+  gateway_->on_outcome(outcome, now_ns_);
+}
+
+}  // namespace tandem::gateway

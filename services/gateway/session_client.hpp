@@ -1,0 +1,46 @@
+#pragma once
+// The gateway as a client of a session.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "sdk/client/client_core.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/gateway/gateway.hpp"
+#include "services/gateway/world.hpp"
+
+namespace tandem::gateway {
+
+/// A ClientCore whose news a gateway hears in their order. Not thread-safe; the port's wait() and wake() are
+/// left to the caller.
+class SessionClient final : public World, private client::CoreListener {
+ public:
+  /// `port` must outlive it.
+  SessionClient(client::CoreOptions options, transport::ClientPort& port);
+
+  /// Takes what arrived and tells `gateway`. Returns when it wants to be called again.
+  std::int64_t poll(Gateway& gateway, client::Now now);
+  [[nodiscard]] const client::ClientCore& core() const { return core_; }
+
+  [[nodiscard]] bool playing() const override { return core_.timeline() != nullptr; }
+  [[nodiscard]] transport::Role role() const override;
+  [[nodiscard]] std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const override;
+  [[nodiscard]] std::optional<Cut> cut() override;
+  Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
+                             std::int64_t now_ns) override;
+
+ private:
+  void on_session(const transport::SessionMessage& session) override;
+  void on_scheduled(const transport::ScheduledInputMessage& input) override;
+  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
+  void on_outcome(const client::InputOutcome& outcome) override;
+
+  transport::ClientPort& port_;
+  client::ClientCore core_;
+  StreamId stream_;             // played
+  Gateway* gateway_ = nullptr;  // during a poll
+  std::int64_t now_ns_ = 0;     // of it
+};
+
+}  // namespace tandem::gateway

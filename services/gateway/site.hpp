@@ -1,0 +1,43 @@
+#pragma once
+// The files of the viewer.
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "tandem/result.hpp"
+
+namespace tandem::gateway {
+
+/// A folder, read once and held in memory: no request reaches the file system, so no path can lead out of it.
+/// Thread-safe.
+class Site {
+ public:
+  static constexpr std::size_t kMostFiles = 4096;
+  static constexpr std::size_t kMostBytes = 64U << 20U;
+
+  struct File {
+    std::string bytes;
+    std::string gzip;  ///< the same, compressed; empty where that is not smaller
+    std::string_view type;
+    bool immutable = false;  ///< its name has a hash of its content
+  };
+
+  /// Nothing to serve.
+  Site() = default;
+  /// Reads `folder`, which must hold an index.html. Names that begin with a dot and what is no regular file
+  /// are left out. Errors: kIo, kCapacity.
+  [[nodiscard]] static Result<Site> load(const std::string& folder);
+
+  /// The file at the path of a request, as "/assets/x.js"; "/" is index.html. Null where there is none.
+  [[nodiscard]] const File* find(std::string_view path) const;
+
+ private:
+  std::map<std::string, File, std::less<>> files_;  // by path, with the slash in front
+};
+
+/// By a name's ending; unknown ones are octet streams.
+[[nodiscard]] std::string_view media_type(std::string_view name);
+
+}  // namespace tandem::gateway

@@ -1,0 +1,59 @@
+#pragma once
+// A snapshot cut into parts, and one viewer's way through it.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "sdk/transport/messages.hpp"
+#include "services/accounts/transfer_window.hpp"
+#include "services/gateway/outgoing.hpp"
+#include "services/gateway/world.hpp"
+
+namespace tandem::gateway {
+
+/// Made once, shared by all viewers that join together.
+struct SnapshotParts {
+  /// Of a part, unless there would be more than kMostParts.
+  static constexpr std::size_t kLeastPartBytes = 1'300;
+  static constexpr std::size_t kMostParts = 1'024;
+
+  /// `inputs`: scheduled inputs that came before the cut and are not in it.
+  SnapshotParts(const World::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs);
+
+  Frame frame = 0;
+  std::size_t bytes = 0;  ///< of the whole
+  std::size_t part_bytes = 0;
+  std::vector<OutgoingPtr> inputs;  ///< go first
+  std::vector<OutgoingPtr> parts;
+};
+
+/// Paces the parts for one viewer: no more is on its way than the window that follows the delay of its link.
+/// A WebSocket keeps order and loses nothing, so what arrived is a number of parts. Not thread-safe.
+class SnapshotPassage {
+ public:
+  /// Nothing to send.
+  SnapshotPassage() = default;
+  SnapshotPassage(std::shared_ptr<const SnapshotParts> snapshot, std::int64_t now_ns)
+      : snapshot_(std::move(snapshot)), began_ns_(now_ns) {}
+
+  /// Not all of it has been handed out.
+  [[nodiscard]] bool unfinished() const { return snapshot_ != nullptr; }
+  [[nodiscard]] std::int64_t began_ns() const { return began_ns_; }
+  [[nodiscard]] bool has_next() const;
+  /// The next message, of those that have one.
+  [[nodiscard]] OutgoingPtr next(std::int64_t now_ns);
+  /// What a joining viewer says that it holds. Untrusted.
+  void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
+
+ private:
+  std::shared_ptr<const SnapshotParts> snapshot_;  // null once all is handed out
+  std::int64_t began_ns_ = 0;
+  std::size_t inputs_sent_ = 0;
+  std::size_t arrived_ = 0;            // parts
+  std::vector<std::int64_t> sent_ns_;  // by part, of those sent
+  accounts::TransferWindow window_;
+};
+
+}  // namespace tandem::gateway

@@ -1,0 +1,67 @@
+#pragma once
+// What a gateway keeps of one connection.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "sdk/transport/messages.hpp"
+#include "services/accounts/outcomes.hpp"
+#include "services/accounts/reply_schedule.hpp"
+#include "services/accounts/token_bucket.hpp"
+#include "services/gateway/input_merger.hpp"
+#include "services/gateway/live_log.hpp"
+#include "services/gateway/snapshot_parts.hpp"
+
+namespace tandem::gateway {
+
+// Per viewer; the bursts are as large.
+inline constexpr double kMessagesPerSecond = 200;  ///< a viewer that joins acknowledges 50 times a second
+inline constexpr double kInputsPerSecond = 60;
+inline constexpr double kOtherInputsPerSecond = 5;  ///< of these, other than gravity
+
+struct Viewer {
+  enum class Flow : std::uint8_t {
+    kSilent,     ///< has not asked for anything yet
+    kWaiting,    ///< gets a snapshot with the next cut
+    kFollowing,  ///< gets what is live from `place` on
+  };
+
+  ViewerId id = 0;
+  transport::ClientId client = 0;       ///< 0: nothing came yet
+  std::uint64_t told_announcement = 0;  ///< number of the newest it was sent
+  std::uint64_t told_status = 0;
+  accounts::TokenBucket messages{kMessagesPerSecond, kMessagesPerSecond};
+  accounts::TokenBucket inputs{kInputsPerSecond, kInputsPerSecond};
+  accounts::TokenBucket other_inputs{kOtherInputsPerSecond, kOtherInputsPerSecond};
+  accounts::TokenBucket snapshots_again{0.5, 4};
+  /// Since when something waits to be sent and nothing was taken.
+  std::optional<std::int64_t> waiting_since_ns;
+
+  /// Of the epoch: a new one starts with a new object.
+  struct InEpoch {
+    bool heard = false;  ///< an acknowledgement of this epoch came
+    transport::Phase phase = transport::Phase::kJoining;
+    transport::Role wanted = transport::Role::kObserver;
+    std::int64_t clock_ns = 0;
+    std::uint32_t attempt = 0;
+    std::optional<std::uint32_t> served_attempt;
+
+    Flow flow = Flow::kSilent;
+    LiveLog::Place place = 0;
+    SnapshotPassage passage;
+
+    std::uint64_t highest = 0;             ///< input number taken, whatever the outcome
+    std::vector<std::uint64_t> undecided;  ///< of these, no outcome yet; ascending
+    accounts::Outcomes outcomes;
+    accounts::ReplySchedule reply;
+    transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
+
+    /// All inputs up to this number have their outcome.
+    [[nodiscard]] std::uint64_t decided() const {
+      return undecided.empty() ? highest : undecided.front() - 1;
+    }
+  } now;
+};
+
+}  // namespace tandem::gateway

@@ -1,0 +1,178 @@
+// What viewers say.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <variant>
+
+#include "sdk/transport/envelope.hpp"
+#include "services/gateway/gateway.hpp"
+
+namespace tandem::gateway {
+
+using transport::InputKind;
+using transport::Phase;
+using transport::Reason;
+using transport::Role;
+
+namespace {
+
+bool is_gravity(const transport::InputMessage& input) {
+  return input.kind == static_cast<std::uint32_t>(InputKind::kGravity);
+}
+
+// What comes in the place of another must not be refused in its place, where that can be known.
+bool well_formed(const transport::InputMessage& input) {
+  const bool finite = std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
+  switch (static_cast<InputKind>(input.kind)) {
+    case InputKind::kGravity:
+      return finite && input.values.size() == 3 && input.bytes.empty();
+    case InputKind::kPush:
+      return finite && input.values.size() == 7 && input.bytes.empty();
+    case InputKind::kApplication:
+      return finite;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::optional<Refusal> Gateway::receive(ViewerId id, std::span<const std::byte> message,
+                                        std::int64_t now_ns) {
+  const auto found = viewers_.find(id);
+  if (found == viewers_.end()) return std::nullopt;
+  Viewer& viewer = found->second;
+  std::optional<Refusal> refusal;
+  if (message.size() > kMostViewerBytes) {
+    refusal = Refusal::kTooLarge;
+  } else if (!viewer.messages.take(now_ns)) {
+    refusal = Refusal::kTooManyMessages;
+  } else if (auto read = transport::read_viewer_envelope(message); !read) {
+    refusal = Refusal::kMalformed;
+  } else {
+    refusal = take(viewer, std::move(*read), now_ns);
+  }
+  if (refusal) ++counts_.of(*refusal);
+  return refusal;
+}
+
+// A viewer's status is for tools that watch a DDS domain; here nobody reads it.
+std::optional<Refusal> Gateway::take(Viewer& viewer, transport::ViewerMessage&& message,
+                                     std::int64_t now_ns) {
+  const auto client = std::visit([](const auto& body) { return body.client; }, message);
+  if (client == 0) return Refusal::kMalformed;
+  if (viewer.client == 0) viewer.client = client;
+  if (viewer.client != client) return Refusal::kForeignClient;
+  if (const auto* ack = std::get_if<transport::AckMessage>(&message)) return take(viewer, *ack, now_ns);
+  if (auto* input = std::get_if<transport::InputMessage>(&message)) take(viewer, std::move(*input), now_ns);
+  return std::nullopt;
+}
+
+std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns) {
+  if (ack.protocol_version != transport::kProtocolVersion) return Refusal::kProtocolVersion;
+  // Under way while the session changed.
+  const bool of_this = session_ && !session_->streams.empty() && ack.epoch == session_->epoch &&
+                       ack.stream == session_->streams.front().id;
+  const bool plays = ack.phase == Phase::kPlaying;
+  if (!of_this || (plays && ack.applied > frame_)) {
+    ++counts_.stale;
+    return std::nullopt;
+  }
+  Viewer::InEpoch& state = viewer.now;
+  if (!state.heard || state.phase != ack.phase || state.wanted != ack.role_wanted) state.reply.on_change();
+  state.heard = true;
+  state.phase = ack.phase;
+  state.wanted = ack.role_wanted;
+  state.clock_ns = ack.clock_ns;
+  state.reply.on_clock();
+  if (!plays) {
+    on_joining(viewer, ack, now_ns);
+  } else if (state.flow == Viewer::Flow::kSilent) {
+    // It played over another connection: from the newest on it finds out what it lacks.
+    state.flow = Viewer::Flow::kFollowing;
+    state.place = newest_delta_.value_or(log_.end());
+  }
+  return std::nullopt;
+}
+
+void Gateway::on_joining(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns) {
+  Viewer::InEpoch& state = viewer.now;
+  state.attempt = ack.join_attempt;
+  state.passage.acknowledged(ack, now_ns);
+  if (state.flow == Viewer::Flow::kWaiting || state.served_attempt == state.attempt) return;
+  // What is on its way answers a repeated question too.
+  if (state.passage.unfinished()) {
+    state.served_attempt = state.attempt;
+    return;
+  }
+  if (state.served_attempt && !viewer.snapshots_again.take(now_ns)) return;
+  state.flow = Viewer::Flow::kWaiting;
+  if (!collecting_since_ns_) collecting_since_ns_ = now_ns;
+}
+
+void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t now_ns) {
+  ++counts_.inputs;
+  Viewer::InEpoch& state = viewer.now;
+  if (!session_ || input.epoch != session_->epoch) {
+    ++counts_.inputs_refused;
+    state.once = Reason::kStaleEpoch;
+    state.reply.on_outcome();
+    return;
+  }
+  if (input.number <= state.highest) {
+    // The first outcome of a number is the one that counts.
+    const bool first =
+        !state.outcomes.has(input.number) && !std::ranges::binary_search(state.undecided, input.number);
+    if (first) refuse_input(viewer, input.number, Reason::kDuplicate, now_ns);
+    return;
+  }
+  state.highest = input.number;
+  if (const Reason reason = check(viewer, input, now_ns); reason != Reason::kNone) {
+    refuse_input(viewer, input.number, reason, now_ns);
+    return;
+  }
+  state.undecided.push_back(input.number);
+  const InputMerger::Claim claim{viewer.id, input.number};
+  merger_.add(claim, std::move(input), world_, now_ns, verdicts_);
+  tell(verdicts_, now_ns);
+}
+
+Reason Gateway::check(Viewer& viewer, const transport::InputMessage& input, std::int64_t now_ns) const {
+  const Viewer::InEpoch& state = viewer.now;
+  if (!viewer.inputs.take(now_ns)) return Reason::kRateLimited;
+  if (state.phase != Phase::kPlaying || !world_.playing()) return Reason::kNotPlaying;
+  if (state.wanted == Role::kObserver) return Reason::kObserver;
+  if (world_.role() == Role::kObserver) return Reason::kDemoted;
+  if (!well_formed(input)) return Reason::kInvalid;
+  if (!is_gravity(input) && !viewer.other_inputs.take(now_ns)) return Reason::kRateLimited;
+  if (state.undecided.size() >= kMostUndecided) return Reason::kRateLimited;
+  return Reason::kNone;
+}
+
+Role Gateway::role_of(const Viewer& viewer) const {
+  return world_.role() == Role::kObserver ? Role::kObserver : viewer.now.wanted;
+}
+
+void Gateway::refuse_input(Viewer& viewer, std::uint64_t number, Reason reason, std::int64_t now_ns) {
+  ++counts_.inputs_refused;
+  viewer.now.outcomes.add({.number = number, .frame = 0, .code = static_cast<std::uint32_t>(reason)}, now_ns);
+  viewer.now.reply.on_outcome();
+}
+
+void Gateway::tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now_ns) {
+  for (const InputMerger::Verdict& verdict : verdicts) {
+    const auto found = viewers_.find(verdict.claim.viewer);
+    if (found == viewers_.end()) continue;
+    Viewer& viewer = found->second;
+    std::erase(viewer.now.undecided, verdict.claim.number);
+    viewer.now.reply.on_outcome();
+    if (!verdict.known) continue;
+    if (verdict.reason != Reason::kNone) {
+      refuse_input(viewer, verdict.claim.number, verdict.reason, now_ns);
+    } else {
+      viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.frame, .code = 0}, now_ns);
+    }
+  }
+  verdicts.clear();
+}
+
+}  // namespace tandem::gateway

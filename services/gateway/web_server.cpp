@@ -1,0 +1,413 @@
+#include "services/gateway/web_server.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <libwebsockets.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <unordered_map>
+#include <utility>
+
+namespace tandem::gateway {
+namespace {
+
+static_assert(Outgoing::kHeadroom >= LWS_PRE);
+
+constexpr const char* kSubprotocol = "tandem.1";
+constexpr std::string_view kPath = "/tandem";
+// Unsent bytes that the kernel takes of one connection: what is sent next is decided late. More only costs
+// those who are slow.
+constexpr int kUnsentBytes = 16 * 1024;
+constexpr int kSendBufferBytes = 256 * 1024;
+constexpr std::size_t kChunkBytes = 16 * 1024;  // of a file
+constexpr int kRefusedSeconds = 5, kFileSeconds = 30;
+constexpr std::size_t kMostHeaderBytes = 2048;
+// A connection from which nothing comes is asked for a sign of life, and ended without one.
+constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
+                                     .retry_ms_table_count = 0,
+                                     .conceal_count = 0,
+                                     .secs_since_valid_ping = 15,
+                                     .secs_since_valid_hangup = 45,
+                                     .jitter_percent = 0};
+
+std::string header(lws* wsi, lws_token_indexes token) {
+  std::string text(static_cast<std::size_t>(std::max(lws_hdr_total_length(wsi, token), 0)) + 1, '\0');
+  const int size = lws_hdr_copy(wsi, text.data(), static_cast<int>(text.size()), token);
+  text.resize(static_cast<std::size_t>(std::max(size, 0)));
+  return text;
+}
+
+/// One of WebSocket.
+struct Connection {
+  ViewerId id = 0;
+  std::optional<Refusal> refused;
+  std::vector<std::byte> message;  // what came of the present one
+};
+
+/// A response on its way.
+struct Exchange {
+  std::string own;        // where the body is made for this one
+  std::string_view body;  // what is left of it
+};
+
+// libwebsockets keeps plain memory for a connection; it holds one pointer, to what we made.
+template <class T>
+T*& slot(void* user) {
+  return *static_cast<T**>(user);
+}
+
+template <class T>
+void drop(void* user) {
+  if (user != nullptr) delete std::exchange(slot<T>(user), nullptr);
+}
+
+}  // namespace
+
+struct WebServer::Impl {
+  Impl(const Site& the_site, Handler& the_handler) : site(the_site), handler(the_handler) {}
+  ~Impl() {
+    if (context != nullptr) lws_context_destroy(context);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  Impl(Impl&&) = delete;
+  Impl& operator=(Impl&&) = delete;
+
+  static Impl& of(lws* wsi) { return *static_cast<Impl*>(lws_context_user(lws_get_context(wsi))); }
+  static int on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len);
+  static int on_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len);
+  static void on_tick(lws_sorted_usec_list_t* sul);
+
+  // HTTP
+  int respond(lws* wsi, void* user, std::string_view path);
+  int send_head(lws* wsi, void* user, unsigned status, std::string_view type, std::string_view cache,
+                bool compressed);
+  static int send_body(lws* wsi, void* user);
+
+  // WebSocket
+  int open(lws* wsi, void* user);
+  int established(lws* wsi, Connection& connection);
+  int receive(lws* wsi, Connection& connection, const void* in, std::size_t len);
+  int write(lws* wsi, Connection& connection);
+  static int end(lws* wsi, Refusal refusal);
+  void ask_to_write();
+  void let_go();
+
+  struct Tick {
+    lws_sorted_usec_list_t sul{};  // first: what libwebsockets hands back
+    Impl* self = nullptr;
+  };
+
+  const Site& site;
+  Handler& handler;
+  lws_context* context = nullptr;
+  std::array<lws_protocols, 3> protocols{};
+  std::unordered_map<ViewerId, lws*> connections;
+  std::vector<ViewerId> ids;  // kept to reuse its memory
+  Tick tick;
+};
+
+int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::string_view type,
+                               std::string_view cache, bool compressed) {
+  std::array<unsigned char, LWS_PRE + kMostHeaderBytes> buffer{};
+  unsigned char* const start = buffer.data() + LWS_PRE;
+  unsigned char* const end = buffer.data() + buffer.size() - 1;
+  unsigned char* at = start;
+  const auto add = [&](const char* name, std::string_view value) {
+    return lws_add_http_header_by_name(wsi, reinterpret_cast<const unsigned char*>(name),
+                                       reinterpret_cast<const unsigned char*>(value.data()),
+                                       static_cast<int>(value.size()), &at, end) == 0;
+  };
+  const Exchange& exchange = *slot<Exchange>(user);
+  // The address of a page may hold its token.
+  const bool good = lws_add_http_common_headers(wsi, status, std::string(type).c_str(), exchange.body.size(),
+                                                &at, end) == 0 &&
+                    add("x-content-type-options:", "nosniff") && add("referrer-policy:", "no-referrer") &&
+                    add("cache-control:", cache) && (!compressed || add("content-encoding:", "gzip")) &&
+                    lws_finalize_write_http_header(wsi, start, &at, end) == 0;
+  if (!good) return -1;
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty())
+    return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+  lws_callback_on_writable(wsi);
+  return 0;
+}
+
+int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
+  drop<Exchange>(user);
+  Exchange& exchange = *(slot<Exchange>(user) = new Exchange());
+  const auto say = [&](unsigned status, std::string text, std::string_view type) {
+    exchange.own = std::move(text);
+    exchange.body = exchange.own;
+    return send_head(wsi, user, status, type, "no-store", false);
+  };
+  const bool reads =
+      lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 || lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+  if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
+  if (path == "/healthz") return say(HTTP_STATUS_OK, handler.health(), "application/json");
+  const Site::File* file = site.find(path);
+  if (file == nullptr) return say(HTTP_STATUS_NOT_FOUND, "not found\n", "text/plain");
+  const bool compressed =
+      !file->gzip.empty() && header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING).find("gzip") != std::string::npos;
+  exchange.body = compressed ? file->gzip : file->bytes;
+  return send_head(wsi, user, HTTP_STATUS_OK, file->type,
+                   file->immutable ? "public, max-age=31536000, immutable" : "no-cache", compressed);
+}
+
+int WebServer::Impl::send_body(lws* wsi, void* user) {
+  if (user == nullptr || slot<Exchange>(user) == nullptr) return 0;
+  Exchange& exchange = *slot<Exchange>(user);
+  std::array<unsigned char, LWS_PRE + kChunkBytes> buffer{};
+  const std::size_t size = std::min(exchange.body.size(), kChunkBytes);
+  std::memcpy(buffer.data() + LWS_PRE, exchange.body.data(), size);
+  exchange.body.remove_prefix(size);
+  const bool last = exchange.body.empty();
+  lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, kFileSeconds);
+  if (lws_write(wsi, buffer.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) <
+      static_cast<int>(size))
+    return -1;
+  if (last) return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+  lws_callback_on_writable(wsi);
+  return 0;
+}
+
+int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len) {
+  switch (reason) {
+    case LWS_CALLBACK_HTTP:
+      return of(wsi).respond(wsi, user, {static_cast<const char*>(in), len});
+    case LWS_CALLBACK_HTTP_WRITEABLE:
+      return send_body(wsi, user);
+    case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
+    case LWS_CALLBACK_CLOSED_HTTP:
+      drop<Exchange>(user);
+      return 0;
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+      return -1;  // a WebSocket without our subprotocol
+    default:
+      return 0;
+  }
+}
+
+// The headers are there only now; what is refused is told once a close frame can be sent.
+int WebServer::Impl::open(lws* wsi, void* user) {
+  if (header(wsi, WSI_TOKEN_GET_URI) != kPath) return -1;
+  Handler::Request request{
+      .origin = header(wsi, WSI_TOKEN_ORIGIN), .host = header(wsi, WSI_TOKEN_HOST), .token = {}};
+  std::array<char, 256> token{};
+  if (const char* given = lws_get_urlarg_by_name(wsi, "token=", token.data(), static_cast<int>(token.size())))
+    request.token = given;
+  auto connection = std::make_unique<Connection>();
+  const auto opened = handler.open(request);
+  if (const auto* id = std::get_if<ViewerId>(&opened)) {
+    connection->id = *id;
+  } else {
+    connection->refused = std::get<Refusal>(opened);
+  }
+  slot<Connection>(user) = connection.release();
+  return 0;
+}
+
+int WebServer::Impl::established(lws* wsi, Connection& connection) {
+  const int fd = lws_get_socket_fd(wsi);
+  constexpr int kOn = 1;
+  setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &kOn, sizeof kOn);
+  setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
+  setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
+  if (connection.refused) {
+    lws_set_timeout(wsi, PENDING_TIMEOUT_CLOSE_SEND, kRefusedSeconds);
+  } else {
+    connections[connection.id] = wsi;
+  }
+  lws_callback_on_writable(wsi);
+  return 0;
+}
+
+// Returns what a callback returns to end the connection.
+int WebServer::Impl::end(lws* wsi, Refusal refusal) {
+  const Closing& why = closing(refusal);
+  std::string reason(why.reason);
+  lws_close_reason(wsi, static_cast<lws_close_status>(why.code),
+                   reinterpret_cast<unsigned char*>(reason.data()), reason.size());
+  return -1;
+}
+
+int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, std::size_t len) {
+  if (connection.refused) return 0;
+  if (lws_frame_is_binary(wsi) == 0) return end(wsi, Refusal::kMalformed);
+  const auto* const bytes = static_cast<const std::byte*>(in);
+  const bool first = lws_is_first_fragment(wsi) != 0;
+  if (first) connection.message.clear();
+  // One byte more than there may be is enough to be refused.
+  const std::size_t room = kMostViewerBytes + 1 - connection.message.size();
+  connection.message.insert(connection.message.end(), bytes, bytes + std::min(len, room));
+  const bool whole = lws_is_final_fragment(wsi) != 0 && lws_remaining_packet_payload(wsi) == 0;
+  if (!whole && connection.message.size() <= kMostViewerBytes) return 0;
+  const auto refusal = handler.receive(connection.id, connection.message);
+  connection.message.clear();
+  return refusal ? end(wsi, *refusal) : 0;
+}
+
+int WebServer::Impl::write(lws* wsi, Connection& connection) {
+  if (connection.refused) return end(wsi, *connection.refused);
+  while (true) {
+    const Gateway::Next next = handler.next(connection.id);
+    if (!next.message) return 0;
+    const std::size_t size = next.message->size();
+    auto* const bytes = reinterpret_cast<unsigned char*>(next.message->to_send());
+    if (lws_write(wsi, bytes, size, LWS_WRITE_BINARY) < static_cast<int>(size)) return -1;
+    if (!next.more) return 0;
+    if (lws_send_pipe_choked(wsi) != 0) break;
+  }
+  lws_callback_on_writable(wsi);
+  return 0;
+}
+
+void WebServer::Impl::ask_to_write() {
+  handler.list_ready(ids);
+  for (const ViewerId id : ids) {
+    const auto found = connections.find(id);
+    if (found != connections.end()) lws_callback_on_writable(found->second);
+  }
+}
+
+// They take no close frame either.
+void WebServer::Impl::let_go() {
+  handler.list_not_reading(ids);
+  for (const ViewerId id : ids) {
+    const auto found = connections.find(id);
+    if (found != connections.end())
+      lws_set_timeout(found->second, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
+  }
+}
+
+int WebServer::Impl::on_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len) {
+  if (reason == LWS_CALLBACK_EVENT_WAIT_CANCELLED) {
+    of(wsi).ask_to_write();
+    return 0;
+  }
+  if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return of(wsi).open(wsi, user);
+  if (user == nullptr || slot<Connection>(user) == nullptr) return 0;
+  Connection& connection = *slot<Connection>(user);
+  switch (reason) {
+    case LWS_CALLBACK_ESTABLISHED:
+      return of(wsi).established(wsi, connection);
+    case LWS_CALLBACK_RECEIVE:
+      return of(wsi).receive(wsi, connection, in, len);
+    case LWS_CALLBACK_SERVER_WRITEABLE:
+      return of(wsi).write(wsi, connection);
+    case LWS_CALLBACK_CLOSED:
+    case LWS_CALLBACK_WSI_DESTROY:
+      if (!connection.refused) {
+        of(wsi).connections.erase(connection.id);
+        of(wsi).handler.closed(connection.id);
+      }
+      drop<Connection>(user);
+      return 0;
+    default:
+      return 0;
+  }
+}
+
+void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
+  Impl& self = *reinterpret_cast<Tick*>(sul)->self;
+  self.handler.tick();
+  self.ask_to_write();
+  self.let_go();
+  lws_sul_schedule(self.context, 0, sul, on_tick, 100 * LWS_US_PER_MS);
+}
+
+namespace {
+
+/// Why nobody can listen there; libwebsockets would not say. Nothing where somebody can.
+std::optional<std::string> cannot_listen(const WebOptions& options) {
+  const bool v6 = options.address.find(':') != std::string::npos;
+  sockaddr_in6 six{};
+  sockaddr_in four{};
+  six.sin6_family = AF_INET6;
+  six.sin6_port = htons(options.port);
+  four.sin_family = AF_INET;
+  four.sin_port = htons(options.port);
+  const int parsed = v6 ? inet_pton(AF_INET6, options.address.c_str(), &six.sin6_addr)
+                        : inet_pton(AF_INET, options.address.c_str(), &four.sin_addr);
+  if (parsed != 1) return "not an IPv4 or IPv6 address";
+  const int fd = socket(v6 ? AF_INET6 : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return std::strerror(errno);
+  constexpr int kOn = 1;
+  setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
+  const int bound = v6 ? bind(fd, reinterpret_cast<const sockaddr*>(&six), sizeof six)
+                       : bind(fd, reinterpret_cast<const sockaddr*>(&four), sizeof four);
+  std::optional<std::string> why;
+  if (bound != 0) why = std::strerror(errno);
+  if (!why && listen(fd, 1) != 0) why = std::strerror(errno);
+  close(fd);
+  return why;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, const Site& site,
+                                                     Handler& handler) {
+  if (const auto why = cannot_listen(options)) {
+    return fail(ErrorCode::kIo,
+                fmt::format("cannot listen on {} port {}: {}", options.address, options.port, *why));
+  }
+  auto impl = std::make_unique<Impl>(site, handler);
+  constexpr std::size_t kReceiveBytes = 2 * kMostViewerBytes;
+  impl->protocols[0] = {"http", Impl::on_http, sizeof(void*), 0, 0, nullptr, 0};
+  impl->protocols[1] = {kSubprotocol, Impl::on_socket, sizeof(void*), kReceiveBytes, 0, nullptr, 0};
+
+  // What goes wrong on connections is counted by who handles them, and must not fill a log.
+  lws_set_log_level(0, nullptr);
+  lws_context_creation_info info{};
+  info.port = options.port;
+  info.iface = options.address.c_str();
+  info.protocols = impl->protocols.data();
+  info.user = impl.get();
+  info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
+  if (options.address.find(':') == std::string::npos) info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
+  info.fd_limit_per_thread = static_cast<unsigned>(options.connections);
+  info.retry_and_idle_policy = &kIdlePolicy;
+  info.timeout_secs = 10;
+  info.keepalive_timeout = 15;
+  info.server_string = "tandem-gateway";
+  info.alpn = "http/1.1";
+  if (!options.tls_cert.empty()) {
+    info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+    info.ssl_cert_filepath = options.tls_cert.c_str();
+    info.ssl_private_key_filepath = options.tls_key.c_str();
+  }
+  impl->context = lws_create_context(&info);
+  if (impl->context == nullptr) {
+    return fail(
+        ErrorCode::kIo,
+        options.tls_cert.empty()
+            ? fmt::format("cannot listen on {} port {}", options.address, options.port)
+            : fmt::format("{} and {} are no certificate and its key", options.tls_cert, options.tls_key));
+  }
+  impl->tick.self = impl.get();
+  lws_sul_schedule(impl->context, 0, &impl->tick.sul, Impl::on_tick, 1);
+  return std::unique_ptr<WebServer>(new WebServer(std::move(impl)));
+}
+
+WebServer::WebServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+WebServer::~WebServer() = default;
+
+void WebServer::run(const std::atomic<bool>& stop) {
+  while (!stop.load(std::memory_order_relaxed)) {
+    if (lws_service(impl_->context, 0) < 0) return;
+  }
+}
+
+void WebServer::wake() { lws_cancel_service(impl_->context); }
+
+std::uint16_t WebServer::port() const {
+  return static_cast<std::uint16_t>(
+      lws_get_vhost_listen_port(lws_get_vhost_by_name(impl_->context, "default")));
+}
+
+}  // namespace tandem::gateway

@@ -1,0 +1,73 @@
+#pragma once
+// HTTP and WebSocket, by libwebsockets. This header sees nothing of it.
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "services/gateway/gateway.hpp"
+#include "services/gateway/site.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::gateway {
+
+struct WebOptions {
+  std::string address = "127.0.0.1";  ///< of IPv4 or IPv6
+  std::uint16_t port = 8080;          ///< 0: any free one
+  std::string tls_cert, tls_key;      ///< files; empty: no TLS
+  std::size_t connections = 512;      ///< at once, of all kinds
+};
+
+/// Serves the viewer's files and the connections of viewers. Connections are bounded; what is said on them is
+/// left to the handler.
+class WebServer {
+ public:
+  /// Called by run(), in its thread.
+  class Handler {
+   public:
+    struct Request {
+      std::string origin, host, token;  ///< empty where there is none
+    };
+    virtual ~Handler() = default;
+    virtual std::variant<ViewerId, Refusal> open(const Request& request) = 0;
+    virtual std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) = 0;
+    virtual Gateway::Next next(ViewerId id) = 0;
+    virtual void closed(ViewerId id) = 0;
+    virtual void list_ready(std::vector<ViewerId>& out) = 0;
+    virtual void list_not_reading(std::vector<ViewerId>& out) = 0;
+    /// Ten times a second.
+    virtual void tick() = 0;
+    /// A JSON object for /healthz.
+    virtual std::string health() = 0;
+  };
+
+  /// Listens. `site` and `handler` must outlive it. Errors: kIo (the address cannot be listened on, a file of
+  /// TLS cannot be used).
+  [[nodiscard]] static Result<std::unique_ptr<WebServer>> create(const WebOptions& options, const Site& site,
+                                                                 Handler& handler);
+  WebServer(const WebServer&) = delete;
+  WebServer& operator=(const WebServer&) = delete;
+  WebServer(WebServer&&) = delete;
+  WebServer& operator=(WebServer&&) = delete;
+  ~WebServer();
+
+  /// Serves until `stop`, and 0.1 s longer at most.
+  void run(const std::atomic<bool>& stop);
+  /// list_ready() has something new. Thread-safe.
+  void wake();
+  [[nodiscard]] std::uint16_t port() const;
+
+ private:
+  struct Impl;
+  explicit WebServer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tandem::gateway

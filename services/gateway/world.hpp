@@ -1,0 +1,38 @@
+#pragma once
+// What a gateway asks of the session that it is a client of.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "sdk/transport/messages.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::gateway {
+
+class World {
+ public:
+  virtual ~World() = default;
+
+  /// It holds an agreed state and follows it.
+  [[nodiscard]] virtual bool playing() const = 0;
+  /// As granted by the server: an observer's inputs are refused.
+  [[nodiscard]] virtual transport::Role role() const = 0;
+  /// The wall clock of the server's host at `now_ns`; nothing while it is not known.
+  [[nodiscard]] virtual std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const = 0;
+
+  /// The agreed state as a snapshot; nothing unless playing.
+  struct Cut {
+    StreamId stream;
+    Frame frame = 0;
+    std::uint64_t last_input = 0;  ///< scheduled inputs up to this number are in it
+    transport::Bytes bytes;
+  };
+  [[nodiscard]] virtual std::optional<Cut> cut() = 0;
+
+  /// Sends an input under the gateway's one client id; returns its number. Its outcome comes later.
+  virtual Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values,
+                                     transport::Bytes bytes, std::int64_t now_ns) = 0;
+};
+
+}  // namespace tandem::gateway

@@ -1,0 +1,179 @@
+// What viewers send, good and bad.
+#include "fake_world.hpp"
+
+namespace tandem::gateway {
+namespace {
+
+using transport::Phase;
+using transport::Reason;
+using transport::ReplyEntry;
+using transport::ReplyMessage;
+
+class ViewerInputs : public GatewayTest {
+ protected:
+  ViewerInputs() {
+    gateway.on_session(fake_session());
+    frame();
+  }
+  static std::uint32_t code(Reason reason) { return static_cast<std::uint32_t>(reason); }
+  static const std::vector<double>& push() {
+    static const std::vector<double> values{0, 0, 0, 1, 0, 0, 5};
+    return values;
+  }
+};
+
+TEST_F(ViewerInputs, EachViewerIsToldOfItsOwn) {
+  const ViewerId a = join(1), b = join(2);
+  EXPECT_FALSE(say(a, input(1, 1, push())));
+  EXPECT_FALSE(say(b, input(2, 1, push())));
+  ASSERT_EQ(world.sent.size(), 2U);
+  acts(1, 20);
+  gateway.on_outcome({client::InputOutcome::Kind::kRefused, 2, 0, code(Reason::kInvalid), 0}, now_ns);
+  const ReplyMessage to_a = reply(a), to_b = reply(b);
+  EXPECT_EQ(to_a.entries, (std::vector<ReplyEntry>{{1, 20, 0}}));
+  EXPECT_EQ(to_a.highest_input, 1U);
+  EXPECT_EQ(to_b.entries, (std::vector<ReplyEntry>{{1, 0, code(Reason::kInvalid)}}));
+}
+
+TEST_F(ViewerInputs, HighestIsUpToWhereEveryOutcomeIsKnown) {
+  const ViewerId id = join(1);
+  for (std::uint64_t number = 1; number <= 3; ++number) EXPECT_FALSE(say(id, input(1, number, push())));
+  acts(2, 20);
+  ReplyMessage told = reply(id);
+  EXPECT_EQ(told.highest_input, 0U);
+  EXPECT_EQ(told.entries, (std::vector<ReplyEntry>{{2, 20, 0}}));
+  acts(1, 20);
+  EXPECT_EQ(reply(id).highest_input, 2U);
+  gateway.on_outcome({client::InputOutcome::Kind::kUnknown, 3, 0, 0, 0}, now_ns);
+  told = reply(id);
+  EXPECT_EQ(told.highest_input, 3U);
+  EXPECT_EQ(told.entries.size(), 2U) << "of what nobody knows nothing is said";
+}
+
+TEST_F(ViewerInputs, AreRefusedAsAServerWould) {
+  const ViewerId id = join(1);
+  auto observer = ack(1, Phase::kPlaying);
+  observer.role_wanted = transport::Role::kObserver;
+  std::uint64_t number = 0;
+  const auto reason = [&](std::vector<double> values) {
+    EXPECT_FALSE(say(id, input(1, ++number, std::move(values))));
+    const auto told = reply(id).entries;
+    return told.empty() || told.back().number != number ? Reason::kNone
+                                                        : static_cast<Reason>(told.back().code);
+  };
+  EXPECT_EQ(reason({1, 2}), Reason::kInvalid);
+  EXPECT_EQ(reason({1, 2, std::numeric_limits<double>::infinity()}), Reason::kInvalid);
+  EXPECT_FALSE(say(id, observer));
+  EXPECT_EQ(reason({0, 0, 1}), Reason::kObserver);
+  plays(id, 1);
+  world.granted = transport::Role::kObserver;
+  EXPECT_EQ(reason({0, 0, 1}), Reason::kDemoted);
+  world.granted = transport::Role::kParticipant;
+  EXPECT_FALSE(say(id, ack(1, Phase::kJoining)));
+  EXPECT_EQ(reason({0, 0, 1}), Reason::kNotPlaying);
+  EXPECT_TRUE(world.sent.empty());
+}
+
+TEST_F(ViewerInputs, ANumberCountsOnce) {
+  const ViewerId id = join(1);
+  EXPECT_FALSE(say(id, input(1, 5, push())));
+  EXPECT_FALSE(say(id, input(1, 5, push())));
+  EXPECT_FALSE(say(id, input(1, 4, push())));
+  EXPECT_EQ(world.sent.size(), 1U);
+  acts(1, 9);
+  EXPECT_EQ(reply(id).entries, (std::vector<ReplyEntry>{{4, 0, code(Reason::kDuplicate)}, {5, 9, 0}}));
+}
+
+TEST_F(ViewerInputs, OfAnotherEpochAreAnsweredByTheReplysReason) {
+  const ViewerId id = join(1);
+  auto stale = input(1, 1);
+  stale.epoch = 3;
+  EXPECT_FALSE(say(id, stale));
+  const ReplyMessage told = reply(id);
+  EXPECT_EQ(told.reason, code(Reason::kStaleEpoch));
+  EXPECT_EQ(told.highest_input, 0U);
+  EXPECT_TRUE(world.sent.empty());
+}
+
+TEST_F(ViewerInputs, OneViewerHasARate) {
+  const ViewerId a = join(1), b = join(2);
+  for (std::uint64_t number = 1; number <= 20; ++number) EXPECT_FALSE(say(a, input(1, number, push())));
+  EXPECT_EQ(world.sent.size(), 5U);
+  EXPECT_FALSE(say(b, input(2, 1, push())));
+  EXPECT_EQ(world.sent.size(), 6U) << "another has its own";
+}
+
+TEST_F(ViewerInputs, NoMoreWaitThanCanBeToldOf) {
+  const ViewerId id = join(1);
+  for (std::uint64_t number = 1; number <= 50; ++number) EXPECT_FALSE(say(id, input(1, number)));
+  const auto told = reply(id);
+  EXPECT_EQ(told.entries.size(), 50U - Gateway::kMostUndecided);
+  EXPECT_EQ(told.entries.front().number, Gateway::kMostUndecided + 1);
+}
+
+TEST_F(ViewerInputs, OutcomesOfThoseWhoLeftAreForgotten) {
+  const ViewerId id = join(1);
+  EXPECT_FALSE(say(id, input(1, 1, push())));
+  gateway.leave(id);
+  acts(1, 3);
+}
+
+TEST_F(ViewerInputs, AViewerCannotSpeakAsAnother) {
+  const ViewerId id = join(1);
+  EXPECT_EQ(say(id, input(2, 1)), Refusal::kForeignClient);
+  auto status = transport::ClientStatusMessage();
+  status.session = "default";
+  status.client = 3;
+  EXPECT_EQ(say(id, status), Refusal::kForeignClient);
+  EXPECT_EQ(gateway.counts().of(Refusal::kForeignClient), 2U);
+}
+
+TEST_F(ViewerInputs, WhatOnlyAGatewaySendsIsRefused) {
+  const ViewerId id = join(1);
+  transport::DeltaMessage delta;
+  delta.epoch = kEpoch;
+  EXPECT_EQ(say(id, delta), Refusal::kMalformed);
+  EXPECT_EQ(say(id, fake_session()), Refusal::kMalformed);
+}
+
+TEST_F(ViewerInputs, BytesThatAreNoMessageAreRefused) {
+  const ViewerId id = join(1);
+  transport::Bytes whole;
+  transport::write_envelope(ack(1, Phase::kPlaying), whole);
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    now_ns += kSecond;
+    EXPECT_EQ(gateway.receive(id, std::span(whole).first(size), now_ns), Refusal::kMalformed) << size;
+  }
+  EXPECT_EQ(gateway.receive(id, transport::Bytes(kMostViewerBytes + 1), now_ns), Refusal::kTooLarge);
+  for (int kind = 0; kind < 256; ++kind) {
+    now_ns += kSecond;
+    EXPECT_EQ(gateway.receive(id, transport::Bytes{static_cast<std::byte>(kind)}, now_ns),
+              Refusal::kMalformed);
+  }
+}
+
+TEST_F(ViewerInputs, AnotherProtocolVersionIsRefused) {
+  const ViewerId id = *gateway.admit();
+  auto foreign = ack(1, Phase::kJoining);
+  foreign.protocol_version = 2;
+  EXPECT_EQ(say(id, foreign), Refusal::kProtocolVersion);
+}
+
+TEST_F(ViewerInputs, TooManyMessagesAreRefused) {
+  const ViewerId id = *gateway.admit();
+  int taken = 0;
+  while (!say(id, ack(1, Phase::kJoining))) ++taken;
+  EXPECT_EQ(taken, 200);
+  EXPECT_EQ(gateway.counts().of(Refusal::kTooManyMessages), 1U);
+}
+
+TEST_F(ViewerInputs, AFrameThatIsNotThereYetCannotBeApplied) {
+  const ViewerId id = *gateway.admit();
+  auto early = ack(1, Phase::kPlaying);
+  early.applied = world.frame + 1;
+  EXPECT_FALSE(say(id, early));
+  EXPECT_EQ(gateway.counts().stale, 1U);
+}
+
+}  // namespace
+}  // namespace tandem::gateway
