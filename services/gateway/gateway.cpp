@@ -199,6 +199,7 @@ void Gateway::cut(std::int64_t now_ns) {
     if (input.number > made->last_input) inputs.push_back(input.message);
   }
   const auto snapshot = std::make_shared<SnapshotParts>(*made, session_->epoch, std::move(inputs));
+  frame_ = snapshot->frame;  // perhaps of a snapshot that the gateway was sent itself
   snapshot_bytes_ = snapshot->bytes;
   ++counts_.snapshots;
   for (auto& [id, viewer] : viewers_) {

@@ -125,7 +125,7 @@ class Gateway {
 
   LiveLog log_;
   std::optional<LiveLog::Place> newest_delta_;
-  Frame frame_ = 0;  // applied last
+  Frame frame_ = 0;  // the newest that a viewer may hold
   /// Scheduled inputs whose number no applied delta has named yet.
   struct ComingInput {
     std::uint64_t number = 0;

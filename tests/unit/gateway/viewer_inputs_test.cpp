@@ -167,6 +167,14 @@ TEST_F(ViewerInputs, TooManyMessagesAreRefused) {
   EXPECT_EQ(gateway.counts().of(Refusal::kTooManyMessages), 1U);
 }
 
+TEST_F(ViewerInputs, AreTakenFromWhoPlaysFromASnapshotAlone) {
+  world.frame = 50;  // the gateway joined again, and no delta has come yet
+  const ViewerId id = join(1);
+  EXPECT_EQ(gateway.counts().stale, 0U);
+  EXPECT_FALSE(say(id, input(1, 1, push())));
+  EXPECT_EQ(world.sent.size(), 1U);
+}
+
 TEST_F(ViewerInputs, AFrameThatIsNotThereYetCannotBeApplied) {
   const ViewerId id = *gateway.admit();
   auto early = ack(1, Phase::kPlaying);
