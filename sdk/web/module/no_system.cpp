@@ -1,9 +1,22 @@
-// The C library of WASI writes messages of aborts to a system that a browser does not have. With these
-// functions in place of its own, the module imports nothing of WASI.
+// What libraries for WASI expect of a system that a browser does not have.
 
 #include <wasi/api.h>
 
 #include <cstddef>
+#include <cstdlib>
+#include <new>
+
+// Without exceptions the library's own returns null where memory ran out, and null is an address like any
+// other here.
+void* operator new(std::size_t size) {
+  void* const memory = std::malloc(size);
+  if (memory == nullptr) __builtin_trap();
+  return memory;
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+
+// The C library writes messages of aborts. With these functions in place of its own, the module imports
+// nothing of WASI.
 
 extern "C" {
 

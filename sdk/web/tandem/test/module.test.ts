@@ -28,6 +28,23 @@ describe.each(VARIANTS)('the module, %s', (variant) => {
 
   test('is below 400 kB', () => expect(wasm[variant].length).toBeLessThan(400_000));
 
+  test('ends in a trap where its memory does', async () => {
+    const { instance } = await WebAssembly.instantiate(wasm[variant], { tandem: { clock_ms: () => 0, log: () => undefined } });
+    const { tandem_create, tandem_input, memory, _initialize } = instance.exports as unknown as {
+      tandem_create(id: bigint, role: number, lead: number): number;
+      tandem_input(self: number, size: number): number;
+      memory: WebAssembly.Memory;
+      _initialize(): void;
+    };
+    _initialize();
+    const fill = () => {
+      for (let i = 0; i < 20; ++i) tandem_input(tandem_create(1n, 1, 1), 40 << 20);
+    };
+    expect(fill).toThrow(WebAssembly.RuntimeError);
+    expect(memory.buffer.byteLength).toBeGreaterThan(400 << 20);
+    expect(memory.buffer.byteLength).toBeLessThanOrEqual(512 << 20);
+  });
+
   test('searches until a server is announced', async () => {
     const { module } = await start(variant);
     expect(module.poll()).toBeGreaterThan(5000);
