@@ -148,7 +148,7 @@ int run(const Options& options) {
     return 1;
   }
   Crowd crowd(std::stoi(said.substr(at + 10)), options.viewers, options.sleepers);
-  while (crowd.playing() < options.viewers && transport::steady_ns() < give_up_ns)
+  while (crowd.playing() + options.sleepers < options.viewers && transport::steady_ns() < give_up_ns)
     crowd.run_for(100 * kMillisecond);
   crowd.run_for(2 * kSecond);
   crowd.forget_arrivals();
