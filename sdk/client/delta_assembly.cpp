@@ -5,6 +5,18 @@
 
 namespace tandem::client {
 
+transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch, const StreamId& stream) {
+  transport::DeltaMessage message;
+  message.epoch = epoch;
+  message.stream = stream;
+  message.frame = delta.frame;
+  message.last_input = delta.last_input;
+  message.server_time_ns = delta.server_time_ns;
+  message.hash = delta.hash;
+  message.payload = delta.payload;
+  return message;
+}
+
 DeltaAssembly::Outcome DeltaAssembly::add(transport::DeltaMessage&& part) {
   const bool malformed = part.parts == 0 || part.part >= part.parts || part.frame == 0 ||
                          part.payload.size() > limits_.delta_bytes ||

@@ -17,6 +17,9 @@ struct CompleteDelta {
   std::uint64_t hash = 0;
   transport::Bytes payload;
 };
+/// The same as one message, for who passes it on.
+[[nodiscard]] transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch,
+                                                 const StreamId& stream);
 
 /// One writer's samples keep their order, so parts arrive as 0, 1, ... n - 1 and frames one after another;
 /// whatever else arrives means that something was lost. Holds one run of frames without a gap. Not

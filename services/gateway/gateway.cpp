@@ -59,16 +59,8 @@ void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns
   frame_ = delta.frame;
   std::erase_if(coming_inputs_,
                 [&delta](const ComingInput& input) { return input.number <= delta.last_input; });
-  transport::DeltaMessage message;
-  message.epoch = session_->epoch;
-  message.stream = session_->streams.front().id;
-  message.frame = delta.frame;
-  message.last_input = delta.last_input;
-  message.server_time_ns = delta.server_time_ns;
-  message.hash = delta.hash;
-  message.payload = delta.payload;
   newest_delta_ = log_.end();
-  log_.push(make_outgoing(message), now_ns);
+  log_.push(make_outgoing(client::to_message(delta, session_->epoch, session_->streams.front().id)), now_ns);
 }
 
 void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) {

@@ -72,15 +72,7 @@ void Recorder::add(const transport::ScheduledInputMessage& input, std::int64_t w
 }
 
 void Recorder::add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns) {
-  transport::DeltaMessage message;
-  message.epoch = epoch;
-  message.stream = stream_;
-  message.frame = delta.frame;
-  message.last_input = delta.last_input;
-  message.server_time_ns = delta.server_time_ns;
-  message.hash = delta.hash;
-  message.payload = delta.payload;
-  write(message, wall_ns, delta.server_time_ns);
+  write(client::to_message(delta, epoch, stream_), wall_ns, delta.server_time_ns);
   unpromised_.erase(unpromised_.begin(), unpromised_.upper_bound(delta.last_input));
   ++totals_.frames;
   totals_.payload_bytes += delta.payload.size();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/heap/heap.hpp"
+#include "services/signals/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
@@ -24,16 +25,12 @@ struct JoinOptions {
   bool json = false;
 };
 
-std::atomic<bool> stopped = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
-
 std::string with_suffix(const std::string& path, std::uint32_t index) {
   return path.empty() ? path : path + "." + std::to_string(index);
 }
 
 int run_join(const JoinOptions& options) {
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
+  const SignalWatch signals;
   const HeapTrimmer trimmer;
   std::vector<std::unique_ptr<HeadlessClient>> clients;
   for (std::uint32_t i = 0; i < options.count; ++i) {
@@ -54,9 +51,9 @@ int run_join(const JoinOptions& options) {
   {
     std::vector<std::jthread> threads;
     for (std::size_t i = 1; i < clients.size(); ++i) {
-      threads.emplace_back([&client = *clients[i]] { client.run(stopped); });
+      threads.emplace_back([&client = *clients[i], &signals] { client.run(signals.stop()); });
     }
-    clients[0]->run(stopped);
+    clients[0]->run(signals.stop());
   }
   if (options.json) {
     nlohmann::ordered_json out;

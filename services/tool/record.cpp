@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <csignal>
 #include <memory>
 
 #include "services/heap/heap.hpp"
+#include "services/signals/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
@@ -18,9 +18,6 @@ struct RecordOptions {
   bool plain = false;
   bool json = false;
 };
-
-std::atomic<bool> stopped = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
 nlohmann::ordered_json report(const HeadlessClient& client) {
   const recording::Recorder::Totals& totals = client.recorder()->totals();
@@ -39,8 +36,7 @@ nlohmann::ordered_json report(const HeadlessClient& client) {
 }
 
 int run_record(RecordOptions options) {
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
+  const SignalWatch signals;
   const HeapTrimmer trimmer;
   options.client.observe = true;
   options.client.lead = 0;  // nothing is drawn
@@ -51,7 +47,7 @@ int run_record(RecordOptions options) {
     fmt::print(stderr, "tandem record: {}\n", client.error().message);
     return 1;
   }
-  (*client)->run(stopped);
+  (*client)->run(signals.stop());
   if (options.json) {
     fmt::print("{}\n", report(**client).dump());
   } else {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <csignal>
 #include <memory>
 #include <thread>
 
@@ -14,6 +13,7 @@
 #include "sdk/transport/units.hpp"
 #include "services/heap/heap.hpp"
 #include "services/host/publisher.hpp"
+#include "services/signals/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/recorded_source.hpp"
@@ -36,19 +36,17 @@ struct ReplayOptions {
   std::uint32_t wait_for = 0;
 };
 
-std::atomic<bool> stopped = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
-
 // What was queued last goes out, and whoever reads has the time to take it.
-void let_go(const host::Outbox& outbox) {
+void let_go(const host::Outbox& outbox, const std::atomic<bool>& stop) {
   constexpr int kMostTicks = 200;
   constexpr std::chrono::milliseconds kTick(5), kTaking(500);
   for (int i = 0; i < kMostTicks && outbox.size() > 0; ++i) std::this_thread::sleep_for(kTick);
-  if (!stopped) std::this_thread::sleep_for(kTaking);
+  if (!stop) std::this_thread::sleep_for(kTaking);
 }
 
 /// Publishes the run at hand to its end. Returns what comes behind it, kFrame when it was stopped before.
-Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch) {
+Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch,
+                   const std::atomic<bool>& stop) {
   host::ServiceConfig config;
   config.session = options.session;
   config.epoch = epoch;
@@ -61,7 +59,7 @@ Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch
   dds.session = options.session;
   dds.delta_depth =
       transport::delta_depth(config.frame_rate_hz, config.window_ceiling, playback.stream().max_delta_bytes);
-  dds.stop = &stopped;
+  dds.stop = &stop;
   const auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
   auto frames = std::make_unique<RecordedSource>(playback, config);
@@ -72,7 +70,7 @@ Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch
       stderr, "tandem replay: session '{}' on domain {}, epoch {}, {} slots, from frame {} ({:.1f} s)\n",
       options.session, options.domain, epoch, playback.session().capacity, source.frame(), playback.time_s());
   host::Publisher publisher((*host)->outbox(), **port);
-  while (!stopped && (*host)->state() != host::Host::State::kEnded) {
+  while (!stop && (*host)->state() != host::Host::State::kEnded) {
     (*host)->poll(steady_ns(), wall_ns());
     if ((*host)->error()) return tl::unexpected(*(*host)->error());
     if (publisher.gave_up())
@@ -83,7 +81,7 @@ Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch
     const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
   }
-  let_go((*host)->outbox());
+  let_go((*host)->outbox(), stop);
   return source.ending();
 }
 
@@ -99,7 +97,7 @@ Result<Step> go_to(Playback& playback, double from_s) {
   return step;
 }
 
-Result<void> replay(const ReplayOptions& options) {
+Result<void> replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   auto playback = Playback::open(options.file);
   if (!playback) return tl::unexpected(playback.error());
   if (const auto torn = (*playback)->torn_at())
@@ -109,20 +107,19 @@ Result<void> replay(const ReplayOptions& options) {
   do {
     auto step = go_to(**playback, options.from_s);
     // An epoch of its own for each run, as frames follow one another within one.
-    while (step && *step != Step::kEnd && !stopped) {
+    while (step && *step != Step::kEnd && !stop) {
       epoch = std::max<Epoch>(epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
-      step = serve(**playback, options, epoch);
+      step = serve(**playback, options, epoch, stop);
     }
     if (!step) return fail(step.error().code, options.file + ": " + step.error().message);
-  } while (options.loop && !stopped);
+  } while (options.loop && !stop);
   return {};
 }
 
 int run_replay(const ReplayOptions& options) {
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
+  const SignalWatch signals;
   const HeapTrimmer trimmer;
-  const auto done = replay(options);
+  const auto done = replay(options, signals.stop());
   if (done) return 0;
   fmt::print(stderr, "tandem replay: {}\n", done.error().message);
   return 1;

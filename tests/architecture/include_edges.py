@@ -62,7 +62,7 @@ EDGES = {
     "services/gateway/main.cpp": ["services/gateway", "services/heap", "services/signals"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
-    + ["services/heap", "services/host", "services/recording", "services/scenes"],
+    + ["services/heap", "services/host", "services/recording", "services/scenes", "services/signals"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
