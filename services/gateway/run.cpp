@@ -55,11 +55,14 @@ class Service final : public WebServer::Handler {
     constexpr std::int64_t kLongestNs = 100 * kMillisecond;
     while (!stop.stop_requested()) {
       std::int64_t due_ns = 0;
+      bool ready = false;
       {
         const std::lock_guard lock(mutex_);
         due_ns = client_.poll(gateway_, client::now());
+        gateway_.list_ready(steady_ns(), ready_);
+        ready = !ready_.empty();
       }
-      server.wake();  // it lists who has something to get
+      if (ready) server.wake();
       const std::int64_t wait_ns = std::min(kLongestNs, due_ns - steady_ns());
       if (wait_ns > 0) port_.wait(std::chrono::nanoseconds(wait_ns));
     }
@@ -135,6 +138,7 @@ class Service final : public WebServer::Handler {
   SessionClient client_;
   Gateway gateway_;
   CountLog log_;
+  std::vector<ViewerId> ready_;  // kept to reuse its memory
 };
 
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
