@@ -47,9 +47,9 @@ void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
       ->capture_default_str();
 }
 
-void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
+CLI::Option* add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
   // CLI11 reads -1 as 2^64 - 1, and what is too large as that.
-  command.add_option("--seed", seed, help)
+  return command.add_option("--seed", seed, help)
       ->check([](const std::string& text) {
         std::uint64_t value = 0;
         const char* const end = text.data() + text.size();

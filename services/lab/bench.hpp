@@ -34,7 +34,7 @@ inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
 void add_scene_option(CLI::App& command, std::vector<std::string>& scenes);
 void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies);
 void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice);
-void add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
+CLI::Option* add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
 CLI::Option* add_threshold_scale(CLI::App& command, sessions::SessionChoice& choice);
 
 }  // namespace tandem::lab

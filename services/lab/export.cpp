@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "services/lab/bench.hpp"
+#include "services/lab/export_recording.hpp"
 #include "services/lab/scene_source.hpp"
 #include "services/lab/trajectory.hpp"
 #include "services/sessions/session_plan.hpp"
@@ -18,6 +19,8 @@ struct ExportOptions {
   std::string scene;
   SceneRun run;
   std::string out;
+  std::string recording, points;  // instead of a scene
+  std::uint32_t every = 1;
 };
 
 Result<void> export_trajectory(const ExportOptions& options) {
@@ -64,34 +67,62 @@ Result<void> export_trajectory(const ExportOptions& options) {
   return writer->finish(info);
 }
 
+Result<void> export_chosen(const ExportOptions& options) {
+  if (options.recording.empty()) return export_trajectory(options);
+  if (options.points.empty()) return export_states(options.recording, options.out);
+  return export_points(options.recording, options.points, options.every);
+}
+
 }  // namespace
 
 void add_export(CLI::App& app, Run& run) {
   CLI::App* command = app.add_subcommand(
       "export",
       "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity) or, of bodies that turn, "
-      "[13], and X.json.");
-  command->footer(kTrajectoryFormat);
+      "[13], and X.json; of a scene, or of a recording, which also becomes point clouds.");
+  command->footer(std::string(kTrajectoryFormat) + "\n\n" + kRecordingFormat);
   const auto options = std::make_shared<ExportOptions>();
   options->run.bodies = 10000;
   options->run.frames = 1000;
-  command->add_option("--scene", options->scene, "Scene by name or file")->required();
+  CLI::Option* const scene = command->add_option("--scene", options->scene, "Scene by name or file");
+  CLI::Option* const from =
+      command
+          ->add_option("--from", options->recording,
+                       "Instead of a scene: the agreed states of what `tandem record` wrote")
+          ->excludes(scene);
+  CLI::Option* const points =
+      command
+          ->add_option("--points", options->points,
+                       "Instead of --out: an MCAP file of point clouds, as Foxglove opens them")
+          ->needs(from);
+  command->add_option("--every", options->every, "With --points: of the frames, those that this divides")
+      ->check(CLI::Range(1U, 1U << 20U))
+      ->needs(points)
+      ->capture_default_str();
   command->add_option("--bodies", options->run.bodies, "Number of bodies")
       ->check(CLI::Range(1U, engine::kMaxBodies))
+      ->excludes(from)
       ->capture_default_str();
   command->add_option("--frames", options->run.frames, "Frames after the start")
       ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
+      ->excludes(from)
       ->capture_default_str();
-  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
+  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs")->excludes(from);
   command->add_option("--threads", options->run.threads, "Of the engine")
       ->check(CLI::Range(1U, kMaxThreads))
+      ->excludes(from)
       ->capture_default_str();
   command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
-      ->check(CLI::Range(1U, scenes::kMaxUsers));
-  command->add_option("--out", options->out, "The .npy file; the .json beside it")->required();
+      ->check(CLI::Range(1U, scenes::kMaxUsers))
+      ->excludes(from);
+  command->add_option("--out", options->out, "The .npy file; the .json beside it")->excludes(points);
   command->callback([options, &run] {
+    if (options->scene.empty() && options->recording.empty())
+      throw CLI::ValidationError("--scene", "expected --scene or --from");
+    if (options->out.empty() && options->points.empty())
+      throw CLI::ValidationError("--out", "expected the .npy file to write");
     run = [options] {
-      const auto exported = export_trajectory(*options);
+      const auto exported = export_chosen(*options);
       return exported ? 0 : report("export", exported.error());
     };
   });

@@ -38,7 +38,9 @@ class Playback {
   /// permits; from there on call next() until time_s() is late enough.
   void seek(double from_s);
 
-  /// When the message at hand was recorded, and the last one; seconds since the first.
+  /// When the message at hand was recorded, wall clock, ns since 1970.
+  [[nodiscard]] std::uint64_t time_ns() const { return time_ns_; }
+  /// The same, and of the last message; seconds since the first.
   [[nodiscard]] double time_s() const { return seconds_since_first(time_ns_); }
   [[nodiscard]] double length_s() const { return seconds_since_first(reader_.last_ns()); }
   /// Where the file is cut short, if it is.

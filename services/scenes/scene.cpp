@@ -189,17 +189,25 @@ std::uint32_t filled(const Scene& scene, std::uint32_t bodies) {
   return bodies - static_cast<std::uint32_t>(scene.spare * bodies);
 }
 
-Result<Scene> read_scene(const std::string& path) {
+// `read` fills in the message and its lines.
+template <class Read>
+Result<Scene> checked_scene(const std::string& path, const Read& read) {
   idl::Scene file;
   google::protobuf::TextFormat::ParseInfoTree lines;
-  if (auto read = read_text_file(path, file, lines); !read) return tl::unexpected(read.error());
+  if (auto done = read(file, lines); !done) return tl::unexpected(done.error());
   Findings findings{path, {}};
   check_scene(Node(file, &lines, "", 1, findings), file);
   if (findings.first) return tl::unexpected(*findings.first);
+  return to_scene(file, path);
+}
+
+Result<Scene> read_scene(const std::string& path) {
+  auto scene =
+      checked_scene(path, [&](auto& file, auto& lines) { return read_text_file(path, file, lines); });
+  if (!scene) return scene;
   return load_trained(path).transform([&](std::vector<TrainedTable> tables) {
-    Scene scene = to_scene(file, path);
-    scene.trained = std::move(tables);
-    return scene;
+    scene->trained = std::move(tables);
+    return std::move(*scene);
   });
 }
 
@@ -207,6 +215,11 @@ Result<Scene> read_scene(const std::string& path) {
 
 Result<Scene> load_scene(std::string_view name_or_path) {
   return find_scene_file(name_or_path).and_then(read_scene);
+}
+
+Result<Scene> parse_scene(const std::string& text, const std::string& source) {
+  return checked_scene(source,
+                       [&](auto& file, auto& lines) { return parse_text(text, source, file, lines); });
 }
 
 Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {

@@ -106,6 +106,9 @@ struct Scene {
 /// everything. Errors: kInvalidArgument for an unknown name (lists the known ones), kIo, kMalformed with
 /// file, line and field.
 [[nodiscard]] Result<Scene> load_scene(std::string_view name_or_path);
+/// The same of a text, as a session announces it: without trained tables. `source` names it in errors.
+/// Errors: kMalformed.
+[[nodiscard]] Result<Scene> parse_scene(const std::string& text, const std::string& source);
 
 /// The scene's simulation with `bodies` slots at frame 0. The number of bodies changes how far the scene is
 /// filled, nothing else. Errors: kInvalidArgument (bodies 0, above the limit or more than the scene's bounds

@@ -129,16 +129,20 @@ void Node::require_sane_numbers() const {
   }
 }
 
+Result<void> parse_text(const std::string& text, const std::string& source, pb::Message& message,
+                        pb::TextFormat::ParseInfoTree& lines) {
+  FirstError errors(source, text);
+  pb::TextFormat::Parser parser;
+  parser.RecordErrorsTo(&errors);
+  parser.WriteLocationsTo(&lines);
+  if (!parser.ParseFromString(text, &message)) return fail(ErrorCode::kMalformed, errors.what());
+  return {};
+}
+
 Result<void> read_text_file(const std::string& path, pb::Message& message,
                             pb::TextFormat::ParseInfoTree& lines) {
-  return read_all(path).and_then([&](const std::string& text) -> Result<void> {
-    FirstError errors(path, text);
-    pb::TextFormat::Parser parser;
-    parser.RecordErrorsTo(&errors);
-    parser.WriteLocationsTo(&lines);
-    if (!parser.ParseFromString(text, &message)) return fail(ErrorCode::kMalformed, errors.what());
-    return {};
-  });
+  return read_all(path).and_then(
+      [&](const std::string& text) { return parse_text(text, path, message, lines); });
 }
 
 }  // namespace tandem::scenes

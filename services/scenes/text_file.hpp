@@ -45,7 +45,12 @@ class Node {
   Findings* findings_;
 };
 
-/// Reads `path` into `message`; `lines` receives where its fields are. Errors: kIo, kMalformed.
+/// Reads `text` into `message`; `lines` receives where its fields are. `source` names it in errors. Errors:
+/// kMalformed.
+[[nodiscard]] Result<void> parse_text(const std::string& text, const std::string& source,
+                                      google::protobuf::Message& message,
+                                      google::protobuf::TextFormat::ParseInfoTree& lines);
+/// The same of a file. Errors: kIo, kMalformed.
 [[nodiscard]] Result<void> read_text_file(const std::string& path, google::protobuf::Message& message,
                                           google::protobuf::TextFormat::ParseInfoTree& lines);
 

@@ -66,7 +66,7 @@ EDGES = {
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
-    + ["sdk/statistics", "services/engine/shape", "services/host", "services/scenes", "services/sessions", "services/tool", "services/workers"],
+    + ["sdk/statistics", "services/engine/shape", "services/host", "services/recording", "services/scenes", "services/sessions", "services/tool", "services/workers"],
     "tests": ["*"],
 }
 

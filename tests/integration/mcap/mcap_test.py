@@ -10,8 +10,10 @@ import argparse
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -80,7 +82,7 @@ def check_fixed(writer, compression, folder, scratch):
 
 
 def check_live(options, folder, scratch):
-    """A session of a second or two."""
+    """A session of a second or two; its recording."""
     file = scratch / "live.mcap"
     environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
     server = subprocess.Popen(
@@ -107,6 +109,44 @@ def check_live(options, folder, scratch):
     assert found["compression"] == "zstd" and found["chunks"] >= 3, found["chunks"]
     assert {"TandemAck", "TandemReply", "TandemServerStatus", "TandemClientStatus"} <= set(topics), set(topics)
     print(f"live session: {len(frames)} deltas read")
+    return file
+
+
+def rows_of(npy):
+    """The positions in a trajectory, by row and slot."""
+    data = npy.read_bytes()
+    rows, bodies, columns = map(int, re.search(rb"\((\d+), (\d+), (\d+)\)", data[:128]).groups())
+    floats = struct.unpack(f"<{rows * bodies * columns}f", data[128:])
+    each = [floats[i : i + 3] for i in range(0, len(floats), columns)]
+    return [each[row * bodies : (row + 1) * bodies] for row in range(rows)]
+
+
+def check_points(options, recording, folder, scratch):
+    """Point clouds of a recording hold the positions of its trajectory, and say how to read them."""
+    clouds, npy = scratch / "points.mcap", scratch / "states.npy"
+    for out in (("--points", clouds), ("--out", npy)):
+        subprocess.run([options.tandem, "export", "--from", recording, *out], check=True)
+    found = read(clouds, folder)
+    rows = rows_of(npy)
+    assert len(found["messages"]) == found["indexed"] == len(rows) >= 30, (found["indexed"], len(rows))
+    types = {"x": "f", "y": "f", "z": "f", "radius": "f", "red": "B", "green": "B", "blue": "B", "alpha": "B", "type": "I"}
+    numeric = {"f": 7, "B": 1, "I": 5}
+    for message, row in zip(found["messages"], rows):
+        cloud = message["content"]
+        assert message["topic"] == "/bodies" and cloud["schema"] == "foxglove.PointCloud", message["topic"]
+        at = cloud["timestamp"]["sec"] * 10**9 + cloud["timestamp"]["nsec"]
+        assert str(at) == message["logTime"], (at, message["logTime"])
+        assert {field["name"]: field["type"] for field in cloud["fields"]} == {k: numeric[v] for k, v in types.items()}
+        data, stride = bytes.fromhex(cloud["data"]), cloud["point_stride"]
+        assert len(data) == stride * len(row) and len(row) == 200, len(data)
+
+        def column(name):
+            start = next(field["offset"] for field in cloud["fields"] if field["name"] == name)
+            return [struct.unpack_from("<" + types[name], data, i + start)[0] for i in range(0, len(data), stride)]
+
+        assert list(zip(column("x"), column("y"), column("z"))) == row, "other positions than the trajectory"
+        assert set(column("alpha")) == {255} and min(column("radius")) > 0
+    print(f"point clouds: {len(rows)} read")
 
 
 def main():
@@ -119,7 +159,8 @@ def main():
         try:
             for compression in ("none", "zstd"):
                 check_fixed(options.writer, compression, options.modules, pathlib.Path(scratch))
-            check_live(options, options.modules, pathlib.Path(scratch))
+            recording = check_live(options, options.modules, pathlib.Path(scratch))
+            check_points(options, recording, options.modules, pathlib.Path(scratch))
         except (AssertionError, subprocess.SubprocessError) as failure:
             print(f"FAILED: {failure!r}", file=sys.stderr)
             return 1

@@ -6,6 +6,30 @@ import { MessageReader } from "@foxglove/omgidl-serialization";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { decompress } from "fzstd";
 
+// What decodes the messages of a schema.
+function readerOf({ name, encoding, data }) {
+  const schema = new TextDecoder().decode(data);
+  if (encoding === "omgidl") {
+    const reader = new MessageReader(name, parseIDL(schema));
+    return { messageEncoding: "cdr", read: (bytes) => reader.readMessage(bytes) };
+  }
+  if (encoding === "jsonschema") {
+    const { properties } = JSON.parse(schema);
+    return {
+      messageEncoding: "json",
+      read: (bytes) => {
+        const message = JSON.parse(new TextDecoder().decode(bytes));
+        for (const key of Object.keys(message)) {
+          if (!(key in properties)) throw new Error(`${key} is not in the schema`);
+          if (properties[key].contentEncoding === "base64") message[key] = new Uint8Array(Buffer.from(message[key], "base64"));
+        }
+        return { schema: name, ...message };
+      },
+    };
+  }
+  throw new Error(`schema encoding ${encoding}`);
+}
+
 const file = readFileSync(process.argv[2]);
 const decompressHandlers = { zstd: (chunk, size) => decompress(chunk, new Uint8Array(Number(size))) };
 const stream = new McapStreamReader({ decompressHandlers, validateCrcs: true });
@@ -20,14 +44,12 @@ for (let record; (record = stream.nextRecord()); ) {
       out.library = record.library;
       break;
     case "Schema":
-      if (record.encoding !== "omgidl") throw new Error(`schema encoding ${record.encoding}`);
-      schemas.set(
-        record.id,
-        new MessageReader(record.name, parseIDL(new TextDecoder().decode(record.data))),
-      );
+      schemas.set(record.id, readerOf(record));
       break;
     case "Channel":
-      if (record.messageEncoding !== "cdr") throw new Error(`message encoding ${record.messageEncoding}`);
+      if (record.messageEncoding !== schemas.get(record.schemaId).messageEncoding) {
+        throw new Error(`message encoding ${record.messageEncoding}`);
+      }
       channels.set(record.id, record);
       break;
     case "Message": {
@@ -36,7 +58,7 @@ for (let record; (record = stream.nextRecord()); ) {
         topic: channel.topic,
         logTime: record.logTime,
         publishTime: record.publishTime,
-        content: schemas.get(channel.schemaId).readMessage(record.data),
+        content: schemas.get(channel.schemaId).read(record.data),
       });
       break;
     }

@@ -120,6 +120,20 @@ def check_torn(programs, file, truth):
     expect_same(programs, "torn", truth, 10)
 
 
+def check_export(programs, file, truth):
+    """The states as a trajectory, which a bench takes with the recorded scene's predictor."""
+    npy = programs.folder / "states.npy"
+    finish(programs.start(programs.tandem, "export", "--from", file, "--out", npy), "export")
+    assert f"({len(truth) + 1}, 500, 6)".encode() in npy.read_bytes()[:128], npy.read_bytes()[:128]
+    bench = programs.start(
+        programs.tandem, "bench", "bandwidth", "--trajectory", npy, "--frames", len(truth),
+        "--codec", "tracker", "--predictor", "field", "--json",
+    )  # fmt: skip
+    row = json.loads(finish(bench, "bench")[0])["rows"][0]
+    assert row["predictor"] == "field" and row["bodies"] == 500, row
+    print(f"exported {len(truth)} frames, measured at {row['mbit_per_s']:.3f} Mbit/s", flush=True)
+
+
 def check_refusals(programs, file):
     bad = programs.folder / "bad.mcap"
     whole = file.read_bytes()
@@ -153,6 +167,7 @@ def main():
             check_whole(programs, file, truth)
             check_jump(programs, file, truth)
             check_torn(programs, file, truth)
+            check_export(programs, file, truth)
             check_refusals(programs, file)
         except (AssertionError, subprocess.SubprocessError) as failure:
             print(f"FAILED: {failure}", file=sys.stderr)

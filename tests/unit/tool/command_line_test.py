@@ -55,6 +55,14 @@ class CommandLine(unittest.TestCase):
             self.assert_usage("--threshold", "bench", "bandwidth", "--scene", "cube", *wrong)
         for flag in ("--bodies", "--users", "--seed"):
             self.assert_usage(flag, "bench", "bandwidth", "--trajectory", "x.npy", flag, "5")
+        self.assert_usage("--from", "export", "--out", "x.npy")
+        self.assert_usage("--from", "export", "--scene", "cube", "--from", "x.mcap", "--out", "x.npy")
+        self.assert_usage("--from", "export", "--scene", "cube", "--points", "p.mcap")
+        self.assert_usage("--points", "export", "--from", "x.mcap", "--points", "p.mcap", "--out", "x.npy")
+        self.assert_usage("--out", "export", "--from", "x.mcap")
+        self.assert_usage("--every", "export", "--from", "x.mcap", "--out", "x.npy", "--every", "2")
+        for flag in ("--bodies", "--frames", "--users", "--seed", "--threads"):
+            self.assert_usage(flag, "export", "--from", "x.mcap", "--out", "x.npy", flag, "5")
         self.assert_usage("zip", "bench", "bandwidth", "--scene", "half_pipe", "--codec", "zip")
         for seed in ("-1", str(2**64)):
             self.assert_usage("--seed", "bench", "bandwidth", "--scene", "cube", "--seed", seed)
@@ -120,6 +128,23 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(one["threshold"], other["threshold"])
             self.assertEqual(one["lattice_unit"], other["lattice_unit"])
             self.assertEqual(one["mbit_per_s"], other["mbit_per_s"])
+
+    def test_what_is_no_recording_is_refused_in_one_line(self):
+        bad = self.path("bad.mcap")
+        for content, expected in (
+            (None, "No such file"), (b"", "not an MCAP file"), (b"no recording", "not an MCAP file"),
+            (b"\x89MCAP1\r\n", "another version"), (b"\x89MCAP0\r\n", "no snapshot"),
+        ):  # fmt: skip
+            if content is not None:
+                bad.write_bytes(content)
+            for out in (("--out", self.path("x.npy")), ("--points", self.path("p.mcap"))):
+                done = run("export", "--from", bad, *out)
+                self.assertEqual(done.returncode, 1, done.stderr)
+                lines = [line for line in done.stderr.splitlines() if "cut short" not in line]
+                self.assertEqual(len(lines), 1, lines)
+                self.assertIn("bad.mcap", lines[0])
+                self.assertIn(expected, lines[0])
+                self.assertFalse(out[1].exists())
 
     def test_a_trajectory_that_names_its_scene_is_predicted_as_the_scene_itself(self):
         source = pathlib.Path(__file__).resolve().parents[3] / "services/scenes/cube.textproto"

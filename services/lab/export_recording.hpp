@@ -1,0 +1,39 @@
+#pragma once
+// A recording of a session as other tools want it: a trajectory, or point clouds.
+
+#include <cstdint>
+#include <string>
+
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// For people who read them: the end of `tandem export --help`.
+inline constexpr const char* kRecordingFormat =
+    "With --from, row 0 is the recording's first snapshot, and a body is a slot; an empty one is all zeros (w "
+    "of a\n"
+    "quaternion 1), which a reader cannot tell from a body at the origin. dt_s, radius and X.scene.textproto, "
+    "which\n"
+    "\"scene\" then names, are the recorded scene's; of a session without one, dt_s is 1 / its frame rate, "
+    "radius that\n"
+    "of the sphere around the smallest body, or the threshold, and there is no \"scene\". damping_per_s and "
+    "threshold are\n"
+    "those of row 0, gravity as the inputs changed it. The states end where the recording has a gap, where "
+    "another\n"
+    "server began, or where the file is cut short.\n"
+    "--points: messages foxglove.PointCloud (JSON) of topic /bodies, all of the recording, at the times it was "
+    "recorded:\n"
+    "of each body that is there, by slot, x, y, z, radius, red, green, blue, alpha, type.";
+
+/// The agreed states of the recording's first run as a pair X.npy and X.json: a row for the start and one for
+/// each frame. Where the recorded scene can be loaded, it becomes X.scene.textproto, and X.json names it.
+/// Says on stderr where more follows, and where the file is cut short. Errors: kInvalidArgument (`npy` does
+/// not end in .npy), kIo, kMalformed, kUnsupported, kMismatch.
+[[nodiscard]] Result<void> export_states(const std::string& recording, const std::string& npy);
+
+/// All runs as messages foxglove.PointCloud (point_cloud.hpp) of topic /bodies in an MCAP file: of the first
+/// frame of a run, and of each that `every` divides. Log times are those of the recording. Errors: as above.
+[[nodiscard]] Result<void> export_points(const std::string& recording, const std::string& mcap,
+                                         std::uint32_t every);
+
+}  // namespace tandem::lab
