@@ -8,7 +8,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 WEB = ROOT / "sdk" / "web"
-FILES = ("package.json", "package-lock.json", "tsconfig.json", "vite.config.ts", "tandem", "viewer")
+FILES = ("package.json", "package-lock.json", ".npmrc", "tsconfig.json", "vite.config.ts", "tandem", "viewer")
 NOT_RUN = 77
 
 
@@ -34,9 +34,7 @@ def install(folder):
     lock = folder / "package-lock.json"
     if installed.exists() and installed.read_bytes() == lock.read_bytes():
         return
-    done = subprocess.run(
-        ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=folder, capture_output=True, text=True, check=False
-    )  # fmt: skip
+    done = subprocess.run(["npm", "ci"], cwd=folder, capture_output=True, text=True, check=False)
     if "EUSAGE" in done.stderr:
         print(f"FAILED: package-lock.json is not that of package.json:\n{done.stderr}", file=sys.stderr)
         sys.exit(1)
