@@ -1,6 +1,7 @@
 // What the colour of a body tells.
 
 import type { BodyType, Sample } from '../tandem';
+import { Changes } from './changes';
 
 export const colourModes = ['type', 'speed', 'corrected', 'age'] as const;
 export type ColourMode = (typeof colourModes)[number];
@@ -57,6 +58,7 @@ export class Colours {
   private readonly lastPositions: Float32Array;
   private readonly speeds: Float32Array;
   private lastFrame = -Infinity;
+  private readonly changes = new Changes();
   private topSpeed = 1;  // m/s, at the top of the ramp; follows what the bodies do
 
   constructor(
@@ -69,13 +71,20 @@ export class Colours {
     this.speeds = new Float32Array(capacity);
   }
 
+  /** To be called with a sample that follow() does not get. */
+  note(sample: Sample): void {
+    this.changes.note(sample);
+  }
+
   follow(sample: Sample): void {
+    this.note(sample);
     const frames = sample.frame - this.lastFrame;
     if (frames >= 1 || frames < 0) this.measureSpeeds(sample, frames * this.frameSeconds);
   }
 
   private measureSpeeds(sample: Sample, seconds: number): void {
-    const { alive, changes, positions, capacity, frame } = sample;
+    const { alive, positions, capacity, frame } = sample;
+    const changes = this.changes.take();
     const scale = seconds > 0 && seconds < 0.5 ? 1 / seconds : 0;
     let sum = 0;
     let count = 0;

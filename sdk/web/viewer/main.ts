@@ -1,6 +1,6 @@
 // The page: joins the session of the gateway that served it, draws its bodies, and sends what the user does to them.
 
-import { Client, type LogLevel, type OutcomeEvent, type SampleMode, type Status } from '../tandem';
+import { Client, type LogLevel, type OutcomeEvent, type Sample, type SampleMode, type Status } from '../tandem';
 import { chooseColours, chooseSpeed, showLegend } from './choices';
 import type { ColourMode } from './colours';
 import { GravityControls } from './gravity_controls';
@@ -74,9 +74,16 @@ class Page {
   /** What scripts see as globalThis.tandem. */
   readonly forScripts = {
     status: (): Status & { drawing: Drawing } => ({ ...this.client.status(), drawing: this.drawing() }),
-    sample: (mode?: SampleMode) => this.client.sample(mode),
+    sample: (mode?: SampleMode) => this.sample(mode),
     project: (point: Vec3) => this.stage.project(point),
   };
+
+  /** Besides the one of every picture. */
+  private sample(mode?: SampleMode): Sample | null {
+    const sample = this.client.sample(mode);
+    if (sample) this.world?.note(sample);
+    return sample;
+  }
 
   private sessionBegan(epoch: number): void {
     if (this.epoch !== 0 && epoch !== this.epoch) toast('The server was restarted: a new run has begun');
@@ -158,11 +165,11 @@ class Page {
 
   /** Pushes the body under a place of the page away from the viewer. */
   private push(x: number, y: number, slackPixels: number): void {
-    const sample = this.client.sample('extrapolate');
+    const sample = this.sample('extrapolate');
     if (!sample || !this.world) return;
     const { origin, direction, pixel } = this.stage.ray(x, y);
-    const slot = pick(sample, this.radii, origin, direction, slackPixels * pixel);
-    if (slot < 0) return;
+    const slot = pick(this.world.slowMotion.seen(sample), this.radii, origin, direction, slackPixels * pixel);
+    if (slot < 0 || !sample.alive[slot]) return;
     const centre = Array.from(sample.positions.subarray(3 * slot, 3 * slot + 3)) as Vec3;
     const radius = this.radii[sample.types[slot]];
     const limit = this.world.scene.maxPush || Infinity;

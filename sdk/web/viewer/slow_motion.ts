@@ -2,6 +2,7 @@
 // all of them; then it goes on from the newest.
 
 import type { Sample } from '../tandem';
+import { Changes } from './changes';
 
 export const speeds = ['1', '1/2', '1/4'] as const;
 export type Speed = (typeof speeds)[number];
@@ -21,17 +22,30 @@ export class SlowMotion {
   private playedMs = 0;
   private share = 1;
   private shown: Sample | null = null;
+  private readonly changes = new Changes();
 
   constructor(private readonly frameSeconds: number) {}
 
   setSpeed(speed: Speed): void {
     this.share = shares[speed];
     this.kept = [];
+    this.changes.take();
+  }
+
+  /** To be called with a sample that play() does not get: what it tells of bodies that jump is told once. */
+  note(sample: Sample): void {
+    if (this.share !== 1) this.changes.note(sample);
+  }
+
+  /** What is seen while `newest` is the newest sample. */
+  seen(newest: Sample): Sample {
+    return this.share === 1 ? newest : (this.shown ?? newest);
   }
 
   /** Takes the newest sample, and returns what to draw now and the frame of its last delta. */
   play(sample: Sample, applied: number, nowMs: number): { sample: Sample; applied: number } {
     if (this.share === 1) return { sample, applied };
+    this.note(sample);
     const last = this.kept.at(-1)?.sample;
     if (last && (last.capacity !== sample.capacity || sample.frame < last.frame)) this.kept = [];
     if (this.kept.length === 0 || !last || sample.frame >= last.frame + 1) this.keep(sample, applied);
@@ -49,7 +63,7 @@ export class SlowMotion {
   private keep(sample: Sample, applied: number): void {
     const bytes = sample.capacity * (sample.orientations ? 37 : 21);
     const most = Math.max(2, Math.min(mostKept, Math.floor(mostKeptBytes / bytes)));
-    this.kept.push({ sample: copyOf(sample), applied });
+    this.kept.push({ sample: copyOf({ ...sample, changes: this.changes.take() }), applied });
     if (this.kept.length > most) this.kept.shift();
   }
 
@@ -58,6 +72,7 @@ export class SlowMotion {
     const span = b.frame - a.frame;
     const share = span > 0 ? (this.cursor - a.frame) / span : 1;
     const out = { ...b, positions: this.shown.positions, orientations: this.shown.orientations, frame: this.cursor };
+    this.shown = out;
     mix(a.positions, b.positions, 3, share, b.changes, out.positions);
     if (a.orientations && b.orientations && out.orientations) {
       mix(a.orientations, b.orientations, 4, share, b.changes, out.orientations);

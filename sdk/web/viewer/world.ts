@@ -50,6 +50,12 @@ export class World {
     this.bodies.update(sample);
   }
 
+  /** To be called with a sample that update() does not get. */
+  note(sample: Sample): void {
+    this.colours.note(sample);
+    this.slowMotion.note(sample);
+  }
+
   beforeRender(): void {
     this.scenery.update(this.stage.camera);
   }

@@ -44,6 +44,17 @@ describe('colours', () => {
     expect(parseColour('blue')).toEqual(parseColour(''));
   });
 
+  it('a body that jumped between two whole frames is not fast', () => {
+    const colours = new Colours(2, [type], 1 / 30);
+    colours.mode = 'speed';
+    colours.follow(sample(1, 0, 0));
+    colours.follow({ ...sample(1.5, 9, 0), changes: Uint8Array.of(3, 0) });
+    colours.follow(sample(2, 9, 0));
+    const tints = new Uint32Array(2);
+    colours.fill(sample(2, 9, 0), 2, tints);
+    expect(tints[0]).toBe(packed(rampColour(0)));
+  });
+
   it('tell type, speed, corrections and their age', () => {
     const colours = new Colours(2, [type], 1 / 30);
     const tints = new Uint32Array(2);

@@ -57,6 +57,17 @@ it('a body that came or jumped is not drawn on its way', () => {
   expect([1, 10]).toContain(Math.round(played.positions[0]));
 });
 
+it('a jump is no way either where the sample that told of it is not kept', () => {
+  const slow = new SlowMotion(1 / 30);
+  slow.setSpeed('1/2');
+  slow.play(sample(1), 1, 0);
+  slow.play(sample(1.4, 3), 1, 13);
+  slow.note(sample(1.6, 0));
+  const played = slow.play(sample(10), 10, 46).sample;
+  expect(played.frame).toBeCloseTo(1.5, 1);
+  expect(played.positions[0]).toBe(10);
+});
+
 it('a new session starts anew', () => {
   const slow = new SlowMotion(1 / 30);
   slow.setSpeed('1/2');
