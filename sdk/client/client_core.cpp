@@ -297,6 +297,17 @@ void ClientCore::start_sampling() {
   if (epoch_ && epoch_->played) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer);
 }
 
+void ClientCore::show_uncorrected(bool on) {
+  if (on == shows_uncorrected_) return;
+  shows_uncorrected_ = on;
+  if (epoch_ && !epoch_->joining) follow_uncorrected();
+}
+
+std::optional<Drift> ClientCore::drift() const {
+  if (phase() != ClientPhase::kPlaying || !epoch_->uncorrected) return std::nullopt;
+  return epoch_->uncorrected->drift();
+}
+
 // While joining again, the last picture is still there to be drawn, as long as it is of this epoch.
 bool ClientCore::sample(Sample& out, SampleMode mode, Now now) {
   const PictureExchange::Reading reading(pictures_);

@@ -92,6 +92,11 @@ class ClientCore {
 
   /// Once before the first sample(): from now on each frame is made ready to be drawn.
   void start_sampling();
+  /// While on, sample() shows the state of the moment it was switched on, or of a later snapshot, only
+  /// predicted from there: see Uncorrected. What is agreed, acknowledged and hashed stays what it is.
+  void show_uncorrected(bool on);
+  /// Of what is shown, at the last frame applied; nothing while it is off or not playing.
+  [[nodiscard]] std::optional<Drift> drift() const;
   /// See Client::sample(). From any thread, at any time: never waits for poll().
   bool sample(Sample& out, SampleMode mode, Now now);
 
@@ -125,6 +130,7 @@ class ClientCore {
   void load(transport::SnapshotMessage&& snapshot, Now now);
   void play(Now now, std::int64_t since_last_poll_ns);
   void play_ahead(Now now);
+  void follow_uncorrected();
   void rejoin(ResyncReason reason, const std::string& why, Now now);
 
   /// Counts what is not of this epoch and this server.
@@ -166,6 +172,7 @@ class ClientCore {
 
   PictureExchange pictures_;
   Sampler sampler_;  ///< in turns: while reading a picture
+  bool shows_uncorrected_ = false;
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   transport::ParticipantId session_from_;

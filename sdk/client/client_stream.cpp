@@ -140,6 +140,7 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
   port_.close_snapshots();
   e.snapshot.clear();
   e.assembly.drop_through(snapshot.frame);
+  follow_uncorrected();
   e.pictures.on_loaded(e.timeline, e.pacer);
   e.joining = false;
   e.played = true;
@@ -189,6 +190,7 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
       rejoin(mismatch ? ResyncReason::kMismatch : ResyncReason::kRefused, why, now);
       return;
     }
+    if (e.uncorrected) e.uncorrected->on_applied(e.timeline);
     e.pictures.on_applied(e.timeline, e.pacer);
     ++statistics_.frames_applied;
     statistics_.payload_bytes += delta->payload.size();
@@ -204,6 +206,16 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
     e.assembly.pop();
     play_ahead(now);
   }
+}
+
+// From the agreed state as it is now.
+void ClientCore::follow_uncorrected() {
+  EpochState& e = *epoch_;
+  e.pictures.draw_instead(nullptr);
+  e.uncorrected.reset();
+  if (!shows_uncorrected_) return;
+  e.uncorrected.emplace(e.stream.layout, e.timeline);
+  e.pictures.draw_instead(&e.uncorrected->state());
 }
 
 // Simulates the frames that the server simulates by now, as far as the lead allows.

@@ -12,6 +12,7 @@
 #include "sdk/client/server_clock.hpp"
 #include "sdk/client/session_check.hpp"
 #include "sdk/client/snapshot_assembly.hpp"
+#include "sdk/client/uncorrected.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/messages.hpp"
 
@@ -48,6 +49,7 @@ struct EpochState {
   LagLimit lag;
   Pacer pacer;
   PictureWriter pictures;
+  std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while somebody wants that
 
   bool stream_open = false;
   bool joining = true;

@@ -15,7 +15,7 @@ void PictureWriter::on_loaded(const ClientTimeline& timeline, const Pacer& pacer
   jumps_.assign(timeline.state(timeline.applied()).capacity(), 0);
   picture_.load = exchange_.count_load();
   picture_.before = nullptr;
-  picture_.agreed = draw(timeline, timeline.applied());
+  picture_.agreed = draw_agreed(timeline);
   draw_ahead(timeline);
   show(pacer);
 }
@@ -27,7 +27,7 @@ void PictureWriter::on_applied(const ClientTimeline& timeline, const Pacer& pace
     if (moved) ++jumps_[record.slot];
   }
   picture_.before = picture_.agreed;
-  picture_.agreed = draw(timeline, timeline.applied());
+  picture_.agreed = draw_agreed(timeline);
   draw_ahead(timeline);
   show(pacer);
 }
@@ -43,13 +43,17 @@ void PictureWriter::on_clock(const Pacer& pacer) {
 }
 
 void PictureWriter::draw_ahead(const ClientTimeline& timeline) {
-  const bool is_ahead = timeline.now() > timeline.applied();
-  picture_.ahead = is_ahead ? draw(timeline, timeline.now()) : picture_.agreed;
+  const bool is_ahead = timeline.now() > timeline.applied() && instead_ == nullptr;
+  picture_.ahead = is_ahead ? draw(timeline.state(timeline.now()), timeline.now()) : picture_.agreed;
 }
 
-const DrawnFrame* PictureWriter::draw(const ClientTimeline& timeline, Frame frame) {
+const DrawnFrame* PictureWriter::draw_agreed(const ClientTimeline& timeline) {
+  return draw(instead_ != nullptr ? *instead_ : timeline.state(timeline.applied()), timeline.applied());
+}
+
+const DrawnFrame* PictureWriter::draw(const State& state, Frame frame) {
   DrawnFrame& drawn = exchange_.unused(picture_);
-  client::draw(timeline.state(frame), frame, jumps_, drawn);
+  client::draw(state, frame, jumps_, drawn);
   return &drawn;
 }
 

@@ -18,6 +18,9 @@ class PictureWriter {
   /// `exchange` must outlive it.
   PictureWriter(PictureExchange& exchange, const transport::SessionMessage& session);
 
+  /// From the next frame on this is drawn as the agreed state, which it must be of; null: the timeline's.
+  void draw_instead(const State* state) { instead_ = state; }
+
   /// A snapshot was loaded, or somebody samples for the first time.
   void on_loaded(const ClientTimeline& timeline, const Pacer& pacer);
   /// After ClientTimeline::apply().
@@ -28,7 +31,8 @@ class PictureWriter {
   void on_clock(const Pacer& pacer);
 
  private:
-  [[nodiscard]] const DrawnFrame* draw(const ClientTimeline& timeline, Frame frame);
+  [[nodiscard]] const DrawnFrame* draw(const State& state, Frame frame);
+  [[nodiscard]] const DrawnFrame* draw_agreed(const ClientTimeline& timeline);
   void draw_ahead(const ClientTimeline& timeline);
   void show(const Pacer& pacer);
   /// False until a first picture was made: there is nothing that it could follow.
@@ -36,6 +40,7 @@ class PictureWriter {
 
   PictureExchange& exchange_;
   Picture picture_;
+  const State* instead_ = nullptr;
   std::vector<std::uint8_t> jumps_;
 };
 

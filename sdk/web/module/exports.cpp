@@ -133,6 +133,10 @@ TANDEM_EXPORT(scene_description) std::size_t tandem_scene_description(Instance* 
   return hand_out(*instance, instance->client.scene_description());
 }
 
+TANDEM_EXPORT(show_uncorrected) void tandem_show_uncorrected(Instance* instance, std::uint32_t on) {
+  instance->client.show_uncorrected(on != 0);
+}
+
 /// Null before the first snapshot.
 TANDEM_EXPORT(sample)
 const SampleView* tandem_sample(Instance* instance, std::uint32_t mode, double steady_ms, double wall_ms) {

@@ -204,7 +204,19 @@ std::string WebClient::status() const {
       .name("gravity")
       .begin_list();
   for (const double axis : gravity(core_)) json.value(axis);
-  json.end_list().name("server");
+  json.end_list().name("uncorrected");
+  if (const auto drift = core_.drift()) {
+    const double unit = core_.session()->lattice_unit;
+    json.begin_object()
+        .member("frames", drift->frames)
+        .member("bodies", drift->bodies)
+        .member("meanDrift", drift->mean * unit)
+        .member("mostDrift", drift->most * unit)
+        .end_object();
+  } else {
+    json.null();
+  }
+  json.name("server");
   server ? write(json, *server) : static_cast<void>(json.null());
   json.end_object();
   return out;

@@ -58,6 +58,8 @@ class WebClient final : private client::CoreListener {
   /// Protobuf text of the session's scene; empty before one is known.
   [[nodiscard]] std::string_view scene_description() const;
 
+  /// As ClientCore::show_uncorrected().
+  void show_uncorrected(bool on) { core_.show_uncorrected(on); }
   /// As Client::sample(). The arrays are valid until the next call.
   [[nodiscard]] const Sample* sample(SampleMode mode, client::Now now);
   /// Of each slot 1 where the last delta applied corrected the body.

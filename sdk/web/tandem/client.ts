@@ -64,6 +64,7 @@ export class Client {
   #payload = new Rate();
   #received = new Rate();
   #lastStatus: ModuleStatus | null = null;
+  #showsUncorrected = false;
   #types: { json: string; types: BodyType[] } = { json: '', types: [] };
 
   /** Resolves when the module is loaded, whether a gateway is there or not. Throws where it cannot be loaded. */
@@ -112,6 +113,16 @@ export class Client {
   /** The bodies as they should be drawn now; null before the first snapshot. Call it once a picture. */
   sample(mode: SampleMode = 'extrapolate'): Sample | null {
     return this.#guard((module) => module.sample(mode)) ?? null;
+  }
+
+  /**
+   * While on, sample() gives the bodies as they were when it was switched on, or at a later join, moved on by prediction and
+   * scheduled inputs alone: what the session would look like without corrections. Costs a step of all bodies a frame.
+   * What is agreed with the server stays what it is. status().uncorrected says how far the bodies have drifted.
+   */
+  showUncorrected(on: boolean): void {
+    this.#showsUncorrected = on;
+    this.#guard((module) => module.showUncorrected(on));
   }
 
   /** Body types of the session; empty before one is known. */
@@ -170,6 +181,7 @@ export class Client {
       clock: this.#clock,
       log: (level, text) => this.#log(level, text),
     });
+    this.#module.showUncorrected(this.#showsUncorrected);
     if (!this.#closed) this.#open();
   }
 

@@ -19,6 +19,7 @@ interface Exports {
   tandem_status(self: number): number;
   tandem_types(self: number): number;
   tandem_scene_description(self: number): number;
+  tandem_show_uncorrected(self: number, on: number): void;
   tandem_sample(self: number, mode: number, steady: number, wall: number): number;
 }
 
@@ -121,6 +122,10 @@ export class Module {
   }
   sceneDescription(): string {
     return this.#text(this.#exports.tandem_scene_description(this.#self));
+  }
+
+  showUncorrected(on: boolean): void {
+    this.#exports.tandem_show_uncorrected(this.#self, on ? 1 : 0);
   }
 
   sample(mode: SampleMode): Sample | null {

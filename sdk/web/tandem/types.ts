@@ -123,7 +123,19 @@ export interface ModuleStatus {
   inputsUnknown: number;
   /** In force, scene units / s^2; zero before a snapshot. */
   gravity: [number, number, number];
+  /** Null unless showUncorrected() is on and a state is held. */
+  uncorrected: Uncorrected | null;
   server: ServerStatus | null;
+}
+
+/** How far the bodies that are shown without corrections are from where they are agreed to be; scene units. */
+export interface Uncorrected {
+  /** Since the last correction. */
+  frames: number;
+  /** Alive in both states. */
+  bodies: number;
+  meanDrift: number;
+  mostDrift: number;
 }
 
 export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {

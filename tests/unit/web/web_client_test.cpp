@@ -116,6 +116,17 @@ TEST_F(WebClientTest, TellsTheGravityInForceInSceneUnits) {
   EXPECT_THAT(viewer.status(), HasSubstr(R"("gravity":[0,-4.21875,0])"));
 }
 
+TEST_F(WebClientTest, TellsHowFarBodiesDriftWithoutCorrections) {
+  join();
+  EXPECT_THAT(viewer.status(), HasSubstr(R"("uncorrected":null)"));
+  viewer.show_uncorrected(true);
+  server.teleport(3);
+  frame();
+  EXPECT_THAT(viewer.status(), HasSubstr(R"("uncorrected":{"frames":1,"bodies":40,"meanDrift":)"));
+  viewer.show_uncorrected(false);
+  EXPECT_THAT(viewer.status(), HasSubstr(R"("uncorrected":null)"));
+}
+
 TEST_F(WebClientTest, InputsLeaveAndTheirOutcomesAreTold) {
   join();
   frame();
