@@ -73,6 +73,22 @@ async function pushBody(page, tap) {
   );
 }
 
+/** Without corrections bodies are drawn elsewhere, while the agreed state goes on; with them they come back. */
+async function switchCorrections(page, stage) {
+  await page.locator('#corrections').click();
+  const off = await until(async () => {
+    const now = await status(page);
+    return now.uncorrected?.frames > 30 && now.uncorrected.meanDrift > 0 && now;
+  }, 'bodies to drift');
+  console.log(`without corrections bodies drifted by ${off.uncorrected.meanDrift.toFixed(3)} m in ${off.uncorrected.frames} frames`);
+  await until(() => page.evaluate(() => /on average/.test(document.getElementById('drift').innerText)), 'the page to say how far');
+  await stage.picture(page, 'uncorrected');
+  await page.locator('#corrections').click();
+  const on = await status(page);
+  check(on.uncorrected === null && on.hashMismatches === 0 && on.resyncs === off.resyncs, 'corrections are not back');
+  await checkPixels(page);
+}
+
 async function checkHealth(page) {
   const now = await status(page);
   check(now.hashMismatches === 0, `${now.hashMismatches} hash mismatches`);
@@ -91,6 +107,7 @@ const scenarios = {
     await checkPixels(page);
     await pushBody(page, (x, y) => page.mouse.click(x, y));
     await dragGravity(page);
+    await switchCorrections(page, stage);
     await checkHealth(page);
     await stage.picture(page, 'smoke');
   },

@@ -3,6 +3,7 @@
 import { Client, type LogLevel, type OutcomeEvent, type Sample, type SampleMode, type Status } from '../tandem';
 import { chooseColours, chooseSpeed, showLegend } from './choices';
 import type { ColourMode } from './colours';
+import { CorrectionsSwitch } from './corrections';
 import { GravityControls } from './gravity_controls';
 import { noticeOf, ripple, showNotice, toast, type Notice } from './notices';
 import { element, Panel, threeDigits, type Drawing } from './panel';
@@ -30,6 +31,7 @@ function gatewayUrl(): string {
 class Page {
   private readonly panel = new Panel();
   private readonly gravity: GravityControls;
+  private readonly corrections: CorrectionsSwitch;
   private world: World | null = null;
   private sceneShown = '';
   private sessionChanged = true;
@@ -59,6 +61,10 @@ class Page {
     chooseSpeed((speed) => {
       this.speed = speed;
       this.world?.slowMotion.setSpeed(speed);
+    });
+    this.corrections = new CorrectionsSwitch((on) => {
+      client.showUncorrected(!on);
+      this.panelsChanged();
     });
     this.followTaps(canvas);
     element('reframe').addEventListener('click', () => this.world && this.stage.frame(this.world.extent));
@@ -136,6 +142,7 @@ class Page {
   private showFigures(): void {
     const status = this.client.status();
     this.panel.update(status, this.drawing());
+    this.corrections.show(status);
     if (Math.hypot(...status.gravity) > 0) this.gravity.show(status.gravity);
     this.gravity.setAllowed(status.phase === 'playing' && status.role === 'participant');
     if (this.world) showLegend(this.world.colours, this.world.types);
@@ -169,6 +176,10 @@ class Page {
     if (!sample || !this.world) return;
     const { origin, direction, pixel } = this.stage.ray(x, y);
     const slot = pick(this.world.slowMotion.seen(sample), this.radii, origin, direction, slackPixels * pixel);
+    if (slot >= 0 && this.client.status().uncorrected) {
+      toast('Where bodies really are is not what you see: switch corrections on to push them', true);
+      return;
+    }
     if (slot < 0 || !sample.alive[slot]) return;
     const centre = Array.from(sample.positions.subarray(3 * slot, 3 * slot + 3)) as Vec3;
     const radius = this.radii[sample.types[slot]];

@@ -2,6 +2,7 @@ import { PerspectiveCamera, Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
 import type { Sample } from '../../tandem';
 import { Colours, packed, parseColour, rampColour } from '../colours';
+import { driftLine } from '../corrections';
 import { niceTop } from '../history';
 import { noticeOf } from '../notices';
 import { threeDigits } from '../panel';
@@ -14,6 +15,13 @@ it('figures have three digits', () => {
 
 it('scales of plots are 1, 2 or 5 times a power of ten', () => {
   expect([0, 0.03, 1, 1.1, 6].map(niceTop)).toEqual([1, 0.05, 1, 2, 10]);
+});
+
+it('what is seen without corrections is said in seconds and metres', () => {
+  const uncorrected = { frames: 90, bodies: 10, meanDrift: 0.4567, mostDrift: 12.34 };
+  const line = driftLine({ uncorrected, frameRateHz: 30, phase: 'playing' });
+  for (const figure of ['3.00 s', '0.457 m', '12.3 m']) expect(line).toContain(figure);
+  expect(driftLine({ uncorrected: null, frameRateHz: 30, phase: 'playing' })).toBe('');
 });
 
 it('every phase but playing says something', () => {
