@@ -43,6 +43,16 @@ std::string header(lws* wsi, lws_token_indexes token) {
   return text;
 }
 
+/// Whether a list of subprotocols, with commas and spaces between them, has this one.
+bool names(std::string_view list, std::string_view wanted) {
+  while (!list.empty()) {
+    const std::size_t size = std::min(list.find_first_of(", \t"), list.size());
+    if (list.substr(0, size) == wanted) return true;
+    list.remove_prefix(std::min(size + 1, list.size()));
+  }
+  return false;
+}
+
 /// One of WebSocket.
 struct Connection {
   ViewerId id = 0;
@@ -89,6 +99,7 @@ struct WebServer::Impl {
   int send_head(lws* wsi, void* user, unsigned status, std::string_view type, std::string_view cache,
                 bool compressed);
   static int send_body(lws* wsi, void* user);
+  static int confirm_upgrade(lws* wsi);
 
   // WebSocket
   int open(lws* wsi, void* user);
@@ -186,16 +197,29 @@ int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, 
     case LWS_CALLBACK_CLOSED_HTTP:
       drop<Exchange>(user);
       return 0;
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+      return confirm_upgrade(wsi);
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-      return -1;  // a WebSocket without our subprotocol
+      return -1;  // asked for by the name of this protocol
     default:
       return 0;
   }
 }
 
+// Without this whoever asks for another WebSocket would only see the connection end.
+int WebServer::Impl::confirm_upgrade(lws* wsi) {
+  const auto refuse = [&](unsigned status, const char* why) {
+    return lws_return_http_status(wsi, status, why) != 0 ? -1 : 1;
+  };
+  if (header(wsi, WSI_TOKEN_GET_URI) != kPath)
+    return refuse(HTTP_STATUS_NOT_FOUND, "the WebSocket is at /tandem");
+  if (!names(header(wsi, WSI_TOKEN_PROTOCOL), kSubprotocol))
+    return refuse(HTTP_STATUS_BAD_REQUEST, "the WebSocket speaks tandem.1 only");
+  return 0;
+}
+
 // The headers are there only now; what is refused is told once a close frame can be sent.
 int WebServer::Impl::open(lws* wsi, void* user) {
-  if (header(wsi, WSI_TOKEN_GET_URI) != kPath) return -1;
   Handler::Request request{
       .origin = header(wsi, WSI_TOKEN_ORIGIN), .host = header(wsi, WSI_TOKEN_HOST), .token = {}};
   std::array<char, 256> token{};

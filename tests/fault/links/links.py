@@ -1,22 +1,25 @@
 #!/usr/bin/env python3
 """Sessions over thin and broken links: a network namespace of this test's own, a token bucket on its loopback.
 
-links.py --tandemd PATH --tandem PATH [--list | --short | CASE ...]
+links.py --tandemd PATH --tandem PATH [--gateway PATH --viewer PATH] [--list | --short | CASE ...]
 
-Without CASE all run, some ten minutes; with --short two of them, in twenty seconds. Exit 0 passed, 1 failed, 77 not run:
+Cases of viewers need a gateway and tests/integration/gateway's viewer, and are left out without. Without CASE all run, some ten minutes; with --short two of them, in twenty seconds. Exit 0 passed, 1 failed, 77 not run:
 namespaces are not allowed here.
 """
 
+import json
 import pathlib
+import re
 import signal
 import socket
 import struct
 import sys
 import threading
 import time
+import urllib.request
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent))
-from stage import Failed, arguments, cut_link, fast_link, link, run  # noqa: E402
+from stage import QUEUE_MS, Failed, arguments, cut_link, fast_link, link, run, shell  # noqa: E402
 
 
 def snapshots(server_report):
@@ -189,6 +192,43 @@ def busy(stage):
     traffic(stage, "participant", 10, 40, path)
 
 
+def thin_viewers(kbit, port):
+    """The rate of everything that a gateway sends its viewers, who stand behind one such link; the rest is fast."""
+    fast = ("rate", "10gbit", "quantum", "60000")
+    shell("tc", "qdisc", "replace", "dev", "lo", "root", "handle", "1:", "htb", "default", "1")
+    shell("tc", "class", "add", "dev", "lo", "parent", "1:", "classid", "1:1", "htb", *fast)
+    shell("tc", "class", "add", "dev", "lo", "parent", "1:", "classid", "1:2", "htb", *fast)
+    shell("tc", "qdisc", "add", "dev", "lo", "parent", "1:2", "tbf", "rate", f"{kbit}kbit", "burst", "4000",
+          "latency", f"{QUEUE_MS}ms")  # fmt: skip
+    shell("tc", "filter", "add", "dev", "lo", "parent", "1:", "protocol", "ip", "u32", "match", "ip", "sport", str(port),
+          "0xffff", "flowid", "1:2")  # fmt: skip
+
+
+def viewer(stage, bodies, kbit):
+    """A viewer joins a gateway over a thin link and plays: one snapshot at the link's pace, nothing left out."""
+    server = stage.server(bodies)
+    gateway = stage.start(stage.options.gateway, "--port", 0)
+    gateway.wait_for("playing from frame", 30)
+    time.sleep(15)  # bodies in order make a snapshot small
+    port = next(int(found[1]) for _, line in gateway.lines if (found := re.search(r"http://127.0.0.1:(\d+)/", line)))
+    thin_viewers(kbit, port)
+    joined = stage.start(stage.options.viewer, "--port", port, "--seconds", 20, "--timeout", 70)
+    report = joined.output(90)
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=20) as answer:
+        health = json.load(answer)
+    served = server.stop()
+    limit = 1.5 * 20 * bodies * 8 / (kbit * 1000) + 3  # for a snapshot of 20 bytes a body
+    print(f"  playing after {report['join_ms'] / 1000:.1f} s (limit {limit:.1f}); "
+          f"{report['frames_applied']} frames in 20 s, {health['snapshots']} snapshots, {health['fell_behind']} skips, "
+          f"{report['resyncs']} rejoins, round trip {report['round_trip_ms']:.0f} ms; server: {served['stalls']} stalls")  # fmt: skip
+    if report["join_ms"] > 1000 * limit:
+        raise Failed("joined too late")
+    if report["hash_mismatches"] or report["resyncs"] or health["fell_behind"] or health["snapshots"] > 1:
+        raise Failed(f"{report}, {health}")
+    if report["frames_applied"] < 0.95 * 20 * 30:
+        raise Failed(f"{report['frames_applied']} frames in 20 s")
+
+
 CASES = {
     "join_10000_at_512": lambda stage: join(stage, 10_000, 512),
     "join_10000_at_256": lambda stage: join(stage, 10_000, 256, settle=20),
@@ -204,6 +244,9 @@ CASES = {
     "traffic_participants": lambda stage: traffic(stage, "participant", 10, 20),
     "traffic_inputs": busy,
 }
+VIEWERS = {
+    "viewer_10000_at_256": lambda stage: viewer(stage, 10_000, 256),
+}
 
 
 SHORT = ["join_10000_at_512", "lost_0.5_s"]
@@ -211,8 +254,10 @@ SHORT = ["join_10000_at_512", "lost_0.5_s"]
 
 def main():
     parser = arguments(__doc__, "a thin and a lost link alone")
+    parser.add_argument("--gateway", type=pathlib.Path)
+    parser.add_argument("--viewer", type=pathlib.Path)
     options = parser.parse_args()
-    return run(CASES, SHORT if options.short else options.cases, parser, options)
+    return run({**CASES, **(VIEWERS if options.gateway and options.viewer else {})}, SHORT if options.short else options.cases, parser, options)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ import json
 import pathlib
 import re
 import socket
+import ssl
+import subprocess
 import sys
 import tempfile
 import urllib.error
@@ -167,10 +169,16 @@ def refusals(stage):
         b"GET %s HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n%s\r\n"
     )
-    for path, protocol in ((b"/other", b"Sec-WebSocket-Protocol: tandem.1\r\n"), (b"/tandem", b""),
-                           (b"/tandem", b"Sec-WebSocket-Protocol: tandem.9\r\n")):  # fmt: skip
-        if b" 101 " in raw(stage.port, upgrade % (path, protocol)):
-            raise Failed(f"{path} with {protocol} is a WebSocket")
+    for status, path, protocol in (
+        (b" 404 ", b"/other", b"Sec-WebSocket-Protocol: tandem.1\r\n"),
+        (b" 400 ", b"/tandem", b""),
+        (b" 400 ", b"/tandem", b"Sec-WebSocket-Protocol: tandem.9\r\n"),
+        (b" 400 ", b"/tandem", b"Sec-WebSocket-Protocol: http\r\n"),
+        (b" 101 ", b"/tandem", b"Sec-WebSocket-Protocol: tandem.9, tandem.1\r\n"),
+    ):
+        answer = raw(stage.port, upgrade % (path, protocol))
+        if status not in answer[:20]:
+            raise Failed(f"{path} with {protocol}: {answer[:200]}")
     raw(stage.port, b"\x16\x03\x01" + bytes(range(256)) * 20)
     raw(stage.port, b"GET /" + b"x" * 100_000 + b" HTTP/1.1\r\n\r\n")
     for path in ("/../token", "/%2e%2e/token", "//etc/passwd", "/site/../../token"):
@@ -184,7 +192,7 @@ def refusals(stage):
     counted = stage.health()["refused"]
     stage.stop("server")
     check_viewer(stage, "good", ["server"], 200, report)
-    wanted = {"token missing or wrong": 2, "origin not allowed": 1, "too many viewers": 1, "malformed message": 1,
+    wanted = {"token missing or wrong": 3, "origin not allowed": 1, "too many viewers": 1, "malformed message": 1,
               "message too large": 1}  # fmt: skip
     if any(counted[reason] != count for reason, count in wanted.items()):
         raise Failed(f"counted: {counted}")
@@ -216,7 +224,80 @@ def refusals(stage):
     ends(2, "--no-such-flag")
 
 
-SCENARIOS = {scenario.__name__: scenario for scenario in (viewers, restarts, refusals)}
+def certificate(stage, name):
+    """For `localhost`, and its own authority."""
+    cert, key = stage.folder / f"{name}.crt", stage.folder / f"{name}.key"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
+         "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", cert],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    return cert, key
+
+
+def doors(stage):
+    """Through TLS with a token, and over IPv6: viewers hold the server's state, and whoever speaks otherwise stays out."""
+    token = stage.folder / "token"
+    token.write_text(TOKEN + "\n", encoding="ascii")
+    cert, key = certificate(stage, "its own")
+    stage.server("server")
+    stage.gateway("six", "--listen", "::1")
+    six, stage.port = stage.port, 0
+    stage.gateway("tls", "--tls-cert", cert, "--tls-key", key, "--token-file", token)
+    tls = stage.port
+    stage.viewer("encrypted", "--seconds", 6, "--tls-ca", cert, "--query", f"?token={TOKEN}", "--input-every", 0.3)
+    stage.port = six
+    stage.viewer("over six", "--seconds", 6, "--address", "::1", "--input-every", 0.3)
+    stage.port = tls
+    stage.wait(lambda: len(stage.hashes("encrypted")) > 10, "a viewer to play through TLS")
+
+    def refused(name, codes, *arguments):
+        stage.viewer(name, "--once", "--seconds", 5, "--timeout", 10, *arguments, log=False)
+        report = stage.end(name)
+        if report["frames_applied"] or [close["code"] for close in report["closed"]] != codes:
+            raise Failed(f"{name}: {report}")
+        print(f"  {name}: {report['closed'] or 'no connection'}")
+
+    refused("wrong token", [4001], "--tls-ca", cert, "--query", f"?token={TOKEN[:-1]}x")
+    refused("unencrypted", [], "--query", f"?token={TOKEN}")
+    other, _ = certificate(stage, "another")
+    refused("another authority", [], "--tls-ca", other, "--query", f"?token={TOKEN}")
+    if b"HTTP/1.1 200" in raw(tls, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"):
+        raise Failed("served without TLS where there is TLS")
+    trusted = ssl.create_default_context(cafile=cert)
+    with urllib.request.urlopen(f"https://localhost:{tls}/healthz", timeout=10, context=trusted) as answer:
+        if json.load(answer)["refused"]["token missing or wrong"] != 1:
+            raise Failed("the wrong token was not counted")
+    with urllib.request.urlopen(f"http://[::1]:{six}/", timeout=10) as answer:
+        if answer.read() != b"<p>viewer":
+            raise Failed("the page is not served over IPv6")
+    reports = {name: stage.end(name) for name in ("encrypted", "over six")}
+    stage.stop("server")
+    for name, report in reports.items():
+        check_viewer(stage, name, ["server"], 120, report)
+        if not report["inputs_acted"]:
+            raise Failed(f"{name}: no input acted: {report}")
+
+
+def sleeper(stage):
+    """A viewer that reads nothing any more is let go after half a minute, and nobody else notices."""
+    stage.server("server", "--codec", "none", bodies=10_000)  # 55 Mbit/s fill every buffer at once
+    stage.gateway("gateway")
+    stage.viewer("awake", "--seconds", 45)
+    stage.viewer("asleep", "--seconds", 60, "--sleep-after", 1, log=False)
+    stage.wait(lambda: stage.health()["viewers"] == 2, "two viewers")
+    stage.wait(lambda: stage.health()["refused"]["nothing was read for too long"] == 1, "the sleeper to be let go")
+    played = len(stage.hashes("awake"))
+    stage.wait(lambda: stage.health()["viewers"] == 1, "one viewer")
+    print(f"  let go after {played} frames")
+    if played < 600:
+        raise Failed(f"let go after {played} frames")
+    report = stage.end("awake")
+    stage.stop("server")
+    check_viewer(stage, "awake", ["server"], 900, report)
+
+
+SCENARIOS = {scenario.__name__: scenario for scenario in (viewers, restarts, refusals, doors, sleeper)}
 
 
 def main():

@@ -24,6 +24,8 @@ using namespace tandem;
 
 struct Options {
   int port = 0;
+  std::string address = "127.0.0.1";
+  std::string tls_ca;  // trusted for `localhost`; empty: no TLS
   std::string query, origin, hash_log, session = "default";
   double seconds = 0;             // since the first applied frame
   double timeout = 60;            // of everything
@@ -44,6 +46,10 @@ class Viewer final : private client::CoreListener {
     info.protocols = protocols_.data();
     info.user = this;
     info.options = LWS_SERVER_OPTION_JUST_USE_RAW_ORIGIN;
+    if (!options.tls_ca.empty()) {
+      info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+      info.client_ssl_ca_filepath = options_.tls_ca.c_str();
+    }
     context_ = lws_create_context(&info);
   }
   ~Viewer() override {
@@ -77,6 +83,7 @@ class Viewer final : private client::CoreListener {
             {"resyncs", status.resyncs},
             {"refused_messages", status.refused_messages},
             {"connections", connections_},
+            {"failures", failures_},
             {"epochs", core_.statistics().epochs},
             {"join_ms", status.join_ms},
             {"latency_ms_p50", status.latency_ms_p50},
@@ -111,7 +118,9 @@ class Viewer final : private client::CoreListener {
     const std::string path = "/tandem" + options_.query;
     lws_client_connect_info info{};
     info.context = context_;
-    info.address = info.host = "127.0.0.1";
+    info.address = options_.address.c_str();
+    info.host = options_.tls_ca.empty() ? info.address : "localhost";
+    info.ssl_connection = options_.tls_ca.empty() ? 0 : LCCSCF_USE_SSL;
     info.port = options_.port;
     info.path = path.c_str();
     info.origin = options_.origin.empty() ? nullptr : options_.origin.c_str();
@@ -227,6 +236,8 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app{"A viewer of tandem-gateway for tests."};
   app.add_option("--port", options.port)->required();
+  app.add_option("--address", options.address);
+  app.add_option("--tls-ca", options.tls_ca);
   app.add_option("--query", options.query);
   app.add_option("--origin", options.origin);
   app.add_option("--session", options.session);
