@@ -19,7 +19,7 @@
 #include "sdk/client/status_report.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/port.hpp"
-#include "tandem/client.hpp"
+#include "tandem/client_types.hpp"
 
 namespace tandem::client {
 
@@ -81,6 +81,8 @@ class ClientCore {
   [[nodiscard]] const transport::SessionMessage* session() const;
   /// The one of its streams that is played or joined; null while there is none.
   [[nodiscard]] const transport::StreamMessage* stream() const;
+  /// The writer of the session's announcement lives, as the last poll() saw it.
+  [[nodiscard]] bool server_alive() const { return server_alive_; }
   /// Null unless playing.
   [[nodiscard]] const ClientTimeline* timeline() const;
   /// Wall clock of the server at a steady time of this client's, as far as known.

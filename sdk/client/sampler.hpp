@@ -7,7 +7,7 @@
 
 #include "sdk/client/picture.hpp"
 #include "sdk/client/rotation.hpp"
-#include "tandem/client.hpp"
+#include "tandem/client_types.hpp"
 
 namespace tandem::client {
 

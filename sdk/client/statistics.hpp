@@ -7,7 +7,7 @@
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/units.hpp"
-#include "tandem/client.hpp"
+#include "tandem/client_types.hpp"
 
 namespace tandem::client {
 

@@ -1,173 +1,243 @@
-// tandem::Client: a ClientCore with a clock, a DDS port and, if wanted, a thread.
-#include "tandem/client.hpp"
-#include "sdk/core/timeline/timeline.hpp"
-
-#include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <mutex>
-#include <thread>
+// tandem.h: joining, events and input.
+#include <cmath>
+#include <string>
 #include <utility>
 
 #include "sdk/client/api/client_id.hpp"
+#include "sdk/client/api/clients.hpp"
 #include "sdk/client/api/clock.hpp"
-#include "sdk/client/client_core.hpp"
+#include "sdk/client/api/join.hpp"
+#include "sdk/client/api/structs.hpp"
+#include "sdk/client/reply_reason.hpp"
+#include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/limits.hpp"
 
-namespace tandem {
+namespace tandem::api {
+
+Registry<RunningClient>& clients() {
+  static auto* const all = new Registry<RunningClient>;
+  return *all;
+}
+
 namespace {
 
-constexpr double kLongestWaitS = 1e6;
+static_assert(TANDEM_SEARCHING == static_cast<int>(ClientPhase::kSearching) &&
+              TANDEM_REFUSED == static_cast<int>(ClientPhase::kRefused) &&
+              TANDEM_JOINING == static_cast<int>(ClientPhase::kJoining) &&
+              TANDEM_PLAYING == static_cast<int>(ClientPhase::kPlaying));
+static_assert(TANDEM_OBSERVER == static_cast<int>(ClientRole::kObserver) &&
+              TANDEM_PARTICIPANT == static_cast<int>(ClientRole::kParticipant));
+static_assert(TANDEM_LOG_INFO == static_cast<int>(LogLevel::kInfo) &&
+              TANDEM_LOG_WARNING == static_cast<int>(LogLevel::kWarning) &&
+              TANDEM_LOG_ERROR == static_cast<int>(LogLevel::kError));
 
-client::CoreOptions core_options(const ClientOptions& options) {
+const char* session_of(const tandem_options& options) {
+  return options.session != nullptr ? options.session : "default";
+}
+
+tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
+  if (theirs != nullptr) {
+    if (const auto read = read_struct(theirs, ours); read != TANDEM_OK) return read;
+  }
+  if (const auto named = transport::check_session_name(session_of(ours)); !named)
+    return refuse(named.error());
+  if (ours.domain > transport::kMaxDomain) {
+    return refuse(TANDEM_INVALID_ARGUMENT, "a DDS domain is 0 to 230");
+  }
+  if (ours.role != TANDEM_OBSERVER && ours.role != TANDEM_PARTICIPANT) {
+    return refuse(TANDEM_INVALID_ARGUMENT, "a role is TANDEM_OBSERVER or TANDEM_PARTICIPANT");
+  }
+  if (ours.lead > kMaxLead) return refuse(TANDEM_INVALID_ARGUMENT, "a lead is 0 or 1");
+  if (ours.background > 1 || ours.echo > 1) {
+    return refuse(TANDEM_INVALID_ARGUMENT, "background and echo are 0 or 1");
+  }
+  return kOk;
+}
+
+client::CoreOptions core_options(const tandem_options& options) {
   client::CoreOptions core;
-  core.session = options.session;
+  core.session = session_of(options);
   core.id = client::random_client_id();
-  core.role =
-      options.role == ClientRole::kObserver ? transport::Role::kObserver : transport::Role::kParticipant;
+  core.role = static_cast<transport::Role>(options.role);
   core.lead = options.lead;
-  core.log = options.log;
   core.measure_ns = transport::steady_ns;
+  if (options.log != nullptr) {
+    core.log = [log = options.log, user = options.user](LogLevel level, std::string_view line) {
+      const std::string text(line);
+      const CallbackScope scope;
+      log(user, static_cast<tandem_log_level>(level), text.c_str());
+    };
+  }
   return core;
+}
+
+tandem_result add_client(const tandem_options& options, client::CoreOptions core,
+                         std::unique_ptr<transport::ClientPort> port, RunningClient::Clock clock,
+                         tandem_client* client) {
+  *client = clients().add(std::make_unique<RunningClient>(
+      std::move(core), std::move(port), clock != nullptr ? clock : client::now, options.background != 0));
+  return kOk;
+}
+
+tandem_result send(tandem_client handle, transport::InputKind kind, std::vector<double> values,
+                   transport::Bytes bytes, std::uint64_t* number) {
+  return with_client(handle, [&](RunningClient& client) {
+    const auto sent = client.send(kind, std::move(values), std::move(bytes));
+    if (!sent) return refuse(sent.error());
+    if (number != nullptr) *number = *sent;
+    return kOk;
+  });
 }
 
 }  // namespace
 
-// The port waits without the lock, so that nobody waits for the network; sample() does without it but once.
-struct Client::Impl {
-  Impl(client::CoreOptions core_opts, std::unique_ptr<transport::ClientPort> client_port)
-      : port(std::move(client_port)), core(std::move(core_opts), *port) {}
+tandem_result join_over(std::unique_ptr<transport::ClientPort> port, RunningClient::Clock clock,
+                        const tandem_options* options, tandem_client* client) noexcept {
+  return call([&] {
+    if (client == nullptr) return null_pointer("`client` is null");
+    tandem_options ours = TANDEM_OPTIONS_INIT;
+    if (const auto read = read_options(options, ours); read != TANDEM_OK) return read;
+    return add_client(ours, core_options(ours), std::move(port), clock, client);
+  });
+}
 
-  ~Impl() {
-    ending = true;
-    port->wake();
-    if (thread.joinable()) thread.join();
+}  // namespace tandem::api
+
+using namespace tandem;  // what follows is C
+using namespace tandem::api;
+
+tandem_result tandem_join(const tandem_options* options, tandem_client* client) noexcept {
+  return call([&] {
+    if (client == nullptr) return null_pointer("`client` is null");
+    tandem_options ours = TANDEM_OPTIONS_INIT;
+    if (const auto read = read_options(options, ours); read != TANDEM_OK) return read;
+    auto core = core_options(ours);
+    transport::DdsOptions dds;
+    dds.domain = ours.domain;
+    dds.session = core.session;
+    dds.client = core.id;
+    if (ours.role == TANDEM_OBSERVER) dds.lease = transport::DdsOptions::kObserverLease;
+    auto port = transport::make_dds_client_port(dds);
+    if (!port) return refuse(port.error());
+    return add_client(ours, std::move(core), std::move(*port), nullptr, client);
+  });
+}
+
+tandem_result tandem_leave(tandem_client client) noexcept {
+  return call([&] {
+    const auto left = clients().remove(client, [](RunningClient& ending) { ending.end(); });
+    if (left == nullptr) return refuse(TANDEM_INVALID_HANDLE, "no such client, or it was closed");
+    return kOk;
+  });
+}
+
+tandem_result tandem_update(tandem_client client, double wait_s) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (std::isnan(wait_s)) return refuse(TANDEM_INVALID_ARGUMENT, "a time to wait is a number");
+    const auto updated = running.update(wait_s);
+    return updated ? kOk : refuse(updated.error());
+  });
+}
+
+tandem_result tandem_wait_until_playing(tandem_client client, double timeout_s) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (std::isnan(timeout_s)) return refuse(TANDEM_INVALID_ARGUMENT, "a time to wait is a number");
+    const auto played = running.wait_until_playing(timeout_s);
+    return played ? kOk : refuse(played.error());
+  });
+}
+
+tandem_result tandem_get_status(tandem_client client, tandem_status* status) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (const auto checked = check_struct(status); checked != TANDEM_OK) return checked;
+    const auto known = running.status();
+    if (!known) return refuse(known.error());
+    const ClientStatus& s = *known;
+    tandem_status out = TANDEM_STATUS_INIT;
+    out.phase = static_cast<tandem_phase>(s.phase);
+    out.role = static_cast<tandem_role>(s.role);
+    out.lead = s.lead;
+    out.server_alive = s.server_alive ? 1 : 0;
+    out.queue_high_water = s.queue_high_water;
+    out.client_id = s.client_id;
+    out.epoch = s.epoch;
+    out.frame = s.frame;
+    out.state_hash = s.state_hash;
+    out.frames_applied = s.frames_applied;
+    out.resyncs = s.resyncs;
+    out.hash_mismatches = s.hash_mismatches;
+    out.refused_messages = s.refused_messages;
+    out.payload_bytes = s.payload_bytes;
+    out.inputs_sent = s.inputs_sent;
+    out.inputs_acted = s.inputs_acted;
+    out.inputs_refused = s.inputs_refused;
+    out.inputs_unknown = s.inputs_unknown;
+    out.events_dropped = running.events_dropped();
+    out.frame_rate_hz = s.frame_rate_hz;
+    out.mbit_per_s = s.mbit_per_s;
+    out.latency_ms_p50 = s.latency_ms_p50;
+    out.latency_ms_p99 = s.latency_ms_p99;
+    out.input_latency_ms_p50 = s.input_latency_ms_p50;
+    out.input_latency_ms_p99 = s.input_latency_ms_p99;
+    out.client_ms_p50 = s.client_ms_p50;
+    out.client_ms_p99 = s.client_ms_p99;
+    out.join_ms = s.join_ms;
+    out.round_trip_ms = s.round_trip_ms;
+    out.jitter_ms = s.jitter_ms;
+    write_text(s.scene, out.scene);
+    write_text(s.reason, out.reason);
+    write_struct(out, status);
+    return kOk;
+  });
+}
+
+tandem_result tandem_next_event(tandem_client client, tandem_event* event) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (const auto checked = check_struct(event); checked != TANDEM_OK) return checked;
+    const auto next = running.next_event();
+    if (!next) return refuse(TANDEM_NOT_READY, "no event");
+    tandem_event out = TANDEM_EVENT_INIT;
+    out.kind = next->kind;
+    out.number = next->number;
+    out.frame = next->frame;
+    out.epoch = next->epoch;
+    out.at_ns = next->at_ns;
+    out.reason = next->reason;
+    out.dropped = next->dropped;
+    write_text(next->reason != 0 ? client::describe(next->reason) : next->text, out.text);
+    write_struct(out, event);
+    return kOk;
+  });
+}
+
+tandem_result tandem_send_gravity(tandem_client client, const double scene_units_per_s2[3],
+                                  uint64_t* number) noexcept {
+  if (scene_units_per_s2 == nullptr) return null_pointer("`scene_units_per_s2` is null");
+  return call([&] {
+    return send(client, transport::InputKind::kGravity, {scene_units_per_s2, scene_units_per_s2 + 3}, {},
+                number);
+  });
+}
+
+tandem_result tandem_send_push(tandem_client client, const double centre[3], double radius,
+                               const double velocity[3], uint64_t* number) noexcept {
+  if (centre == nullptr || velocity == nullptr) return null_pointer("`centre` or `velocity` is null");
+  return call([&] {
+    return send(client, transport::InputKind::kPush,
+                {centre[0], centre[1], centre[2], radius, velocity[0], velocity[1], velocity[2]}, {}, number);
+  });
+}
+
+tandem_result tandem_send_bytes(tandem_client client, const void* bytes, size_t count,
+                                uint64_t* number) noexcept {
+  if (bytes == nullptr && count != 0) return null_pointer("`bytes` is null");
+  if (count > transport::kMaxInputBytes) {
+    return refuse(TANDEM_INVALID_ARGUMENT, "an input holds at most 1,024 bytes");
   }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-  Impl(Impl&&) = delete;
-  Impl& operator=(Impl&&) = delete;
-
-  /// One round; waits at most `longest_ns` for the next thing to do.
-  void round(std::int64_t longest_ns) {
-    std::int64_t due_ns = 0;
-    {
-      const std::lock_guard lock(mutex);
-      due_ns = core.poll(client::now());
-    }
-    const std::int64_t wait_ns = std::min(longest_ns, due_ns - transport::steady_ns());
-    if (wait_ns > 0 && !ending) port->wait(std::chrono::nanoseconds(wait_ns));
-  }
-
-  Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes) {
-    const std::lock_guard lock(mutex);
-    return core.send(kind, std::move(values), std::move(bytes), client::now());
-  }
-
-  std::unique_ptr<transport::ClientPort> port;
-  mutable std::mutex mutex;  // guards core but for its sample(); port->wait() and wake() need no guard
-  client::ClientCore core;
-  std::atomic<bool> sampling = false;
-  std::atomic<bool> ending = false;
-  std::thread thread;
-};
-
-Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Client::Client(Client&&) noexcept = default;
-Client& Client::operator=(Client&&) noexcept = default;
-Client::~Client() = default;
-
-Result<Client> Client::connect(const ClientOptions& options) {
-  if (auto ok = transport::check_session_name(options.session); !ok) return tl::unexpected<Error>(ok.error());
-  if (options.domain > transport::kMaxDomain) {
-    return fail(ErrorCode::kInvalidArgument, "a DDS domain is 0 to " + std::to_string(transport::kMaxDomain));
-  }
-  if (options.lead > kMaxLead) return fail(ErrorCode::kInvalidArgument, "a lead is 0 or 1");
-  auto core = core_options(options);
-  transport::DdsOptions dds;
-  dds.domain = options.domain;
-  dds.session = options.session;
-  dds.client = core.id;
-  if (options.role == ClientRole::kObserver) dds.lease = transport::DdsOptions::kObserverLease;
-  auto port = transport::make_dds_client_port(dds);
-  if (!port) return tl::unexpected<Error>(port.error());
-  auto impl = std::make_unique<Impl>(std::move(core), std::move(*port));
-  if (options.background) {
-    impl->thread = std::thread([self = impl.get()] {
-      constexpr std::int64_t kLongestNs = 100'000'000;
-      while (!self->ending) self->round(kLongestNs);
-    });
-  }
-  return Client(std::move(impl));
+  return call([&] {
+    const auto* first = static_cast<const std::byte*>(bytes);
+    return send(client, transport::InputKind::kApplication, {},
+                count == 0 ? transport::Bytes{} : transport::Bytes(first, first + count), number);
+  });
 }
-
-void Client::poll(double wait_s) {
-  if (impl_->thread.joinable()) return;
-  impl_->round(static_cast<std::int64_t>(std::clamp(wait_s, 0.0, kLongestWaitS) * 1e9));
-}
-
-ClientStatus Client::status() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->core.status();
-}
-
-void Client::run_for(double seconds) {
-  using Clock = std::chrono::steady_clock;
-  const std::chrono::duration<double> span(std::clamp(seconds, 0.0, kLongestWaitS));
-  if (impl_->thread.joinable()) return std::this_thread::sleep_for(span);
-  for (const auto end = Clock::now() + span; Clock::now() < end;) {
-    poll(std::chrono::duration<double>(end - Clock::now()).count());
-  }
-}
-
-bool Client::wait_until_playing(double timeout_s) {
-  constexpr double kStepS = 0.01;
-  const auto playing = [this] {
-    const std::lock_guard lock(impl_->mutex);
-    return impl_->core.phase() == ClientPhase::kPlaying;
-  };
-  for (double waited_s = 0; !playing() && waited_s < timeout_s; waited_s += kStepS) run_for(kStepS);
-  return playing();
-}
-
-Result<std::uint64_t> Client::send_gravity(std::array<double, 3> metres_per_s2) {
-  return impl_->send(transport::InputKind::kGravity, {metres_per_s2.begin(), metres_per_s2.end()}, {});
-}
-
-Result<std::uint64_t> Client::send_push(std::array<double, 3> centre, double radius,
-                                        std::array<double, 3> velocity) {
-  return impl_->send(transport::InputKind::kPush,
-                     {centre[0], centre[1], centre[2], radius, velocity[0], velocity[1], velocity[2]}, {});
-}
-
-Result<std::uint64_t> Client::send_bytes(std::span<const std::byte> bytes) {
-  return impl_->send(transport::InputKind::kApplication, {}, {bytes.begin(), bytes.end()});
-}
-
-std::vector<BodyTypeInfo> Client::types() const {
-  const std::lock_guard lock(impl_->mutex);
-  std::vector<BodyTypeInfo> out;
-  if (const auto* session = impl_->core.session()) {
-    for (const auto& type : session->types) {
-      out.push_back({type.name, type.radius, type.colour_rgba, type.shape, type.shape_values});
-    }
-  }
-  return out;
-}
-
-std::string Client::scene_description() const {
-  const std::lock_guard lock(impl_->mutex);
-  const auto* session = impl_->core.session();
-  return session != nullptr ? session->scene_description : std::string();
-}
-
-bool Client::sample(Sample& out, SampleMode mode) {
-  if (!impl_->sampling) {
-    const std::lock_guard lock(impl_->mutex);
-    impl_->core.start_sampling();
-    impl_->sampling = true;
-  }
-  return impl_->core.sample(out, mode, client::now());
-}
-
-}  // namespace tandem

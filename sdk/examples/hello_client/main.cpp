@@ -13,5 +13,5 @@ int main() {
     const float* p = bodies.positions.data();
     std::printf("frame %.1f: body 0 at %.2f %.2f %.2f\n", bodies.frame, p[0], p[1], p[2]);
   }
-  return client->status().hash_mismatches == 0 ? 0 : 1;
+  return client->status()->hash_mismatches == 0 ? 0 : 1;
 }

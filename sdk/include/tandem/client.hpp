@@ -1,76 +1,46 @@
 #pragma once
-// tandem::Client: joins a session, holds its bodies bit-identically with the server, sends input, samples for
-// rendering. Provisional: names may still change before 1.0.
+// tandem::Client: the functions of tandem/tandem.h, which says what each of them does, for C++20. Header only:
+// what is linked is the C library.
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "tandem/body_shape.hpp"
-#include "tandem/export.hpp"
+#include "tandem/client_types.hpp"
 #include "tandem/result.hpp"
+#include "tandem/tandem.h"
 
 namespace tandem {
 
-/// A participant may send input and the server waits for it, within limits; an observer only watches.
-enum class ClientRole : std::uint8_t { kObserver = 0, kParticipant = 1 };
-
-enum class ClientPhase : std::uint8_t {
-  kSearching = 0,  ///< no live server of that session seen
-  kRefused = 1,    ///< a session is there, but this client cannot play it; `ClientStatus::reason` says why
-  kJoining = 2,    ///< waiting for a snapshot
-  kPlaying = 3,    ///< holds the agreed state and follows it
-};
-
-enum class LogLevel : std::uint8_t { kInfo = 0, kWarning = 1, kError = 2 };
-
+/// What Client::connect() is told.
 struct ClientOptions {
   std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
   std::uint32_t domain = 0;         ///< DDS domain, 0..230
   ClientRole role = ClientRole::kParticipant;
   std::uint32_t lead = 1;  ///< frames to simulate beyond the last delta; clamped to what the session allows
-  /// True: a thread of the client's own does the work. False: the application calls poll() often (at least
+  /// True: a thread of the client's own does the work. False: the application calls update() often (at least
   /// once a frame), and everything happens in there.
   bool background = true;
-  /// One line for a human. Called from the thread that polls; must return soon, and must not call the client.
-  std::function<void(LogLevel, std::string_view)> log;
+  /// EXPERIMENTAL. sample() shows the application's own gravity before the server has said when it acts.
+  bool echo = false;
+  /// One line for a human. Called from the thread that does the work; must return soon, and must not call the
+  /// client. What it throws is dropped.
+  std::function<void(LogLevel, std::string_view)> log = {};
 };
 
-/// Figures since connect(). Times in milliseconds, percentiles over all frames.
-struct ClientStatus {
-  ClientPhase phase = ClientPhase::kSearching;
-  ClientRole role = ClientRole::kObserver;  ///< as granted by the server
-  std::uint64_t client_id = 0;
-  bool server_alive = false;
-  std::string reason;  ///< why the role or the phase is not what was asked for; empty when it is
-  std::string scene;
-  std::uint64_t epoch = 0;       ///< of the server's run; 0 before the first
-  std::uint64_t frame = 0;       ///< last frame agreed with the server
-  std::uint64_t state_hash = 0;  ///< of that frame
-  double frame_rate_hz = 0;
-  std::uint32_t lead = 0;  ///< in force; lower than asked for when the session allows less
-  std::uint64_t frames_applied = 0;
-  std::uint64_t resyncs = 0;  ///< joins after the first one of an epoch
-  std::uint64_t hash_mismatches = 0;
-  std::uint64_t refused_messages = 0;  ///< bytes that broke a rule of the protocol
-  std::uint64_t payload_bytes = 0;
-  double mbit_per_s = 0;                          ///< of payload since the first frame; 2^20 bits to the Mbit
-  double latency_ms_p50 = 0, latency_ms_p99 = 0;  ///< publish to applied; needs one clock for both hosts
-  double input_latency_ms_p50 = 0,
-         input_latency_ms_p99 = 0;              ///< sent until the frame it acted on was applied
-  double client_ms_p50 = 0, client_ms_p99 = 0;  ///< decode, apply and simulate, a frame
-  double join_ms = 0;  ///< last join: from learning of the session, or of the loss, to playing
-  double round_trip_ms = 0, jitter_ms = 0;
-  std::uint64_t inputs_sent = 0, inputs_acted = 0, inputs_refused = 0, inputs_unknown = 0;
-  std::uint32_t queue_high_water = 0;  ///< deltas that waited at once, at most
-};
-
+/// What a type of bodies looks like.
 struct BodyTypeInfo {
   std::string name;
   float radius = 0;               ///< of the sphere that holds the body; scene units
@@ -79,84 +49,284 @@ struct BodyTypeInfo {
   std::vector<float> shape_values = {};  ///< as the shape says
 };
 
-enum class BodyChange : std::uint8_t {
-  kNone = 0,
-  kNew = 1,     ///< was not there, or another body took its slot
-  kGone = 2,    ///< was there in the previous sample
-  kJumped = 3,  ///< the same body at another place: teleported, or this client had to join again
+/// Where Client::sample() puts one value of each body: a plain array, or a member of an array of structs.
+/// Empty: not wanted.
+template <class T>
+class Column {
+ public:
+  Column() = default;
+  /// `first`: of the first body; `stride_bytes` from one body's to the next's, 0: side by side.
+  Column(T* first, std::size_t stride_bytes = 0) : first_(first), stride_(stride_bytes) {}
+  /// A member of each struct: a T, or a struct or array that begins with as many T as a body has of them.
+  template <class Struct, class Member>
+  Column(std::span<Struct> bodies, Member Struct::*member)
+      : first_(bodies.empty() ? nullptr : reinterpret_cast<T*>(&(bodies.front().*member))),
+        stride_(sizeof(Struct)) {}
+
+  [[nodiscard]] T* first() const { return first_; }
+  [[nodiscard]] std::size_t stride_bytes() const { return stride_; }
+
+ private:
+  T* first_ = nullptr;
+  std::size_t stride_ = 0;
 };
 
-enum class SampleMode : std::uint8_t {
-  kInterpolate = 0,  ///< between the last two agreed frames: always true, a frame late
-  kExtrapolate = 1,  ///< at the server's time: predicted, with corrections blended in over about 0.1 s
+/// As tandem_columns.
+struct Columns {
+  std::size_t capacity = 0;  ///< bodies that every column has room for
+  Column<float> positions = {}, velocities = {}, orientations = {}, angular_velocities = {};
+  Column<std::uint16_t> types = {};
+  Column<std::uint8_t> alive = {}, reuse = {}, changes = {};
 };
 
-/// The bodies at one moment, to draw. Arrays are `capacity` long, positions three times that (x, y, z of slot
-/// 0, of slot 1, ...), orientations four times. Values of slots with alive == 0 are unspecified, except their
-/// `change`.
-struct Sample {
-  std::uint64_t epoch = 0;
-  double frame = 0;  ///< the moment, in frames
-  std::uint32_t capacity = 0;
-  std::vector<float> positions;  ///< scene units
-  /// Quaternions x, y, z, w (Eigen's order) of norm 1, from the body's frame to the world's. q and -q are the
-  /// same orientation, and a body's may change from one to the other between samples. Empty where the session
-  /// has no orientations: its bodies are points.
-  std::vector<float> orientations;
-  std::vector<std::uint8_t> alive;
-  std::vector<std::uint8_t> generation;
-  std::vector<std::uint16_t> types;  ///< index into Client::types()
-  std::vector<BodyChange> changes;   ///< against the previous sample() of this client
+/// As tandem_sample_options.
+struct SampleOptions {
+  SampleMode mode = SampleMode::kExtrapolate;
+  std::int64_t at_ns = 0;   ///< by tandem_clock_ns(); 0: now
+  double smoothing_s = -1;  ///< below 0: the default; 0: corrections show as jumps
 };
 
 /// One client of one session. Movable. All members may be called from any thread; all but sample() may have
-/// to wait until the frame in work is applied.
-class TANDEM_API Client {
+/// to wait until the frame in work is applied. A moved-from client answers kInvalidHandle.
+class Client {
  public:
   /// Starts looking for the session; returns at once, whether a server is there or not.
   /// Errors: kInvalidArgument (session name, domain, lead), kTransport (DDS could not start).
-  [[nodiscard]] static Result<Client> connect(const ClientOptions& options);
-  Client(Client&&) noexcept;
-  Client& operator=(Client&&) noexcept;
+  [[nodiscard]] static Result<Client> connect(const ClientOptions& options) {
+    Client client;
+    tandem_options c = TANDEM_OPTIONS_INIT;
+    c.session = options.session.c_str();
+    c.domain = options.domain;
+    c.role = static_cast<tandem_role>(options.role);
+    c.lead = options.lead;
+    c.background = options.background ? 1 : 0;
+    c.echo = options.echo ? 1 : 0;
+    if (options.log) {
+      client.log_ = std::make_unique<Log>(options.log);
+      c.log = &call_log;
+      c.user = client.log_.get();
+    }
+    if (auto joined = checked(tandem_join(&c, &client.handle_)); !joined) return unexpected(joined);
+    client.background_ = options.background;
+    return client;
+  }
+  Client(Client&& other) noexcept
+      : log_(std::move(other.log_)),
+        handle_(std::exchange(other.handle_, 0)),
+        background_(other.background_) {}
+  Client& operator=(Client&& other) noexcept {
+    std::swap(log_, other.log_);
+    std::swap(handle_, other.handle_);
+    std::swap(background_, other.background_);
+    return *this;
+  }
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
-  /// Leaves the session; waits for the thread, if there is one.
-  ~Client();
+  /// Leaves the session; waits for calls of other threads.
+  ~Client() {
+    if (handle_ != 0) static_cast<void>(tandem_leave(handle_));
+  }
+
+  /// For the functions of tandem/tandem.h; 0 when moved from.
+  [[nodiscard]] tandem_client handle() const { return handle_; }
 
   /// Without a thread: takes what arrived, follows the session, and waits at most `wait_s` for something to
-  /// do.
-  void poll(double wait_s = 0);
-  /// Lets the session go on for `seconds`: polls, or sleeps when a thread does the polling.
+  /// do. Errors: kWrongThread.
+  Result<void> update(double wait_s = 0) { return checked(tandem_update(handle_, wait_s)); }
+  /// Lets the session go on for `seconds`: updates, or sleeps when a thread does the work.
   void run_for(double seconds);
-  [[nodiscard]] ClientStatus status() const;
-  /// Blocks until playing, or `timeout_s` passed; returns whether it plays. Polls itself when there is no
-  /// thread.
-  bool wait_until_playing(double timeout_s);
+  /// Blocks until playing, or `timeout_s` passed. Updates itself when there is no thread. Errors: kTimeout.
+  Result<void> wait_until_playing(double timeout_s) {
+    return checked(tandem_wait_until_playing(handle_, timeout_s));
+  }
+  [[nodiscard]] Result<ClientStatus> status() const;
+  /// The oldest event that was not taken yet; empty: there is none.
+  [[nodiscard]] std::optional<tandem_event> next_event() {
+    tandem_event event = TANDEM_EVENT_INIT;
+    if (tandem_next_event(handle_, &event) != TANDEM_OK) return std::nullopt;
+    return event;
+  }
 
-  /// Sends an input and returns its number. It acts on the same frame everywhere; status() counts the
-  /// outcome. Errors: kOutOfOrder while not playing or as an observer, kInvalidArgument (not finite, above
+  /// Sends an input and returns its number. It acts on the same frame everywhere; an event tells which.
+  /// Errors: kNotReady while not playing, kOutOfOrder as an observer, kInvalidArgument (not finite, above
   /// 1,024 bytes), kTransport.
-  [[nodiscard]] Result<std::uint64_t> send_gravity(std::array<double, 3> metres_per_s2);
+  [[nodiscard]] Result<std::uint64_t> send_gravity(std::array<double, 3> metres_per_s2) {
+    std::uint64_t number = 0;
+    return numbered(tandem_send_gravity(handle_, metres_per_s2.data(), &number), number);
+  }
   /// Adds `velocity` to the bodies within `radius` of `centre`; scene units.
   [[nodiscard]] Result<std::uint64_t> send_push(std::array<double, 3> centre, double radius,
-                                                std::array<double, 3> velocity);
+                                                std::array<double, 3> velocity) {
+    std::uint64_t number = 0;
+    return numbered(tandem_send_push(handle_, centre.data(), radius, velocity.data(), &number), number);
+  }
   /// Bytes for the engine.
-  [[nodiscard]] Result<std::uint64_t> send_bytes(std::span<const std::byte> bytes);
+  [[nodiscard]] Result<std::uint64_t> send_bytes(std::span<const std::byte> bytes) {
+    std::uint64_t number = 0;
+    return numbered(tandem_send_bytes(handle_, bytes.data(), bytes.size(), &number), number);
+  }
+
+  /// The bodies as they should be drawn, straight into the application's memory. Errors: kNotReady (nothing to
+  /// draw yet), kCapacity (the session has more slots), kInvalidArgument.
+  Result<tandem_frame> sample(const Columns& columns, const SampleOptions& options = {}) {
+    tandem_frame frame = TANDEM_FRAME_INIT;
+    if (const auto sampled = checked(sample_into(columns, options, frame)); !sampled) return unexpected(sampled);
+    return frame;
+  }
+  /// The same into arrays that grow with the session. Returns false, and leaves `out` as it is, where there is
+  /// nothing to draw. Allocates when the capacity changed only.
+  bool sample(Sample& out, SampleMode mode = SampleMode::kExtrapolate);
 
   /// Body types of the session joined; empty before.
   [[nodiscard]] std::vector<BodyTypeInfo> types() const;
-  /// The scene's geometry as protobuf text, for drawing; empty before a session is known.
-  [[nodiscard]] std::string scene_description() const;
-  /// The bodies as they should be drawn now, at any rate. Never changes what the client holds. Returns false,
-  /// and leaves `out` as it is, before the first snapshot. Never waits for the network, for decoding or for
-  /// applying, only for other calls of sample(); but the first call turns sampling on, and waits as the other
-  /// members do. O(capacity); allocates when the capacity changed only.
-  bool sample(Sample& out, SampleMode mode = SampleMode::kExtrapolate);
 
  private:
-  struct Impl;
-  explicit Client(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  using Log = std::function<void(LogLevel, std::string_view)>;
+  Client() = default;
+
+  static void call_log(void* user, tandem_log_level level, const char* line) {
+    try {
+      (*static_cast<Log*>(user))(static_cast<LogLevel>(level), line);
+    } catch (...) {  // C is between here and whoever could catch it
+    }
+  }
+  [[nodiscard]] static Result<void> checked(tandem_result result) {
+    if (result == TANDEM_OK) return {};
+    return fail(static_cast<ErrorCode>(result), tandem_error_text());
+  }
+  [[nodiscard]] static tl::unexpected<Error> unexpected(const Result<void>& failed) {
+    return tl::unexpected<Error>(failed.error());
+  }
+  [[nodiscard]] static Result<std::uint64_t> numbered(tandem_result result, const std::uint64_t& number) {
+    if (const auto sent = checked(result); !sent) return unexpected(sent);
+    return number;
+  }
+  tandem_result sample_into(const Columns& columns, const SampleOptions& options, tandem_frame& frame);
+
+  std::unique_ptr<Log> log_;
+  tandem_client handle_ = 0;
+  bool background_ = true;
 };
+
+inline void Client::run_for(double seconds) {
+  const auto left_s = [end_ns = static_cast<double>(tandem_clock_ns()) + seconds * 1e9] {
+    return (end_ns - static_cast<double>(tandem_clock_ns())) / 1e9;
+  };
+  for (double wait_s = left_s(); wait_s > 0; wait_s = left_s()) {
+    if (background_) return std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
+    if (!update(wait_s)) return;
+  }
+}
+
+inline Result<ClientStatus> Client::status() const {
+  tandem_status c = TANDEM_STATUS_INIT;
+  if (const auto got = checked(tandem_get_status(handle_, &c)); !got) return unexpected(got);
+  ClientStatus s;
+  s.phase = static_cast<ClientPhase>(c.phase);
+  s.role = static_cast<ClientRole>(c.role);
+  s.client_id = c.client_id;
+  s.server_alive = c.server_alive != 0;
+  s.reason = c.reason;
+  s.scene = c.scene;
+  s.epoch = c.epoch;
+  s.frame = c.frame;
+  s.state_hash = c.state_hash;
+  s.frame_rate_hz = c.frame_rate_hz;
+  s.lead = c.lead;
+  s.frames_applied = c.frames_applied;
+  s.resyncs = c.resyncs;
+  s.hash_mismatches = c.hash_mismatches;
+  s.refused_messages = c.refused_messages;
+  s.payload_bytes = c.payload_bytes;
+  s.mbit_per_s = c.mbit_per_s;
+  s.latency_ms_p50 = c.latency_ms_p50;
+  s.latency_ms_p99 = c.latency_ms_p99;
+  s.input_latency_ms_p50 = c.input_latency_ms_p50;
+  s.input_latency_ms_p99 = c.input_latency_ms_p99;
+  s.client_ms_p50 = c.client_ms_p50;
+  s.client_ms_p99 = c.client_ms_p99;
+  s.join_ms = c.join_ms;
+  s.round_trip_ms = c.round_trip_ms;
+  s.jitter_ms = c.jitter_ms;
+  s.inputs_sent = c.inputs_sent;
+  s.inputs_acted = c.inputs_acted;
+  s.inputs_refused = c.inputs_refused;
+  s.inputs_unknown = c.inputs_unknown;
+  s.queue_high_water = c.queue_high_water;
+  return s;
+}
+
+inline std::vector<BodyTypeInfo> Client::types() const {
+  std::vector<BodyTypeInfo> types;
+  tandem_body_type c = TANDEM_BODY_TYPE_INIT;
+  while (tandem_get_type(handle_, static_cast<std::uint32_t>(types.size()), &c) == TANDEM_OK) {
+    BodyTypeInfo& type = types.emplace_back();
+    type.name = c.name;
+    type.radius = c.radius;
+    type.colour_rgba = c.colour_rgba;
+    type.shape = static_cast<BodyShape>(c.shape);
+    type.shape_values.resize(c.value_count);
+    static_cast<void>(tandem_get_type_values(handle_, static_cast<std::uint32_t>(types.size() - 1),
+                                             type.shape_values.data(), type.shape_values.size(), nullptr));
+  }
+  return types;
+}
+
+inline tandem_result Client::sample_into(const Columns& columns, const SampleOptions& options,
+                                         tandem_frame& frame) {
+  tandem_sample_options how = TANDEM_SAMPLE_OPTIONS_INIT;
+  how.mode = static_cast<tandem_sample_mode>(options.mode);
+  how.at_ns = options.at_ns;
+  how.smoothing_s = options.smoothing_s;
+  tandem_columns c = TANDEM_COLUMNS_INIT;
+  const auto count = [](std::size_t n) {  // more than that is as good as that
+    constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+    return static_cast<std::uint32_t>(n < kMost ? n : kMost);
+  };
+  const auto put = [&](const auto& column, auto*& first, std::uint32_t& stride) {
+    first = column.first();
+    stride = count(column.stride_bytes());
+  };
+  c.capacity = count(columns.capacity);
+  put(columns.positions, c.positions, c.position_stride);
+  put(columns.velocities, c.velocities, c.velocity_stride);
+  put(columns.orientations, c.orientations, c.orientation_stride);
+  put(columns.angular_velocities, c.angular_velocities, c.angular_velocity_stride);
+  put(columns.types, c.types, c.type_stride);
+  put(columns.alive, c.alive, c.alive_stride);
+  put(columns.reuse, c.reuse, c.reuse_stride);
+  put(columns.changes, c.changes, c.change_stride);
+  return tandem_sample(handle_, &how, &c, &frame);
+}
+
+inline bool Client::sample(Sample& out, SampleMode mode) {
+  tandem_frame frame = TANDEM_FRAME_INIT;
+  for (;;) {
+    Columns columns;
+    columns.capacity = out.alive.size();
+    columns.positions = out.positions.data();
+    columns.orientations = out.orientations.data();
+    columns.types = out.types.data();
+    columns.alive = out.alive.data();
+    columns.reuse = out.generation.data();
+    columns.changes = Column<std::uint8_t>(reinterpret_cast<std::uint8_t*>(out.changes.data()));
+    const tandem_result result = sample_into(columns, {.mode = mode}, frame);
+    const std::size_t capacity = frame.capacity;
+    const bool fits = out.alive.size() == capacity &&
+                      out.orientations.size() == (frame.has_orientations != 0 ? 4 * capacity : 0);
+    if (result == TANDEM_OK && fits) break;
+    if (result != TANDEM_OK && result != TANDEM_CAPACITY) return false;
+    out.positions.resize(3 * capacity);
+    out.orientations.resize(frame.has_orientations != 0 ? 4 * capacity : 0);
+    out.alive.resize(capacity);
+    out.generation.resize(capacity);
+    out.types.resize(capacity);
+    out.changes.resize(capacity);
+  }
+  out.epoch = frame.epoch;
+  out.frame = frame.frame;
+  out.capacity = frame.capacity;
+  return true;
+}
 
 }  // namespace tandem

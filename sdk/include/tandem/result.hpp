@@ -20,6 +20,13 @@ enum class ErrorCode : std::uint8_t {
   kConflict = 8,         ///< somebody else owns the name
   kTransport = 9,        ///< the middleware reported an error
   kIo = 10,              ///< a file could not be read or written
+  // Of the functions in tandem/tandem.h only.
+  kInvalidHandle = 11,  ///< closed, or never made
+  kNotReady = 12,       ///< nothing to draw, not playing, not known, or no event, yet
+  kInCallback = 13,     ///< called from a callback
+  kWrongThread = 14,    ///< another thread does this already
+  kOutOfMemory = 15,
+  kInternal = 16,  ///< a fault of the library
 };
 
 /// A failure: a code to branch on and one line for a human that says what to do.

@@ -11,7 +11,7 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/web/module/web_port.hpp"
-#include "tandem/client.hpp"
+#include "tandem/client_types.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::web {

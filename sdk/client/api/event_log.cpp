@@ -1,0 +1,111 @@
+#include "sdk/client/api/event_log.hpp"
+
+#include <utility>
+
+namespace tandem::api {
+namespace {
+
+const char* describe(client::ResyncReason reason) {
+  switch (reason) {
+    case client::ResyncReason::kGap:
+      return "a frame was missing";
+    case client::ResyncReason::kLostPart:
+      return "a part of a frame was missing";
+    case client::ResyncReason::kMissingInput:
+      return "a scheduled input did not come in time";
+    case client::ResyncReason::kMismatch:
+      return "the state differed from the server's";
+    case client::ResyncReason::kRefused:
+      return "what came broke a rule of the protocol";
+    case client::ResyncReason::kOverflow:
+      return "more frames waited than there is room for";
+    case client::ResyncReason::kLag:
+      return "too far behind for too long";
+  }
+  return "";
+}
+
+}  // namespace
+
+EventLog::EventLog() : ring_(kMost) {}
+
+void EventLog::add(Event event) {
+  event.epoch = epoch_;
+  event.at_ns = now_ns_;
+  if (count_ == kMost) {
+    first_ = (first_ + 1) % kMost;
+    --count_;
+    ++dropped_;
+    ++dropped_since_;
+  }
+  ring_[(first_ + count_++) % kMost] = std::move(event);
+}
+
+std::optional<Event> EventLog::take() {
+  if (count_ == 0) return std::nullopt;
+  Event event = std::move(ring_[first_]);
+  first_ = (first_ + 1) % kMost;
+  --count_;
+  event.dropped = std::exchange(dropped_since_, 0);
+  return event;
+}
+
+void EventLog::on_session(const transport::SessionMessage& session) {
+  const bool another = epoch_ != 0;
+  epoch_ = session.epoch;
+  playing_ = played_ = refused_ = demoted_ = was_alive_ = false;
+  if (another) add({.kind = TANDEM_EVENT_NEW_EPOCH, .text = {}});
+}
+
+void EventLog::on_snapshot(const transport::SnapshotMessage& snapshot) {
+  add({.kind = played_ ? TANDEM_EVENT_REJOINED : TANDEM_EVENT_PLAYING, .frame = snapshot.frame, .text = {}});
+  playing_ = played_ = true;
+}
+
+void EventLog::on_resync(client::ResyncReason reason) {
+  if (!std::exchange(playing_, false)) return;  // it was joining still
+  add({.kind = TANDEM_EVENT_LOST, .text = describe(reason)});
+}
+
+void EventLog::on_outcome(const client::InputOutcome& outcome) {
+  Event event;
+  switch (outcome.kind) {
+    case client::InputOutcome::Kind::kActed:
+      event.kind = TANDEM_EVENT_INPUT_ACTED;
+      event.frame = outcome.frame;
+      break;
+    case client::InputOutcome::Kind::kRefused:
+      event.kind = TANDEM_EVENT_INPUT_REFUSED;
+      event.reason = outcome.reason;
+      break;
+    case client::InputOutcome::Kind::kUnknown:
+      event.kind = TANDEM_EVENT_INPUT_UNKNOWN;
+      break;
+  }
+  event.number = outcome.number;
+  add(std::move(event));
+}
+
+void EventLog::end(const client::ClientCore& core) {
+  if (core.session() == nullptr) return;
+  if (core.phase() == ClientPhase::kRefused && !std::exchange(refused_, true)) {
+    add({.kind = TANDEM_EVENT_REFUSED, .text = core.status().reason});
+  }
+  if (const transport::ReplyMessage* reply = core.reply()) {
+    // Observers by their own choice are told no reason.
+    const bool demoted = reply->role == transport::Role::kObserver && reply->reason != 0;
+    if (demoted != std::exchange(demoted_, demoted)) {
+      add({.kind = demoted ? TANDEM_EVENT_DEMOTED : TANDEM_EVENT_PROMOTED,
+           .reason = reply->reason,
+           .text = {}});
+    }
+  }
+  const bool alive = core.server_alive();
+  if (alive != std::exchange(alive_, alive)) {
+    if (!alive) add({.kind = TANDEM_EVENT_SESSION_ENDED, .text = {}});
+    if (alive && was_alive_) add({.kind = TANDEM_EVENT_SESSION_BACK, .text = {}});
+  }
+  was_alive_ = was_alive_ || alive;
+}
+
+}  // namespace tandem::api

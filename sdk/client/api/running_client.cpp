@@ -1,0 +1,197 @@
+#include "sdk/client/api/running_client.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <new>
+#include <utility>
+
+namespace tandem::api {
+namespace {
+
+constexpr double kLongestWaitS = 1e6;
+constexpr std::int64_t kThreadWaitNs = 100'000'000;
+
+std::int64_t wait_ns(double seconds) {
+  return static_cast<std::int64_t>(std::clamp(seconds, 0.0, kLongestWaitS) * 1e9);
+}
+
+tl::unexpected<Error> closed() { return fail(ErrorCode::kInvalidHandle, "the client was closed meanwhile"); }
+
+}  // namespace
+
+RunningClient::RunningClient(client::CoreOptions options, std::unique_ptr<transport::ClientPort> port,
+                             Clock clock, bool background)
+    : clock_(clock),
+      participant_(options.role == transport::Role::kParticipant),
+      port_(std::move(port)),
+      core_(std::move(options), *port_, &events_) {
+  if (background) thread_ = std::thread([this] { work(); });
+}
+
+RunningClient::~RunningClient() {
+  end();
+  if (thread_.joinable()) thread_.join();
+}
+
+void RunningClient::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  phase_changed_.notify_all();
+  port_->wake();
+}
+
+void RunningClient::work() {
+  while (!ending_ && round(kThreadWaitNs)) {
+  }
+}
+
+Result<void> RunningClient::usable() const {
+  if (!fault_) return {};
+  if (*fault_ == ErrorCode::kOutOfMemory) {
+    return fail(*fault_, "the client stopped when there was no memory left; join again");
+  }
+  return fail(*fault_, "the client stopped at a fault of its own; join again");
+}
+
+Result<void> RunningClient::poll(std::int64_t& due_ns) {
+  const std::lock_guard lock(mutex_);
+  if (auto can = usable(); !can) return can;
+  const client::Now now = clock_();
+  try {
+    events_.begin(now.steady_ns);
+    due_ns = core_.poll(now);
+    events_.end(core_);
+  } catch (const std::bad_alloc&) {
+    fault_ = ErrorCode::kOutOfMemory;
+  } catch (...) {
+    fault_ = ErrorCode::kInternal;
+  }
+  if (phase_.exchange(core_.phase()) != core_.phase() || fault_) phase_changed_.notify_all();
+  return usable();
+}
+
+Result<void> RunningClient::round(std::int64_t longest_ns) {
+  std::int64_t due_ns = 0;
+  if (auto polled = poll(due_ns); !polled) return polled;
+  const std::int64_t wait_ns = std::min(longest_ns, due_ns - clock_().steady_ns);
+  if (wait_ns > 0 && !ending_) port_->wait(std::chrono::nanoseconds(wait_ns));
+  return {};
+}
+
+Result<void> RunningClient::update(double wait_s) {
+  if (has_thread()) {
+    return fail(ErrorCode::kWrongThread, "this client has a thread of its own: join with background = 0");
+  }
+  if (updating_.exchange(true)) return fail(ErrorCode::kWrongThread, "another thread updates this client");
+  struct Done {
+    std::atomic<bool>& updating;
+    ~Done() { updating = false; }
+  } const done{updating_};
+  if (auto went = round(wait_ns(wait_s)); !went) return went;
+  if (ending_) return closed();
+  return {};
+}
+
+Result<void> RunningClient::wait_until_playing(double timeout_s) {
+  const auto playing = [this] { return phase_ == ClientPhase::kPlaying; };
+  const auto late = [] { return fail(ErrorCode::kTimeout, "no session to play within the time given"); };
+  if (has_thread()) {
+    std::unique_lock lock(mutex_);
+    const bool over = phase_changed_.wait_for(lock, std::chrono::nanoseconds(wait_ns(timeout_s)),
+                                              [&] { return playing() || ending_ || fault_; });
+    if (ending_) return closed();
+    if (auto can = usable(); !can) return can;
+    if (!over) return late();
+    return {};
+  }
+  const std::int64_t end_ns = clock_().steady_ns + wait_ns(timeout_s);
+  while (!playing()) {
+    const std::int64_t left_ns = end_ns - clock_().steady_ns;
+    if (left_ns <= 0) return late();
+    if (auto updated = update(static_cast<double>(left_ns) / 1e9); !updated) return updated;
+  }
+  return {};
+}
+
+Result<std::uint64_t> RunningClient::send(transport::InputKind kind, std::vector<double> values,
+                                          transport::Bytes bytes) {
+  const std::lock_guard lock(mutex_);
+  if (auto can = usable(); !can) return tl::unexpected<Error>(can.error());
+  auto sent = core_.send(kind, std::move(values), std::move(bytes), clock_());
+  if (!sent && sent.error().code == ErrorCode::kOutOfOrder && participant_) {
+    sent.error().code = ErrorCode::kNotReady;  // not playing
+  }
+  return sent;
+}
+
+std::optional<Event> RunningClient::next_event() {
+  const std::lock_guard lock(mutex_);
+  return events_.take();
+}
+
+Result<ClientStatus> RunningClient::status() const {
+  const std::lock_guard lock(mutex_);
+  if (auto can = usable(); !can) return tl::unexpected<Error>(can.error());
+  return core_.status();
+}
+
+std::uint64_t RunningClient::events_dropped() const {
+  const std::lock_guard lock(mutex_);
+  return events_.dropped();
+}
+
+namespace {
+
+template <class T, class U>
+void scatter(const std::vector<U>& from, std::size_t numbers, T* to, std::size_t stride) {
+  if (to == nullptr || from.empty()) return;
+  if (stride == 0) stride = numbers * sizeof(T);
+  auto* at = reinterpret_cast<std::byte*>(to);
+  for (std::size_t i = 0; i < from.size() / numbers; ++i) {
+    std::memcpy(at + i * stride, &from[i * numbers], numbers * sizeof(T));
+  }
+}
+
+}  // namespace
+
+Result<void> RunningClient::sample(const tandem_sample_options& options, const tandem_columns& columns,
+                                   tandem_frame& frame) {
+  if (!sampling_) {
+    const std::lock_guard lock(mutex_);
+    if (auto can = usable(); !can) return can;
+    core_.start_sampling();
+    sampling_ = true;
+  }
+  client::Now now = clock_();
+  if (options.at_ns != 0) now.steady_ns = options.at_ns;
+  const std::lock_guard lock(sample_mutex_);
+  if (!core_.sample(sample_, static_cast<SampleMode>(options.mode), now)) {
+    return fail(ErrorCode::kNotReady, "nothing to draw yet");
+  }
+  frame.capacity = sample_.capacity;
+  frame.epoch = sample_.epoch;
+  frame.frame = sample_.frame;
+  frame.alive = 0;
+  for (const std::uint8_t alive : sample_.alive) frame.alive += alive;
+  frame.has_orientations = sample_.orientations.empty() ? 0 : 1;
+  frame.mode = options.mode;
+  frame.phase = static_cast<tandem_phase>(phase());
+  const bool wanted = columns.positions != nullptr || columns.velocities != nullptr ||
+                      columns.orientations != nullptr || columns.types != nullptr || columns.alive != nullptr;
+  if (wanted && columns.capacity < sample_.capacity) {
+    return fail(ErrorCode::kCapacity, "the columns have less room than the session has slots");
+  }
+  scatter(sample_.positions, 3, columns.positions, columns.position_stride);
+  scatter(sample_.orientations, 4, columns.orientations, columns.orientation_stride);
+  scatter(sample_.types, 1, columns.types, columns.type_stride);
+  scatter(sample_.alive, 1, columns.alive, columns.alive_stride);
+  scatter(sample_.generation, 1, columns.reuse, columns.reuse_stride);
+  static_assert(sizeof(BodyChange) == 1);
+  scatter(sample_.changes, 1, columns.changes, columns.change_stride);
+  return {};
+}
+
+}  // namespace tandem::api

@@ -1,0 +1,81 @@
+#pragma once
+// A ClientCore with a clock, a port and, if wanted, a thread: what a tandem_client stands for.
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "sdk/client/api/event_log.hpp"
+#include "sdk/client/client_core.hpp"
+
+namespace tandem::api {
+
+/// All members may be called from any thread, end() and the destructor too. The port waits without the lock,
+/// so that nobody waits for the network.
+class RunningClient {
+ public:
+  using Clock = client::Now (*)();
+
+  /// `background`: a thread of its own does the work.
+  RunningClient(client::CoreOptions options, std::unique_ptr<transport::ClientPort> port, Clock clock,
+                bool background);
+  ~RunningClient();
+  RunningClient(const RunningClient&) = delete;
+  RunningClient& operator=(const RunningClient&) = delete;
+  RunningClient(RunningClient&&) = delete;
+  RunningClient& operator=(RunningClient&&) = delete;
+
+  /// Calls in work that wait end with kInvalidHandle, and soon.
+  void end();
+
+  /// One round of work, and a wait for the next. Errors: kWrongThread, and what failed() says.
+  Result<void> update(double wait_s);
+  /// Errors: also kTimeout.
+  Result<void> wait_until_playing(double timeout_s);
+  /// Errors: kNotReady, kOutOfOrder, kInvalidArgument, kTransport.
+  Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes);
+  [[nodiscard]] std::optional<Event> next_event();
+  [[nodiscard]] Result<ClientStatus> status() const;
+  [[nodiscard]] std::uint64_t events_dropped() const;
+  /// Calls `look(session)` while the client is locked; null before one is known.
+  template <class Look>
+  auto with_session(Look&& look) const {
+    const std::lock_guard lock(mutex_);
+    return look(core_.session());
+  }
+  [[nodiscard]] ClientPhase phase() const { return phase_; }
+  /// Without the lock, but for the first call. Errors: kNotReady, kCapacity (`frame` is filled in).
+  Result<void> sample(const tandem_sample_options& options, const tandem_columns& columns,
+                      tandem_frame& frame);
+
+ private:
+  /// Errors: what went wrong within a round, once and for all: the core may have been left half-way.
+  [[nodiscard]] Result<void> usable() const;
+  Result<void> round(std::int64_t longest_ns);
+  Result<void> poll(std::int64_t& due_ns);
+  void work();
+  [[nodiscard]] bool has_thread() const { return thread_.joinable(); }
+
+  const Clock clock_;
+  const bool participant_;
+  std::unique_ptr<transport::ClientPort> port_;
+  EventLog events_;
+  mutable std::mutex mutex_;  // guards core_ but for its sample(), events_ and fault_
+  std::condition_variable phase_changed_;
+  client::ClientCore core_;
+  std::optional<ErrorCode> fault_;
+  std::atomic<ClientPhase> phase_ = ClientPhase::kSearching;
+  std::atomic<bool> sampling_ = false;
+  std::atomic<bool> ending_ = false;
+  std::atomic<bool> updating_ = false;  // without a thread: somebody is in round()
+  std::mutex sample_mutex_;             // guards sample_
+  Sample sample_;
+  std::thread thread_;
+};
+
+}  // namespace tandem::api

@@ -1,0 +1,82 @@
+#pragma once
+// Structs of tandem.h, whose `size` may be that of an older or a newer header.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string_view>
+
+#include "sdk/client/api/boundary.hpp"
+
+namespace tandem::api {
+
+/// What a struct had when it was first released; smaller ones were never valid.
+template <class T>
+inline constexpr std::uint32_t kFirstSize = sizeof(T);
+
+/// No struct will ever be larger: a size beyond is garbage.
+inline constexpr std::uint32_t kLargestStruct = 4096;
+
+[[nodiscard]] inline std::uint32_t size_of(const void* theirs) {
+  std::uint32_t size = 0;
+  std::memcpy(&size, theirs, sizeof size);
+  return size;
+}
+
+/// Errors: TANDEM_INVALID_ARGUMENT (null, or a size that no header has).
+template <class T>
+[[nodiscard]] tandem_result check_struct(const T* theirs) {
+  if (theirs == nullptr) return refuse(TANDEM_INVALID_ARGUMENT, "a pointer to a struct is null");
+  const std::uint32_t size = size_of(theirs);
+  if (size < kFirstSize<T> || size > kLargestStruct) {
+    return refuse(TANDEM_INVALID_ARGUMENT, "a struct's size is not set: begin with its ..._INIT");
+  }
+  return kOk;
+}
+
+/// Reads a struct over `ours`, which holds the defaults of what theirs does not have. Errors: also
+/// TANDEM_UNSUPPORTED (something set that this library does not know).
+template <class T>
+[[nodiscard]] tandem_result read_struct(const T* theirs, T& ours) {
+  if (const tandem_result checked = check_struct(theirs); checked != TANDEM_OK) return checked;
+  const std::size_t size = size_of(theirs);
+  const void* const whole = theirs;
+  const auto* const bytes = static_cast<const std::byte*>(whole);
+  for (std::size_t i = sizeof(T); i < size; ++i) {
+    if (bytes[i] != std::byte{0}) {
+      return refuse(TANDEM_UNSUPPORTED,
+                    "a struct of a newer header asks for what this library does not know");
+    }
+  }
+  std::memcpy(&ours, whole, std::min(size, sizeof(T)));
+  return kOk;
+}
+
+/// Writes what fits into their struct, which was checked; the rest of it becomes 0. `size`: of the one in
+/// front of it in an array.
+template <class T>
+void write_struct(const T& ours, void* theirs, std::size_t size) {
+  const std::size_t known = std::min(size, sizeof(T));
+  std::memset(theirs, 0, size);
+  std::memcpy(theirs, &ours, known);
+  const auto filled = static_cast<std::uint32_t>(known);
+  std::memcpy(theirs, &filled, sizeof filled);
+}
+template <class T>
+void write_struct(const T& ours, T* theirs) {
+  write_struct(ours, theirs, size_of(theirs));
+}
+
+/// Cuts what is too long, at a character's end.
+template <std::size_t kSize>
+void write_text(std::string_view text, char (&to)[kSize]) {  // NOLINT(*-avoid-c-arrays): C's
+  std::size_t length = std::min(text.size(), kSize - 1);
+  while (length < text.size() && length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0U) == 0x80U) {
+    --length;
+  }
+  std::memset(to, 0, kSize);
+  text.copy(to, length);
+}
+
+}  // namespace tandem::api
