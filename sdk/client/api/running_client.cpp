@@ -107,6 +107,10 @@ Result<void> RunningClient::wait_until_playing(double timeout_s) {
     if (!over) return late();
     return {};
   }
+  {
+    const std::lock_guard lock(mutex_);
+    if (auto can = usable(); !can) return can;
+  }
   const std::int64_t end_ns = clock_().steady_ns + wait_ns(timeout_s);
   while (!playing()) {
     const std::int64_t left_ns = end_ns - clock_().steady_ns;
@@ -141,6 +145,16 @@ Result<ClientStatus> RunningClient::status() const {
 std::uint64_t RunningClient::events_dropped() const {
   const std::lock_guard lock(mutex_);
   return events_.dropped();
+}
+
+std::shared_ptr<const KnownScene> RunningClient::scene() const {
+  const std::lock_guard lock(mutex_);
+  return scene_;
+}
+
+void RunningClient::hold_scene(std::shared_ptr<const KnownScene> scene) {
+  const std::lock_guard lock(mutex_);
+  scene_ = std::move(scene);
 }
 
 namespace {

@@ -11,9 +11,16 @@
 #include <vector>
 
 #include "sdk/client/api/event_log.hpp"
+#include "sdk/client/api/scene_text.hpp"
 #include "sdk/client/client_core.hpp"
 
 namespace tandem::api {
+
+/// A session's scene, and whose it is.
+struct KnownScene {
+  Epoch epoch = 0;
+  Result<SceneText> scene;
+};
 
 /// All members may be called from any thread, end() and the destructor too. The port waits without the lock,
 /// so that nobody waits for the network.
@@ -48,6 +55,9 @@ class RunningClient {
     const std::lock_guard lock(mutex_);
     return look(core_.session());
   }
+  /// What was read last; null before that.
+  [[nodiscard]] std::shared_ptr<const KnownScene> scene() const;
+  void hold_scene(std::shared_ptr<const KnownScene> scene);
   [[nodiscard]] ClientPhase phase() const { return phase_; }
   /// Without the lock, but for the first call. Errors: kNotReady, kCapacity (`frame` is filled in).
   Result<void> sample(const tandem_sample_options& options, const tandem_columns& columns,
@@ -65,10 +75,11 @@ class RunningClient {
   const bool participant_;
   std::unique_ptr<transport::ClientPort> port_;
   EventLog events_;
-  mutable std::mutex mutex_;  // guards core_ but for its sample(), events_ and fault_
+  mutable std::mutex mutex_;  // guards core_ but for its sample(), events_, fault_ and scene_
   std::condition_variable phase_changed_;
   client::ClientCore core_;
   std::optional<ErrorCode> fault_;
+  std::shared_ptr<const KnownScene> scene_;
   std::atomic<ClientPhase> phase_ = ClientPhase::kSearching;
   std::atomic<bool> sampling_ = false;
   std::atomic<bool> ending_ = false;

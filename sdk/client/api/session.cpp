@@ -1,8 +1,12 @@
 // tandem.h: what a session is made of.
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
+#include <memory>
 #include <string>
 
 #include "sdk/client/api/clients.hpp"
+#include "sdk/client/api/scene_text.hpp"
 #include "sdk/client/api/structs.hpp"
 
 namespace tandem::api {
@@ -27,6 +31,53 @@ tandem_result with_type(tandem_client client, std::uint32_t index, Use&& use) {
       return use(session->types[index]);
     });
   });
+}
+
+void copy(const Vector& from, float (&to)[3]) {  // NOLINT(*-avoid-c-arrays): C's
+  for (std::size_t i = 0; i < from.size(); ++i) to[i] = static_cast<float>(from[i]);
+}
+
+tandem_solid to_c(const Solid& solid) {
+  tandem_solid out = TANDEM_SOLID_INIT;
+  switch (solid.shape) {
+    case Solid::Shape::kPlane:
+      out.shape = TANDEM_SHAPE_PLANE;
+      break;
+    case Solid::Shape::kBox:
+      out.shape = TANDEM_SHAPE_BOX;
+      break;
+    case Solid::Shape::kSphere:
+      out.shape = TANDEM_SHAPE_SPHERE;
+      break;
+  }
+  copy(solid.centre, out.centre);
+  copy(solid.normal, out.normal);
+  copy({solid.size[0] / 2, solid.size[1] / 2, solid.size[2] / 2}, out.half_size);
+  for (std::size_t i = 0; i < solid.orientation.size(); ++i) {
+    out.orientation[i] = static_cast<float>(solid.orientation[i]);
+  }
+  out.radius = static_cast<float>(solid.radius);
+  return out;
+}
+
+/// Of the session that is known; read again where that is another run of a server.
+Result<std::shared_ptr<const KnownScene>> scene_of(RunningClient& client) {
+  auto held = client.scene();
+  Epoch epoch = 0;
+  std::string text;
+  const bool known = client.with_session([&](const transport::SessionMessage* session) {
+    if (session == nullptr) return false;
+    epoch = session->epoch;
+    if (held == nullptr || held->epoch != epoch) text = session->scene_description;
+    return true;
+  });
+  if (!known) return fail(ErrorCode::kNotReady, "no session is known yet");
+  if (held == nullptr || held->epoch != epoch) {
+    held = std::make_shared<const KnownScene>(KnownScene{epoch, read_scene_text(text)});
+    client.hold_scene(held);
+  }
+  if (!held->scene) return tl::unexpected<Error>(held->scene.error());
+  return held;
 }
 
 }  // namespace
@@ -59,6 +110,50 @@ tandem_result tandem_get_type_values(tandem_client client, uint32_t index, float
     std::copy_n(known.shape_values.begin(), std::min(all, capacity), values);
     if (count != nullptr) *count = all;
     if (capacity != 0 && capacity < all) return refuse(TANDEM_CAPACITY, "the shape has more values");
+    return kOk;
+  });
+}
+
+tandem_result tandem_get_scene(tandem_client client, tandem_scene* scene) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (const auto checked = check_struct(scene); checked != kOk) return checked;
+    const auto known = scene_of(running);
+    if (!known) return refuse(known.error());
+    const SceneText& text = *(*known)->scene;
+    tandem_scene out = TANDEM_SCENE_INIT;
+    running.with_session([&](const transport::SessionMessage* session) {
+      out.capacity = session->capacity;
+      out.type_count = static_cast<std::uint32_t>(session->types.size());
+      out.frame_rate_hz = session->frame_rate_hz;
+      write_text(session->scene, out.name);
+    });
+    out.solid_count = static_cast<std::uint32_t>(text.solids.size());
+    std::copy(text.gravity.begin(), text.gravity.end(), std::begin(out.gravity));
+    out.max_gravity = text.max_gravity;
+    out.max_push = text.max_push;
+    copy(text.low, out.low);
+    copy(text.high, out.high);
+    write_struct(out, scene);
+    return kOk;
+  });
+}
+
+tandem_result tandem_get_geometry(tandem_client client, tandem_solid* solids, size_t capacity,
+                                  size_t* count) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (capacity != 0) {
+      if (const auto checked = check_struct(solids); checked != kOk) return checked;
+    }
+    const auto known = scene_of(running);
+    if (!known) return refuse(known.error());
+    const std::vector<Solid>& all = (*known)->scene->solids;
+    const std::size_t size = capacity != 0 ? size_of(solids) : 0;
+    auto* const first = reinterpret_cast<std::byte*>(solids);
+    for (std::size_t i = 0; i < std::min(capacity, all.size()); ++i) {
+      write_struct(to_c(all[i]), first + i * size, size);
+    }
+    if (count != nullptr) *count = all.size();
+    if (capacity != 0 && capacity < all.size()) return refuse(TANDEM_CAPACITY, "the scene has more solids");
     return kOk;
   });
 }

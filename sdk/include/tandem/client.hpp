@@ -1,6 +1,6 @@
 #pragma once
-// tandem::Client: the functions of tandem/tandem.h, which says what each of them does, for C++20. Header only:
-// what is linked is the C library.
+// tandem::Client: the functions of tandem/tandem.h, which says what each of them does, for C++20. Header
+// only: what is linked is the C library.
 
 #include <array>
 #include <chrono>
@@ -47,6 +47,43 @@ struct BodyTypeInfo {
   std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
   BodyShape shape = BodyShape::kSphere;
   std::vector<float> shape_values = {};  ///< as the shape says
+};
+
+/// One piece of a scene that does not move; see tandem_solid.
+struct Solid {
+  enum class Shape : std::int32_t {
+    kPlane = TANDEM_SHAPE_PLANE,
+    kBox = TANDEM_SHAPE_BOX,
+    kSphere = TANDEM_SHAPE_SPHERE
+  };
+  Shape shape = Shape::kPlane;
+  std::array<float, 3> centre{};                 ///< of a plane: a point of it
+  std::array<float, 4> orientation{0, 0, 0, 1};  ///< of a box: x, y, z, w
+  std::array<float, 3> half_size{};              ///< of a box
+  std::array<float, 3> normal{};                 ///< of a plane: of norm 1, to where the bodies are
+  float radius = 0;                              ///< of a sphere
+};
+
+/// What a session plays in; see tandem_scene.
+struct Scene {
+  std::string name;
+  std::uint32_t capacity = 0;  ///< slots
+  double frame_rate_hz = 0;
+  std::array<double, 3> gravity{};       ///< at the start; scene units / s^2
+  double max_gravity = 0, max_push = 0;  ///< beyond, the server refuses it; 0: not told
+  std::array<float, 3> low{}, high{};    ///< bounds; all 0: not told
+  std::vector<Solid> solids;
+};
+
+/// A session on a domain; see tandem_session_info.
+struct SessionInfo {
+  std::string name, scene, codec, predictor;
+  bool playable = false;  ///< by this build
+  std::uint64_t epoch = 0;
+  std::uint32_t capacity = 0, bodies = 0, participants = 0, observers = 0;
+  double frame_rate_hz = 0;
+  double client_ms = 0;   ///< what a client computes in a frame, on the server's processor
+  double mbit_per_s = 0;  ///< of payload, now
 };
 
 /// Where Client::sample() puts one value of each body: a plain array, or a member of an array of structs.
@@ -166,21 +203,25 @@ class Client {
     return numbered(tandem_send_bytes(handle_, bytes.data(), bytes.size(), &number), number);
   }
 
-  /// The bodies as they should be drawn, straight into the application's memory. Errors: kNotReady (nothing to
-  /// draw yet), kCapacity (the session has more slots), kInvalidArgument.
+  /// The bodies as they should be drawn, straight into the application's memory. Errors: kNotReady (nothing
+  /// to draw yet), kCapacity (the session has more slots), kInvalidArgument.
   Result<tandem_frame> sample(const Columns& columns, const SampleOptions& options = {}) {
     tandem_frame frame = TANDEM_FRAME_INIT;
-    if (const auto sampled = checked(sample_into(columns, options, frame)); !sampled) return unexpected(sampled);
+    if (const auto sampled = checked(sample_into(columns, options, frame)); !sampled)
+      return unexpected(sampled);
     return frame;
   }
-  /// The same into arrays that grow with the session. Returns false, and leaves `out` as it is, where there is
-  /// nothing to draw. Allocates when the capacity changed only.
+  /// The same into arrays that grow with the session. Returns false, and leaves `out` as it is, where there
+  /// is nothing to draw. Allocates when the capacity changed only.
   bool sample(Sample& out, SampleMode mode = SampleMode::kExtrapolate);
 
   /// Body types of the session joined; empty before.
   [[nodiscard]] std::vector<BodyTypeInfo> types() const;
+  /// Geometry, gravity and bounds. Errors: kNotReady (no session is known yet), kMalformed.
+  [[nodiscard]] Result<Scene> scene() const;
 
  private:
+  friend class Browser;
   using Log = std::function<void(LogLevel, std::string_view)>;
   Client() = default;
 
@@ -207,6 +248,88 @@ class Client {
   tandem_client handle_ = 0;
   bool background_ = true;
 };
+
+/// Watches the sessions of a domain, without taking part in any. Movable. All members may be called from any
+/// thread.
+class Browser {
+ public:
+  /// Errors: kInvalidArgument (domain), kTransport (DDS could not start).
+  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0) {
+    Browser browser;
+    if (const auto opened = Client::checked(tandem_browser_open(domain, &browser.handle_)); !opened)
+      return Client::unexpected(opened);
+    return browser;
+  }
+  Browser(Browser&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  Browser& operator=(Browser&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  Browser(const Browser&) = delete;
+  Browser& operator=(const Browser&) = delete;
+  ~Browser() {
+    if (handle_ != 0) static_cast<void>(tandem_browser_close(handle_));
+  }
+
+  /// What is there now, by name. Does not wait: a session is known within a second or two of open().
+  [[nodiscard]] Result<std::vector<SessionInfo>> sessions() const;
+
+ private:
+  Browser() = default;
+  tandem_browser handle_ = 0;
+};
+
+/// The sessions of a domain, after watching it for `watch_s`.
+[[nodiscard]] inline Result<std::vector<SessionInfo>> sessions(std::uint32_t domain = 0, double watch_s = 2) {
+  const auto browser = Browser::open(domain);
+  if (!browser) return tl::unexpected<Error>(browser.error());
+  std::this_thread::sleep_for(std::chrono::duration<double>(watch_s));
+  return browser->sessions();
+}
+
+inline Result<std::vector<SessionInfo>> Browser::sessions() const {
+  std::vector<tandem_session_info> found;
+  std::size_t count = 0;
+  do {  // more may come in between
+    found.assign(count, TANDEM_SESSION_INFO_INIT);
+    const tandem_result result = tandem_browser_list(handle_, found.data(), found.size(), &count);
+    if (result != TANDEM_CAPACITY) {
+      if (const auto listed = Client::checked(result); !listed) return Client::unexpected(listed);
+    }
+  } while (count > found.size());
+  std::vector<SessionInfo> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const tandem_session_info& c = found[i];
+    out.push_back({c.name, c.scene, c.codec, c.predictor, c.playable != 0, c.epoch, c.capacity, c.bodies,
+                   c.participants, c.observers, c.frame_rate_hz, c.client_ms, c.mbit_per_s});
+  }
+  return out;
+}
+
+inline Result<Scene> Client::scene() const {
+  tandem_scene c = TANDEM_SCENE_INIT;
+  if (const auto got = checked(tandem_get_scene(handle_, &c)); !got) return unexpected(got);
+  Scene scene;
+  scene.name = c.name;
+  scene.capacity = c.capacity;
+  scene.frame_rate_hz = c.frame_rate_hz;
+  scene.max_gravity = c.max_gravity;
+  scene.max_push = c.max_push;
+  scene.gravity = std::to_array(c.gravity);
+  scene.low = std::to_array(c.low);
+  scene.high = std::to_array(c.high);
+  std::vector<tandem_solid> solids(c.solid_count, TANDEM_SOLID_INIT);
+  std::size_t count = 0;
+  const tandem_result result = tandem_get_geometry(handle_, solids.data(), solids.size(), &count);
+  if (result != TANDEM_OK && result != TANDEM_CAPACITY) return unexpected(checked(result));
+  for (std::size_t i = 0; i < count && i < solids.size(); ++i) {
+    const tandem_solid& s = solids[i];
+    scene.solids.push_back({static_cast<Solid::Shape>(s.shape), std::to_array(s.centre),
+                            std::to_array(s.orientation), std::to_array(s.half_size), std::to_array(s.normal),
+                            s.radius});
+  }
+  return scene;
+}
 
 inline void Client::run_for(double seconds) {
   const auto left_s = [end_ns = static_cast<double>(tandem_clock_ns()) + seconds * 1e9] {

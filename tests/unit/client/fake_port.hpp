@@ -8,7 +8,7 @@
 
 namespace tandem::client {
 
-class FakePort final : public transport::ClientPort {
+class FakePort : public transport::ClientPort {
  public:
   [[nodiscard]] transport::ParticipantId self() const override { return {}; }
   void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {

@@ -1,0 +1,56 @@
+#include "sdk/client/api/browser.hpp"
+
+#include "sdk/client/session_check.hpp"
+
+namespace tandem::api {
+namespace {
+
+// Status comes once a second.
+constexpr std::int64_t kSilenceNs = 3'000'000'000;
+// A machine that floods the status topic shall not fill this one's memory.
+constexpr std::size_t kMostHeard = 4096;
+
+}  // namespace
+
+void Browser::hear(std::int64_t now_ns) {
+  std::vector<transport::Received<transport::ServerStatusMessage>> statuses;
+  monitor_->take(statuses);
+  for (auto& [status, from] : statuses) {
+    if (status.stream != 0 || (heard_.size() >= kMostHeard && !heard_.contains(status.session))) continue;
+    const std::string name = status.session;
+    heard_[name] = {std::move(status), now_ns};
+  }
+  std::erase_if(heard_, [now_ns](const auto& entry) { return now_ns - entry.second.at_ns > kSilenceNs; });
+}
+
+std::size_t Browser::playable_stream(const transport::Received<transport::SessionMessage>& announced) {
+  const auto [at, first] = playable_.try_emplace(Run{announced.from, announced.message.epoch}, kNone);
+  if (first) {
+    if (const auto playable = client::choose_stream(announced.message)) at->second = playable->stream;
+  }
+  return at->second;
+}
+
+void Browser::refresh(std::int64_t now_ns) {
+  hear(now_ns);
+  std::vector<transport::Received<transport::SessionMessage>> live;
+  monitor_->list_sessions(live);
+  sessions_.clear();
+  std::map<Run, std::size_t> playable;
+  for (auto& announced : live) {
+    const std::size_t stream = playable_stream(announced);
+    playable.emplace(Run{announced.from, announced.message.epoch}, stream);
+    const auto [at, first] = sessions_.try_emplace(announced.message.session);
+    if (!first) continue;
+    FoundSession& found = at->second;
+    found.announced = std::move(announced.message);
+    if (stream != kNone) found.stream = &found.announced.streams[stream];
+    const auto heard = heard_.find(at->first);
+    if (heard != heard_.end() && heard->second.status.epoch == found.announced.epoch) {
+      found.status = heard->second.status;
+    }
+  }
+  playable_ = std::move(playable);
+}
+
+}  // namespace tandem::api

@@ -1,0 +1,56 @@
+#pragma once
+// The sessions on a domain, as whoever chooses one wants to see them: what a tandem_browser stands for.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+
+namespace tandem::api {
+
+struct FoundSession {
+  transport::SessionMessage announced;
+  /// Of its streams, the one that a client would play; null: none can be played.
+  const transport::StreamMessage* stream = nullptr;
+  transport::ServerStatusMessage status;  ///< of this epoch, or empty
+};
+
+/// Keeps of each live session what was heard last. Thread-safe.
+class Browser {
+ public:
+  explicit Browser(std::unique_ptr<transport::Monitor> monitor) : monitor_(std::move(monitor)) {}
+
+  /// Takes in what arrived and calls `see(found)` for each live session, by name; of several servers of one
+  /// name for the first that was seen, which is the one that clients follow.
+  template <class See>
+  void list(std::int64_t now_ns, See&& see) {
+    const std::lock_guard lock(mutex_);
+    refresh(now_ns);
+    for (const auto& [name, found] : sessions_) see(found);
+  }
+
+ private:
+  struct Heard {
+    transport::ServerStatusMessage status;
+    std::int64_t at_ns = 0;
+  };
+  using Run = std::pair<transport::ParticipantId, Epoch>;
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  void refresh(std::int64_t now_ns);
+  void hear(std::int64_t now_ns);
+  [[nodiscard]] std::size_t playable_stream(const transport::Received<transport::SessionMessage>& announced);
+
+  std::mutex mutex_;
+  std::unique_ptr<transport::Monitor> monitor_;
+  std::map<std::string, FoundSession> sessions_;
+  std::map<std::string, Heard> heard_;   // by session
+  std::map<Run, std::size_t> playable_;  // of the live ones: finding out takes as much memory as playing
+};
+
+}  // namespace tandem::api
