@@ -74,7 +74,7 @@ EDGES = {
 OWNERS = [
     (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
     (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
-    (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "tests"]),
+    (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/gateway", "services/tool", "services/lab", "services/tandemd", "tests"]),
