@@ -4,6 +4,9 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
+#include <filesystem>
+#include <string>
+#include <system_error>
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -12,6 +15,13 @@
 
 namespace tandem::gateway {
 namespace {
+
+/// Where the package puts the viewer; empty where it is not.
+std::string installed_viewer() {
+  std::error_code error;
+  const bool found = std::filesystem::exists(TANDEM_VIEWER_INSTALL_DIR "/index.html", error);
+  return found ? TANDEM_VIEWER_INSTALL_DIR : "";
+}
 
 constexpr std::size_t kMostViewers = 16'384;
 constexpr std::size_t kLeastQueueBytes = 64U << 10U, kMostQueueBytes = 1U << 30U;
@@ -44,7 +54,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--port", options.web.port, "TCP port; 0 for any free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
-  app.add_option("--viewer", options.viewer, "Folder with the viewer's files, read once at the start");
+  options.viewer = installed_viewer();
+  app.add_option("--viewer", options.viewer,
+                 "Folder with the viewer's files, read once at the start [" TANDEM_VIEWER_INSTALL_DIR
+                 " where it is installed]");
   app.add_option("--token-file", options.token_file,
                  "File whose first line is a token that viewers have to name: ?token=TOKEN");
   app.add_option("--tls-cert", options.web.tls_cert, "Certificate chain, PEM");
