@@ -3,8 +3,8 @@
 //   node measure.mjs [--seconds S] [--bodies N] --tandemd PATH --gateway PATH --site FOLDER --packages FOLDER
 //        --chromium PATH --pictures FOLDER
 //
-// Prints one JSON object a row: as it is, and with Chromium's CPU throttled by four, with both predictors. Exit 0 if
-// every frame was applied, each with the server's hash; 1 otherwise.
+// Prints one JSON object a row: as it is, and with Chromium's CPU throttled by four, with both predictors. serverFramesPerS is
+// what the server made meanwhile. Exit 0 if every frame was applied, each with the server's hash; 1 otherwise.
 
 import { setTimeout as sleep } from 'node:timers/promises';
 import { parseArgs } from 'node:util';
@@ -44,9 +44,10 @@ async function row(stage, address, predictor, throttle) {
     requestAnimationFrame(count);
   });
   const pictures = () => page.evaluate(() => globalThis.pictures);
-  const [from, fromPictures, began] = [await status(page), await pictures(), performance.now()];
+  const serverFrame = async () => (await (await fetch(`${address}healthz`)).json()).frame;
+  const [from, fromPictures, fromServer, began] = [await status(page), await pictures(), await serverFrame(), performance.now()];
   await sleep(1000 * values.seconds);
-  const [to, toPictures, ended] = [await status(page), await pictures(), performance.now()];
+  const [to, toPictures, toServer, ended] = [await status(page), await pictures(), await serverFrame(), performance.now()];
   const seconds = (ended - began) / 1000;
   await stage.picture(page, `measured-${predictor}-${throttle}`);
   await page.context().close();
@@ -56,6 +57,8 @@ async function row(stage, address, predictor, throttle) {
     seconds: Number(seconds.toFixed(1)),
     fps: Number(((toPictures - fromPictures) / seconds).toFixed(1)),
     updatesPerS: Number(((to.framesApplied - from.framesApplied) / seconds).toFixed(1)),
+    serverFramesPerS: Number(((toServer - fromServer) / seconds).toFixed(1)),
+    lagMs: [from.lagMs, to.lagMs].map(Math.round),
     missed: to.frame - from.frame - (to.framesApplied - from.framesApplied),
     rejoins: to.resyncs - from.resyncs,
     mismatches: to.hashMismatches,

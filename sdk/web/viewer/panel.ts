@@ -1,6 +1,7 @@
 // The figures beside the world.
 
 import type { Status } from '../tandem';
+import { adviceOf } from './advice';
 import { History } from './history';
 
 const historyLength = 240;
@@ -61,6 +62,7 @@ export class Panel {
     text('roundTrip', `round trip ${threeDigits(status.roundTripMs)} ms`);
     text('work', threeDigits(status.frameMs.p50));
     text('drawing', `p99 ${threeDigits(status.frameMs.p99)} · ${drawing.framesPerSecond.toFixed(0)} pictures a second`);
+    text('advice', adviceOf(status));
     text('hashHex', status.stateHash || '–');
     const good = status.hashMismatches === 0;
     element('hash').dataset.good = status.framesApplied === 0 ? '' : good ? 'yes' : 'no';

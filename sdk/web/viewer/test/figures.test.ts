@@ -1,6 +1,7 @@
 import { PerspectiveCamera, Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
 import type { Sample } from '../../tandem';
+import { adviceOf } from '../advice';
 import { Colours, packed, parseColour, rampColour } from '../colours';
 import { driftLine } from '../corrections';
 import { niceTop } from '../history';
@@ -22,6 +23,16 @@ it('what is seen without corrections is said in seconds and metres', () => {
   const line = driftLine({ uncorrected, frameRateHz: 30, phase: 'playing' });
   for (const figure of ['3.00 s', '0.457 m', '12.3 m']) expect(line).toContain(figure);
   expect(driftLine({ uncorrected: null, frameRateHz: 30, phase: 'playing' })).toBe('');
+});
+
+it('a device that does not keep up is told what to do', () => {
+  const well = { phase: 'playing', predictor: 'field', frameMs: { p50: 9, p99: 20 }, frameRateHz: 30, lagMs: 80, roundTripMs: 20 } as const;
+  expect(adviceOf(well)).toBe('');
+  expect(adviceOf({ ...well, frameMs: { p50: 24, p99: 30 } })).toMatch(/72 %.*ballistic/);
+  expect(adviceOf({ ...well, lagMs: 900 })).toMatch(/0.9 s late.*ballistic/);
+  expect(adviceOf({ ...well, lagMs: 900, roundTripMs: 800 })).toBe('');
+  expect(adviceOf({ ...well, predictor: 'ballistic', lagMs: 900 })).toMatch(/fewer bodies/);
+  expect(adviceOf({ ...well, phase: 'lost', lagMs: 900 })).toBe('');
 });
 
 it('every phase but playing says something', () => {
