@@ -106,7 +106,8 @@ class Page {
     this.updateWorld(now);
     this.gravity.draw();
     this.world?.beforeRender();
-    this.stage.render(now);
+    // An empty picture would take a browser that has just started as long as the first one with bodies.
+    if (this.world) this.stage.render(now);
     if (this.world && !this.seen) performance.mark('tandem-first-picture');
     this.seen = this.world !== null;
     this.drawn.push({ at: now, ms: performance.now() - began });
@@ -231,11 +232,10 @@ async function start(): Promise<void> {
   document.body.classList.toggle('bare', asked.has('bare'));
   const wasm = { plain: new URL('tandem.wasm', document.baseURI), simd: new URL('tandem-simd.wasm', document.baseURI) };
   const log = (level: LogLevel, text: string) => void (level !== 'info' && toast(text, true));
-  const connecting = Client.connect({ url: gatewayUrl(), role, wasm, log });
-  connecting.catch(() => undefined); // told below, where it is waited for
+  const client = await Client.connect({ url: gatewayUrl(), role, wasm, log });
   const canvas = element<HTMLCanvasElement>('world');
-  const stage = stageOn(canvas); // takes its time too
-  Object.assign(globalThis, { tandem: new Page(await connecting, stage, canvas).forScripts });
+  const stage = stageOn(canvas); // takes up to a second at first, while the connection is being made
+  Object.assign(globalThis, { tandem: new Page(client, stage, canvas).forScripts });
 }
 
 function stageOn(canvas: HTMLCanvasElement): Stage {
