@@ -58,19 +58,47 @@ double Playback::seconds_since_first(std::uint64_t ns) const {
   return static_cast<double>(ns - std::min(ns, reader_.first_ns())) / 1e9;
 }
 
-void Playback::seek(double from_s) {
+void Playback::rewind() {
   run_.reset();
   time_ns_ = 0;
   reader_.rewind();
-  // Sessions stand in front of every snapshot that a recorder cuts.
+}
+
+// Sessions stand in front of every snapshot that a recorder cuts.
+std::vector<McapReader::Place> Playback::starts() const {
   auto starts = reader_.chunks_with(transport::SnapshotMessage::kTopic);
   const auto sessions = reader_.chunks_with(transport::SessionMessage::kTopic);
   std::erase_if(starts, [&](const McapReader::Place& start) {
     return std::ranges::none_of(sessions, [&](const auto& session) { return session.at == start.at; });
   });
-  for (const McapReader::Place& start : starts) {
+  return starts;
+}
+
+void Playback::seek(double from_s) {
+  rewind();
+  for (const McapReader::Place& start : starts()) {
     if (seconds_since_first(start.first_ns) <= from_s) reader_.go_to(start);
   }
+}
+
+// Epochs and frames only grow within a file, so that a few snapshots have to be looked at.
+Result<void> Playback::seek(Epoch epoch, Frame frame) {
+  const std::vector<McapReader::Place> all = starts();
+  std::size_t from = 0, to = all.size();  // the last start not behind is below `to`
+  while (from < to) {
+    const std::size_t middle = from + (to - from) / 2;
+    rewind();
+    reader_.go_to(all[middle]);
+    const auto step = next();
+    if (!step) return tl::unexpected(step.error());
+    // Without a frame behind it the start is cut short: nothing from there on.
+    const bool behind = *step == Step::kEnd || session().epoch > epoch ||
+                        (session().epoch == epoch && timeline().applied() > frame);
+    (behind ? to : from) = behind ? middle : middle + 1;
+  }
+  rewind();
+  if (from > 0) reader_.go_to(all[from - 1]);
+  return {};
 }
 
 Result<Playback::Step> Playback::next() {

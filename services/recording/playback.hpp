@@ -37,6 +37,9 @@ class Playback {
   /// To the last snapshot that has one, so that next() begins a run no later than `from_s` where the file
   /// permits; from there on call next() until time_s() is late enough.
   void seek(double from_s);
+  /// To the last snapshot of an epoch that is not behind `frame`, or the file's begin where there is none;
+  /// from there on call next() until the frame is there. Errors: as next().
+  [[nodiscard]] Result<void> seek(Epoch epoch, Frame frame);
 
   /// When the message at hand was recorded, wall clock, ns since 1970.
   [[nodiscard]] std::uint64_t time_ns() const { return time_ns_; }
@@ -76,6 +79,9 @@ class Playback {
   static Result<std::unique_ptr<Playback>> open(std::optional<MappedFile> mapped,
                                                 std::span<const std::byte> file);
   [[nodiscard]] double seconds_since_first(std::uint64_t ns) const;
+  void rewind();
+  // Where next() can begin a run.
+  [[nodiscard]] std::vector<McapReader::Place> starts() const;
   // Each returns what the message brought about, if anything.
   [[nodiscard]] Result<std::optional<Step>> take(const McapMessage& message);
   [[nodiscard]] Result<void> take(transport::SessionMessage message);

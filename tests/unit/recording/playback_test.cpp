@@ -124,6 +124,32 @@ TEST_F(PlaybackTest, SeeksToTheLastSnapshotBefore) {
   }
 }
 
+TEST_F(PlaybackTest, SeeksToTheLastSnapshotNotBehindAFrame) {
+  begin();
+  frames(200);
+  server = FakeServer(server.session.epoch + 1000, 30);
+  client.emplace(std::move(*ClientTimeline::create(server.session.streams[0].layout)));
+  recorder->add(server.session, wall_ns);
+  join();
+  frames(3);
+  ASSERT_TRUE(recorder->finish());
+  auto playback = Playback::open(path);
+  ASSERT_TRUE(playback);
+  const Epoch last = server.session.epoch, first = last - 1000;
+  for (const auto& [epoch, frame, epoch_found, found] : {std::tuple{first, 130U, first, 120U},
+                                                         {first, 59U, first, 0U},
+                                                         {first, 60U, first, 60U},
+                                                         {first, 1000000U, first, 180U},
+                                                         {last, 2U, last, 0U},
+                                                         {last + 1, 0U, last, 0U},
+                                                         {first - 1, 70U, first, 0U}}) {
+    ASSERT_TRUE((*playback)->seek(epoch, frame));
+    ASSERT_EQ((*playback)->next(), Step::kStarted);
+    EXPECT_EQ((*playback)->session().epoch, epoch_found) << epoch << ' ' << frame;
+    EXPECT_EQ((*playback)->timeline().applied(), found) << epoch << ' ' << frame;
+  }
+}
+
 TEST_F(PlaybackTest, AnInputOnItsWayWhenASnapshotIsCutIsThereBehindIt) {
   begin();
   frames(59);
