@@ -40,6 +40,7 @@ EDGES = {
     "sdk/client": TIMELINE + ["public", "sdk/statistics", "sdk/transport"],
     "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
     "sdk/web/module": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
+    "sdk/python": ["public"],
     "sdk/examples": ["public"],
     "services/heap": [],
     "services/workers": [],
@@ -52,6 +53,8 @@ EDGES = {
     + SIMULATION,
     "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
     "services/recording": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
+    "services/recording/python": TIMELINE
+    + ["public", "sdk/client", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"],
     "services/tandemd": LAYOUT
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
@@ -77,6 +80,7 @@ OWNERS = [
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
+    (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/gateway", "services/tool", "services/lab", "services/tandemd", "tests"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),

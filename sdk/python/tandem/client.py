@@ -1,0 +1,218 @@
+"""A client of a session, and the sessions on a domain."""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Optional, Union
+
+import numpy as np
+
+from tandem import _client
+from tandem.bodies import Bodies
+from tandem.errors import Error, Result
+from tandem.session import (
+    BodyType,
+    Event,
+    LogLevel,
+    Phase,
+    Role,
+    SampleMode,
+    Scene,
+    SessionInfo,
+    Solid,
+    Status,
+)
+
+
+def version() -> str:
+    """Of the library at run time: "MAJOR.MINOR.PATCH"."""
+    return _client.version()
+
+
+def clock_ns() -> int:
+    """The clock of samples and events: the system's monotonic one, nanoseconds."""
+    return _client.clock_ns()
+
+
+def sessions(domain: int = 0, wait: float = 2.0) -> list[SessionInfo]:
+    """The sessions on a DDS domain (0..230), by name, after listening for `wait` seconds without taking part."""
+    browser = _client.Browser(domain)
+    time.sleep(wait)
+    return [SessionInfo._of(session) for session in browser.list()]
+
+
+class Sample(Bodies):
+    """Bodies as they should be drawn at a moment."""
+
+    changes: Optional[np.ndarray]  #: (n,) uint8: a Change, against the client's previous sample
+
+    def __init__(self, columns=None) -> None:
+        super().__init__(columns)
+        self.frame = 0.0  #: the moment that is drawn, in frames
+        self.seconds_since_delta = 0.0  #: how long nothing has come from the server: what is drawn is a guess
+        self.alive_count = 0  #: slots that hold a body
+        self.mode = SampleMode.EXTRAPOLATE  #: in force
+        self.phase = Phase.SEARCHING  #: JOINING: the last bodies known, while the client joins again
+
+
+class Client:
+    """Holds a session's bodies as its server has them, bit by bit, to draw them and to act on them.
+
+        with tandem.Client() as client:           # session "default" on DDS domain 0
+            client.wait_until_playing(10)
+            client.send_gravity((3, -9, 0))
+            bodies = client.sample()
+            print(bodies.frame, bodies.positions[bodies.alive].mean(axis=0))
+
+    Every method raises `Error`; its `code` is INVALID_HANDLE after close().
+
+    Threads: all methods may be called from any thread, also at the same time, with two exceptions: of update()
+    one at a time, and of a Sample that is written to one sample() at a time. Whatever may wait does so without
+    the interpreter's lock. `log` is called with it, from the thread that does the client's work, while the
+    client is locked: return soon, and do not wait for a thread that may be in a call with this client. Methods
+    called from there raise `Error` IN_CALLBACK; what `log` itself raises is reported on stderr and goes no
+    further. After os.fork() the child has no clients.
+    """
+
+    def __init__(
+        self,
+        session: str = "default",
+        domain: int = 0,
+        *,
+        observe: bool = False,
+        lead: int = 1,
+        background: bool = True,
+        echo: bool = False,
+        log: Optional[Callable[[LogLevel, str], object]] = None,
+    ) -> None:
+        """Starts looking for a session; returns at once, whether a server is there or not.
+
+        session     1..64 characters of [A-Za-z0-9._-]
+        domain      DDS domain, 0..230
+        observe     only watch: the server never waits for this client, and refuses its input
+        lead        frames to simulate beyond the last delta, 0 or 1; clamped to what the session allows
+        background  a thread of the client's own does the work. False: the application calls update(), at least
+                    once a frame, and everything happens in there
+        echo        EXPERIMENTAL: sample() shows the application's own gravity at once
+        log         gets a LogLevel and a line for a human
+
+        Also raises TRANSPORT (DDS could not start).
+        """
+        role = Role.OBSERVER if observe else Role.PARTICIPANT
+        if log is not None and not callable(log):
+            raise TypeError("log must be a function of a level and a line")
+        told = None if log is None else lambda level, line: log(LogLevel(level), line)
+        self._connection = _client.Connection(domain, session, role, lead, background, echo, told)
+        # At the end of the program, too: before the interpreter is gone that the log function needs.
+        self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leaves the session. Calls of other threads with this client end soon, with INVALID_HANDLE. Once is
+        enough, more does nothing."""
+        if not self._leave.alive:
+            return
+        try:
+            self._connection.leave()
+        except Error as error:
+            if error.code != Result.INVALID_HANDLE:  # that is: another thread was faster
+                raise
+        self._leave.detach()
+
+    def update(self, wait: float = 0.0) -> None:
+        """For a client without a thread: takes what arrived, follows the session, and waits for the next thing
+        to do, at most `wait` seconds. Also raises WRONG_THREAD: the client has a thread of its own, or another
+        thread is in here."""
+        self._connection.update(wait)
+
+    def wait_until_playing(self, timeout: float) -> None:
+        """Blocks until the client plays, at most `timeout` seconds; updates it, where it has no thread. Also
+        raises TIMEOUT, and what update() raises where the client has no thread."""
+        self._connection.wait_until_playing(timeout)
+
+    def status(self) -> Status:
+        """How the client stands."""
+        return Status._of(self._connection.status())
+
+    def sample(
+        self,
+        mode: SampleMode = SampleMode.EXTRAPOLATE,
+        at_ns: int = 0,
+        smoothing: Optional[float] = None,
+        out: Union[Sample, np.ndarray, Mapping[str, np.ndarray], None] = None,
+    ) -> Sample:
+        """The bodies as they should be drawn at a moment; never changes what the client holds.
+
+        mode       which moment is drawn
+        at_ns      by clock_ns(), such as when the picture will be on the screen; 0: now. Far past or future gives
+                   the nearest that is held, and Sample.frame says which
+        smoothing  time constant with which corrections are blended in, seconds; 0: not at all, None: the
+                   default, 0.1
+        out        a Sample, whose arrays are written to where they are (and replaced only when the session has
+                   another number of slots), or arrays of the caller's own as for Sample.into(); None: new ones
+
+        At any rate, from any thread; waits neither for the network nor for decoding. Also raises NOT_READY
+        (nothing to draw yet) and CAPACITY (the caller's arrays have fewer rows than the session has slots; those
+        of `out.capacity` do).
+        """
+        sample = Sample() if out is None else out if isinstance(out, Sample) else Sample.into(out)
+        smoothing_s = -1.0 if smoothing is None else smoothing
+        while True:
+            sampled = self._connection.sample(mode, at_ns, smoothing_s, sample._columns)
+            (result, sample.capacity, sample.epoch, sample.frame, sample.seconds_since_delta) = sampled[:5]
+            (sample.alive_count, sample.has_orientations, mode_in_force, phase) = sampled[5:]
+            if not sample._fit(sample.capacity):
+                break
+        if result != Result.OK:
+            raise Error(result, f"the session has {sample.capacity} slots, more than the arrays have rows")
+        sample.mode, sample.phase = SampleMode(mode_in_force), Phase(phase)
+        return sample
+
+    def next_event(self) -> Optional[Event]:
+        """Takes the oldest event; None where there is none. 256 are kept; beyond, the oldest are dropped."""
+        event = self._connection.next_event()
+        return None if event is None else Event._of(event)
+
+    def events(self) -> Iterator[Event]:
+        """Takes the events that are there, oldest first; does not wait for more."""
+        while (event := self.next_event()) is not None:
+            yield event
+
+    def send_gravity(self, gravity: Sequence[float]) -> int:
+        """Gravity from now on: x, y, z, scene units / s^2. Returns the input's number; an event tells on which
+        frame it acted, the same one everywhere, or why not.
+
+        As the other send_ methods it also raises NOT_READY (not playing), OUT_OF_ORDER (joined as an observer)
+        and TRANSPORT; values that are not finite are INVALID_ARGUMENT."""
+        return self._connection.send_gravity(gravity)
+
+    def send_push(self, centre: Sequence[float], radius: float, velocity: Sequence[float]) -> int:
+        """Adds a velocity (x, y, z; scene units / s) to the bodies around a point (x, y, z; scene units). Returns
+        the input's number."""
+        return self._connection.send_push(centre, radius, velocity)
+
+    def send_bytes(self, data: Union[bytes, bytearray, memoryview]) -> int:
+        """At most 1,024 bytes for the server's simulation, which knows what they mean. Returns the input's
+        number."""
+        return self._connection.send_bytes(bytes(data))
+
+    def scene(self) -> Scene:
+        """The scene of the session. As geometry() and types() it also raises NOT_READY before a session is known,
+        and MALFORMED where the server describes its scene in a way that cannot be read. With another epoch
+        (EventKind.NEW_EPOCH) everything may be another."""
+        return Scene._of(self._connection.scene())
+
+    def geometry(self) -> list[Solid]:
+        """The pieces of the scene that do not move."""
+        return [Solid._of(solid) for solid in self._connection.geometry()]
+
+    def types(self) -> list[BodyType]:
+        """The types of bodies, as Sample.types counts them."""
+        return [BodyType._of(kind) for kind in self._connection.types()]

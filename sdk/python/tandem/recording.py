@@ -1,0 +1,136 @@
+"""What `tandem record` wrote, state by state."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from tandem.bodies import Bodies
+from tandem.errors import Error, Result
+from tandem.session import BodyType, Scene, Solid
+
+try:
+    from tandem import _recording
+except ImportError:  # the package was built without the services
+    _recording = None
+
+
+class State(Bodies):
+    """The bodies at a frame, as server and clients agreed on them."""
+
+    COLUMNS = tuple(name for name in Bodies.COLUMNS if name != "changes")
+
+    def __init__(self, columns=None) -> None:
+        super().__init__(columns)
+        self.frame = 0
+        self.time_s = 0.0  #: when it was recorded, seconds since the recording's first message
+        self.state_hash = 0  #: by which all agreed, checked when it was read
+        self.starts = False  #: the state before it, if any, was of another epoch, or frames between are missing
+
+
+class Recording:
+    """A recording, from the first state that it holds.
+
+        with tandem.Recording("session.mcap") as recording:
+            for state in recording:
+                print(state.frame, state.positions[state.alive].mean(axis=0))
+
+    Iterating goes on from where the recording stands, and gives new arrays each time; read(out) writes them to where
+    they are. Every state's hash is checked. What is in a file may be anybody's: nothing in it can do more than raise
+    `Error`: IO, MALFORMED, UNSUPPORTED (of another version) or MISMATCH (a hash). A file that was cut short is read up
+    to there, and `torn` tells. Decoding does without the interpreter's lock.
+    A recording is for one thread at a time.
+    """
+
+    def __init__(self, path: "str | os.PathLike[str]") -> None:
+        if _recording is None:
+            raise Error(Result.UNSUPPORTED, "this package was built without the reader of recordings")
+        self._held: Optional[Any] = _recording.Reader(os.fspath(path))
+        self._at = self._reader.next()  # the place of the state that read() gives next
+        if self._at is None:
+            raise Error(Result.MALFORMED, f"{os.fspath(path)}: holds no state")
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file. Whatever else is called after it raises INVALID_HANDLE."""
+        self._held = None
+
+    def __iter__(self) -> Iterator[State]:
+        while (state := self.read()) is not None:
+            yield state
+
+    def read(self, out: Union[State, np.ndarray, Mapping[str, np.ndarray], None] = None) -> Optional[State]:
+        """The next state; None behind the last one.
+
+        out  a State, whose arrays are written to where they are (and replaced only when the session has another
+             number of slots), or arrays of the caller's own as for State.into(); None: new ones
+
+        Also raises CAPACITY: the caller's arrays have fewer rows than the session has slots."""
+        reader = self._reader
+        if self._at is None:
+            self._at = reader.next()
+        if self._at is None:
+            return None
+        state = State() if out is None else out if isinstance(out, State) else State.into(out)
+        (state.starts, state.epoch, state.frame, state.state_hash, state.time_s) = self._at[:5]
+        (state.capacity, state.has_orientations) = self._at[5:]
+        state._fit(state.capacity)
+        reader.write(state._columns)
+        self._at = None
+        return state
+
+    def seek(self, frame: int, epoch: Optional[int] = None) -> None:
+        """To a frame, which read() gives next, of an epoch of the recording; None: the one it stands in. Also raises
+        INVALID_ARGUMENT: that frame is not there; the recording then stands behind where it would be.
+
+        A snapshot before it, one in some ten seconds, is looked up, and what follows is decoded."""
+        reader = self._reader
+        wanted = (self.epoch if epoch is None else epoch, frame)
+        reader.seek(*wanted)
+        self._at = reader.next()
+        while self._at is not None and self._at[1:3] < wanted:
+            self._at = reader.next()
+        if self._at is None or self._at[1:3] != wanted:
+            raise Error(Result.INVALID_ARGUMENT, f"the recording holds no frame {frame} of epoch {wanted[0]}")
+
+    @property
+    def epoch(self) -> int:
+        """Of the run of the server that the recording stands in."""
+        return self._reader.epoch()
+
+    @property
+    def length_s(self) -> float:
+        """From the first message to the last one, seconds."""
+        return self._reader.length_s
+
+    @property
+    def torn(self) -> Optional[int]:
+        """Where the file is cut short: the first byte that cannot be read. None: it is whole."""
+        return self._reader.torn_at
+
+    def scene(self) -> Scene:
+        """The scene of the session. This, geometry() and types() are those of the epoch that the recording stands in. Also
+        raises MALFORMED, as geometry() does: the server described its scene in a way that cannot be read."""
+        return Scene._of(self._reader.scene())
+
+    def geometry(self) -> list[Solid]:
+        """The pieces of the scene that do not move."""
+        return [Solid._of(solid) for solid in self._reader.geometry()]
+
+    def types(self) -> list[BodyType]:
+        """The types of bodies, as State.types counts them."""
+        return [BodyType._of(kind) for kind in self._reader.types()]
+
+    @property
+    def _reader(self) -> Any:
+        if self._held is None:
+            raise Error(Result.INVALID_HANDLE, "the recording is closed")
+        return self._held
