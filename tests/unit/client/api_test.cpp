@@ -124,5 +124,29 @@ TEST_F(ClientApi, TypesTellWhatBodiesLookLike) {
   EXPECT_EQ(types[0].shape_values, (std::vector<float>{1, 2, 0.5F}));
 }
 
+TEST_F(ClientApi, ABrowserFindsTheSessionsOfADomain) {
+  transport::DdsOptions dds;
+  dds.session = "found";
+  auto server = transport::make_dds_server_port(dds);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  transport::SessionMessage session = client::FakeServer(7, 4, 1).session;
+  session.session = dds.session;
+  ASSERT_TRUE((*server)->write(session).has_value());
+  auto browser = Browser::open();
+  ASSERT_TRUE(browser.has_value()) << browser.error().message;
+  Result<std::vector<SessionInfo>> found;
+  for (int i = 0; i < 200 && (!found || found->empty()); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    found = browser->sessions();
+  }
+  ASSERT_TRUE(found.has_value());
+  ASSERT_EQ(found->size(), 1U);
+  EXPECT_EQ(found->front().name, "found");
+  EXPECT_EQ(found->front().epoch, 7U);
+  EXPECT_EQ(found->front().capacity, 4U);
+  EXPECT_TRUE(found->front().playable);
+  EXPECT_FALSE(Browser::open(231).has_value());
+}
+
 }  // namespace
 }  // namespace tandem
