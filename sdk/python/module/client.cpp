@@ -83,14 +83,14 @@ class Connection {
   }
   // In slices, so that Ctrl-C ends the wait.
   void wait_until_playing(double timeout_s) {
-    constexpr double kSlice_s = 0.1;
+    constexpr double kSliceS = 0.1;
     using Seconds = std::chrono::duration<double>;
     const auto start = std::chrono::steady_clock::now();
     for (;;) {
       const double left_s = timeout_s - Seconds(std::chrono::steady_clock::now() - start).count();
       const auto result =
-          unlocked([&] { return tandem_wait_until_playing(client_, std::clamp(left_s, 0.0, kSlice_s)); });
-      if (result != TANDEM_TIMEOUT || left_s <= kSlice_s) return check(result);
+          unlocked([&] { return tandem_wait_until_playing(client_, std::clamp(left_s, 0.0, kSliceS)); });
+      if (result != TANDEM_TIMEOUT || left_s <= kSliceS) return check(result);
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     }
   }
