@@ -9,7 +9,7 @@
 #include "sdk/core/layout/parameters.hpp"
 #include "sdk/transport/messages.hpp"
 #include "services/host/outbox.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::host {
 

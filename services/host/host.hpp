@@ -13,9 +13,9 @@
 #include "sdk/transport/units.hpp"
 #include "services/host/frame_source.hpp"
 #include "services/host/outbox.hpp"
-#include "services/host/simulation.hpp"
 #include "services/host/stream.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::host {
 

@@ -5,8 +5,8 @@
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/predict/drive.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::host {
 

@@ -9,7 +9,7 @@
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "services/host/lattice_choice.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::host {
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/predict/predictor.hpp"
 #include "services/host/mirror.hpp"
 
 namespace tandem::host {
@@ -87,6 +88,22 @@ struct Stream::Impl final : EncodeObserver {
   std::uint32_t bodies = 0;
   std::int64_t (*clock)() = nullptr;
 };
+
+Result<void> choose_gains(StreamConfig& config) {
+  // What the constants make of the predictor, which may be another than the name says.
+  const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
+  if (!predictor) return tl::unexpected(predictor.error());
+  const std::string_view kind = (*predictor)->name();
+  set_first_gains(kind, config.layout.parameters);
+  config.gains = usual_gain_goal(kind);
+  return {};
+}
+
+Result<std::size_t> largest_delta_bytes(const StreamConfig& config) {
+  return ServerTimeline::create(config.layout, Epoch{1}).map([](const ServerTimeline& timeline) {
+    return timeline.payload_bound();
+  });
+}
 
 Result<Stream> Stream::create(StreamConfig config, const StreamStart& start) {
   if (auto good = check(config, start); !good) return tl::unexpected(good.error());

@@ -13,8 +13,8 @@
 #include "services/host/gains.hpp"
 #include "services/host/lattice_choice.hpp"
 #include "services/host/quality.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::host {
 
@@ -26,6 +26,14 @@ struct StreamConfig {
   std::optional<GainGoal> gains;       ///< empty: so do decay and gains
   LocalOptions local;
 };
+
+/// Sets the decay and gains of the first frame, and what the later ones aim at, for a codec that reads them.
+/// Errors: those of the layout's predictor.
+[[nodiscard]] Result<void> choose_gains(StreamConfig& config);
+
+/// Most bytes a delta of this stream can take: what a transport must be ready for before the host exists.
+/// Errors: as Stream::create() for codec and predictor.
+[[nodiscard]] Result<std::size_t> largest_delta_bytes(const StreamConfig& config);
 
 /// Where a stream begins: bodies that were not stepped yet.
 struct StreamStart {

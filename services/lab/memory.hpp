@@ -7,8 +7,8 @@
 #include <string>
 
 #include "services/host/host.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

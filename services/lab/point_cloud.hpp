@@ -6,8 +6,8 @@
 #include <string>
 
 #include "sdk/transport/messages.hpp"
-#include "services/host/simulation.hpp"
 #include "services/recording/mcap_writer.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

@@ -6,7 +6,7 @@
 
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

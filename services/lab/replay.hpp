@@ -8,8 +8,8 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/clock.hpp"
 #include "services/host/lattice_choice.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "services/host/simulation.hpp"
 #include "services/lab/replay.hpp"
 #include "services/scenes/scene.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "services/engine/shape/shape.hpp"
-#include "services/host/simulation.hpp"
 #include "services/tool/output_file.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

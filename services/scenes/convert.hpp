@@ -6,7 +6,7 @@
 
 #include "services/engine/bullet/inputs.hpp"
 #include "services/engine/shape/shape.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::scenes {
 

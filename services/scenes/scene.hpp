@@ -11,10 +11,10 @@
 #include "services/engine/bullet/world.hpp"
 #include "services/engine/particles/world.hpp"
 #include "services/engine/shape/shape.hpp"
-#include "services/host/simulation.hpp"
 #include "services/scenes/script.hpp"
 #include "services/scenes/trained.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::scenes {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "services/host/simulation.hpp"
 #include "services/scenes/random.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::scenes {
 

@@ -8,8 +8,8 @@
 
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "services/host/block_threads.hpp"
+#include "services/host/groups.hpp"
 #include "services/sessions/contact_plan.hpp"
-#include "services/sessions/group_plan.hpp"
 
 namespace tandem::sessions {
 namespace {
@@ -33,6 +33,13 @@ std::vector<std::byte> codec_tables(const scenes::TrainedTable& table, const Gro
   // Of a table that was trained before bodies turned.
   if (table.turn_code_lengths.empty()) bytes.insert(bytes.end(), usual.begin() + 2 * kSymbols, usual.end());
   return bytes;
+}
+
+Result<void> choose_groups(const scenes::Scene& scene, const host::Lattice& lattice,
+                           const CodecTraits& traits, Layout& layout) {
+  std::vector<host::BodySize> sizes;
+  for (const scenes::BodyType& type : scene.types) sizes.push_back({type.name, type.bounding_radius_m});
+  return host::choose_groups(scene.turns, sizes, lattice, traits, layout);
 }
 
 // Where the codec reads them and bodies turn.
@@ -77,17 +84,6 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
   return {};
 }
 
-// Decay and gains of the first frame, and what the later ones aim at.
-Result<void> choose_gains(host::StreamConfig& stream) {
-  // What the constants make of the predictor, which may be another than the name says.
-  const auto predictor = make_predictor(stream.layout.predictor, 1, stream.layout.predictor_constants);
-  if (!predictor) return tl::unexpected(predictor.error());
-  const std::string_view kind = (*predictor)->name();
-  host::set_first_gains(kind, stream.layout.parameters);
-  stream.gains = host::usual_gain_goal(kind);
-  return {};
-}
-
 }  // namespace
 
 Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice) {
@@ -128,7 +124,7 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   if (auto chosen = choose_predictor(scene, choice, *traits, stream); !chosen)
     return tl::unexpected(chosen.error());
   if (traits->reads_gains) {
-    if (auto gained = choose_gains(stream); !gained) return tl::unexpected(gained.error());
+    if (auto gained = host::choose_gains(stream); !gained) return tl::unexpected(gained.error());
   }
   stream.local.run_blocks = host::blocks_on_threads(choice.threads);
   return stream;
@@ -150,12 +146,6 @@ Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionC
                               .shape_values = type.shape.values});
     }
     return config;
-  });
-}
-
-Result<std::size_t> largest_delta_bytes(const host::StreamConfig& stream) {
-  return ServerTimeline::create(stream.layout, Epoch{1}).map([](const ServerTimeline& timeline) {
-    return timeline.payload_bound();
   });
 }
 

@@ -44,8 +44,4 @@ struct SessionChoice {
 /// defaults. Errors: as plan_stream().
 [[nodiscard]] Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice);
 
-/// Most bytes a delta of this stream can take: what a transport must be ready for before the host exists.
-/// Errors: as Stream::create() for codec and predictor.
-[[nodiscard]] Result<std::size_t> largest_delta_bytes(const host::StreamConfig& stream);
-
 }  // namespace tandem::sessions

@@ -11,9 +11,9 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
-#include "services/host/simulation.hpp"
 #include "services/tandemd/number.hpp"
 #include "services/workers/workers.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::daemon {
 namespace {

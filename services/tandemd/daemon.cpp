@@ -109,7 +109,7 @@ Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& op
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
                                                          const Options& options,
                                                          const std::atomic<bool>& stop) {
-  const auto largest = sessions::largest_delta_bytes(config.stream);
+  const auto largest = host::largest_delta_bytes(config.stream);
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;

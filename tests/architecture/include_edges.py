@@ -21,7 +21,7 @@ LAYOUT = CORE + ["sdk/core/layout"]
 PREDICT = ["sdk/core/predict", "sdk/core/predict/ballistic", "sdk/core/predict/contact"]
 CODEC = ["sdk/core/codec", "sdk/core/codec/paper", "sdk/core/codec/tracker"]
 TIMELINE = LAYOUT + PREDICT + CODEC + ["sdk/core/timeline"]
-SIMULATION = ["services/host/simulation.hpp"]
+SIMULATION = ["services/host/include/tandem/simulation.hpp"]
 EDGES = {
     "sdk/include": [],
     "sdk/core/lattice": ["public/result.hpp"],
@@ -41,21 +41,24 @@ EDGES = {
     "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
     "sdk/web/module": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
     "sdk/python": ["public"],
-    "sdk/examples": ["public"],
+    "sdk/examples": ["public", "services/host/include"],
     "services/heap": [],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
-    "services/host": TIMELINE + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"],
+    "services/host/include": ["public/result.hpp", "public/body_shape.hpp"],
+    "services/host/api": TIMELINE + ["services/host", "services/host/include", "sdk/transport", "sdk/transport/dds"],
+    "services/host": SIMULATION + TIMELINE + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"],
     "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
     "services/engine/shape": ["public/result.hpp"],
     "services/engine/bullet": ["public/result.hpp", "services/engine/particles", "services/engine/shape"] + SIMULATION,
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/particles", "services/engine/shape"]
     + SIMULATION,
-    "services/sessions": TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
+    "services/sessions": SIMULATION + TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
     "services/recording": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
     "services/recording/python": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"],
-    "services/tandemd": LAYOUT
+    "services/tandemd": SIMULATION
+    + LAYOUT
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
     "services/tandemd/main.cpp": ["services/tandemd", "services/heap", "services/signals"],
@@ -67,7 +70,8 @@ EDGES = {
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
     + ["services/heap", "services/host", "services/recording", "services/scenes", "services/signals"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
-    "services/lab": TIMELINE
+    "services/lab": SIMULATION
+    + TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
     + ["sdk/statistics", "services/engine/shape", "services/host", "services/recording", "services/scenes", "services/sessions", "services/tool", "services/workers"],
     "tests": ["*"],
@@ -124,8 +128,9 @@ def resolve(root, quoted):
     """The path from the root that a project include names, or None for a header from outside."""
     if (root / quoted).is_file():
         return quoted
-    if (root / "sdk/include" / quoted).is_file():
-        return "sdk/include/" + quoted
+    for public in ("sdk/include/", "services/host/include/"):
+        if (root / public / quoted).is_file():
+            return public + quoted
     return None
 
 

@@ -16,8 +16,8 @@ class IncludeEdges(unittest.TestCase):
                 "sdk/core/lattice/state.hpp": '#include <vector>\n#include "tandem/result.hpp"\n',
                 "sdk/core/predict/predictor.hpp": '#include "sdk/core/lattice/state.hpp"\n',
                 "sdk/transport/port.hpp": '#include "sdk/core/lattice/state.hpp"\n',
-                "services/host/simulation.hpp": "#include <span>\n",
-                "services/engine/particles/particles.cpp": '#include "services/host/simulation.hpp"\n',
+                "services/host/include/tandem/simulation.hpp": "#include <span>\n",
+                "services/engine/particles/particles.cpp": '#include "tandem/simulation.hpp"\n',
             }
             for path, text in {**base, **dict(files)}.items():
                 file = pathlib.Path(root) / path

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "services/engine/bullet/world.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::engine {
 

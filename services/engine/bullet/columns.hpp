@@ -9,7 +9,7 @@
 
 #include "services/engine/bullet/inputs.hpp"
 #include "services/engine/bullet/motion.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::engine {
 

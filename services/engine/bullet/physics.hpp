@@ -10,7 +10,7 @@
 
 #include "services/engine/bullet/motion.hpp"
 #include "services/engine/bullet/world.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::engine {
 

@@ -2,8 +2,8 @@
 // What a particle simulation accepts: worlds at the start, inputs at run time.
 
 #include "services/engine/particles/world.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::engine {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/engine/particles/contacts.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::engine {
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "services/engine/particles/world.hpp"
-#include "services/host/simulation.hpp"
 #include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::engine {
 

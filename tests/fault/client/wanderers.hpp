@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::client {
 

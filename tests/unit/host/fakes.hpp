@@ -13,7 +13,7 @@
 
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::host {
 

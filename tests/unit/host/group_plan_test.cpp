@@ -1,5 +1,5 @@
 // Which sessions have orientations.
-#include "services/sessions/group_plan.hpp"
+#include "services/host/groups.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,46 +15,35 @@ constexpr CodecTraits kCodesTurns{.turns = true};
 constexpr host::Lattice kLattice{.unit = 0.001, .dt_s = 1.0 / 60};
 const std::vector<std::string> kBoth{kPositionGroup, kOrientationGroup};
 
-scenes::Scene turning_scene() {
-  scenes::Scene scene;
-  scene.turns = true;
-  scene.types.resize(2);
-  scene.types[0].bounding_radius_m = 0.5;
-  scene.types[1].bounding_radius_m = 0.0101;
-  return scene;
-}
+const std::vector<host::BodySize> kSizes{{"rock", 0.5}, {"pebble", 0.0101}};
 
 TEST(GroupPlan, BodiesThatTurnHaveOrientationsAndRadiiRoundedUp) {
   Layout layout;
-  ASSERT_TRUE(choose_groups(turning_scene(), kLattice, kCodesTurns, layout));
+  ASSERT_TRUE(host::choose_groups(true, kSizes, kLattice, kCodesTurns, layout));
   EXPECT_EQ(layout.groups, kBoth);
   EXPECT_EQ(layout.radii, (std::vector<std::int32_t>{500, 11}));
 }
 
 TEST(GroupPlan, WithACodecThatCodesNoneTheyArePoints) {
   Layout layout;
-  ASSERT_TRUE(choose_groups(turning_scene(), kLattice, CodecTraits{}, layout));
+  ASSERT_TRUE(host::choose_groups(true, kSizes, kLattice, CodecTraits{}, layout));
   EXPECT_EQ(layout.groups, Layout{}.groups);
   EXPECT_TRUE(layout.radii.empty());
 }
 
 TEST(GroupPlan, BodiesThatDoNotTurnArePointsWithAnyCodec) {
-  scenes::Scene scene = turning_scene();
-  scene.turns = false;
-  scene.types[0].bounding_radius_m = 0;
   Layout layout;
-  ASSERT_TRUE(choose_groups(scene, kLattice, kCodesTurns, layout));
+  ASSERT_TRUE(host::choose_groups(false, std::vector<host::BodySize>(2), kLattice, kCodesTurns, layout));
   EXPECT_EQ(layout.groups, Layout{}.groups);
   EXPECT_TRUE(layout.radii.empty());
 }
 
 TEST(GroupPlan, ATypeWithoutARadiusOrOneBeyondTheLatticeIsNamed) {
   for (const double radius : {0.0, -1.0, 1.1e6, std::numeric_limits<double>::quiet_NaN()}) {
-    scenes::Scene scene = turning_scene();
-    scene.types[1].name = "pebble";
-    scene.types[1].bounding_radius_m = radius;
+    std::vector<host::BodySize> sizes = kSizes;
+    sizes[1].radius = radius;
     Layout layout;
-    const auto chosen = choose_groups(scene, kLattice, kCodesTurns, layout);
+    const auto chosen = host::choose_groups(true, sizes, kLattice, kCodesTurns, layout);
     ASSERT_FALSE(chosen) << radius;
     EXPECT_EQ(chosen.error().code, ErrorCode::kInvalidArgument);
     EXPECT_NE(chosen.error().message.find("pebble"), std::string::npos);
@@ -87,7 +76,7 @@ TEST(GroupPlan, StepsAndTablesOfTurnsAreThoseThatWereTrained) {
   choice.codec = "entropy";
   const auto usual = plan_stream(scene, choice).value();
   EXPECT_TRUE(has_turn_steps(usual.layout.parameters.codec));
-  EXPECT_TRUE(largest_delta_bytes(usual));
+  EXPECT_TRUE(host::largest_delta_bytes(usual));
 
   const std::vector<std::uint8_t> flat(256, 8);
   scenes::TrainedTable table;
@@ -96,7 +85,7 @@ TEST(GroupPlan, StepsAndTablesOfTurnsAreThoseThatWereTrained) {
   table.position_code_lengths = table.velocity_code_lengths = flat;
   scene.trained = {table};
   const auto partly = plan_stream(scene, choice).value();
-  EXPECT_TRUE(largest_delta_bytes(partly)) << "trained before bodies turned";
+  EXPECT_TRUE(host::largest_delta_bytes(partly)) << "trained before bodies turned";
   EXPECT_EQ(partly.layout.codec_tables.size(), 1024U);
 
   table.turn_range_rad = 0.25;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "services/host/simulation.hpp"
+#include "tandem/simulation.hpp"
 
 namespace tandem::lab {
 

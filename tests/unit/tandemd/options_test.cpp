@@ -249,7 +249,7 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       EXPECT_EQ(config->scene, name);
       EXPECT_EQ(config->stream.budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
       EXPECT_EQ(config->stream.layout.parameters.codec.threshold, 1 << config->stream.lattice.halvings);
-      const auto largest = sessions::largest_delta_bytes(config->stream);
+      const auto largest = host::largest_delta_bytes(config->stream);
       ASSERT_TRUE(largest) << largest.error().message;
       EXPECT_GT(*largest, 0U);
     }
@@ -281,7 +281,7 @@ TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
     choice.predictor = "contact";
     const auto config = sessions::plan_session(*scene, choice);
     ASSERT_TRUE(config) << config.error().message;
-    EXPECT_TRUE(sessions::largest_delta_bytes(config->stream));
+    EXPECT_TRUE(host::largest_delta_bytes(config->stream));
     const auto read = read_contact_constants(config->stream.layout.predictor_constants);
     ASSERT_TRUE(read);
     EXPECT_EQ(read->substeps, static_cast<std::int32_t>(scene->world.substeps));

@@ -1,5 +1,6 @@
 #pragma once
-// What the server needs from a full simulation. Engines implement this and see nothing else of Tandem.
+// What a server needs from a full simulation: implement engine::Simulation, and tandem/host.hpp streams it.
+// Engines see nothing else of Tandem.
 
 #include <array>
 #include <cstddef>
@@ -25,8 +26,8 @@ enum class InputKind : std::uint32_t {
 
 struct Input {
   std::uint32_t kind = 0;  ///< InputKind; unknown values are refused by classify()
-  std::vector<double> values;
-  std::vector<std::byte> bytes;
+  std::vector<double> values = {};
+  std::vector<std::byte> bytes = {};
 };
 
 /// How an input takes effect (paper, section 4.2.1), and what it makes of the predicted step.
@@ -83,18 +84,23 @@ class Simulation {
   [[nodiscard]] virtual double dt_s() const = 0;
   /// In force now: the drive of the next step unless an input changes it.
   [[nodiscard]] virtual Vec3 gravity() const = 0;
-  [[nodiscard]] virtual double damping_per_s() const = 0;
+  /// 1/s: a body loses damping_per_s * dt_s of its velocity in a step.
+  [[nodiscard]] virtual double damping_per_s() const { return 0; }
 
-  /// Decides what an input is, without applying it. Refuses what is not finite or out of range.
-  [[nodiscard]] virtual Classification classify(const Input& input) const = 0;
+  /// Decides what an input is, without applying it. Refuses what is not finite or out of range; all, unless
+  /// overridden.
+  [[nodiscard]] virtual Classification classify(const Input& /*input*/) const {
+    return {.reason = "this simulation takes no input"};
+  }
   /// Takes effect in the next step(). The last gravity wins. Only inputs that classify() did not refuse.
-  virtual void apply(const Input& input) = 0;
+  virtual void apply(const Input& /*input*/) {}
   virtual void step() = 0;
 
   [[nodiscard]] virtual Bodies bodies() const = 0;
-  [[nodiscard]] virtual std::span<const Event> events() const = 0;
+  /// Of the last step; valid until the next one.
+  [[nodiscard]] virtual std::span<const Event> events() const { return {}; }
   /// Bodies in contact (with another body or with the scene) in the last step, for the paper's tables.
-  [[nodiscard]] virtual std::uint32_t colliding() const = 0;
+  [[nodiscard]] virtual std::uint32_t colliding() const { return 0; }
   [[nodiscard]] virtual Mishaps mishaps() const { return {}; }
 
   /// Checkpoint: everything that decides the following steps. load() returns false and changes nothing when
@@ -102,8 +108,8 @@ class Simulation {
   /// what they were at save(). The steps that follow are valid, but an engine that keeps caches from step to
   /// step (contact points, impulses to start from) may rebuild them, so that its bits need not be those of
   /// the run that saved; two loads of the same bytes go on alike.
-  virtual void save(std::vector<std::byte>& out) const = 0;
-  [[nodiscard]] virtual bool load(std::span<const std::byte> bytes) = 0;
+  virtual void save(std::vector<std::byte>& /*out*/) const {}
+  [[nodiscard]] virtual bool load(std::span<const std::byte> /*bytes*/) { return false; }
 };
 
 }  // namespace tandem::engine

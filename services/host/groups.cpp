@@ -1,29 +1,28 @@
-#include "services/sessions/group_plan.hpp"
+#include "services/host/groups.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
-#include <vector>
 
-namespace tandem::sessions {
+namespace tandem::host {
 
-Result<void> choose_groups(const scenes::Scene& scene, const host::Lattice& lattice,
+Result<void> choose_groups(bool turns, std::span<const BodySize> types, const Lattice& lattice,
                            const CodecTraits& traits, Layout& layout) {
   layout.groups = {kPositionGroup};
   layout.radii.clear();
-  if (!scene.turns || !traits.turns) return {};
+  if (!turns || !traits.turns) return {};
   layout.groups.emplace_back(kOrientationGroup);
-  for (const scenes::BodyType& type : scene.types) {
-    const double units = std::ceil(type.bounding_radius_m * lattice.position_scale());
+  for (const BodySize& type : types) {
+    const double units = std::ceil(type.radius * lattice.position_scale());
     if (!(units >= 1 && units <= double{kPositionLimit})) {
       return fail(
           ErrorCode::kInvalidArgument,
           fmt::format("body type '{}': orientations need a radius above 0 that fits the lattice, not {}",
-                      type.name, type.bounding_radius_m));
+                      type.name, type.radius));
     }
     layout.radii.push_back(static_cast<std::int32_t>(units));
   }
   return {};
 }
 
-}  // namespace tandem::sessions
+}  // namespace tandem::host

@@ -1,0 +1,102 @@
+#pragma once
+// tandem::Server: streams a simulation of yours to any number of clients. Implement engine::Simulation
+// (tandem/simulation.hpp), start a server on it, poll it.
+//
+//     MySimulation simulation;
+//     auto server = tandem::Server::start({.session = "mine", .threshold = 0.005, .extent = 50}, simulation);
+//     if (!server) return complain(server.error().message);
+//     while (server->poll()) {}
+//
+// EXPERIMENTAL: names may still change before 1.0; link it from the version it was built with.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tandem/body_shape.hpp"
+#include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
+
+namespace tandem {
+
+/// What clients draw for one type of body.
+struct ServedType {
+  std::string name = "body";  ///< 1..64 bytes
+  double radius = 0.5;        ///< of the sphere around a body; scene units
+  std::uint32_t colour_rgba = 0xC0C0C0FF;
+  BodyShape shape = BodyShape::kSphere;
+  std::vector<float> shape_values = {};  ///< as the shape says
+};
+
+struct ServerOptions {
+  std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
+  std::uint32_t domain = 0;         ///< DDS domain, 0..230
+  /// Largest distance between where the simulation and where the clients have a body, or a point of its
+  /// surface where bodies turn; scene units. The price of a frame grows as it shrinks.
+  double threshold = 0.01;
+  /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears until it is back. At
+  /// most about a million thresholds.
+  double extent = 100;
+  /// Payload that the server keeps to by itself, Mbit/s (2^20 bits), with errors of up to four thresholds; 0:
+  /// `threshold` alone decides.
+  double target_mbit_per_s = 0;
+  std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
+  std::uint32_t lead = 1;         ///< frames that clients may simulate beyond the last delta, 0 or 1
+  /// By what Simulation::bodies() calls type; at least one, at most 65,535.
+  std::vector<ServedType> types{ServedType{}};
+  std::string scene = "";  ///< a name to show, at most 64 bytes
+  /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
+  std::string scene_description = "";
+  std::uint32_t wait_for = 0;  ///< participants that must play before frame 1
+  /// One line for a human: who joined, was demoted, refused. Called by poll(); must not call the server.
+  std::function<void(std::string_view)> log = {};
+};
+
+/// Counts since the start.
+struct ServerStatus {
+  std::uint64_t frame = 0;                        ///< of the last delta
+  std::uint64_t state_hash = 0;                   ///< of that frame, as every client has it
+  std::uint32_t participants = 0, observers = 0;  ///< playing now
+  std::uint64_t payload_bytes = 0, corrected = 0, stalls = 0, refused_inputs = 0;
+  double threshold = 0;                       ///< in force
+  double frame_ms_p50 = 0, frame_ms_p99 = 0;  ///< step, predict, encode, apply
+};
+
+/// One server of one session, at the simulation's rate (1 / dt_s). Movable. All members from one thread,
+/// which is the one that calls the simulation; a thread of the server's own does the sending.
+class __attribute__((visibility("default"))) Server {
+ public:
+  /// `simulation` must outlive the server; it was not stepped yet, and its bodies now are the start frame.
+  /// Errors: kInvalidArgument (options, or body columns not `capacity` long), kUnsupported (codec),
+  /// kTransport (DDS could not start).
+  [[nodiscard]] static Result<Server> start(const ServerOptions& options, engine::Simulation& simulation);
+  Server(Server&&) noexcept;
+  Server& operator=(Server&&) noexcept;
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  /// Ends the session; what was queued is sent first.
+  ~Server();
+
+  /// Does what is due, which may be a step of the simulation, and waits at most `wait_s` for the next thing.
+  /// False once the session cannot go on: see error().
+  bool poll(double wait_s = 0.05);
+  /// Polls for so long, or until the session cannot go on; returns as poll().
+  bool run_for(double seconds);
+  /// kConflict: another server has the session. kTransport: a frame could not be written for 10 s.
+  [[nodiscard]] const Error& error() const;
+
+  /// An input of the server's own, as if a participant had sent it now; returns the frame it acts on.
+  /// Errors: kInvalidArgument (refused by the simulation), kCapacity (too many at once).
+  Result<std::uint64_t> inject(const engine::Input& input);
+  [[nodiscard]] ServerStatus status() const;
+
+ private:
+  struct Impl;
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tandem

@@ -1,0 +1,107 @@
+// tandem::Server over DDS: what who brings a simulation of their own may do wrong, and what they see of it.
+#include "tandem/host.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+
+namespace tandem {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Two bodies that stand; takes no input.
+class Standing : public engine::Simulation {
+ public:
+  [[nodiscard]] std::uint32_t capacity() const override { return 2; }
+  [[nodiscard]] double dt_s() const override { return 0.01; }
+  [[nodiscard]] engine::Vec3 gravity() const override { return {0, 0, 0}; }
+  void step() override { ++steps; }
+  [[nodiscard]] engine::Bodies bodies() const override {
+    return {{zeros, zeros, zeros}, {zeros, zeros, zeros}, alive, types};
+  }
+  std::vector<float> zeros = std::vector<float>(2, 0);
+  std::vector<std::uint8_t> alive = std::vector<std::uint8_t>(2, 1);
+  std::vector<std::uint16_t> types = std::vector<std::uint16_t>(2, 0);
+  int steps = 0;
+};
+
+class ServerApi : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    ::setenv("CYCLONEDDS_URI",
+             "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" "
+             "multicast=\"true\"/></Interfaces></General><Discovery><Tag>server-api-test</Tag></Discovery>"
+             "</Domain></CycloneDDS>",
+             1);
+  }
+  [[nodiscard]] ErrorCode refusal() {
+    auto server = Server::start(options, standing);
+    EXPECT_FALSE(server.has_value());
+    return server ? ErrorCode{} : server.error().code;
+  }
+  Standing standing;
+  ServerOptions options;
+};
+
+TEST_F(ServerApi, OptionsOutOfRangeAreRefused) {
+  const auto with = [&](auto change) {
+    options = {};
+    change(options);
+    return refusal();
+  };
+  EXPECT_EQ(with([](ServerOptions& o) { o.session = "a*"; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.domain = 231; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.threshold = 0; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.threshold = kNan; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.extent = 1e9; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.lead = 2; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.types.clear(); }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.types[0].name = std::string(65, 'x'); }),
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.target_mbit_per_s = kNan; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.codec = "zip"; }), ErrorCode::kUnsupported);
+}
+
+TEST_F(ServerApi, ColumnsThatAreNotOfTheCapacityAreRefused) {
+  standing.zeros.resize(1);
+  EXPECT_EQ(refusal(), ErrorCode::kInvalidArgument);
+}
+
+TEST_F(ServerApi, ItStepsAtTheSimulationsRateAndRefusesWhatTheSimulationDoes) {
+  options.session = "standing";
+  auto started = Server::start(options, standing);
+  ASSERT_TRUE(started.has_value()) << started.error().message;
+  Server server = std::move(*started);
+  while (server.status().frame < 3) ASSERT_TRUE(server.poll());
+  EXPECT_EQ(static_cast<std::uint64_t>(standing.steps), server.status().frame);
+  EXPECT_EQ(server.status().participants, 0U);
+  const auto refused = server.inject({.kind = 1, .values = {0, -9, 0}});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(ServerApi, ASecondServerOfASessionEndsAndSaysWhy) {
+  options.session = "twice";
+  std::string told;
+  options.log = [&told](std::string_view line) { told += line; };
+  auto first = Server::start(options, standing);
+  ASSERT_TRUE(first.has_value());
+  while (first->status().frame < 1) ASSERT_TRUE(first->poll());
+  Standing other;
+  auto second = Server::start(options, other);
+  ASSERT_TRUE(second.has_value());
+  bool goes_on = true;
+  while (goes_on && second->status().frame == 0) {
+    ASSERT_TRUE(first->poll(0));
+    goes_on = second->poll(0.01);
+  }
+  EXPECT_FALSE(goes_on);
+  EXPECT_EQ(second->error().code, ErrorCode::kConflict);
+  EXPECT_FALSE(second->poll());
+  EXPECT_EQ(other.steps, 0);
+}
+
+}  // namespace
+}  // namespace tandem
