@@ -152,6 +152,7 @@ struct ReplyMessage {
 enum class InputKind : std::uint32_t {
   kGravity = 1,       ///< values: x, y, z in scene units / s^2 (scheduled)
   kPush = 2,          ///< values: centre x, y, z; radius; velocity change x, y, z (immediate)
+  kSeek = 3,          ///< values: seconds into the recording that is replayed, at which it goes on
   kApplication = 16,  ///< bytes for the engine (immediate)
 };
 

@@ -28,6 +28,8 @@ bool well_formed(const transport::InputMessage& input) {
       return finite && input.values.size() == 3 && input.bytes.empty();
     case InputKind::kPush:
       return finite && input.values.size() == 7 && input.bytes.empty();
+    case InputKind::kSeek:
+      return finite && input.values.size() == 1 && input.bytes.empty();
     case InputKind::kApplication:
       return finite;
   }

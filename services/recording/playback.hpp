@@ -43,6 +43,8 @@ class Playback {
 
   /// When the message at hand was recorded, wall clock, ns since 1970.
   [[nodiscard]] std::uint64_t time_ns() const { return time_ns_; }
+  /// Of the first message; 0 without any.
+  [[nodiscard]] std::uint64_t first_ns() const { return reader_.first_ns(); }
   /// The same, and of the last message; seconds since the first.
   [[nodiscard]] double time_s() const { return seconds_since_first(time_ns_); }
   [[nodiscard]] double length_s() const { return seconds_since_first(reader_.last_ns()); }

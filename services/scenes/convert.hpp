@@ -58,7 +58,10 @@ inline engine::Input to_input(const idl::InputEvent& event) {
                                            .radius = static_cast<float>(event.remove().radius_m())});
   }
   engine::Input input;
-  if (event.input_case() == idl::InputEvent::kGravity) {
+  if (event.input_case() == idl::InputEvent::kSeekS) {
+    input.kind = static_cast<std::uint32_t>(engine::InputKind::kSeek);
+    input.values.push_back(event.seek_s());
+  } else if (event.input_case() == idl::InputEvent::kGravity) {
     input.kind = static_cast<std::uint32_t>(engine::InputKind::kGravity);
     for (const double v : to_vec3(event.gravity())) input.values.push_back(v);
   } else {

@@ -169,6 +169,7 @@ Scene to_scene(const idl::Scene& file, const std::string& path) {
   scene.description = file.description();
   idl::Scene drawn = file;
   drawn.clear_script();
+  drawn.clear_recording();
   google::protobuf::TextFormat::PrintToString(drawn, &scene.text);
   scene.dt_s = file.dt_s();
   scene.damping_per_s = file.damping_per_s();

@@ -178,6 +178,8 @@ void check_script(const Node& root, const idl::Scene& scene) {
   for (int i = 0; i < script.events_size(); ++i) {
     const Node event = node.child("events", i);
     check_event(event, script.events(i));
+    event.require(script.events(i).input_case() != idl::InputEvent::kSeekS, "seek_s",
+                  "belongs into a client's script");
     event.require(is_bullet(scene) || !script.events(i).has_spawn(), "spawn", kNeedsBullet);
     event.require(is_bullet(scene) || !script.events(i).has_remove(), "remove", kNeedsBullet);
     event.require(!script.events(i).has_spawn() ||
@@ -217,7 +219,8 @@ void check_event(const Node& node, const idl::InputEvent& event) {
   node.require(event.when_case() != idl::InputEvent::kFrame || event.frame() >= 1, "frame",
                "must be at least 1");
   node.require(event.input_case() != idl::InputEvent::INPUT_NOT_SET, "",
-               "needs gravity, push, spawn or remove");
+               "needs gravity, push, spawn, remove or seek_s");
+  node.require(event.seek_s() >= 0, "seek_s", "must not be negative");
   if (event.input_case() == idl::InputEvent::kPush) {
     node.child("push").require(event.push().radius_m() > 0, "radius_m", "must be above 0");
   }

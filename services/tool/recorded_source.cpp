@@ -2,6 +2,9 @@
 
 #include <utility>
 
+#include "sdk/transport/units.hpp"
+#include "services/scenes/replayed.hpp"
+
 namespace tandem::tool {
 
 using recording::Playback;
@@ -14,12 +17,18 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
   session_.session = config.session;
   session_.epoch = config.epoch;
   session_.frame_rate_hz = config.frame_rate_hz;
+  session_.scene_description =
+      scenes::replayed(session_.scene_description, {.started_unix_ms = playback.first_ns() / kMillisecond,
+                                                    .length_s = playback.length_s(),
+                                                    .from_s = playback.time_s(),
+                                                    .from_frame = frame(),
+                                                    .frame_rate_hz = playback.session().frame_rate_hz});
   session_.window_ceiling = config.window_ceiling;
   playback.timeline().rename(config.epoch, {});
 }
 
 std::optional<host::FrameSource::Made> RecordedSource::next(bool /*snapshot_follows*/, host::Outbox& outbox) {
-  if (!ending_ || *ending_ != Playback::Step::kFrame) return std::nullopt;
+  if (sought_s_ || !ending_ || *ending_ != Playback::Step::kFrame) return std::nullopt;
   ending_ = playback_->next();
   if (!ending_ || *ending_ != Playback::Step::kFrame) return std::nullopt;
   for (transport::ScheduledInputMessage input : playback_->inputs()) {
@@ -35,6 +44,18 @@ std::optional<host::FrameSource::Made> RecordedSource::next(bool /*snapshot_foll
               .hash = delta.hash,
               .payload = delta.payload,
               .corrected = static_cast<std::uint32_t>(timeline().touched().size())};
+}
+
+transport::Reason RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,
+                                         host::Outbox& /*outbox*/, Frame& acts_on) {
+  using transport::Reason;
+  if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return Reason::kRecording;
+  if (input.values.size() != 1 || !input.bytes.empty()) return Reason::kInvalid;
+  if (!(input.values[0] >= 0 && input.values[0] <= playback_->length_s())) return Reason::kInvalid;
+  if (sought_s_) return Reason::kRateLimited;
+  sought_s_ = input.values[0];
+  acts_on = frame();
+  return Reason::kNone;
 }
 
 }  // namespace tandem::tool

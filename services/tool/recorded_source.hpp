@@ -12,7 +12,7 @@
 namespace tandem::tool {
 
 /// Publishes a run of a playback as a session of its own; what was recorded of payloads, hashes and scheduled
-/// inputs goes out as it is. Every input is refused.
+/// inputs goes out as it is. Of inputs it takes kSeek, and ends with it.
 class RecordedSource final : public host::FrameSource {
  public:
   /// `playback` holds a state, outlives this, and is stepped by nobody else meanwhile.
@@ -25,12 +25,13 @@ class RecordedSource final : public host::FrameSource {
   [[nodiscard]] const StreamParameters& parameters() const override { return timeline().parameters(); }
   std::optional<Made> next(bool snapshot_follows, host::Outbox& outbox) override;
   void snapshot(std::vector<std::byte>& out) override { timeline().snapshot(out); }
-  transport::Reason accept(const engine::Input& /*input*/, const host::InputOrigin& /*origin*/,
-                           host::Outbox& /*outbox*/, Frame& /*acts_on*/) override {
-    return transport::Reason::kRecording;
-  }
+  transport::Reason accept(const engine::Input& input, const host::InputOrigin& origin, host::Outbox& outbox,
+                           Frame& acts_on) override;
 
-  /// After next() had nothing: what the playback said instead, kStarted where another run begins.
+  /// Where to go on, in seconds since the recording's first message, once a client has asked for it.
+  [[nodiscard]] std::optional<double> sought_s() const { return sought_s_; }
+  /// After next() had nothing and nothing is sought: what the playback said instead, kStarted where another
+  /// run begins.
   [[nodiscard]] const Result<recording::Playback::Step>& ending() const { return ending_; }
 
  private:
@@ -38,6 +39,7 @@ class RecordedSource final : public host::FrameSource {
 
   recording::Playback* playback_;
   transport::SessionMessage session_;
+  std::optional<double> sought_s_;
   Result<recording::Playback::Step> ending_ = recording::Playback::Step::kFrame;
 };
 

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "sdk/transport/clock.hpp"
@@ -36,17 +37,24 @@ struct ReplayOptions {
   std::uint32_t wait_for = 0;
 };
 
-// What was queued last goes out, and whoever reads has the time to take it.
-void let_go(const host::Outbox& outbox, const std::atomic<bool>& stop) {
+// What was queued last goes out, and whoever reads has `taking` to take it.
+void let_go(const host::Outbox& outbox, std::chrono::milliseconds taking) {
   constexpr int kMostTicks = 200;
-  constexpr std::chrono::milliseconds kTick(5), kTaking(500);
+  constexpr std::chrono::milliseconds kTick(5);
   for (int i = 0; i < kMostTicks && outbox.size() > 0; ++i) std::this_thread::sleep_for(kTick);
-  if (!stop) std::this_thread::sleep_for(kTaking);
+  std::this_thread::sleep_for(taking);
 }
+constexpr std::chrono::milliseconds kTakingFrames(500), kTakingReplies(50);
 
-/// Publishes the run at hand to its end. Returns what comes behind it, kFrame when it was stopped before.
-Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch,
-                   const std::atomic<bool>& stop) {
+/// How a run was left.
+struct Served {
+  Step behind = Step::kFrame;      ///< what comes next in the file; kFrame when it was stopped before its end
+  std::optional<double> sought_s;  ///< a client wants to go on there
+};
+
+/// Publishes the run at hand to its end, or until a client seeks.
+Result<Served> serve(Playback& playback, const ReplayOptions& options, Epoch epoch,
+                     const std::atomic<bool>& stop) {
   host::ServiceConfig config;
   config.session = options.session;
   config.epoch = epoch;
@@ -81,20 +89,35 @@ Result<Step> serve(Playback& playback, const ReplayOptions& options, Epoch epoch
     const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
   }
-  let_go((*host)->outbox(), stop);
-  return source.ending();
+  if (!stop) let_go((*host)->outbox(), source.sought_s() ? kTakingReplies : kTakingFrames);
+  return source.ending().map([&](Step behind) { return Served{behind, source.sought_s()}; });
 }
 
-// To the first frame that was recorded at `from_s` or later.
+// To the first frame that was recorded at `from_s` or later; kEnd where there is none.
 Result<Step> go_to(Playback& playback, double from_s) {
   playback.seek(from_s);
   auto step = playback.next();
   while (step && *step != Step::kEnd && playback.time_s() < from_s) step = playback.next();
+  return step;
+}
+
+/// From `from_s` to the end of the file, or until stopped.
+Result<void> play(Playback& playback, const ReplayOptions& options, Epoch& epoch,
+                  const std::atomic<bool>& stop) {
+  auto step = go_to(playback, options.from_s);
   if (step && *step == Step::kEnd)
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("no frame at {:.1f} s or later; the recording has {:.1f} s", from_s,
+                fmt::format("no frame at {:.1f} s or later; the recording has {:.1f} s", options.from_s,
                             playback.length_s()));
-  return step;
+  // An epoch of its own for each run, as frames follow one another within one.
+  while (step && *step != Step::kEnd && !stop) {
+    epoch = std::max<Epoch>(epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
+    const auto served = serve(playback, options, epoch, stop);
+    if (!served) return tl::unexpected(served.error());
+    step = served->sought_s ? go_to(playback, *served->sought_s) : served->behind;
+  }
+  if (!step) return tl::unexpected(step.error());
+  return {};
 }
 
 Result<void> replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
@@ -105,13 +128,8 @@ Result<void> replay(const ReplayOptions& options, const std::atomic<bool>& stop)
                *torn);
   Epoch epoch = 0;
   do {
-    auto step = go_to(**playback, options.from_s);
-    // An epoch of its own for each run, as frames follow one another within one.
-    while (step && *step != Step::kEnd && !stop) {
-      epoch = std::max<Epoch>(epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
-      step = serve(**playback, options, epoch, stop);
-    }
-    if (!step) return fail(step.error().code, options.file + ": " + step.error().message);
+    if (auto played = play(**playback, options, epoch, stop); !played)
+      return fail(played.error().code, options.file + ": " + played.error().message);
   } while (options.loop && !stop);
   return {};
 }
@@ -146,8 +164,10 @@ void add_replay(CLI::App& app, Run& run) {
   command->footer(
       "Clients join at any frame. Each run of the recording (where it has a gap, or the server was restarted, another "
       "begins) is\n"
-      "an epoch of its own; inputs are refused. A file that is cut short is replayed up to there. Exit 1 when it cannot "
-      "be read.");
+      "an epoch of its own. Participants may seek, which begins another; all other inputs are refused. --rate changes "
+      "how\n"
+      "often frames come, not what they say: velocities stay those of the recorded time. A file that is cut short is\n"
+      "replayed up to there. Exit 1 when it cannot be read.");
   command->callback([options, &run] { run = [options] { return run_replay(*options); }; });
 }
 

@@ -120,6 +120,8 @@ Classification classify_input(const Input& input, const World& world) {
         return refuse("a push is not finite or beyond the scene's limit");
       result.effect = Classification::Effect::kImmediate;
       return result;
+    case InputKind::kSeek:
+      return refuse("this is no recording");
     case InputKind::kApplication:
       return refuse("this engine takes no application input");
   }

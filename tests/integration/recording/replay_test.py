@@ -107,6 +107,60 @@ def check_jump(programs, file, truth):
     assert min(found) > min(truth) + 60, f"from frame {min(found)}"
 
 
+def epochs_of(programs, name):
+    """By epoch, in order: its frames."""
+    epochs = {}
+    for line in (programs.folder / f"{name}.csv").read_text(encoding="utf-8").split():
+        epoch, frame, _ = line.split(",")
+        epochs.setdefault(int(epoch), []).append(int(frame))
+    return [epochs[epoch] for epoch in sorted(epochs)]
+
+
+def expect_epochs(programs, name, truth, count):
+    """The states of each are those recorded, and no frame is missing."""
+    for line in (programs.folder / f"{name}.csv").read_text(encoding="utf-8").split():
+        _, frame, value = line.split(",")
+        assert truth[int(frame)] == value, f"{name}: frame {frame} is another"
+    epochs = epochs_of(programs, name)
+    assert len(epochs) >= count, f"{name}: {len(epochs)} epochs"
+    for frames in epochs:
+        assert frames == list(range(frames[0], frames[-1] + 1)), f"{name} has gaps"
+    print(f"{name}: epochs from frames {[frames[0] for frames in epochs]} agree", flush=True)
+    return epochs
+
+
+def check_seek(programs, file, truth):
+    """A participant goes forward, back, and where there is nothing; an observer follows."""
+    script = programs.folder / "seeks.textproto"
+    script.write_text(
+        "inputs { frame: 60 seek_s: 4 } inputs { frame: 130 seek_s: 1 } inputs { frame: 150 seek_s: 1e5 }", encoding="utf-8"
+    )
+    seeker = programs.join("seeker", "--input-script", script, "--seconds", 8)
+    watcher = programs.join("watcher", "--observe", "--seconds", 8)
+    replay = programs.start(programs.tandem, "replay", file, "--wait-for", 1)
+    report = json.loads(finish(seeker, "the seeking client")[0])
+    finish(watcher, "the watching client")
+    replay.send_signal(signal.SIGINT)
+    finish(replay, "replay")
+    assert report["hash_mismatches"] == 0 and report["inputs_sent"] == 3 and report["inputs_refused"] == 1, report
+    first, forward, back = expect_epochs(programs, "seeker", truth, 3)[:3]
+    assert min(truth) == first[0] < back[0] < forward[0], (first[0], back[0], forward[0])
+    expect_epochs(programs, "watcher", truth, 2)
+
+
+def check_loop(programs, file, truth):
+    """Twice round, beside `tandem top`."""
+    client = programs.join("rounds", "--seconds", 5)
+    replay = programs.start(programs.tandem, "replay", file, "--from", 4.5, "--loop", "--wait-for", 1)
+    seen = json.loads(finish(programs.start(programs.tandem, "top", "--once", "--json"), "top")[0])
+    finish(client, "the client of two rounds")
+    replay.send_signal(signal.SIGINT)
+    finish(replay, "replay")
+    rounds = expect_epochs(programs, "rounds", truth, 2)
+    assert rounds[0][0] == rounds[1][0] > min(truth), rounds
+    assert [each["session"] for each in seen["sessions"]] == ["default"], seen
+
+
 def check_torn(programs, file, truth):
     """A file cut in the middle of its deltas."""
     torn = programs.folder / "torn.mcap"
@@ -166,6 +220,8 @@ def main():
             truth = programs.hashes("recorded")
             check_whole(programs, file, truth)
             check_jump(programs, file, truth)
+            check_seek(programs, file, truth)
+            check_loop(programs, file, truth)
             check_torn(programs, file, truth)
             check_export(programs, file, truth)
             check_refusals(programs, file)

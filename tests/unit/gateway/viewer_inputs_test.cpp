@@ -74,6 +74,19 @@ TEST_F(ViewerInputs, AreRefusedAsAServerWould) {
   EXPECT_TRUE(world.sent.empty());
 }
 
+TEST_F(ViewerInputs, ASeekHasOneValueAndGoesOn) {
+  const ViewerId id = join(1);
+  auto seek = input(1, 1, {1, 2});
+  seek.kind = static_cast<std::uint32_t>(transport::InputKind::kSeek);
+  EXPECT_FALSE(say(id, seek));
+  EXPECT_EQ(reply(id).entries.back().code, code(Reason::kInvalid));
+  seek.number = 2;
+  seek.values = {12.5};
+  EXPECT_FALSE(say(id, seek));
+  ASSERT_EQ(world.sent.size(), 1U);
+  EXPECT_EQ(world.sent[0].kind, transport::InputKind::kSeek);
+}
+
 TEST_F(ViewerInputs, ANumberCountsOnce) {
   const ViewerId id = join(1);
   EXPECT_FALSE(say(id, input(1, 5, push())));

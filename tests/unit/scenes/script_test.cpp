@@ -110,15 +110,17 @@ TEST(InputScripts, AreReadInOrderOfTheirFrames) {
   const auto inputs = load_input_script(
       folder.write("i.textproto",
                    "inputs { time_s: 2 gravity { y: -1 } }\ninputs { frame: 1 push { radius_m: 1 } }\n"
-                   "inputs { time_s: 0 gravity { y: -2 } }\n"),
+                   "inputs { time_s: 0 gravity { y: -2 } }\ninputs { frame: 90 seek_s: 12.5 }\n"),
       1.0 / 30);
   ASSERT_TRUE(inputs) << inputs.error().message;
-  ASSERT_EQ(inputs->size(), 3U);
+  ASSERT_EQ(inputs->size(), 4U);
   EXPECT_EQ((*inputs)[0].frame, 1U);
   EXPECT_EQ((*inputs)[0].input.values.size(), 7U);
   EXPECT_EQ((*inputs)[1].frame, 1U);
   EXPECT_EQ((*inputs)[2].frame, 60U);
   EXPECT_EQ((*inputs)[2].input.values, (std::vector<double>{0, -1, 0}));
+  EXPECT_EQ((*inputs)[3].input.kind, static_cast<std::uint32_t>(engine::InputKind::kSeek));
+  EXPECT_EQ((*inputs)[3].input.values, (std::vector<double>{12.5}));
 }
 
 TEST(InputScripts, ThatAreMalformedNameFileLineAndField) {
@@ -129,6 +131,7 @@ TEST(InputScripts, ThatAreMalformedNameFileLineAndField) {
   };
   EXPECT_THAT(refusal("inputs {\n  frame: 1\n  gravity { x: nan }\n}"),
               HasSubstr(":3: field \"inputs[0].gravity.x\""));
+  EXPECT_THAT(refusal("inputs { frame: 1 seek_s: -1 }"), HasSubstr("field \"inputs[0].seek_s\""));
   EXPECT_THAT(refusal("\ninputs { frame: -1 }"), HasSubstr(":2: field \"frame\""));
   EXPECT_THAT(refusal("inputs { gravity { } }"), HasSubstr(":1: field \"inputs[0]\" needs time_s or frame"));
   EXPECT_EQ(refusal(""), "accepted");

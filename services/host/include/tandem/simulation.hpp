@@ -21,6 +21,7 @@ enum class InputKind : std::uint32_t {
   /// radius. Where bodies turn it is an impulse, mass times velocity change, at the point of the body's
   /// surface that is nearest to the centre, so that a push off the middle turns the body too.
   kPush = 2,
+  kSeek = 3,          ///< values: seconds into a recording; no simulation takes it
   kApplication = 16,  ///< bytes whose meaning only the engine knows
 };
 

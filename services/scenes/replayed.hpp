@@ -1,0 +1,22 @@
+#pragma once
+// What the announcement of a replayed session says beside its scene.
+
+#include <cstdint>
+#include <string>
+
+namespace tandem::scenes {
+
+/// See Recording in idl/scene.proto.
+struct Recording {
+  std::uint64_t started_unix_ms = 0;
+  double length_s = 0, from_s = 0;
+  std::uint64_t from_frame = 0;
+  double frame_rate_hz = 0;  ///< > 0
+};
+
+/// A scene's text with `recording` in the place of the one it had, and, where it tells no dt_s, that of the
+/// recorded frame rate, so that another rate of the replay changes no velocity. What is no scene's text stays
+/// as it is.
+[[nodiscard]] std::string replayed(const std::string& text, const Recording& recording);
+
+}  // namespace tandem::scenes
