@@ -149,6 +149,10 @@ export class Client {
   ): number {
     return this.#send(InputKind.push, values([...centre, radius, ...velocity]));
   }
+  /** Of a session that is a recording's: goes on at `seconds` after its first message. A new session follows. */
+  sendSeek(seconds: number): number {
+    return this.#send(InputKind.seek, values([seconds]));
+  }
   /** Bytes for the engine, 1,024 at most. */
   sendBytes(bytes: Uint8Array): number {
     return this.#send(InputKind.application, bytes);

@@ -25,7 +25,7 @@ interface Exports {
 
 const LEVELS: readonly LogLevel[] = ['info', 'warning', 'error'];
 
-export const InputKind = { gravity: 1, push: 2, application: 16 } as const;
+export const InputKind = { gravity: 1, push: 2, seek: 3, application: 16 } as const;
 
 /** i8x16.splat, the smallest module that needs SIMD. */
 const NEEDS_SIMD = new Uint8Array([

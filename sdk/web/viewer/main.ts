@@ -11,6 +11,7 @@ import { pick } from './pick';
 import type { Vec3 } from './scene_text';
 import type { Speed } from './slow_motion';
 import { Stage } from './stage';
+import { TimeLine } from './time_line';
 import { World } from './world';
 
 const figuresEveryMs = 250;
@@ -31,6 +32,7 @@ function gatewayUrl(): string {
 class Page {
   private readonly panel = new Panel();
   private readonly gravity: GravityControls;
+  private readonly timeLine = new TimeLine((seconds) => this.send('seek', () => this.client.sendSeek(seconds)));
   private readonly corrections: CorrectionsSwitch;
   private world: World | null = null;
   private sceneShown = '';
@@ -92,7 +94,8 @@ class Page {
   }
 
   private sessionBegan(epoch: number): void {
-    if (this.epoch !== 0 && epoch !== this.epoch) toast('The server was restarted: a new run has begun');
+    const restarted = this.epoch !== 0 && epoch !== this.epoch && !this.world?.scene.recording;
+    if (restarted) toast('The server was restarted: a new run has begun');
     this.epoch = epoch;
     this.sessionChanged = true;
     this.applied = 0;
@@ -132,8 +135,11 @@ class Page {
       this.gravity.setScene(this.world.scene);
       element('scene').title = this.world.scene.description;
       if (this.world.sceneError) toast(`The scene’s geometry cannot be drawn: ${this.world.sceneError}`, true);
-      if (description !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
-      this.sceneShown = description;
+      this.timeLine.set(this.world.scene.recording);
+      // A replay says with each jump where it is.
+      const shown = JSON.stringify({ ...this.world.scene, recording: null });
+      if (shown !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
+      this.sceneShown = shown;
     }
     this.world.colours.mode = this.colourMode;
     const shown = this.world.slowMotion.play(sample, this.applied, now);
@@ -145,7 +151,9 @@ class Page {
     this.panel.update(status, this.drawing());
     this.corrections.show(status);
     if (Math.hypot(...status.gravity) > 0) this.gravity.show(status.gravity);
-    this.gravity.setAllowed(status.phase === 'playing' && status.role === 'participant');
+    const allowed = status.phase === 'playing' && status.role === 'participant';
+    this.gravity.setAllowed(allowed);
+    this.timeLine.show(this.applied, allowed);
     if (this.world) showLegend(this.world.colours, this.world.types);
     showNotice(noticeOf(status));
   }
@@ -203,7 +211,7 @@ class Page {
     const what = this.sent.get(number) ?? 'input';
     this.sent.delete(number);
     if (kind !== 'acted') toast(`${what}: ${kind === 'refused' ? `refused, ${reason}` : 'outcome unknown'}`, true);
-    else if (what !== 'gravity') toast(`${what} acted in frame ${frame.toLocaleString('en')}, after ${latencyMs.toFixed(0)} ms`);
+    else if (what !== 'gravity' && what !== 'seek') toast(`${what} acted in frame ${frame.toLocaleString('en')}, after ${latencyMs.toFixed(0)} ms`);
   }
 
   /** The world keeps to what the panels leave free. */

@@ -129,6 +129,18 @@ export interface Sphere {
   radius: number;
 }
 
+/** Where a replayed session is in its recording: `fromFrame` is `from` seconds after the first message. */
+export interface Recording {
+  /** Of the first message, ms since 1970. */
+  started: number;
+  /** Seconds. */
+  length: number;
+  from: number;
+  fromFrame: number;
+  /** Frames a second of the recorded session. */
+  rate: number;
+}
+
 /** What is drawn of a scene and what inputs are measured by. Metres, seconds. */
 export interface Scene {
   description: string;
@@ -142,6 +154,8 @@ export interface Scene {
   planes: Plane[];
   boxes: Box[];
   spheres: Sphere[];
+  /** Null: the session is no replay. */
+  recording: Recording | null;
 }
 
 export const emptyScene: Scene = {
@@ -154,6 +168,7 @@ export const emptyScene: Scene = {
   planes: [],
   boxes: [],
   spheres: [],
+  recording: null,
 };
 
 const maxSolids = 4096;
@@ -188,7 +203,20 @@ export function readScene(text: string): Scene {
       centre: vec3(child(sphere, 'centre')),
       radius: number(sphere, 'radius_m'),
     })),
+    recording: readRecording(child(scene, 'recording')),
   };
+}
+
+function readRecording(message: Message | null): Recording | null {
+  if (!message) return null;
+  const recording = {
+    started: number(message, 'started_unix_ms'),
+    length: number(message, 'length_s'),
+    from: number(message, 'from_s'),
+    fromFrame: number(message, 'from_frame'),
+    rate: number(message, 'frame_rate_hz'),
+  };
+  return recording.length > 0 && recording.rate > 0 ? recording : null;
 }
 
 function children(message: Message, name: string): Message[] {

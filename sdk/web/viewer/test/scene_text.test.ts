@@ -3,6 +3,7 @@ import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { describe, expect, it } from 'vitest';
 import { parseText, readScene, SceneTextError } from '../scene_text';
+import { clock, secondsOf } from '../time_line';
 
 const scenes = process.env.TANDEM_SCENES ?? fileURLToPath(new URL('../../../../services/scenes', import.meta.url));
 
@@ -80,5 +81,33 @@ describe('a scene', () => {
 
   it('ignores fields of a wrong type', () => {
     expect(readScene('planes: 3 gravity: "down" dt_s { }').planes).toEqual([]);
+  });
+});
+
+describe('the recording of a replay', () => {
+  const told = 'recording { started_unix_ms: 1700000000000 length_s: 130.5 from_s: 62 from_frame: 1900 frame_rate_hz: 30 }';
+
+  it('is read from the scene', () => {
+    expect(readScene(`dt_s: 0.02 ${told}`).recording).toEqual({
+      started: 1700000000000,
+      length: 130.5,
+      from: 62,
+      fromFrame: 1900,
+      rate: 30,
+    });
+  });
+
+  it('is not there in a live session, nor without a length', () => {
+    expect(readScene('dt_s: 0.02').recording).toBeNull();
+    expect(readScene('recording { from_s: 1 frame_rate_hz: 30 }').recording).toBeNull();
+    expect(readScene('recording { length_s: 1 frame_rate_hz: 0 }').recording).toBeNull();
+  });
+
+  it('tells the second of a frame', () => {
+    const recording = readScene(told).recording!;
+    expect(secondsOf(recording, 0)).toBe(62);
+    expect(secondsOf(recording, 1915)).toBe(62.5);
+    expect(secondsOf(recording, 99999)).toBe(130.5);
+    expect([0, 61.9, 3725].map(clock)).toEqual(['0:00', '1:01', '1:02:05']);
   });
 });
