@@ -20,6 +20,30 @@ constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
 // A server from which nothing comes for so long while it is joined makes room for another, if there is one.
 constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
 
+Drawable drawable(const Picture& picture) {
+  return {picture.epoch, static_cast<std::uint32_t>(picture.agreed->alive.size()),
+          picture.agreed->has_orientations()};
+}
+
+SampleColumns make_room(const Drawable& drawable, Sample& out) {
+  out.epoch = drawable.epoch;
+  out.capacity = drawable.capacity;
+  out.positions.resize(std::size_t{3} * drawable.capacity);
+  out.orientations.resize(drawable.has_orientations ? std::size_t{4} * drawable.capacity : 0);
+  out.alive.resize(drawable.capacity);
+  out.generation.resize(drawable.capacity);
+  out.types.resize(drawable.capacity);
+  out.changes.resize(drawable.capacity);
+  SampleColumns columns{.capacity = drawable.capacity};
+  columns.positions = packed(out.positions.data(), 3);
+  columns.orientations = packed(out.orientations.data(), 4);
+  columns.alive = packed(out.alive.data());
+  columns.reuse = packed(out.generation.data());
+  columns.types = packed(out.types.data());
+  columns.changes = packed(reinterpret_cast<std::uint8_t*>(out.changes.data()));  // of that type
+  return columns;
+}
+
 }  // namespace
 
 ClientCore::ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener)
@@ -294,7 +318,13 @@ ClientStatus ClientCore::status() const {
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
   pictures_.want();
-  if (epoch_ && epoch_->played) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer);
+  if (epoch_ && epoch_->played) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer, last_poll_ns_);
+}
+
+std::optional<Drawable> ClientCore::drawable() {
+  const PictureExchange::Reading reading(pictures_);
+  if (reading.picture() == nullptr) return std::nullopt;
+  return client::drawable(*reading.picture());
 }
 
 void ClientCore::show_uncorrected(bool on) {
@@ -309,11 +339,19 @@ std::optional<Drift> ClientCore::drift() const {
 }
 
 // While joining again, the last picture is still there to be drawn, as long as it is of this epoch.
+Result<SampledFrame> ClientCore::sample(const SampleRequest& request, const SampleColumns& columns, Now now) {
+  const PictureExchange::Reading reading(pictures_);
+  if (reading.picture() == nullptr) return fail(ErrorCode::kOutOfOrder, "nothing to draw");
+  return sampler_.sample(*reading.picture(), request, columns, now.steady_ns);
+}
+
 bool ClientCore::sample(Sample& out, SampleMode mode, Now now) {
   const PictureExchange::Reading reading(pictures_);
   if (reading.picture() == nullptr) return false;
-  sampler_.sample(*reading.picture(), now.steady_ns, mode, out);
-  return true;
+  const SampleColumns columns = make_room(client::drawable(*reading.picture()), out);
+  const auto sampled = sampler_.sample(*reading.picture(), {.mode = mode}, columns, now.steady_ns);
+  if (sampled) out.frame = sampled->frame;
+  return sampled.has_value();
 }
 
 }  // namespace tandem::client

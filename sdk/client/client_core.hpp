@@ -99,7 +99,14 @@ class ClientCore {
   void show_uncorrected(bool on);
   /// Of what is shown, at the last frame applied; nothing while it is off or not playing.
   [[nodiscard]] std::optional<Drift> drift() const;
-  /// See Client::sample(). From any thread, at any time: never waits for poll().
+  /// The next three from any thread, at any time: they never wait for poll(). Nothing when there is nothing
+  /// to draw.
+  [[nodiscard]] std::optional<Drawable> drawable();
+  /// The bodies at one moment, straight into the caller's memory. Allocates nothing unless the session
+  /// changed. Errors: kOutOfOrder (nothing to draw), kCapacity (the columns are shorter than
+  /// drawable().capacity, and are left as they are).
+  Result<SampledFrame> sample(const SampleRequest& request, const SampleColumns& columns, Now now);
+  /// See Client::sample().
   bool sample(Sample& out, SampleMode mode, Now now);
 
  private:

@@ -141,7 +141,7 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
   e.snapshot.clear();
   e.assembly.drop_through(snapshot.frame);
   follow_uncorrected();
-  e.pictures.on_loaded(e.timeline, e.pacer);
+  e.pictures.on_loaded(e.timeline, e.pacer, now.steady_ns);
   e.joining = false;
   e.played = true;
   e.input_missing_ns.reset();
@@ -191,7 +191,7 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
       return;
     }
     if (e.uncorrected) e.uncorrected->on_applied(e.timeline);
-    e.pictures.on_applied(e.timeline, e.pacer);
+    e.pictures.on_applied(e.timeline, e.pacer, now.steady_ns);
     ++statistics_.frames_applied;
     statistics_.payload_bytes += delta->payload.size();
     statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta->server_time_ns));

@@ -15,16 +15,24 @@
 
 namespace tandem::client {
 
-/// The columns of one frame that sampling reads: 29 bytes a slot, 57 with orientations.
+/// The columns of one frame that sampling reads: 30 bytes a slot, 58 with orientations.
 struct DrawnFrame {
   Frame frame = 0;
-  std::array<std::vector<std::int32_t>, kPositionChannels> p, v;
+  std::array<std::vector<std::int32_t>, kPositionChannels> p;
+  std::array<std::vector<std::int32_t>, kPositionChannels> v;    ///< from this frame to the next, as foreseen
   std::array<std::vector<std::int32_t>, kQuaternionChannels> q;  ///< empty without orientations
   std::array<std::vector<std::int32_t>, kSpinChannels> w;        ///< likewise
   std::vector<std::uint8_t> alive;
-  std::vector<std::uint8_t> generation;
+  std::vector<std::uint8_t> reuse;
   std::vector<TypeId> type;
-  std::vector<std::uint8_t> jumps;  ///< counts the bodies' spawns and teleports since the snapshot, wraps
+  std::vector<std::uint8_t> motion;  ///< kMoves, kFalls
+  std::vector<std::uint8_t> jumps;   ///< counts the bodies' spawns and teleports since the snapshot, wraps
+
+  std::uint32_t alive_count = 0;
+  Vec3i gravity{};  ///< 1/64 lattice unit per frame^2
+
+  static constexpr std::uint8_t kMoves = 1;  ///< a body that is not at rest
+  static constexpr std::uint8_t kFalls = 2;  ///< and whose velocity gravity alone changes
 
   [[nodiscard]] bool has_orientations() const { return !q[0].empty(); }
   [[nodiscard]] Quaternion quaternion(Slot slot) const {
@@ -33,9 +41,21 @@ struct DrawnFrame {
   [[nodiscard]] Spin spin(Slot slot) const { return {w[0][slot], w[1][slot], w[2][slot]}; }
 };
 
+/// How velocities are going to change, as the last predicted step changed them. A step that changed one by
+/// more than gravity does in 1.5 frames was a collision, which tells nothing of the next.
+struct Accelerations {
+  std::array<std::vector<std::int32_t>, kPositionChannels> a;  ///< 1/64 lattice unit per frame^2
+  std::vector<std::uint8_t> falls;                             ///< 1: as gravity does
+  Vec3i gravity{};
+
+  void forget(std::size_t capacity);
+  void learn(const State& before, const State& after, const Vec3i& drive);
+};
+
 /// Copies what sampling reads of `state`, the one of `frame`. `jumps`: a count a slot. Allocates where
 /// `drawn` held fewer slots.
-void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps, DrawnFrame& drawn);
+void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps,
+          const Accelerations& accelerations, DrawnFrame& drawn);
 
 /// All that one sample() reads, of one moment. The frames belong to a PictureExchange.
 struct Picture {
@@ -45,6 +65,7 @@ struct Picture {
   const DrawnFrame* before = nullptr;  ///< the agreed frame before `agreed`; null right after a snapshot
   const DrawnFrame* agreed = nullptr;  ///< the last frame agreed with the server
   const DrawnFrame* ahead = nullptr;   ///< the last frame simulated; `agreed` when nothing is ahead of it
+  std::int64_t agreed_ns = 0;          ///< steady time at which `agreed` was
   Pacer pacer;
 };
 

@@ -19,12 +19,15 @@ class PictureWriter {
   PictureWriter(PictureExchange& exchange, const transport::SessionMessage& session);
 
   /// From the next frame on this is drawn as the agreed state, which it must be of; null: the timeline's.
-  void draw_instead(const State* state) { instead_ = state; }
+  void draw_instead(const State* state) {
+    instead_ = state;
+    accelerations_.forget(jumps_.size());
+  }
 
   /// A snapshot was loaded, or somebody samples for the first time.
-  void on_loaded(const ClientTimeline& timeline, const Pacer& pacer);
+  void on_loaded(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
   /// After ClientTimeline::apply().
-  void on_applied(const ClientTimeline& timeline, const Pacer& pacer);
+  void on_applied(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
   /// Frames beyond the agreed one were simulated, or simulated again.
   void on_simulated(const ClientTimeline& timeline, const Pacer& pacer);
   /// The estimate of the server's clock may have changed.
@@ -42,6 +45,7 @@ class PictureWriter {
   Picture picture_;
   const State* instead_ = nullptr;
   std::vector<std::uint8_t> jumps_;
+  Accelerations accelerations_;
 };
 
 }  // namespace tandem::client

@@ -1,157 +1,240 @@
 #include "sdk/client/sampler.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <cstring>
+#include <string>
 
 namespace tandem::client {
 namespace {
 
-constexpr double kVelocityScale = 1.0 / 64;
+constexpr float kVelocityScale = 1.0F / 64;
+constexpr double kSpinScale = 1.0 / (1 << 28);
+constexpr double kMostSmoothingS = 10;
+
+template <class T>
+std::byte* slot_of(const Column<T>& column, std::size_t slot) {
+  return reinterpret_cast<std::byte*>(column.first) + slot * column.stride;
+}
+
+/// Values of a run of slots, from `begin` on.
+template <class T>
+void put(const Column<T>& column, std::size_t begin, const T* from, std::size_t count) {
+  if (column.first == nullptr) return;
+  if (column.stride == sizeof(T)) {
+    std::memcpy(slot_of(column, begin), from, count * sizeof(T));
+    return;
+  }
+  for (std::size_t i = 0; i < count; ++i) std::memcpy(slot_of(column, begin + i), from + i, sizeof(T));
+}
+
+/// Vectors of a run, an axis at a time.
+void put_vectors(const Column<float>& column, std::size_t begin, const float* x, const float* y,
+                 const float* z, float scale, std::size_t count) {
+  const auto store = [&](std::byte* to, std::size_t stride) {
+    for (std::size_t i = 0; i < count; ++i, to += stride) {
+      const std::array<float, 3> vector{x[i] * scale, y[i] * scale, z[i] * scale};
+      std::memcpy(to, vector.data(), sizeof vector);
+    }
+  };
+  if (column.first == nullptr) return;
+  if (column.stride == 3 * sizeof(float)) {
+    store(slot_of(column, begin), 3 * sizeof(float));  // a stride that the compiler knows
+  } else {
+    store(slot_of(column, begin), column.stride);
+  }
+}
+
+template <std::size_t N>
+void put_one(const Column<float>& column, std::size_t slot, const std::array<float, N>& value) {
+  if (column.first != nullptr) std::memcpy(slot_of(column, slot), value.data(), sizeof value);
+}
 
 }  // namespace
+
+/// Slots begin .. begin + count - 1, in work.
+struct Sampler::Run {
+  std::size_t begin = 0, count = 0;
+  std::array<std::uint8_t, kRun> changes{};  // BodyChange
+  bool changed = false;                      // any of them
+  // Lattice units, and those per frame: where the motion is, how far it came since the last sample, and how
+  // fast it is.
+  Numbers place{}, way{}, speed{};
+};
 
 // Another epoch: whatever is alive in it is new.
 void Sampler::begin(const Picture& picture) {
   epoch_ = picture.epoch;
   capacity_ = picture.agreed->alive.size();
-  shown_.assign(3 * capacity_, 0);
-  shown_turns_.assign(picture.agreed->has_orientations() ? capacity_ : 0, Rotation{0, 0, 0, 1});
-  shown_alive_.assign(capacity_, 0);
-  shown_generation_.assign(capacity_, 0);
-  shown_jumps_.assign(capacity_, 0);
+  for (auto& axis : place_) axis.assign(capacity_, 0);
+  for (auto& axis : speed_) axis.assign(capacity_, 0);
+  turns_.assign(picture.agreed->has_orientations() ? capacity_ : 0, Rotation{0, 0, 0, 1});
+  alive_.assign(capacity_, 0);
+  reuse_.assign(capacity_, 0);
+  jumps_.assign(capacity_, 0);
 }
 
-void Sampler::report_changes(const Picture& picture, Sample& out) {
+bool Sampler::tell_changes(const Picture& picture, Run& run) {
   const DrawnFrame& agreed = *picture.agreed;
   const bool all_jumped = load_ != picture.load;
-  for (std::size_t slot = 0; slot < capacity_; ++slot) {
-    const bool was = shown_alive_[slot] != 0;
+  const auto same = [&run](const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
+    return std::memcmp(a.data() + run.begin, b.data() + run.begin, run.count) == 0;
+  };
+  run.changes.fill(static_cast<std::uint8_t>(BodyChange::kNone));
+  if (!all_jumped && same(alive_, agreed.alive) && same(reuse_, agreed.reuse) && same(jumps_, agreed.jumps))
+    return false;
+  for (std::size_t i = 0; i < run.count; ++i) {
+    const std::size_t slot = run.begin + i;
+    const bool was = alive_[slot] != 0;
     const bool is = agreed.alive[slot] != 0;
     BodyChange change = BodyChange::kNone;
-    if (is && (!was || shown_generation_[slot] != agreed.generation[slot])) {
+    if (is && (!was || reuse_[slot] != agreed.reuse[slot])) {
       change = BodyChange::kNew;
     } else if (was && !is) {
       change = BodyChange::kGone;
-    } else if (is && (all_jumped || shown_jumps_[slot] != agreed.jumps[slot])) {
+    } else if (is && (all_jumped || jumps_[slot] != agreed.jumps[slot])) {
       change = BodyChange::kJumped;
     }
-    out.changes[slot] = change;
+    run.changes[i] = static_cast<std::uint8_t>(change);
+    alive_[slot] = agreed.alive[slot];
+    reuse_[slot] = agreed.reuse[slot];
+    jumps_[slot] = agreed.jumps[slot];
   }
-  load_ = picture.load;
-  shown_alive_ = agreed.alive;
-  shown_generation_ = agreed.generation;
-  shown_jumps_ = agreed.jumps;
+  return true;
 }
 
-void Sampler::interpolate(const Picture& picture, double share, Sample& out) {
-  const DrawnFrame& agreed = *picture.agreed;
-  const DrawnFrame& before = picture.before != nullptr ? *picture.before : agreed;
-  for (std::size_t slot = 0; slot < capacity_; ++slot) {
-    // Spawned or teleported between the two frames: it was never on the way from one place to the other.
-    const bool jumped = before.jumps[slot] != agreed.jumps[slot];
-    const double lag = jumped ? 0 : 1 - share;
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      const std::size_t at = 3 * slot + channel;
-      double value = agreed.p[channel][slot];
-      value -= (value - before.p[channel][slot]) * lag;
-      shown_[at] = static_cast<float>(value);
-      out.positions[at] = static_cast<float>(value * picture.lattice_unit);
+// Where the motion of one axis is. Floats: a place needs no more digits than the caller's own have.
+void Sampler::place(const SampledMoment& moment, std::size_t axis, Run& run) const {
+  const DrawnFrame& at = *moment.at;
+  const std::int32_t* const p = at.p[axis].data() + run.begin;
+  if (moment.from != nullptr) {
+    const std::int32_t* const p0 = moment.from->p[axis].data() + run.begin;
+    const std::uint8_t* const jumps0 = moment.from->jumps.data() + run.begin;
+    const std::uint8_t* const jumps = at.jumps.data() + run.begin;
+    for (std::size_t i = 0; i < run.count; ++i) {
+      // Spawned or teleported in between: it was never on the way from one place to the other.
+      const float on_the_way = jumps0[i] == jumps[i] ? 1 : 0;
+      const float speed = (static_cast<float>(p[i]) - static_cast<float>(p0[i])) * on_the_way;
+      run.place[i] = static_cast<float>(p[i]) + speed * moment.after;
+      run.way[i] = speed * moment.since;
+      run.speed[i] = speed;
+    }
+    return;
+  }
+  const std::int32_t* const v = at.v[axis].data() + run.begin;
+  for (std::size_t i = 0; i < run.count; ++i) {
+    const float speed = kVelocityScale * static_cast<float>(v[i]);
+    run.place[i] = static_cast<float>(p[i]) + speed * moment.after;
+    run.way[i] = speed * moment.since;
+    run.speed[i] = speed * moment.pace;
+  }
+  if (moment.fall == 0 && moment.fall_since == 0) return;
+  const float gravity = kVelocityScale * static_cast<float>(at.gravity[axis]);
+  for (std::size_t i = 0; i < run.count; ++i) {
+    const float g = (at.motion[run.begin + i] & DrawnFrame::kFalls) != 0 ? gravity : 0;
+    run.place[i] += g * moment.fall;
+    run.way[i] += g * moment.fall_since;
+    run.speed[i] += g * moment.fall_speed;
+  }
+}
+
+// What was drawn, carried on with the motion, is where the eye expects it; the rest is a correction.
+void Sampler::show_places(const SampledMoment& moment, const Smoothing& smoothing,
+                          const SampleColumns& columns, const Picture& picture, Run& run) {
+  for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+    place(moment, axis, run);
+    float* const place = place_[axis].data() + run.begin;
+    float* const speed = speed_[axis].data() + run.begin;
+    if (run.changed) {
+      for (std::size_t i = 0; i < run.count; ++i) {
+        if (run.changes[i] == static_cast<std::uint8_t>(BodyChange::kNone)) continue;
+        place[i] = run.place[i] - run.way[i] - run.speed[i] * moment.gap;
+        speed[i] = run.speed[i];
+      }
+    }
+    for (std::size_t i = 0; i < run.count; ++i) {
+      const float beside = place[i] + speed[i] * moment.gap + run.way[i] - run.place[i];
+      const float faster = speed[i] - run.speed[i];
+      place[i] = run.place[i] + smoothing.place_of_place * beside + smoothing.place_of_speed * faster;
+      speed[i] = run.speed[i] + smoothing.speed_of_place * beside + smoothing.speed_of_speed * faster;
     }
   }
+  const auto unit = static_cast<float>(picture.lattice_unit);
+  const auto rate_hz = static_cast<float>(1e9 / picture.pacer.period_ns());
+  put_vectors(columns.positions, run.begin, place_[0].data() + run.begin, place_[1].data() + run.begin,
+              place_[2].data() + run.begin, unit, run.count);
+  put_vectors(columns.velocities, run.begin, speed_[0].data() + run.begin, speed_[1].data() + run.begin,
+              speed_[2].data() + run.begin, unit * rate_hz, run.count);
 }
 
-void Sampler::extrapolate(const Picture& picture, double share, double beyond, double blend, double frames,
-                          Sample& out) {
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const auto& p0 = picture.agreed->p[channel];
-    const auto& p1 = picture.ahead->p[channel];
-    const auto& v = picture.ahead->v[channel];
-    for (std::size_t slot = 0; slot < capacity_; ++slot) {
-      const std::size_t at = 3 * slot + channel;
-      const double speed = v[slot] * kVelocityScale;
-      double value = p0[slot] + (static_cast<double>(p1[slot]) - p0[slot]) * share + speed * beyond;
-      // What was drawn, carried on at the body's speed, is where the eye expects it; the rest is a
-      // correction.
-      if (out.changes[slot] == BodyChange::kNone) value += (shown_[at] + speed * frames - value) * blend;
-      shown_[at] = static_cast<float>(value);
-      out.positions[at] = static_cast<float>(value * picture.lattice_unit);
+void Sampler::show_turns(const SampledMoment& moment, float blend, const SampleColumns& columns,
+                         const Picture& picture, const Run& run) {
+  const DrawnFrame& at = *moment.at;
+  const auto spin_scale = static_cast<float>(kSpinScale * 1e9 / picture.pacer.period_ns()) * moment.pace;
+  for (std::size_t i = 0; i < run.count; ++i) {
+    const auto slot = static_cast<Slot>(run.begin + i);
+    if (at.alive[slot] == 0) continue;
+    const Spin spin = at.spin(slot);
+    Rotation turn = to_rotation(at.quaternion(slot));
+    if (moment.from == nullptr) {
+      turn = turned_on(turn, spin, moment.after);
+    } else if (moment.from->jumps[slot] == at.jumps[slot]) {
+      turn = between(turn, to_rotation(moment.from->quaternion(slot)), -moment.after);
     }
-  }
-}
-
-void Sampler::show_turn(std::size_t slot, const Rotation& turn, Sample& out) {
-  shown_turns_[slot] = turn;
-  std::copy(turn.begin(), turn.end(), out.orientations.begin() + static_cast<std::ptrdiff_t>(4 * slot));
-}
-
-void Sampler::interpolate_turns(const Picture& picture, double share, Sample& out) {
-  const DrawnFrame& agreed = *picture.agreed;
-  const DrawnFrame& before = picture.before != nullptr ? *picture.before : agreed;
-  const auto lag = static_cast<float>(1 - share);
-  for (Slot slot = 0; slot < shown_turns_.size(); ++slot) {
-    if (agreed.alive[slot] == 0) continue;
-    Rotation turn = to_rotation(agreed.quaternion(slot));
-    const bool jumped = before.jumps[slot] != agreed.jumps[slot];
-    if (!jumped) turn = between(turn, to_rotation(before.quaternion(slot)), lag);
-    show_turn(slot, turn, out);
-  }
-}
-
-void Sampler::extrapolate_turns(const Picture& picture, double share, double beyond, double blend,
-                                double frames, Sample& out) {
-  const DrawnFrame& agreed = *picture.agreed;
-  const DrawnFrame& ahead = *picture.ahead;
-  for (Slot slot = 0; slot < shown_turns_.size(); ++slot) {
-    if (agreed.alive[slot] == 0) continue;
-    const Spin spin = ahead.spin(slot);
-    Rotation turn = between(to_rotation(agreed.quaternion(slot)), to_rotation(ahead.quaternion(slot)),
-                            static_cast<float>(share));
-    if (beyond > 0) turn = turned_on(turn, spin, static_cast<float>(beyond));
-    if (out.changes[slot] == BodyChange::kNone) {
-      const Rotation expected = turned_on(shown_turns_[slot], spin, static_cast<float>(frames));
-      turn = between(turn, expected, static_cast<float>(blend));
+    if (run.changes[i] == static_cast<std::uint8_t>(BodyChange::kNone) && blend > 0) {
+      const Rotation expected = turned_on(turns_[slot], spin, moment.gap + moment.since);
+      turn = between(turn, expected, blend);
     }
-    show_turn(slot, turn, out);
+    turns_[slot] = turn;
+    put_one(columns.orientations, slot, turn);
+    put_one(columns.angular_velocities, slot,
+            std::array<float, 3>{static_cast<float>(spin[0]) * spin_scale,
+                                 static_cast<float>(spin[1]) * spin_scale,
+                                 static_cast<float>(spin[2]) * spin_scale});
   }
 }
 
-void Sampler::sample(const Picture& picture, std::int64_t now_ns, SampleMode mode, Sample& out) {
+Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest& request,
+                                     const SampleColumns& columns, std::int64_t now_ns) {
   const DrawnFrame& agreed = *picture.agreed;
-  const Pacer& pacer = picture.pacer;
-  const bool had_orientations = !shown_turns_.empty();
-  if (epoch_ != picture.epoch || capacity_ != agreed.alive.size() ||
-      had_orientations != agreed.has_orientations())
+  const std::size_t capacity = agreed.alive.size();
+  if (columns.capacity < capacity)
+    return fail(ErrorCode::kCapacity, "the session holds " + std::to_string(capacity) +
+                                          " slots, the columns " + std::to_string(columns.capacity));
+  const bool had_orientations = !turns_.empty();
+  if (epoch_ != picture.epoch || capacity_ != capacity || had_orientations != agreed.has_orientations())
     begin(picture);
-  out.epoch = epoch_;
-  out.capacity = static_cast<std::uint32_t>(capacity_);
-  out.positions.resize(3 * capacity_);
-  out.orientations.resize(4 * shown_turns_.size());
-  out.changes.resize(capacity_);
-  out.alive = agreed.alive;
-  out.generation = agreed.generation;
-  out.types = agreed.type;
-  const auto applied = static_cast<double>(agreed.frame);
-  const auto ahead = static_cast<double>(picture.ahead->frame - agreed.frame);
-  const double elapsed_s = std::max(0.0, static_cast<double>(now_ns - last_ns_) / 1e9);
-  report_changes(picture, out);
-  if (mode == SampleMode::kInterpolate) {
-    const double wanted = pacer.known() ? pacer.arrived_frame(now_ns) - 1 : applied;
-    out.frame = std::clamp(wanted, applied - (picture.before != nullptr ? 1 : 0), applied);
-    const double share = out.frame - (applied - 1);
-    interpolate(picture, share, out);
-    interpolate_turns(picture, share, out);
-  } else {
-    const double wanted = pacer.known() ? pacer.server_frame(now_ns) : applied;
-    out.frame = std::clamp(wanted, applied, applied + ahead + 1);
-    const double share = ahead > 0 ? std::min(1.0, (out.frame - applied) / ahead) : 1;
-    const double beyond = std::max(0.0, out.frame - applied - ahead);
-    const double blend = std::exp(-elapsed_s / kBlendS);
-    const double frames = std::clamp(out.frame - last_frame_, -2.0, 2.0);
-    extrapolate(picture, share, beyond, blend, frames, out);
-    extrapolate_turns(picture, share, beyond, blend, frames, out);
+  const std::int64_t at_ns = request.at_ns != 0 ? request.at_ns : now_ns;
+  const auto later = [](std::int64_t from_ns, std::int64_t to_ns) {
+    return std::max(0.0, static_cast<double>(to_ns) - static_cast<double>(from_ns));
+  };
+  const double period_ns = picture.pacer.period_ns();
+  const SampledMoment moment =
+      moment_at(picture, request.mode, at_ns, last_frame_, later(last_at_ns_, at_ns) / period_ns);
+  const double smoothing_s =
+      request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMostSmoothingS) : kSmoothingS;
+  Smoothing smoothing;
+  if (request.mode == SampleMode::kExtrapolate)
+    smoothing = Smoothing::exponential(later(last_ns_, now_ns) / period_ns, smoothing_s * 1e9 / period_ns);
+  for (Run run; run.begin < capacity; run.begin += kRun) {
+    run.count = std::min(kRun, capacity - run.begin);
+    run.changed = tell_changes(picture, run);
+    show_places(moment, smoothing, columns, picture, run);
+    if (!turns_.empty()) show_turns(moment, smoothing.place_of_place, columns, picture, run);
+    put(columns.changes, run.begin, run.changes.data(), run.count);
   }
+  put(columns.types, 0, agreed.type.data(), capacity);
+  put(columns.alive, 0, agreed.alive.data(), capacity);
+  put(columns.reuse, 0, agreed.reuse.data(), capacity);
+  load_ = picture.load;
   last_ns_ = now_ns;
-  last_frame_ = out.frame;
+  last_at_ns_ = at_ns;
+  last_frame_ = moment.frame;
+  return SampledFrame{.epoch = picture.epoch,
+                      .frame = moment.frame,
+                      .capacity = static_cast<std::uint32_t>(capacity),
+                      .alive = agreed.alive_count,
+                      .has_orientations = !turns_.empty(),
+                      .since_delta_s = later(picture.agreed_ns, now_ns) / 1e9};
 }
 
 }  // namespace tandem::client

@@ -1,45 +1,56 @@
 #pragma once
 // What to draw: the client state at any moment, without the jerks of frames and corrections.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sdk/client/picture.hpp"
 #include "sdk/client/rotation.hpp"
-#include "tandem/client_types.hpp"
+#include "sdk/client/sample_columns.hpp"
+#include "sdk/client/sampled_moment.hpp"
+#include "sdk/client/smoothing.hpp"
+#include "tandem/result.hpp"
 
 namespace tandem::client {
 
-/// Remembers what it drew last, 15 bytes a slot or 31 with orientations, and so can tell what changed and
+/// Remembers what it drew last, 27 bytes a slot or 43 with orientations, and so can tell what changed and
 /// blend corrections in. Not thread-safe.
 class Sampler {
  public:
   /// Time constant of the blend after a correction. Shorter shows jerks, longer shows bodies off their place.
-  static constexpr double kBlendS = 0.1;
+  static constexpr double kSmoothingS = 0.1;
 
-  void sample(const Picture& picture, std::int64_t now_ns, SampleMode mode, Sample& out);
+  /// Errors: kCapacity (the columns hold fewer slots than the picture).
+  Result<SampledFrame> sample(const Picture& picture, const SampleRequest& request,
+                              const SampleColumns& columns, std::int64_t now_ns);
 
  private:
+  // Slots are worked on in runs that stay in the first cache.
+  static constexpr std::size_t kRun = 256;
+  using Numbers = std::array<float, kRun>;
+  struct Run;
+
   void begin(const Picture& picture);
-  void report_changes(const Picture& picture, Sample& out);
-  void interpolate(const Picture& picture, double share, Sample& out);
-  void extrapolate(const Picture& picture, double share, double beyond, double blend, double frames,
-                   Sample& out);
-  void interpolate_turns(const Picture& picture, double share, Sample& out);
-  void extrapolate_turns(const Picture& picture, double share, double beyond, double blend, double frames,
-                         Sample& out);
-  void show_turn(std::size_t slot, const Rotation& turn, Sample& out);
+  [[nodiscard]] bool tell_changes(const Picture& picture, Run& run);
+  void place(const SampledMoment& moment, std::size_t axis, Run& run) const;
+  void show_places(const SampledMoment& moment, const Smoothing& smoothing, const SampleColumns& columns,
+                   const Picture& picture, Run& run);
+  void show_turns(const SampledMoment& moment, float blend, const SampleColumns& columns,
+                  const Picture& picture, const Run& run);
 
   std::size_t capacity_ = 0;
   Epoch epoch_ = 0;
   std::uint64_t load_ = 0;
-  std::int64_t last_ns_ = 0;
+  std::int64_t last_ns_ = 0, last_at_ns_ = 0;  ///< when it was taken, and of when it was
   double last_frame_ = 0;
   // As in the last sample.
-  std::vector<float> shown_;           // 3 a slot, lattice units
-  std::vector<Rotation> shown_turns_;  // empty without orientations
-  std::vector<std::uint8_t> shown_alive_, shown_generation_, shown_jumps_;
+  std::array<std::vector<float>, kPositionChannels> place_;  // lattice units
+  std::array<std::vector<float>, kPositionChannels> speed_;  // lattice units per frame
+  std::vector<Rotation> turns_;                              // empty without orientations
+  std::vector<std::uint8_t> alive_, reuse_, jumps_;
 };
 
 }  // namespace tandem::client

@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include "tests/unit/client/fake_server.hpp"
+#include "tests/unit/client/taken.hpp"
 
 namespace tandem::client {
 namespace {
@@ -38,7 +39,8 @@ class World {
   }
   bool sample(SampleMode mode) {
     sampled_ns_ += 4 * kMs;
-    return core_.sample(sample_, mode, {now_ns_ + sampled_ns_ % kFrameNs, 0});
+    const SampleColumns columns = sample_.make_room(kBodies);
+    return core_.sample({.mode = mode}, columns, {now_ns_ + sampled_ns_ % kFrameNs, 0}).has_value();
   }
   ClientCore& core() { return core_; }
 
@@ -60,7 +62,7 @@ class World {
   FakeServer server_{1000, kBodies};
   FakePort port_;
   ClientCore core_;
-  Sample sample_;
+  Taken sample_;
   std::int64_t now_ns_ = 1'000'000'000'000;
   std::int64_t sampled_ns_ = 0;
 };
@@ -78,6 +80,8 @@ BENCHMARK_CAPTURE(sample, extrapolate, SampleMode::kExtrapolate)->Unit(benchmark
 // The same of bodies with orientations, all of which turn and are corrected a little in every frame.
 void sample_turning(benchmark::State& state, SampleMode mode) {
   const std::vector<std::uint8_t> jumps(kBodies);
+  Accelerations steady;
+  steady.forget(kBodies);
   std::array<DrawnFrame, 3> frames;
   for (Frame frame = 0; frame < frames.size(); ++frame) {
     State bodies(kBodies, {.orientation = true});
@@ -86,7 +90,7 @@ void sample_turning(benchmark::State& state, SampleMode mode) {
       const Spin spin{1 << 25, tilt, 1 << 24};
       bodies.spawn(slot, 0, 0, {.q = turned(turned(kNoTurn, spin), {tilt, 0, 0}), .w = spin});
     }
-    draw(bodies, frame + 1, jumps, frames[frame]);
+    draw(bodies, frame + 1, jumps, steady, frames[frame]);
   }
   Picture picture{.epoch = 1, .lattice_unit = 0.001, .pacer = Pacer(30)};
   picture.before = &frames[0];
@@ -95,9 +99,9 @@ void sample_turning(benchmark::State& state, SampleMode mode) {
   std::int64_t now_ns = 0;
   picture.pacer.on_delta(2, now_ns, now_ns);
   Sampler sampler;
-  Sample out;
+  Taken out;
   for (auto _ : state) {
-    sampler.sample(picture, now_ns, mode, out);
+    if (!out.take(sampler, picture, {.mode = mode}, now_ns)) state.SkipWithError("no room");
     benchmark::DoNotOptimize(out.orientations.data());
     now_ns = (now_ns + 4 * kMs) % (2 * kFrameNs);
   }

@@ -76,7 +76,7 @@ TEST_F(ConcurrentSampling, EverySampleShowsOneFrameWhole) {
     std::vector<float>& positions = agreed[core->timeline()->applied()];
     for (Slot slot = 0; slot < state.capacity(); ++slot) {
       for (const std::int32_t p : state.body(slot).p) {
-        positions.push_back(static_cast<float>(p * server.session.lattice_unit));
+        positions.push_back(static_cast<float>(p) * static_cast<float>(server.session.lattice_unit));
       }
     }
   };

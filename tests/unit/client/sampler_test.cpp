@@ -79,7 +79,8 @@ TEST_F(SamplerTest, WhenTheServerHaltsThePictureHaltsToo) {
     poll(20 * kMs);
     take(SampleMode::kExtrapolate);
   }
-  EXPECT_EQ(sample.frame, static_cast<double>(core->timeline()->now() + 1));
+  // 0.1 s at full speed, and what is left of 0.25 s of slowing down.
+  EXPECT_NEAR(sample.frame, static_cast<double>(core->timeline()->now()) + 3 + 7.5 / 2, 1e-6);
   const float settled = sample.positions[0];
   poll(500 * kMs);
   take(SampleMode::kExtrapolate);

@@ -1,0 +1,61 @@
+#include "sdk/client/sampled_moment.hpp"
+
+#include <algorithm>
+
+namespace tandem::client {
+namespace {
+
+// More than that between two samples tells of nothing; keeps floats finite.
+constexpr double kFarFrames = 1000;
+
+float bounded(double frames) { return static_cast<float>(std::clamp(frames, -kFarFrames, kFarFrames)); }
+
+// Velocities are v + a in the first frame beyond the last, v + 2 a in the second, and so on: the first is in
+// the velocity that is drawn.
+double fall_after(double beyond) { return beyond > 1 ? beyond * (beyond - 1) / 2 : 0; }
+
+// Where the moment leaps ahead of the clock, as after trouble, the leap is a correction.
+void since_last(SampledMoment& moment, double start, double last_frame, double elapsed) {
+  moment.gap = bounded(std::min(std::max(0.0, start - last_frame), elapsed));
+  moment.since = bounded(std::min(moment.frame - std::max(start, last_frame), elapsed - moment.gap));
+}
+
+}  // namespace
+
+SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at_ns, double last_frame,
+                        double elapsed) {
+  const DrawnFrame& agreed = *picture.agreed;
+  const DrawnFrame* last = mode == SampleMode::kExtrapolate ? picture.ahead : picture.agreed;
+  const DrawnFrame* first = picture.before != nullptr ? picture.before : picture.agreed;
+  const auto number = [](const DrawnFrame* frame) { return static_cast<double>(frame->frame); };
+  double wanted = number(&agreed);
+  if (picture.pacer.known()) {
+    wanted = mode == SampleMode::kExtrapolate ? picture.pacer.server_frame(at_ns)
+                                              : picture.pacer.arrived_frame(at_ns) - 1;
+  }
+  SampledMoment moment;
+  if (wanted < number(last) || mode == SampleMode::kInterpolate) {
+    moment.frame = std::clamp(wanted, number(first), number(last));
+    moment.at = moment.frame <= number(&agreed) ? picture.agreed : last;
+    moment.from = moment.at == picture.agreed ? first : picture.agreed;
+    moment.after = bounded(moment.frame - number(moment.at));
+    since_last(moment, number(moment.from), last_frame, elapsed);
+    return moment;
+  }
+  const double rate_hz = 1e9 / picture.pacer.period_ns();
+  const double full = std::max(1.0, SampledMoment::kFullSpeedS * rate_hz);
+  const double slowing = SampledMoment::kSlowingS * rate_hz;
+  const double slowed = std::clamp(wanted - number(last) - full, 0.0, slowing);
+  const double beyond = std::min(wanted - number(last), full) + slowed * (1 - slowed / (2 * slowing));
+  moment.frame = number(last) + beyond;
+  moment.at = last;
+  moment.after = bounded(beyond);
+  moment.pace = static_cast<float>(1 - slowed / slowing);
+  since_last(moment, number(last), last_frame, elapsed);
+  moment.fall = bounded(fall_after(beyond));
+  moment.fall_since = bounded(fall_after(beyond) - fall_after(beyond - moment.since));
+  if (beyond > 1) moment.fall_speed = bounded(beyond - 0.5) * moment.pace;
+  return moment;
+}
+
+}  // namespace tandem::client

@@ -1,0 +1,158 @@
+// Where samples go, and of which moment they are.
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "fake_server.hpp"
+#include "taken.hpp"
+
+namespace tandem::client {
+namespace {
+
+class SampleColumnsTest : public ClientTest {
+ protected:
+  void play(int frames) {
+    for (int i = 0; i < frames; ++i) frame();
+  }
+  Taken& take(const SampleRequest& request) {
+    const auto taken = core->sample(request, sample.make_room(core->drawable()->capacity), now());
+    EXPECT_TRUE(taken.has_value());
+    if (taken) static_cast<SampledFrame&>(sample) = *taken;
+    return sample;
+  }
+  [[nodiscard]] Now now() const { return {now_ns, wall_ns()}; }
+  /// Where the client holds a body of the last agreed frame.
+  [[nodiscard]] float agreed(Slot slot, std::size_t axis) const {
+    const std::int32_t p = core->timeline()->state(core->timeline()->applied()).p(axis)[slot];
+    return static_cast<float>(p * server.session.lattice_unit);
+  }
+  Taken sample;
+};
+
+TEST_F(SampleColumnsTest, BeforeTheFirstSnapshotThereIsNothingToDraw) {
+  start();
+  core->start_sampling();
+  poll();
+  EXPECT_FALSE(core->drawable().has_value());
+  const auto taken = core->sample({}, sample.make_room(40), now());
+  ASSERT_FALSE(taken.has_value());
+  EXPECT_EQ(taken.error().code, ErrorCode::kOutOfOrder);
+}
+
+TEST_F(SampleColumnsTest, ColumnsThatAreTooShortAreLeftAsTheyAre) {
+  join();
+  core->start_sampling();
+  std::vector<float> positions(3 * 39, 7);
+  SampleColumns columns{.capacity = 39};
+  columns.positions = packed(positions.data(), 3);
+  const auto taken = core->sample({}, columns, now());
+  ASSERT_FALSE(taken.has_value());
+  EXPECT_EQ(taken.error().code, ErrorCode::kCapacity);
+  EXPECT_EQ(positions, std::vector<float>(3 * 39, 7));
+  EXPECT_EQ(core->drawable()->capacity, 40U);
+}
+
+TEST_F(SampleColumnsTest, AnArrayOfTheAppsOwnStructsIsFilledAsPackedColumnsAre) {
+  // Of an odd size, so that nothing in it is aligned.
+  constexpr std::size_t kStruct = 41;
+  std::vector<std::byte> bodies(40 * kStruct, std::byte{0xEE});
+  join();
+  core->start_sampling();
+  play(20);
+  SampleColumns columns{.capacity = 40};
+  const auto at = [&](std::size_t offset) { return static_cast<void*>(bodies.data() + offset); };
+  columns.positions = {static_cast<float*>(at(1)), kStruct};
+  columns.velocities = {static_cast<float*>(at(13)), kStruct};
+  columns.types = {static_cast<std::uint16_t*>(at(25)), kStruct};
+  columns.alive = {static_cast<std::uint8_t*>(at(27)), kStruct};
+  columns.changes = {static_cast<std::uint8_t*>(at(28)), kStruct};
+  ASSERT_TRUE(core->sample({.smoothing_s = 0}, columns, now()).has_value());
+  take({.smoothing_s = 0});
+  for (std::size_t slot = 0; slot < 40; ++slot) {
+    const std::byte* const body = bodies.data() + slot * kStruct;
+    EXPECT_EQ(std::memcmp(body + 1, &sample.positions[3 * slot], 12), 0);
+    EXPECT_EQ(std::memcmp(body + 13, &sample.velocities[3 * slot], 12), 0);
+    EXPECT_EQ(std::memcmp(body + 25, &sample.types[slot], 2), 0);
+    EXPECT_EQ(std::memcmp(body + 27, &sample.alive[slot], 1), 0);
+    EXPECT_EQ(body[0], std::byte{0xEE});
+    EXPECT_EQ(body[29], std::byte{0xEE});
+  }
+}
+
+TEST_F(SampleColumnsTest, VelocitiesAreHowFastPositionsMove) {
+  join();
+  core->start_sampling();
+  play(30);
+  for (const double smoothing_s : {0.0, 0.1}) {
+    const std::vector<float> before = take({.smoothing_s = smoothing_s}).positions;
+    poll(kMs);
+    take({.smoothing_s = smoothing_s});
+    for (std::size_t i = 0; i < before.size(); ++i)
+      EXPECT_NEAR((sample.positions[i] - before[i]) / 0.001, sample.velocities[i],
+                  0.02 * std::abs(sample.velocities[i]) + 0.05)
+          << i;
+  }
+}
+
+TEST_F(SampleColumnsTest, TheBodiesThatAreThereAreCounted) {
+  join();
+  core->start_sampling();
+  play(5);
+  take({});
+  std::uint32_t alive = 0;
+  for (const std::uint8_t body : sample.alive) alive += body;
+  EXPECT_EQ(SampledFrame(sample).alive, alive);
+  EXPECT_EQ(sample.epoch, server.session.epoch);
+  EXPECT_FALSE(sample.has_orientations);
+  poll(20 * kMs);
+  take({});
+  EXPECT_NEAR(sample.since_delta_s, 0.02, 1e-9);
+}
+
+TEST_F(SampleColumnsTest, OfAMomentLongAgoTheOldestFrameIsGiven) {
+  join();
+  core->start_sampling();
+  play(9);
+  std::array<float, 3> before{agreed(3, 0), agreed(3, 1), agreed(3, 2)};
+  play(1);
+  const auto applied = static_cast<double>(core->timeline()->applied());
+  for (const SampleMode mode : {SampleMode::kInterpolate, SampleMode::kExtrapolate}) {
+    for (const std::int64_t at_ns : {std::numeric_limits<std::int64_t>::min(), std::int64_t{1}}) {
+      take({.mode = mode, .at_ns = at_ns, .smoothing_s = 0});
+      EXPECT_EQ(sample.frame, applied - 1);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(sample.positions[9 + axis], before[axis], 1e-3);
+    }
+  }
+}
+
+TEST_F(SampleColumnsTest, OfAMomentFarOffTheLastOneThatIsForeseenIsGiven) {
+  join();
+  core->start_sampling();
+  play(10);
+  const std::int64_t far_ns = std::numeric_limits<std::int64_t>::max();
+  take({.mode = SampleMode::kInterpolate, .at_ns = far_ns});
+  EXPECT_EQ(sample.frame, static_cast<double>(core->timeline()->applied()));
+  take({.mode = SampleMode::kExtrapolate, .at_ns = far_ns});
+  EXPECT_NEAR(sample.frame, static_cast<double>(core->timeline()->now()) + 6.75, 1e-6);
+  // And the next one is as if that had never been asked for.
+  const Taken once = take({.smoothing_s = 0});
+  EXPECT_NEAR(once.frame, static_cast<double>(core->timeline()->now()), 1.1);
+}
+
+TEST_F(SampleColumnsTest, NoNumberMakesAPlaceThatIsNone) {
+  join();
+  core->start_sampling();
+  play(10);
+  for (const double smoothing_s : {std::nan(""), -HUGE_VAL, HUGE_VAL, 1e-300, 1e300}) {
+    poll(kMs);
+    take({.smoothing_s = smoothing_s});
+    for (const float place : sample.positions) EXPECT_TRUE(std::isfinite(place));
+    for (const float speed : sample.velocities) EXPECT_TRUE(std::isfinite(speed));
+  }
+}
+
+}  // namespace
+}  // namespace tandem::client
