@@ -75,13 +75,15 @@ void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice) {
 
 void add_bench(CLI::App& app, Run& run) {
   CLI::App* bench = app.add_subcommand(
-      "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine.");
+      "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine, clients.");
   bench->require_subcommand(1);
   add_bandwidth(*bench, run);
   add_train(*bench, run);
   add_memory(*bench, run);
   add_engine(*bench, run);
   add_framerate(*bench, run);
+  add_client(*bench, run);
+  add_smoothing(*bench, run);
 }
 
 }  // namespace tandem::lab

@@ -17,7 +17,9 @@ void add_bandwidth(CLI::App& bench, Run& run);
 void add_train(CLI::App& bench, Run& run);
 void add_memory(CLI::App& bench, Run& run);
 void add_engine(CLI::App& bench, Run& run);
+void add_client(CLI::App& bench, Run& run);
 void add_framerate(CLI::App& bench, Run& run);
+void add_smoothing(CLI::App& bench, Run& run);
 
 /// Prints the error to stderr; the exit code: 2 when the caller named something that does not exist or is out
 /// of range, else 1.

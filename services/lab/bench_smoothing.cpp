@@ -1,0 +1,116 @@
+// `tandem bench smoothing`: how far what is drawn jumps, with and without smoothing.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "services/lab/bench.hpp"
+#include "services/lab/smoothing.hpp"
+
+namespace tandem::lab {
+namespace {
+
+constexpr const char* kCommand = "bench smoothing";
+
+struct SmoothingOptions {
+  std::vector<std::string> scenes{"all"};
+  std::vector<std::string> predictors{"ballistic", "contact", "field"};
+  SmoothingSetup setup;
+  bool json = false;
+};
+
+nlohmann::ordered_json to_json(const Seen& seen) {
+  return {{"jump_p999", seen.jump}, {"mean_error", seen.mean_error}, {"p999_error", seen.p999_error}};
+}
+
+int run_smoothing(const SmoothingOptions& options) {
+  const auto scenes = load_scenes(options.scenes);
+  if (!scenes) return report(kCommand, scenes.error());
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  if (!options.json) {
+    fmt::print("{:<12} {:<10} {:>9}   {:>10} {:>10} {:>6}   {:>10} {:>10} {:>10}\n", "scene", "predictor",
+               "threshold", "jump p99.9", "unsmoothed", "ratio", "mean error", "unsmoothed", "p99.9");
+  }
+  for (const scenes::Scene& scene : *scenes) {
+    for (const std::string& predictor : options.predictors) {
+      SmoothingSetup setup = options.setup;
+      setup.choice.predictor = predictor;
+      const auto row = measure_smoothing(scene, setup);
+      if (!row) return report(kCommand, row.error());
+      const double ratio = row->unsmoothed.jump / row->smoothed.jump;
+      rows.push_back({{"scene", row->scene},
+                      {"predictor", row->predictor},
+                      {"codec", row->codec},
+                      {"bodies", row->bodies},
+                      {"threshold", row->threshold},
+                      {"samples", row->samples},
+                      {"smoothed", to_json(row->smoothed)},
+                      {"unsmoothed", to_json(row->unsmoothed)}});
+      if (options.json) continue;
+      fmt::print("{:<12} {:<10} {:>9.4f}   {:>10.6f} {:>10.6f} {:>6.1f}   {:>10.6f} {:>10.6f} {:>10.6f}\n",
+                 row->scene, row->predictor, row->threshold, row->smoothed.jump, row->unsmoothed.jump, ratio,
+                 row->smoothed.mean_error, row->unsmoothed.mean_error, row->smoothed.p999_error);
+      std::fflush(stdout);
+    }
+  }
+  if (options.json) fmt::print("{}\n", nlohmann::ordered_json{{"rows", rows}}.dump());
+  return 0;
+}
+
+}  // namespace
+
+void add_smoothing(CLI::App& bench, Run& run) {
+  CLI::App* command = bench.add_subcommand(
+      "smoothing", "What is seen of corrections: two clients sample one session, one of them smoothing.");
+  const auto options = std::make_shared<SmoothingOptions>();
+  SmoothingSetup& setup = options->setup;
+  setup.choice.bodies = 1000;
+  command
+      ->add_option("--scene", options->scenes,
+                   "Scenes by name or file, separated by commas; all: the paper's five")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"ballistic", "contact", "field"}))
+      ->capture_default_str();
+  std::vector<std::string> names;
+  for (const std::string_view name : codec_names()) names.emplace_back(name);
+  command->add_option("--codec", setup.choice.codec, "Codec")
+      ->check(CLI::IsMember(names))
+      ->capture_default_str();
+  command->add_option("--bodies", setup.choice.bodies, "Number of bodies")
+      ->check(CLI::Range(1U, engine::kMaxBodies))
+      ->capture_default_str();
+  add_threshold_options(*command, setup.choice);
+  add_seed_option(*command, setup.seed, "Of the start block, the scripted inputs and the network");
+  command->add_option("--seconds", setup.seconds, "Of simulated time, for each row")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->add_option("--rate", setup.rate_hz, "Samples a second")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--smoothing", setup.smoothing_s,
+                   "Time constant of the smoothed client, s (default: the client's own)")
+      ->check(CLI::Range(0.0, 10.0));
+  command->add_option("--delay", setup.delay_ms, "Of the network, ms each way")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  command->add_option("--jitter", setup.jitter_ms, "Of the network, ms: evenly added up to that")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  command->add_option("--outage", setup.outage_s, "Seconds that the link is cut for, every five")
+      ->check(CLI::Range(0.0, 4.0))
+      ->capture_default_str();
+  command->add_flag("--json", options->json,
+                    "One JSON object: rows[scene, predictor, codec, bodies, threshold, samples, smoothed, "
+                    "unsmoothed]");
+  command->footer(
+      "Jump: the 99.9th percentile over bodies and samples of how far the second difference of the place shown\n"
+      "goes beyond that of the full simulation's at the same moments; scene units. All is seeded.");
+  command->callback([options, &run] { run = [options] { return run_smoothing(*options); }; });
+}
+
+}  // namespace tandem::lab

@@ -1,0 +1,45 @@
+#pragma once
+// What `tandem bench client` measures: the time that a client takes.
+
+#include <cstdint>
+#include <string>
+
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+struct ClientCostSetup {
+  sessions::SessionChoice choice;
+  std::uint64_t seed = 1;
+  std::uint64_t frames = 300;  ///< measured, after the first 60
+};
+
+/// Milliseconds. Of the calling thread's own time on a core, so that what else runs on the machine counts
+/// little; but waiting is part of `beside`.
+struct Cost {
+  double p50 = 0, p99 = 0, p999 = 0;
+};
+
+struct ClientCostRow {
+  std::string scene, predictor, codec;
+  std::uint32_t bodies = 0;
+  std::uint64_t frames = 0;
+  double corrected_per_frame = 0;  ///< bodies
+  Cost engine = {};                ///< a step of the full simulation, one thread
+  /// All that a client does in a frame, in which nobody samples: taking what came, the predicted step,
+  /// decoding, applying, checking the hash, acknowledging.
+  Cost frame = {};
+  Cost predicted = {};      ///< the predicted step's part of it
+  Cost sampled_frame = {};  ///< `frame` of a client that is sampled: besides, what is drawn is made ready
+  Cost sample = {};         ///< positions, velocities, alive and types of all bodies, at 144 Hz
+  Cost beside = {};         ///< the same by the wall clock, in a thread of its own while another one applies
+};
+
+/// One server and two clients with lead 1 over a network in memory, in simulated time. Errors: what the scene
+/// or the host refuse; kTimeout when the clients never play.
+[[nodiscard]] Result<ClientCostRow> measure_client_cost(const scenes::Scene& scene,
+                                                        const ClientCostSetup& setup);
+
+}  // namespace tandem::lab

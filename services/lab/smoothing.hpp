@@ -1,0 +1,45 @@
+#pragma once
+// What `tandem bench smoothing` measures: what somebody sees of corrections, with and without smoothing.
+
+#include <cstdint>
+#include <string>
+
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// One session in simulated time, watched by two clients at the same moments.
+struct SmoothingSetup {
+  sessions::SessionChoice choice;
+  std::uint64_t seed = 1;  ///< of the scene, its users and the network
+  double seconds = 10;     ///< after the first second, which is left out
+  double rate_hz = 144;    ///< of samples
+  double smoothing_s = -1;
+  double delay_ms = 5, jitter_ms = 3;  ///< of the network, each way
+  double outage_s = 0;                 ///< every five seconds the link is cut for so long
+};
+
+/// What one of the clients showed. Scene units, over all bodies and samples.
+struct Seen {
+  /// 99.9th percentile of the second difference of the place shown (its length), less that of the true motion
+  /// at the same moments. Bodies that are new or jumped are left out.
+  double jump = 0;
+  double mean_error = 0;  ///< of the place shown to the true one at that moment
+  double p999_error = 0;
+};
+
+struct SmoothingRow {
+  std::string scene, predictor, codec;
+  std::uint32_t bodies = 0;
+  double threshold = 0;  ///< scene units
+  std::uint64_t samples = 0;
+  Seen smoothed = {}, unsmoothed = {};
+};
+
+/// The true motion is the full simulation's, places interpolated between its frames. Errors: what the scene
+/// or the host refuse; kTimeout when the clients never play.
+[[nodiscard]] Result<SmoothingRow> measure_smoothing(const scenes::Scene& scene, const SmoothingSetup& setup);
+
+}  // namespace tandem::lab
