@@ -70,7 +70,7 @@ std::int64_t ClientCore::poll(Now now) {
     if (epoch_->joining) join(now);
     if (!epoch_->joining) play(now, since_ns);
     if (epoch_->joining) join(now);
-    epoch_->pictures.on_clock(epoch_->pacer);
+    show_clock();
     if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
   }
   report_outcomes();
@@ -186,6 +186,7 @@ void ClientCore::report_outcomes() {
         ++statistics_.inputs_unknown;
         break;
     }
+    if (epoch_) epoch_->echo.on_over(outcome.number);
     listener_.on_outcome(outcome);
   }
   outcomes_.clear();
@@ -270,7 +271,29 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
   if (auto written = port_.write(input); !written) return tl::unexpected<Error>(written.error());
   sent_.on_sent(now.steady_ns, outcomes_);
   ++statistics_.inputs_sent;
+  if (options_.echo && kind == transport::InputKind::kGravity) echo(input, now);
   return input.number;
+}
+
+void ClientCore::echo(const transport::InputMessage& gravity, Now now) {
+  EpochState& e = *epoch_;
+  if (gravity.values.size() != kPositionChannels || !e.pacer.known()) return;
+  // The lattice counts velocity in 1/64 of its unit.
+  const double scale = 64 / (e.session.lattice_unit * e.session.frame_rate_hz * e.session.frame_rate_hz);
+  std::array<float, kPositionChannels> in_lattice{};
+  for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+    constexpr double kMost = kVelocityLimit;
+    in_lattice[axis] = static_cast<float>(std::clamp(gravity.values[axis] * scale, -kMost, kMost));
+  }
+  e.echo.on_sent(gravity.number, in_lattice, e.pacer.server_frame(now.steady_ns));
+  show_clock();
+}
+
+void ClientCore::show_clock() {
+  EpochState& e = *epoch_;
+  if (!e.joining) e.echo.on_simulated(e.timeline.now());
+  e.pictures.on_echo(e.echo.shown());
+  e.pictures.on_clock(e.pacer);
 }
 
 const transport::SessionMessage* ClientCore::session() const { return session_ ? &*session_ : nullptr; }

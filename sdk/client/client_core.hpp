@@ -34,6 +34,7 @@ struct CoreOptions {
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
+  bool echo = false;  ///< samples show a gravity of this client's as soon as it is sent
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -124,6 +125,8 @@ class ClientCore {
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   void take_replies(Now now);
   void report_outcomes();
+  void echo(const transport::InputMessage& gravity, Now now);
+  void show_clock();
   void send_ack(Now now);
   [[nodiscard]] std::int64_t next_ack_ns() const;
   void send_status(Now now);

@@ -71,6 +71,8 @@ void ClientCore::take_scheduled() {
       continue;
     }
     epoch_->scheduled.add(*input);
+    if (received.message.source_client == options_.id)
+      epoch_->echo.on_scheduled(received.message.source_number, input->frame);
     listener_.on_scheduled(received.message);
   }
 }

@@ -7,6 +7,7 @@
 #include "sdk/client/delta_assembly.hpp"
 #include "sdk/client/joiner.hpp"
 #include "sdk/client/lag_limit.hpp"
+#include "sdk/client/local_echo.hpp"
 #include "sdk/client/picture_writer.hpp"
 #include "sdk/client/scheduled_inputs.hpp"
 #include "sdk/client/server_clock.hpp"
@@ -49,6 +50,7 @@ struct EpochState {
   LagLimit lag;
   Pacer pacer;
   PictureWriter pictures;
+  LocalEcho echo;
   std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while somebody wants that
 
   bool stream_open = false;

@@ -57,6 +57,12 @@ struct Accelerations {
 void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps,
           const Accelerations& accelerations, DrawnFrame& drawn);
 
+/// A gravity that an app sent and that is not in force yet.
+struct GravityEcho {
+  std::array<float, kPositionChannels> gravity{};  ///< 1/64 lattice unit per frame^2
+  double frame = 0;                                ///< when it was sent
+};
+
 /// All that one sample() reads, of one moment. The frames belong to a PictureExchange.
 struct Picture {
   Epoch epoch = 0;
@@ -66,6 +72,7 @@ struct Picture {
   const DrawnFrame* agreed = nullptr;  ///< the last frame agreed with the server
   const DrawnFrame* ahead = nullptr;   ///< the last frame simulated; `agreed` when nothing is ahead of it
   std::int64_t agreed_ns = 0;          ///< steady time at which `agreed` was
+  std::optional<GravityEcho> echo = {};     ///< to be shown
   Pacer pacer;
 };
 

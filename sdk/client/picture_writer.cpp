@@ -54,6 +54,7 @@ void PictureWriter::draw_ahead(const ClientTimeline& timeline) {
 }
 
 const DrawnFrame* PictureWriter::draw_agreed(const ClientTimeline& timeline) {
+  accelerations_.gravity = timeline.drive().gravity;
   return draw(instead_ != nullptr ? *instead_ : timeline.state(timeline.applied()), timeline.applied());
 }
 

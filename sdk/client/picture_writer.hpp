@@ -30,6 +30,8 @@ class PictureWriter {
   void on_applied(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
   /// Frames beyond the agreed one were simulated, or simulated again.
   void on_simulated(const ClientTimeline& timeline, const Pacer& pacer);
+  /// From the next on_clock() on.
+  void on_echo(const std::optional<GravityEcho>& echo) { picture_.echo = echo; }
   /// The estimate of the server's clock may have changed.
   void on_clock(const Pacer& pacer);
 

@@ -16,8 +16,19 @@ double fall_after(double beyond) { return beyond > 1 ? beyond * (beyond - 1) / 2
 
 // Where the moment leaps ahead of the clock, as after trouble, the leap is a correction.
 void since_last(SampledMoment& moment, double start, double last_frame, double elapsed) {
-  moment.gap = bounded(std::min(std::max(0.0, start - last_frame), elapsed));
-  moment.since = bounded(std::min(moment.frame - std::max(start, last_frame), elapsed - moment.gap));
+  moment.span.gap = bounded(std::min(std::max(0.0, start - last_frame), elapsed));
+  moment.span.since =
+      bounded(std::min(moment.frame - std::max(start, last_frame), elapsed - moment.span.gap));
+}
+
+void add_echo(const GravityEcho& echo, double longest, SampledMoment& moment) {
+  const double now = std::clamp(moment.frame - echo.frame, 0.0, longest);
+  const double before = std::clamp(moment.frame - moment.span.since - echo.frame, 0.0, longest);
+  moment.echo = {bounded(now * now / 2), bounded((now * now - before * before) / 2),
+                 now < longest ? bounded(now) * moment.span.pace : 0};
+  for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+    moment.echo_gravity[axis] = echo.gravity[axis] - static_cast<float>(moment.at->gravity[axis]);
+  }
 }
 
 }  // namespace
@@ -38,7 +49,7 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
     moment.frame = std::clamp(wanted, number(first), number(last));
     moment.at = moment.frame <= number(&agreed) ? picture.agreed : last;
     moment.from = moment.at == picture.agreed ? first : picture.agreed;
-    moment.after = bounded(moment.frame - number(moment.at));
+    moment.span.after = bounded(moment.frame - number(moment.at));
     since_last(moment, number(moment.from), last_frame, elapsed);
     return moment;
   }
@@ -49,12 +60,13 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
   const double beyond = std::min(wanted - number(last), full) + slowed * (1 - slowed / (2 * slowing));
   moment.frame = number(last) + beyond;
   moment.at = last;
-  moment.after = bounded(beyond);
-  moment.pace = static_cast<float>(1 - slowed / slowing);
+  moment.span.after = bounded(beyond);
+  moment.span.pace = static_cast<float>(1 - slowed / slowing);
   since_last(moment, number(last), last_frame, elapsed);
-  moment.fall = bounded(fall_after(beyond));
-  moment.fall_since = bounded(fall_after(beyond) - fall_after(beyond - moment.since));
-  if (beyond > 1) moment.fall_speed = bounded(beyond - 0.5) * moment.pace;
+  moment.fall.place = bounded(fall_after(beyond));
+  moment.fall.way = bounded(fall_after(beyond) - fall_after(beyond - moment.span.since));
+  if (beyond > 1) moment.fall.speed = bounded(beyond - 0.5) * moment.span.pace;
+  if (picture.echo) add_echo(*picture.echo, SampledMoment::kEchoS * rate_hz, moment);
   return moment;
 }
 

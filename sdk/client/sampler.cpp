@@ -27,23 +27,6 @@ void put(const Column<T>& column, std::size_t begin, const T* from, std::size_t 
   for (std::size_t i = 0; i < count; ++i) std::memcpy(slot_of(column, begin + i), from + i, sizeof(T));
 }
 
-/// Vectors of a run, an axis at a time.
-void put_vectors(const Column<float>& column, std::size_t begin, const float* x, const float* y,
-                 const float* z, float scale, std::size_t count) {
-  const auto store = [&](std::byte* to, std::size_t stride) {
-    for (std::size_t i = 0; i < count; ++i, to += stride) {
-      const std::array<float, 3> vector{x[i] * scale, y[i] * scale, z[i] * scale};
-      std::memcpy(to, vector.data(), sizeof vector);
-    }
-  };
-  if (column.first == nullptr) return;
-  if (column.stride == 3 * sizeof(float)) {
-    store(slot_of(column, begin), 3 * sizeof(float));  // a stride that the compiler knows
-  } else {
-    store(slot_of(column, begin), column.stride);
-  }
-}
-
 template <std::size_t N>
 void put_one(const Column<float>& column, std::size_t slot, const std::array<float, N>& value) {
   if (column.first != nullptr) std::memcpy(slot_of(column, slot), value.data(), sizeof value);
@@ -56,9 +39,8 @@ struct Sampler::Run {
   std::size_t begin = 0, count = 0;
   std::array<std::uint8_t, kRun> changes{};  // BodyChange
   bool changed = false;                      // any of them
-  // Lattice units, and those per frame: where the motion is, how far it came since the last sample, and how
-  // fast it is.
-  Numbers place{}, way{}, speed{};
+  Numbers speeds{};
+  std::array<Extra, kPositionChannels> extra{};
 };
 
 // Another epoch: whatever is alive in it is new.
@@ -102,86 +84,75 @@ bool Sampler::tell_changes(const Picture& picture, Run& run) {
   return true;
 }
 
-// Where the motion of one axis is. Floats: a place needs no more digits than the caller's own have.
-void Sampler::place(const SampledMoment& moment, std::size_t axis, Run& run) const {
+void Sampler::fill_extra(const SampledMoment& moment, Run& run) {
   const DrawnFrame& at = *moment.at;
-  const std::int32_t* const p = at.p[axis].data() + run.begin;
-  if (moment.from != nullptr) {
-    const std::int32_t* const p0 = moment.from->p[axis].data() + run.begin;
-    const std::uint8_t* const jumps0 = moment.from->jumps.data() + run.begin;
-    const std::uint8_t* const jumps = at.jumps.data() + run.begin;
+  for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+    const float gravity = kVelocityScale * static_cast<float>(at.gravity[axis]);
+    const float echoed = kVelocityScale * moment.echo_gravity[axis];
+    Extra& extra = run.extra[axis];
     for (std::size_t i = 0; i < run.count; ++i) {
-      // Spawned or teleported in between: it was never on the way from one place to the other.
-      const float on_the_way = jumps0[i] == jumps[i] ? 1 : 0;
-      const float speed = (static_cast<float>(p[i]) - static_cast<float>(p0[i])) * on_the_way;
-      run.place[i] = static_cast<float>(p[i]) + speed * moment.after;
-      run.way[i] = speed * moment.since;
-      run.speed[i] = speed;
+      const std::uint8_t motion = at.motion[run.begin + i];
+      const float fall = (motion & DrawnFrame::kFalls) != 0 ? gravity : 0;
+      const float echo = (motion & DrawnFrame::kMoves) != 0 ? echoed : 0;
+      extra.place[i] = fall * moment.fall.place + echo * moment.echo.place;
+      extra.way[i] = fall * moment.fall.way + echo * moment.echo.way;
+      extra.speed[i] = fall * moment.fall.speed + echo * moment.echo.speed;
     }
-    return;
-  }
-  const std::int32_t* const v = at.v[axis].data() + run.begin;
-  for (std::size_t i = 0; i < run.count; ++i) {
-    const float speed = kVelocityScale * static_cast<float>(v[i]);
-    run.place[i] = static_cast<float>(p[i]) + speed * moment.after;
-    run.way[i] = speed * moment.since;
-    run.speed[i] = speed * moment.pace;
-  }
-  if (moment.fall == 0 && moment.fall_since == 0) return;
-  const float gravity = kVelocityScale * static_cast<float>(at.gravity[axis]);
-  for (std::size_t i = 0; i < run.count; ++i) {
-    const float g = (at.motion[run.begin + i] & DrawnFrame::kFalls) != 0 ? gravity : 0;
-    run.place[i] += g * moment.fall;
-    run.way[i] += g * moment.fall_since;
-    run.speed[i] += g * moment.fall_speed;
   }
 }
 
-// What was drawn, carried on with the motion, is where the eye expects it; the rest is a correction.
 void Sampler::show_places(const SampledMoment& moment, const Smoothing& smoothing,
                           const SampleColumns& columns, const Picture& picture, Run& run) {
+  const DrawnFrame& at = *moment.at;
+  const bool extra = moment.fall.any() || moment.echo.any();
+  if (extra) fill_extra(moment, run);
+  const std::size_t begin = run.begin;
   for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
-    place(moment, axis, run);
-    float* const place = place_[axis].data() + run.begin;
-    float* const speed = speed_[axis].data() + run.begin;
-    if (run.changed) {
-      for (std::size_t i = 0; i < run.count; ++i) {
-        if (run.changes[i] == static_cast<std::uint8_t>(BodyChange::kNone)) continue;
-        place[i] = run.place[i] - run.way[i] - run.speed[i] * moment.gap;
-        speed[i] = run.speed[i];
-      }
+    const std::int32_t* const places = at.p[axis].data() + begin;
+    if (moment.from == nullptr) {
+      read_speeds(at.v[axis].data() + begin, run.count, run.speeds.data());
+    } else {
+      read_ways(moment.from->p[axis].data() + begin, places, moment.from->jumps.data() + begin,
+                at.jumps.data() + begin, run.count, run.speeds.data());
     }
+    float* const shown_place = place_[axis].data() + begin;
+    float* const shown_speed = speed_[axis].data() + begin;
+    const Extra* const more = extra ? &run.extra[axis] : nullptr;
+    show(places, run.speeds.data(), more, run.count, moment.span, smoothing, shown_place, shown_speed);
+    if (!run.changed) continue;
+    // What is new or elsewhere has nothing to come back from.
     for (std::size_t i = 0; i < run.count; ++i) {
-      const float beside = place[i] + speed[i] * moment.gap + run.way[i] - run.place[i];
-      const float faster = speed[i] - run.speed[i];
-      place[i] = run.place[i] + smoothing.place_of_place * beside + smoothing.place_of_speed * faster;
-      speed[i] = run.speed[i] + smoothing.speed_of_place * beside + smoothing.speed_of_speed * faster;
+      if (run.changes[i] == static_cast<std::uint8_t>(BodyChange::kNone)) continue;
+      show(places + i, run.speeds.data() + i, nullptr, 1, moment.span, {}, shown_place + i, shown_speed + i);
     }
   }
   const auto unit = static_cast<float>(picture.lattice_unit);
   const auto rate_hz = static_cast<float>(1e9 / picture.pacer.period_ns());
-  put_vectors(columns.positions, run.begin, place_[0].data() + run.begin, place_[1].data() + run.begin,
-              place_[2].data() + run.begin, unit, run.count);
-  put_vectors(columns.velocities, run.begin, speed_[0].data() + run.begin, speed_[1].data() + run.begin,
-              speed_[2].data() + run.begin, unit * rate_hz, run.count);
+  const auto put = [&](const Column<float>& column, const auto& axes, float scale) {
+    if (column.first == nullptr) return;
+    put_vectors(axes[0].data() + begin, axes[1].data() + begin, axes[2].data() + begin, scale, run.count,
+                slot_of(column, begin), column.stride);
+  };
+  put(columns.positions, place_, unit);
+  put(columns.velocities, speed_, unit * rate_hz);
 }
 
 void Sampler::show_turns(const SampledMoment& moment, float blend, const SampleColumns& columns,
                          const Picture& picture, const Run& run) {
   const DrawnFrame& at = *moment.at;
-  const auto spin_scale = static_cast<float>(kSpinScale * 1e9 / picture.pacer.period_ns()) * moment.pace;
+  const auto spin_scale = static_cast<float>(kSpinScale * 1e9 / picture.pacer.period_ns()) * moment.span.pace;
   for (std::size_t i = 0; i < run.count; ++i) {
     const auto slot = static_cast<Slot>(run.begin + i);
     if (at.alive[slot] == 0) continue;
     const Spin spin = at.spin(slot);
     Rotation turn = to_rotation(at.quaternion(slot));
     if (moment.from == nullptr) {
-      turn = turned_on(turn, spin, moment.after);
+      turn = turned_on(turn, spin, moment.span.after);
     } else if (moment.from->jumps[slot] == at.jumps[slot]) {
-      turn = between(turn, to_rotation(moment.from->quaternion(slot)), -moment.after);
+      turn = between(turn, to_rotation(moment.from->quaternion(slot)), -moment.span.after);
     }
     if (run.changes[i] == static_cast<std::uint8_t>(BodyChange::kNone) && blend > 0) {
-      const Rotation expected = turned_on(turns_[slot], spin, moment.gap + moment.since);
+      const Rotation expected = turned_on(turns_[slot], spin, moment.span.gap + moment.span.since);
       turn = between(turn, expected, blend);
     }
     turns_[slot] = turn;

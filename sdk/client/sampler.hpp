@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "sdk/client/motion.hpp"
 #include "sdk/client/picture.hpp"
 #include "sdk/client/rotation.hpp"
 #include "sdk/client/sample_columns.hpp"
 #include "sdk/client/sampled_moment.hpp"
-#include "sdk/client/smoothing.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::client {
@@ -28,14 +28,11 @@ class Sampler {
                               const SampleColumns& columns, std::int64_t now_ns);
 
  private:
-  // Slots are worked on in runs that stay in the first cache.
-  static constexpr std::size_t kRun = 256;
-  using Numbers = std::array<float, kRun>;
   struct Run;
 
   void begin(const Picture& picture);
   [[nodiscard]] bool tell_changes(const Picture& picture, Run& run);
-  void place(const SampledMoment& moment, std::size_t axis, Run& run) const;
+  static void fill_extra(const SampledMoment& moment, Run& run);
   void show_places(const SampledMoment& moment, const Smoothing& smoothing, const SampleColumns& columns,
                    const Picture& picture, Run& run);
   void show_turns(const SampledMoment& moment, float blend, const SampleColumns& columns,

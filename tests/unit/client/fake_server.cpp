@@ -59,7 +59,7 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
     random_ ^= random_ << 13U;
     random_ ^= random_ >> 7U;
     random_ ^= random_ << 17U;
-    if (random_ % 3 == 0) {
+    if (random_ % 3 == 0 && !undisturbed) {
       body.p[random_ % 3] += static_cast<std::int32_t>(random_ % 3000) - 1500;
       body.v[random_ % 2] += static_cast<std::int32_t>(random_ % 900) - 450;
       body.w[random_ % 3] /= 2;
@@ -91,18 +91,18 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
   return delta;
 }
 
-transport::ScheduledInputMessage FakeServer::schedule(std::int32_t gravity_y) {
+transport::ScheduledInputMessage FakeServer::schedule(std::int32_t gravity_y, std::int32_t gravity_x) {
   ScheduledDrive input;
   input.number = ++last_number_;
   input.frame = frame() + 1 + session.lead;
-  input.drive = {{0, gravity_y, 0}, 300};
+  input.drive = {{gravity_x, gravity_y, 0}, 300};
   EXPECT_TRUE(timeline_.schedule(input).has_value());
   transport::ScheduledInputMessage message;
   message.epoch = session.epoch;
   message.number = input.number;
   message.frame = input.frame;
   message.kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive);
-  message.values = {0, gravity_y, 0, 300};
+  message.values = {gravity_x, gravity_y, 0, 300};
   return message;
 }
 
@@ -151,6 +151,7 @@ void ClientTest::start(std::uint32_t lead, transport::Role role) {
   options.lead = lead;
   options.log = [this](LogLevel, std::string_view line) { log.emplace_back(line); };
   options.measure_ns = measure_ns;
+  options.echo = echo;
   core = std::make_unique<ClientCore>(std::move(options), port, &recorder);
 }
 

@@ -27,9 +27,11 @@ class FakeServer {
   /// The next frame. Its delta is what a writer would publish.
   transport::DeltaMessage advance(std::int64_t server_time_ns = 0);
   /// A drive that acts on frame() + 1 + lead, as a host would schedule it.
-  transport::ScheduledInputMessage schedule(std::int32_t gravity_y);
+  transport::ScheduledInputMessage schedule(std::int32_t gravity_y, std::int32_t gravity_x = 0);
   transport::SnapshotMessage snapshot();
   void teleport(Slot slot) { teleport_ = slot; }
+
+  bool undisturbed = false;  ///< bodies go where they are predicted
 
   transport::SessionMessage session;
   std::map<Frame, std::uint64_t> hashes;
@@ -101,6 +103,7 @@ class ClientTest : public ::testing::Test {
   std::vector<std::string> log;
   std::int64_t now_ns = 1'000'000'000'000;
   std::int64_t (*measure_ns)() = nullptr;  ///< of the next start()
+  bool echo = false;                       ///< likewise
   std::unique_ptr<ClientCore> core;
 };
 
