@@ -44,6 +44,7 @@ void ClientCore::take_deltas(Now now) {
     statistics_.queue_high_water = std::max(statistics_.queue_high_water, epoch_->assembly.high_water());
     if (outcome == Outcome::kStored && last_part)
       epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
+    if (outcome == Outcome::kStored || outcome == Outcome::kIgnored) continue;
     const std::string at = " at frame " + std::to_string(frame);
     if (outcome == Outcome::kRefused) {
       ++statistics_.refused_messages;

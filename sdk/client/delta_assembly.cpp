@@ -5,6 +5,12 @@
 
 namespace tandem::client {
 
+namespace {
+
+constexpr std::size_t kMostPopped = 1024;
+
+}  // namespace
+
 transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch, const StreamId& stream) {
   transport::DeltaMessage message;
   message.epoch = epoch;
@@ -71,7 +77,7 @@ DeltaAssembly::Outcome DeltaAssembly::append(transport::DeltaMessage&& part) {
 
 DeltaAssembly::Outcome DeltaAssembly::finish() {
   const std::size_t most = std::max(limits_.total_bytes, 4 * limits_.delta_bytes);
-  if (queue_.size() >= limits_.frames || queued_bytes_ + open_.payload.size() > most) {
+  if (size() >= limits_.frames || queued_bytes_ + open_.payload.size() > most) {
     clear();
     return Outcome::kOverflow;
   }
@@ -80,21 +86,27 @@ DeltaAssembly::Outcome DeltaAssembly::finish() {
   queued_bytes_ += open_.payload.size();
   queue_.push_back(std::move(open_));
   open_ = {};
-  high_water_ = std::max(high_water_, queue_.size());
+  high_water_ = std::max(high_water_, size());
   return Outcome::kStored;
 }
 
 void DeltaAssembly::pop() {
-  queued_bytes_ -= queue_.front().payload.size();
-  queue_.pop_front();
+  queued_bytes_ -= queue_[first_].payload.size();
+  queue_[first_++] = {};
+  // Mostly that was the only one. Else what is left moves down now and then, so that memory stays bounded.
+  if (first_ == queue_.size() || first_ >= kMostPopped) {
+    queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(first_));
+    first_ = 0;
+  }
 }
 
 void DeltaAssembly::drop_through(Frame frame) {
-  while (!queue_.empty() && queue_.front().frame <= frame) pop();
+  while (size() > 0 && queue_[first_].frame <= frame) pop();
 }
 
 void DeltaAssembly::clear() {
   queue_.clear();
+  first_ = 0;
   queued_bytes_ = 0;
   last_complete_.reset();
   open_ = {};

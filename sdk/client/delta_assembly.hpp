@@ -3,8 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
+#include <vector>
 
 #include "sdk/transport/messages.hpp"
 
@@ -45,14 +45,14 @@ class DeltaAssembly {
   /// Takes one sample of the session's epoch. Untrusted.
   Outcome add(transport::DeltaMessage&& part);
   /// Oldest complete delta, or null.
-  [[nodiscard]] const CompleteDelta* front() const { return queue_.empty() ? nullptr : &queue_.front(); }
+  [[nodiscard]] const CompleteDelta* front() const { return size() == 0 ? nullptr : &queue_[first_]; }
   void pop();
   /// Drops complete deltas up to and including `frame`.
   void drop_through(Frame frame);
   /// Forgets everything, the expected frame too.
   void clear();
 
-  [[nodiscard]] std::size_t size() const { return queue_.size(); }
+  [[nodiscard]] std::size_t size() const { return queue_.size() - first_; }
   [[nodiscard]] std::size_t high_water() const { return high_water_; }
 
  private:
@@ -62,7 +62,8 @@ class DeltaAssembly {
   Outcome finish();
 
   Limits limits_;
-  std::deque<CompleteDelta> queue_;
+  std::vector<CompleteDelta> queue_;  // from first_ on; what is before it was popped
+  std::size_t first_ = 0;
   std::size_t queued_bytes_ = 0;
   std::size_t high_water_ = 0;
   std::optional<Frame> last_complete_;

@@ -24,9 +24,8 @@ template <bool kExtra>
       speed += extra->speed[i];
     }
     const float beside = shown_place[i] + shown_speed[i] * span.gap + way - place;
-    const float faster = shown_speed[i] - speed;
-    shown_place[i] = place + k.place_of_place * beside + k.place_of_speed * faster;
-    shown_speed[i] = speed + k.speed_of_place * beside + k.speed_of_speed * faster;
+    shown_place[i] = place + k.place * beside;
+    shown_speed[i] = speed + k.speed * beside;
   }
 }
 

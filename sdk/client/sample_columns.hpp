@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "sdk/core/lattice/state.hpp"
-#include "tandem/client.hpp"
+#include "tandem/client_types.hpp"
 
 namespace tandem::client {
 

@@ -21,14 +21,18 @@ void since_last(SampledMoment& moment, double start, double last_frame, double e
       bounded(std::min(moment.frame - std::max(start, last_frame), elapsed - moment.span.gap));
 }
 
-void add_echo(const GravityEcho& echo, double longest, SampledMoment& moment) {
+// What was drawn last already moves at the echo's speed of then.
+void add_echo(const GravityEcho& echo, double rate_hz, SampledMoment& moment) {
+  const double longest = SampledMoment::kEchoS * rate_hz;
+  const Span& span = moment.span;
+  const auto speed = [longest](double since) { return since < longest ? since : 0; };
   const double now = std::clamp(moment.frame - echo.frame, 0.0, longest);
-  const double before = std::clamp(moment.frame - moment.span.since - echo.frame, 0.0, longest);
-  moment.echo = {bounded(now * now / 2), bounded((now * now - before * before) / 2),
-                 now < longest ? bounded(now) * moment.span.pace : 0};
-  for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+  const double before = std::clamp(moment.frame - span.since - span.gap - echo.frame, 0.0, longest);
+  moment.echo.place = bounded(now * now / 2);
+  moment.echo.way = bounded((now * now - before * before) / 2 - speed(before) * span.gap);
+  moment.echo.speed = bounded(speed(now)) * span.pace;
+  for (std::size_t axis = 0; axis < kPositionChannels; ++axis)
     moment.echo_gravity[axis] = echo.gravity[axis] - static_cast<float>(moment.at->gravity[axis]);
-  }
 }
 
 }  // namespace
@@ -44,6 +48,7 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
     wanted = mode == SampleMode::kExtrapolate ? picture.pacer.server_frame(at_ns)
                                               : picture.pacer.arrived_frame(at_ns) - 1;
   }
+  const double rate_hz = 1e9 / picture.pacer.period_ns();
   SampledMoment moment;
   if (wanted < number(last) || mode == SampleMode::kInterpolate) {
     moment.frame = std::clamp(wanted, number(first), number(last));
@@ -51,9 +56,9 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
     moment.from = moment.at == picture.agreed ? first : picture.agreed;
     moment.span.after = bounded(moment.frame - number(moment.at));
     since_last(moment, number(moment.from), last_frame, elapsed);
+    if (picture.echo && mode == SampleMode::kExtrapolate) add_echo(*picture.echo, rate_hz, moment);
     return moment;
   }
-  const double rate_hz = 1e9 / picture.pacer.period_ns();
   const double full = std::max(1.0, SampledMoment::kFullSpeedS * rate_hz);
   const double slowing = SampledMoment::kSlowingS * rate_hz;
   const double slowed = std::clamp(wanted - number(last) - full, 0.0, slowing);
@@ -66,7 +71,7 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
   moment.fall.place = bounded(fall_after(beyond));
   moment.fall.way = bounded(fall_after(beyond) - fall_after(beyond - moment.span.since));
   if (beyond > 1) moment.fall.speed = bounded(beyond - 0.5) * moment.span.pace;
-  if (picture.echo) add_echo(*picture.echo, SampledMoment::kEchoS * rate_hz, moment);
+  if (picture.echo) add_echo(*picture.echo, rate_hz, moment);
   return moment;
 }
 

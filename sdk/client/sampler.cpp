@@ -184,13 +184,16 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
   const double smoothing_s =
       request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMostSmoothingS) : kSmoothingS;
   Smoothing smoothing;
-  if (request.mode == SampleMode::kExtrapolate)
-    smoothing = Smoothing::exponential(later(last_ns_, now_ns) / period_ns, smoothing_s * 1e9 / period_ns);
+  if (request.mode == SampleMode::kExtrapolate) {
+    const double elapsed = later(last_ns_, now_ns) / period_ns;
+    const double constant = smoothing_s * 1e9 / period_ns;
+    smoothing = Smoothing::exponential(elapsed, constant);
+  }
   for (Run run; run.begin < capacity; run.begin += kRun) {
     run.count = std::min(kRun, capacity - run.begin);
     run.changed = tell_changes(picture, run);
     show_places(moment, smoothing, columns, picture, run);
-    if (!turns_.empty()) show_turns(moment, smoothing.place_of_place, columns, picture, run);
+    if (!turns_.empty()) show_turns(moment, smoothing.place, columns, picture, run);
     put(columns.changes, run.begin, run.changes.data(), run.count);
   }
   put(columns.types, 0, agreed.type.data(), capacity);
