@@ -61,6 +61,7 @@ client::CoreOptions core_options(const tandem_options& options) {
   core.id = client::random_client_id();
   core.role = static_cast<transport::Role>(options.role);
   core.lead = options.lead;
+  core.echo = options.echo != 0;
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {
     core.log = [log = options.log, user = options.user](LogLevel level, std::string_view line) {

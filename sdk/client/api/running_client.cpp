@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <new>
 #include <utility>
 
@@ -159,14 +158,21 @@ void RunningClient::hold_scene(std::shared_ptr<const KnownScene> scene) {
 
 namespace {
 
-template <class T, class U>
-void scatter(const std::vector<U>& from, std::size_t numbers, T* to, std::size_t stride) {
-  if (to == nullptr || from.empty()) return;
-  if (stride == 0) stride = numbers * sizeof(T);
-  auto* at = reinterpret_cast<std::byte*>(to);
-  for (std::size_t i = 0; i < from.size() / numbers; ++i) {
-    std::memcpy(at + i * stride, &from[i * numbers], numbers * sizeof(T));
-  }
+template <class T>
+client::Column<T> column(T* first, std::uint32_t stride, std::size_t numbers) {
+  return {first, stride != 0 ? stride : numbers * sizeof(T)};
+}
+
+client::SampleColumns to_columns(const tandem_columns& c) {
+  return {.capacity = c.capacity,
+          .positions = column(c.positions, c.position_stride, 3),
+          .velocities = column(c.velocities, c.velocity_stride, 3),
+          .orientations = column(c.orientations, c.orientation_stride, 4),
+          .angular_velocities = column(c.angular_velocities, c.angular_velocity_stride, 3),
+          .types = column(c.types, c.type_stride, 1),
+          .alive = column(c.alive, c.alive_stride, 1),
+          .reuse = column(c.reuse, c.reuse_stride, 1),
+          .changes = column(c.changes, c.change_stride, 1)};
 }
 
 }  // namespace
@@ -179,32 +185,29 @@ Result<void> RunningClient::sample(const tandem_sample_options& options, const t
     core_.start_sampling();
     sampling_ = true;
   }
-  client::Now now = clock_();
-  if (options.at_ns != 0) now.steady_ns = options.at_ns;
-  const std::lock_guard lock(sample_mutex_);
-  if (!core_.sample(sample_, static_cast<SampleMode>(options.mode), now)) {
-    return fail(ErrorCode::kNotReady, "nothing to draw yet");
+  const auto sampled = core_.sample({.mode = static_cast<SampleMode>(options.mode),
+                                     .at_ns = options.at_ns,
+                                     .smoothing_s = options.smoothing_s},
+                                    to_columns(columns), clock_());
+  if (!sampled) {
+    Error error = sampled.error();
+    if (error.code == ErrorCode::kOutOfOrder) error.code = ErrorCode::kNotReady;
+    const auto drawable = core_.drawable();
+    if (drawable) {
+      frame.capacity = drawable->capacity;
+      frame.epoch = drawable->epoch;
+      frame.has_orientations = drawable->has_orientations ? 1 : 0;
+    }
+    return tl::unexpected<Error>(std::move(error));
   }
-  frame.capacity = sample_.capacity;
-  frame.epoch = sample_.epoch;
-  frame.frame = sample_.frame;
-  frame.alive = 0;
-  for (const std::uint8_t alive : sample_.alive) frame.alive += alive;
-  frame.has_orientations = sample_.orientations.empty() ? 0 : 1;
+  frame.capacity = sampled->capacity;
+  frame.epoch = sampled->epoch;
+  frame.frame = sampled->frame;
+  frame.seconds_since_delta = sampled->since_delta_s;
+  frame.alive = sampled->alive;
+  frame.has_orientations = sampled->has_orientations ? 1 : 0;
   frame.mode = options.mode;
   frame.phase = static_cast<tandem_phase>(phase());
-  const bool wanted = columns.positions != nullptr || columns.velocities != nullptr ||
-                      columns.orientations != nullptr || columns.types != nullptr || columns.alive != nullptr;
-  if (wanted && columns.capacity < sample_.capacity) {
-    return fail(ErrorCode::kCapacity, "the columns have less room than the session has slots");
-  }
-  scatter(sample_.positions, 3, columns.positions, columns.position_stride);
-  scatter(sample_.orientations, 4, columns.orientations, columns.orientation_stride);
-  scatter(sample_.types, 1, columns.types, columns.type_stride);
-  scatter(sample_.alive, 1, columns.alive, columns.alive_stride);
-  scatter(sample_.generation, 1, columns.reuse, columns.reuse_stride);
-  static_assert(sizeof(BodyChange) == 1);
-  scatter(sample_.changes, 1, columns.changes, columns.change_stride);
   return {};
 }
 

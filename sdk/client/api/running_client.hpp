@@ -59,7 +59,8 @@ class RunningClient {
   [[nodiscard]] std::shared_ptr<const KnownScene> scene() const;
   void hold_scene(std::shared_ptr<const KnownScene> scene);
   [[nodiscard]] ClientPhase phase() const { return phase_; }
-  /// Without the lock, but for the first call. Errors: kNotReady, kCapacity (`frame` is filled in).
+  /// Without the lock, but for the first call. Errors: kNotReady, kCapacity (`frame` has capacity, epoch and
+  /// has_orientations).
   Result<void> sample(const tandem_sample_options& options, const tandem_columns& columns,
                       tandem_frame& frame);
 

@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
     }
     const auto status = client->status();
     if (!status) return std::fprintf(stderr, "%s\n", status.error().message.c_str()), 1;
-    const auto frame = client->sample(tandem::Columns{});  // nothing but how many there are
+    const auto frame = client->sample_frame();
     std::printf("%d,%d,%llu,%u,%.3f,%.2f,%llu,%llu\n", second, static_cast<int>(status->phase),
                 static_cast<unsigned long long>(status->frame), frame ? frame->alive : 0, status->mbit_per_s,
                 status->latency_ms_p50, static_cast<unsigned long long>(status->resyncs),

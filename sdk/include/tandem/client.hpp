@@ -211,6 +211,15 @@ class Client {
       return unexpected(sampled);
     return frame;
   }
+  /// Which moment it would be, and how many bodies; a sample without columns.
+  Result<tandem_frame> sample_frame(const SampleOptions& options = {}) {
+    tandem_frame frame = TANDEM_FRAME_INIT;
+    const tandem_sample_options how = to_c(options);
+    if (const auto sampled = checked(tandem_sample(handle_, &how, nullptr, &frame)); !sampled) {
+      return unexpected(sampled);
+    }
+    return frame;
+  }
   /// The same into arrays that grow with the session. Returns false, and leaves `out` as it is, where there
   /// is nothing to draw. Allocates when the capacity changed only.
   bool sample(Sample& out, SampleMode mode = SampleMode::kExtrapolate);
@@ -241,6 +250,13 @@ class Client {
   [[nodiscard]] static Result<std::uint64_t> numbered(tandem_result result, const std::uint64_t& number) {
     if (const auto sent = checked(result); !sent) return unexpected(sent);
     return number;
+  }
+  [[nodiscard]] static tandem_sample_options to_c(const SampleOptions& options) {
+    tandem_sample_options c = TANDEM_SAMPLE_OPTIONS_INIT;
+    c.mode = static_cast<tandem_sample_mode>(options.mode);
+    c.at_ns = options.at_ns;
+    c.smoothing_s = options.smoothing_s;
+    return c;
   }
   tandem_result sample_into(const Columns& columns, const SampleOptions& options, tandem_frame& frame);
 
@@ -397,10 +413,7 @@ inline std::vector<BodyTypeInfo> Client::types() const {
 
 inline tandem_result Client::sample_into(const Columns& columns, const SampleOptions& options,
                                          tandem_frame& frame) {
-  tandem_sample_options how = TANDEM_SAMPLE_OPTIONS_INIT;
-  how.mode = static_cast<tandem_sample_mode>(options.mode);
-  how.at_ns = options.at_ns;
-  how.smoothing_s = options.smoothing_s;
+  const tandem_sample_options how = to_c(options);
   tandem_columns c = TANDEM_COLUMNS_INIT;
   const auto count = [](std::size_t n) {  // more than that is as good as that
     constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
@@ -424,7 +437,14 @@ inline tandem_result Client::sample_into(const Columns& columns, const SampleOpt
 
 inline bool Client::sample(Sample& out, SampleMode mode) {
   tandem_frame frame = TANDEM_FRAME_INIT;
-  for (;;) {
+  const auto resize = [&](std::size_t capacity) {
+    out.positions.resize(3 * capacity);
+    out.alive.resize(capacity);
+    out.generation.resize(capacity);
+    out.types.resize(capacity);
+    out.changes.resize(capacity);
+  };
+  for (bool told = false;;) {
     Columns columns;
     columns.capacity = out.alive.size();
     columns.positions = out.positions.data();
@@ -432,19 +452,17 @@ inline bool Client::sample(Sample& out, SampleMode mode) {
     columns.types = out.types.data();
     columns.alive = out.alive.data();
     columns.reuse = out.generation.data();
-    columns.changes = Column<std::uint8_t>(reinterpret_cast<std::uint8_t*>(out.changes.data()));
+    if (!told) columns.changes = reinterpret_cast<std::uint8_t*>(out.changes.data());
+    const std::size_t turning = out.orientations.size() / 4;
+    if (turning != 0 && turning < columns.capacity) columns.capacity = turning;
     const tandem_result result = sample_into(columns, {.mode = mode}, frame);
-    const std::size_t capacity = frame.capacity;
-    const bool fits = out.alive.size() == capacity &&
-                      out.orientations.size() == (frame.has_orientations != 0 ? 4 * capacity : 0);
-    if (result == TANDEM_OK && fits) break;
     if (result != TANDEM_OK && result != TANDEM_CAPACITY) return false;
-    out.positions.resize(3 * capacity);
-    out.orientations.resize(frame.has_orientations != 0 ? 4 * capacity : 0);
-    out.alive.resize(capacity);
-    out.generation.resize(capacity);
-    out.types.resize(capacity);
-    out.changes.resize(capacity);
+    resize(frame.capacity);
+    const std::size_t quaternions = frame.has_orientations != 0 ? frame.capacity : 0;
+    const bool missed = turning < quaternions;
+    out.orientations.resize(4 * quaternions);
+    if (result == TANDEM_OK && !missed) break;
+    told = told || result == TANDEM_OK;  // changes are told once
   }
   out.epoch = frame.epoch;
   out.frame = frame.frame;

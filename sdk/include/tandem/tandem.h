@@ -36,8 +36,8 @@
  *           otherwise); what that cannot fill in is zero, and `size` then says how much it has filled in.
  * Threads   All functions may be called from any thread, unless they say otherwise. tandem_sample() never
  *           waits for the network, for decoding or for applying; the others may wait until the frame in work
- *           is applied. From a callback only functions without a handle may be called: the others return
- *           TANDEM_IN_CALLBACK.
+ *           is applied. From a callback only tandem_error_text(), tandem_result_text(), tandem_clock_ns() and
+ *           the version's functions may be called: all others return TANDEM_IN_CALLBACK.
  * Memory    Arrays and structs are the caller's; nothing of them is kept after the call. Texts in structs end
  *           with 0 and are cut where they are too long. What is buffered is bounded, however seldom a client
  *           is updated.
@@ -238,7 +238,9 @@ typedef int32_t tandem_sample_mode;
 /** Values of tandem_sample_mode. */
 enum {
   TANDEM_INTERPOLATE = 0, /**< between the last two agreed frames: always true, a frame late */
-  TANDEM_EXTRAPOLATE = 1  /**< at the server's time: predicted, with corrections blended in */
+  /** At the server's time: predicted, with corrections taken up by an offset that decays. Where nothing comes
+   * from the server bodies go on for a moment, slow down and stand (tandem_frame::seconds_since_delta). */
+  TANDEM_EXTRAPOLATE = 1
 };
 
 /** What a body did since the client's previous sample: one of the constants below. */
@@ -256,8 +258,8 @@ typedef struct tandem_sample_options {
   /** The moment to draw, by tandem_clock_ns(), such as when the picture will be on the screen; 0: now. Far
    * past or future gives the nearest that is held, and tandem_frame::frame says which. */
   int64_t at_ns;
-  /** Time constant with which corrections are blended in, seconds; 0: not at all, below 0: the default, 0.1.
-   */
+  /** Time constant of the offset that takes up corrections, seconds, at most 10. 0: they show as jumps; below
+   * 0: the default, 0.1. */
   double smoothing_s;
 } tandem_sample_options;
 /** The defaults. */
@@ -274,8 +276,8 @@ typedef struct tandem_columns {
   float* positions;    /**< x, y, z; scene units */
   float* velocities;   /**< x, y, z; scene units / s, as the bodies move on the server */
   float* orientations; /**< quaternion x, y, z, w of norm 1, from the body's frame to the world's; q and -q
-                          are the same. 0, 0, 0, 1 where the session has none */
-  float* angular_velocities; /**< x, y, z in the world's frame; rad / s */
+                          are the same. Left as they are where the session has none */
+  float* angular_velocities; /**< x, y, z in the world's frame; rad / s; likewise */
   uint16_t* types;           /**< for tandem_get_type() */
   uint8_t* alive;            /**< 1: the slot holds a body. 0: the other columns but `changes` say nothing */
   uint8_t* reuse;            /**< counts the bodies that a slot has held; wraps */
@@ -319,7 +321,8 @@ TANDEM_API int64_t tandem_clock_ns(void) TANDEM_NOEXCEPT;
  * @param columns  what is wanted; null: nothing but `frame`
  * @param frame    may be null
  * @return also TANDEM_NOT_READY (nothing to draw yet) and TANDEM_CAPACITY (the session has more slots than
- * the columns have room for; `frame` is filled in, frame->capacity tells how many) */
+ * the columns have room for: nothing was sampled, but frame->capacity tells how many, frame->has_orientations
+ * whether they turn) */
 TANDEM_API tandem_result tandem_sample(tandem_client client, const tandem_sample_options* options,
                                        const tandem_columns* columns, tandem_frame* frame) TANDEM_NOEXCEPT;
 /** @} */

@@ -92,6 +92,57 @@ TEST_F(Playing, ASampleGoesIntoArraysOfStructs) {
   }
 }
 
+TEST_F(Playing, BodiesAreNewInTheFirstSampleAlone) {
+  std::array<std::uint8_t, kBodies> changes{};
+  tandem_columns columns = TANDEM_COLUMNS_INIT;
+  columns.changes = changes.data();
+  tandem_frame frame = TANDEM_FRAME_INIT;
+  ASSERT_EQ(tandem_sample(client, nullptr, &columns, &frame),
+            TANDEM_CAPACITY);  // asks how much room it needs
+  ASSERT_EQ(frame.capacity, kBodies);
+  columns.capacity = frame.capacity;
+  ASSERT_EQ(tandem_sample(client, nullptr, &columns, nullptr), TANDEM_OK);
+  EXPECT_EQ(changes.front(), TANDEM_CHANGE_NEW);
+  ASSERT_EQ(tandem_sample(client, nullptr, &columns, nullptr), TANDEM_OK);
+  EXPECT_EQ(changes.front(), TANDEM_CHANGE_NONE);
+}
+
+TEST_F(Playing, VelocitiesAreThoseOfTheBodies) {
+  run(1);
+  std::vector<float> velocities(3 * kBodies), before(3 * kBodies), after(3 * kBodies);
+  tandem_columns columns = TANDEM_COLUMNS_INIT;
+  columns.capacity = kBodies;
+  tandem_sample_options options = TANDEM_SAMPLE_OPTIONS_INIT;
+  options.mode = TANDEM_INTERPOLATE;
+  constexpr std::int64_t kStepNs = 1'000'000;
+  options.at_ns = Playground::now().steady_ns;
+  columns.positions = before.data();
+  columns.velocities = velocities.data();
+  tandem_frame first = TANDEM_FRAME_INIT, second = TANDEM_FRAME_INIT;
+  ASSERT_EQ(tandem_sample(client, &options, &columns, &first), TANDEM_OK);
+  options.at_ns += kStepNs;
+  columns.positions = after.data();
+  ASSERT_EQ(tandem_sample(client, &options, &columns, &second), TANDEM_OK);
+  const double seconds = (second.frame - first.frame) / 30;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_NEAR(after[i] - before[i], velocities[i] * seconds, 1e-4) << i;
+  }
+}
+
+TEST_F(Playing, CorrectionsMayBeShownAsTheyAre) {
+  run(1);
+  std::vector<float> first(3 * kBodies), second(3 * kBodies);
+  tandem_columns columns = TANDEM_COLUMNS_INIT;
+  columns.capacity = kBodies;
+  tandem_sample_options options = TANDEM_SAMPLE_OPTIONS_INIT;
+  options.smoothing_s = 0;
+  for (auto* positions : {&first, &second}) {
+    columns.positions = positions->data();
+    ASSERT_EQ(tandem_sample(client, &options, &columns, nullptr), TANDEM_OK);
+  }
+  EXPECT_EQ(first, second) << "at one moment without an offset";
+}
+
 TEST_F(Playing, ColumnsThatAreTooShortStayAsTheyAre) {
   std::vector<float> positions(3 * kBodies, 42.0F);
   tandem_columns columns = TANDEM_COLUMNS_INIT;
