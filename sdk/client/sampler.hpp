@@ -21,7 +21,7 @@ namespace tandem::client {
 class Sampler {
  public:
   /// Time constant of the blend after a correction. Shorter shows jerks, longer shows bodies off their place.
-  static constexpr double kSmoothingS = 0.1;
+  static constexpr double kSmoothingS = 0.05;
 
   /// Errors: kCapacity (the columns hold fewer slots than the picture).
   Result<SampledFrame> sample(const Picture& picture, const SampleRequest& request,

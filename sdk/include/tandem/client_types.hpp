@@ -57,7 +57,7 @@ enum class BodyChange : std::uint8_t {
 
 enum class SampleMode : std::uint8_t {
   kInterpolate = 0,  ///< between the last two agreed frames: always true, a frame late
-  kExtrapolate = 1,  ///< at the server's time: predicted, with corrections blended in over about 0.1 s
+  kExtrapolate = 1,  ///< at the server's time: predicted, with corrections blended in over about 0.05 s
 };
 
 /// The bodies at one moment, to draw. Arrays are `capacity` long, positions three times that (x, y, z of slot

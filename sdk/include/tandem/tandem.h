@@ -259,7 +259,7 @@ typedef struct tandem_sample_options {
    * past or future gives the nearest that is held, and tandem_frame::frame says which. */
   int64_t at_ns;
   /** Time constant of the offset that takes up corrections, seconds, at most 10. 0: they show as jumps; below
-   * 0: the default, 0.1. */
+   * 0: the default, 0.05. */
   double smoothing_s;
 } tandem_sample_options;
 /** The defaults. */

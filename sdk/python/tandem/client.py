@@ -154,7 +154,7 @@ class Client:
         at_ns      by clock_ns(), such as when the picture will be on the screen; 0: now. Far past or future gives
                    the nearest that is held, and Sample.frame says which
         smoothing  time constant with which corrections are blended in, seconds; 0: not at all, None: the
-                   default, 0.1
+                   default, 0.05
         out        a Sample, whose arrays are written to where they are (and replaced only when the session has
                    another number of slots), or arrays of the caller's own as for Sample.into(); None: new ones
 

@@ -96,7 +96,12 @@ describe.each(VARIANTS)('%s', (variant) => {
       const bodies = sample?.alive.reduce((sum, each) => sum + each, 0);
       expect(bodies).toBe(trace.told.bodies);
       const alive = (_: number, i: number) => sample?.alive[Math.floor(i / 3)] === 1;
-      expect(Array.from(sample?.positions ?? []).filter(alive)).toEqual(trace.told.positions.filter(alive));
+      // To within the last bit or two of a float: a sample is computed in them.
+      const told = trace.told.positions.filter(alive);
+      const drawn = Array.from(sample?.positions ?? []).filter(alive);
+      expect(drawn).toHaveLength(told.length);
+      const beside = told.filter((value, i) => !(Math.abs((drawn[i] ?? NaN) - value) <= Math.abs(value) * 2 ** -22));
+      expect(beside).toEqual([]);
       expect(sample?.corrected.reduce((sum, each) => sum + each, 0)).toBe(trace.told.frames.at(-1)?.[2]);
       if (name !== 'orientations') expect(sample?.orientations).toBeNull();
       else {
