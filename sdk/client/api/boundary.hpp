@@ -48,6 +48,12 @@ tandem_result call(Body&& body) noexcept {
   }
 }
 
+/// What a forked child gets that asks for a client or browser of its own.
+inline tandem_result forked_child() noexcept {
+  return refuse(TANDEM_TRANSPORT,
+                "a child of fork() cannot use DDS: its parent did; start a program with exec()");
+}
+
 inline tandem_result null_pointer(const char* name) noexcept { return refuse(TANDEM_INVALID_ARGUMENT, name); }
 
 }  // namespace tandem::api

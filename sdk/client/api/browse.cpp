@@ -58,6 +58,7 @@ using namespace tandem::api;
 tandem_result tandem_browser_open(uint32_t domain, tandem_browser* browser) noexcept {
   return call([&] {
     if (browser == nullptr) return null_pointer("`browser` is null");
+    if (in_forked_child()) return forked_child();
     transport::DdsOptions options;
     options.domain = domain;
     auto monitor = transport::make_dds_monitor(options);

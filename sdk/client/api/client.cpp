@@ -111,6 +111,7 @@ using namespace tandem::api;
 tandem_result tandem_join(const tandem_options* options, tandem_client* client) noexcept {
   return call([&] {
     if (client == nullptr) return null_pointer("`client` is null");
+    if (in_forked_child()) return forked_child();
     tandem_options ours = TANDEM_OPTIONS_INIT;
     if (const auto read = read_options(options, ours); read != TANDEM_OK) return read;
     auto core = core_options(ours);

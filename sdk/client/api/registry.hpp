@@ -10,6 +10,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "sdk/client/api/forked.hpp"
+
 namespace tandem::api {
 
 using Handle = std::uint64_t;  ///< 0: none
@@ -17,7 +19,7 @@ using Handle = std::uint64_t;  ///< 0: none
 /// Of all registries of a process. Thread-safe.
 [[nodiscard]] Handle next_handle();
 
-/// Thread-safe. The lock is held for a look-up only.
+/// Thread-safe. The lock is held for a look-up only. In a forked child it finds nothing.
 template <class T>
 class Registry {
  private:
@@ -47,6 +49,7 @@ class Registry {
   };
 
   [[nodiscard]] Handle add(std::unique_ptr<T> object) {
+    watch_forks();
     auto slot = std::make_shared<Slot>();
     slot->object = std::move(object);
     const Handle handle = next_handle();
@@ -56,6 +59,7 @@ class Registry {
   }
 
   [[nodiscard]] Use find(Handle handle) const {
+    if (in_forked_child()) return Use(nullptr);
     const std::shared_lock lock(mutex_);
     const auto found = slots_.find(handle);
     if (found == slots_.end()) return Use(nullptr);
@@ -67,6 +71,7 @@ class Registry {
   /// them and returns it; null where there is none.
   template <class End>
   [[nodiscard]] std::unique_ptr<T> remove(Handle handle, End&& end) {
+    if (in_forked_child()) return nullptr;
     std::shared_ptr<Slot> slot;
     {
       const std::unique_lock lock(mutex_);

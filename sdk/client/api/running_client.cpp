@@ -195,7 +195,6 @@ Result<void> RunningClient::sample(const tandem_sample_options& options, const t
     const auto drawable = core_.drawable();
     if (drawable) {
       frame.capacity = drawable->capacity;
-      frame.epoch = drawable->epoch;
       frame.has_orientations = drawable->has_orientations ? 1 : 0;
     }
     return tl::unexpected<Error>(std::move(error));

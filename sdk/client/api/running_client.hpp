@@ -85,8 +85,6 @@ class RunningClient {
   std::atomic<bool> sampling_ = false;
   std::atomic<bool> ending_ = false;
   std::atomic<bool> updating_ = false;  // without a thread: somebody is in round()
-  std::mutex sample_mutex_;             // guards sample_
-  Sample sample_;
   std::thread thread_;
 };
 

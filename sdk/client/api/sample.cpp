@@ -62,7 +62,10 @@ tandem_result tandem_sample(tandem_client client, const tandem_sample_options* o
     where.capacity = std::numeric_limits<std::uint32_t>::max();  // nothing to have room for
     if (options != nullptr) result = read_struct(options, how);
     if (result == TANDEM_OK && columns != nullptr) result = read_struct(columns, where);
-    if (result == TANDEM_OK && frame != nullptr) result = check_struct(frame);
+    if (result == TANDEM_OK && frame != nullptr) {
+      result = check_struct(frame);
+      if (result == TANDEM_OK) std::memcpy(&what, frame, std::min<std::size_t>(size_of(frame), sizeof what));
+    }
     if (result == TANDEM_OK) result = check(how);
     if (result == TANDEM_OK) result = check(where);
     if (result != TANDEM_OK) return result;

@@ -121,12 +121,15 @@ tandem_result tandem_get_scene(tandem_client client, tandem_scene* scene) noexce
     if (!known) return refuse(known.error());
     const SceneText& text = *(*known)->scene;
     tandem_scene out = TANDEM_SCENE_INIT;
-    running.with_session([&](const transport::SessionMessage* session) {
+    const bool still = running.with_session([&](const transport::SessionMessage* session) {
+      if (session == nullptr) return false;
       out.capacity = session->capacity;
       out.type_count = static_cast<std::uint32_t>(session->types.size());
       out.frame_rate_hz = session->frame_rate_hz;
       write_text(session->scene, out.name);
+      return true;
     });
+    if (!still) return no_session();
     out.solid_count = static_cast<std::uint32_t>(text.solids.size());
     std::copy(text.gravity.begin(), text.gravity.end(), std::begin(out.gravity));
     out.max_gravity = text.max_gravity;

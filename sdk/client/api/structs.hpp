@@ -53,15 +53,14 @@ template <class T>
   return kOk;
 }
 
-/// Writes what fits into their struct, which was checked; the rest of it becomes 0. `size`: of the one in
-/// front of it in an array.
+/// Writes what fits into their struct, which was checked; the rest of it becomes 0. `size`: theirs, which
+/// stays, as it is the stride of an array that the caller may hand over again.
 template <class T>
 void write_struct(const T& ours, void* theirs, std::size_t size) {
-  const std::size_t known = std::min(size, sizeof(T));
   std::memset(theirs, 0, size);
-  std::memcpy(theirs, &ours, known);
-  const auto filled = static_cast<std::uint32_t>(known);
-  std::memcpy(theirs, &filled, sizeof filled);
+  std::memcpy(theirs, &ours, std::min(size, sizeof(T)));
+  const auto same = static_cast<std::uint32_t>(size);
+  std::memcpy(theirs, &same, sizeof same);
 }
 template <class T>
 void write_struct(const T& ours, T* theirs) {

@@ -161,7 +161,9 @@ class Client {
   Client& operator=(const Client&) = delete;
   /// Leaves the session; waits for calls of other threads.
   ~Client() {
-    if (handle_ != 0) static_cast<void>(tandem_leave(handle_));
+    if (handle_ == 0 || tandem_leave(handle_) != TANDEM_IN_CALLBACK) return;
+    // Within the log function of another client. This one's must outlive it.
+    std::thread([handle = handle_, log = std::move(log_)] { tandem_leave(handle); }).detach();
   }
 
   /// For the functions of tandem/tandem.h; 0 when moved from.
@@ -284,7 +286,8 @@ class Browser {
   Browser(const Browser&) = delete;
   Browser& operator=(const Browser&) = delete;
   ~Browser() {
-    if (handle_ != 0) static_cast<void>(tandem_browser_close(handle_));
+    if (handle_ == 0 || tandem_browser_close(handle_) != TANDEM_IN_CALLBACK) return;
+    std::thread([handle = handle_] { tandem_browser_close(handle); }).detach();
   }
 
   /// What is there now, by name. Does not wait: a session is known within a second or two of open().

@@ -30,10 +30,10 @@
  *           TANDEM_OUT_OF_MEMORY. Every function may return TANDEM_INVALID_ARGUMENT (a null pointer where the
  *           text does not allow it, a size or number out of range), TANDEM_INVALID_HANDLE,
  *           TANDEM_IN_CALLBACK, TANDEM_OUT_OF_MEMORY and TANDEM_INTERNAL; the texts name the others.
- * Structs   begin with `size`: set it with the struct's ..._INIT. Of an array of structs the first one's
- *           counts for all. A program built against an older header runs with a newer library, and the other
- *           way round where it leaves zero what the older library does not know (TANDEM_UNSUPPORTED
- *           otherwise); what that cannot fill in is zero, and `size` then says how much it has filled in.
+ * Structs   begin with `size`: set it with the struct's ..._INIT; no function changes it. Of an array of
+ *           structs the first one's counts for all. A program built against an older header runs with a newer
+ *           library, and the other way round where it leaves zero what the older library does not know
+ *           (TANDEM_UNSUPPORTED otherwise); what that library cannot fill in is zero.
  * Threads   All functions may be called from any thread, unless they say otherwise. tandem_sample() never
  *           waits for the network, for decoding or for applying; the others may wait until the frame in work
  *           is applied. From a callback only tandem_error_text(), tandem_result_text(), tandem_clock_ns() and
@@ -42,10 +42,11 @@
  *           with 0 and are cut where they are too long. What is buffered is bounded, however seldom a client
  *           is updated.
  * Processes Clients of one process and domain share the DDS domain: its sockets, threads and discovery. Each
- *           has a participant and endpoints of its own. After fork() the child has no clients.
- * Units     Scene units (metres, as a rule), seconds, radians; right-handed as the scene. Frames count
- * from 1. Promise   What is not marked EXPERIMENTAL keeps its meaning and binary form until the next major
- * version.
+ *           has a participant and endpoints of its own. After fork() the child has none of its parent's
+ *           clients, and cannot join (TANDEM_TRANSPORT) before it has called exec().
+ * Units     Scene units (metres, as a rule), seconds, radians; right-handed as the scene. Frames begin at 1.
+ *
+ * What is not marked EXPERIMENTAL keeps its meaning and binary form until the next major version.
  */
 
 /* Set before this is included where the static library is linked or the symbols are wrapped. */

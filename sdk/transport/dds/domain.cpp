@@ -78,7 +78,9 @@ DomainUse::~DomainUse() {
   const std::lock_guard lock(domains().mutex);
   const auto use = domains().uses.find(domain_);
   if (--use->second.users > 0) return;
-  if (use->second.handle > 0) dds_delete(use->second.handle);
+  // Another library of this process, or the application itself, may have participants in it.
+  if (use->second.handle > 0 && dds_lookup_participant(domain_, nullptr, 0) == 0)
+    dds_delete(use->second.handle);
   domains().uses.erase(use);
 }
 

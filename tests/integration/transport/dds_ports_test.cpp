@@ -1,5 +1,6 @@
 // The DDS ports within one process, over loopback.
 
+#include <dds/dds.h>
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -473,6 +474,16 @@ TEST_F(DdsPorts, WakeEndsAWaitOfAnotherThread) {
   std::thread waker([&] { client->wake(); });
   client->wait(60s);
   waker.join();
+}
+
+TEST_F(DdsPorts, AParticipantOfTheApplicationOutlivesTheLastPort) {
+  auto client = this->client();
+  const dds_entity_t own = dds_create_participant(options_.domain, nullptr, nullptr);
+  ASSERT_GT(own, 0);
+  client.reset();
+  dds_guid_t guid{};
+  EXPECT_EQ(dds_get_guid(own, &guid), DDS_RETCODE_OK);
+  EXPECT_EQ(dds_delete(own), DDS_RETCODE_OK);
 }
 
 }  // namespace

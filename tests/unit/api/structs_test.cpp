@@ -37,7 +37,7 @@ TEST(Structs, OfANewerHeaderAreFilledInAsFarAsKnown) {
   status.known.size = sizeof status;
   status.more.fill(0xFF);
   ASSERT_EQ(tandem_get_status(client, &status.known), TANDEM_OK);
-  EXPECT_EQ(status.known.size, sizeof(tandem_status));
+  EXPECT_EQ(status.known.size, sizeof status) << "the stride of an array that is handed over again";
   EXPECT_NE(status.known.client_id, 0U);
   EXPECT_EQ(status.more, (std::array<std::uint8_t, 40>{}));
   EXPECT_EQ(tandem_leave(client), TANDEM_OK);

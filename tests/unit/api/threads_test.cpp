@@ -1,5 +1,7 @@
 // Calls from several threads at once. The port is nobody's: what matters is who waits for whom.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <condition_variable>
@@ -126,6 +128,25 @@ TEST_F(Threads, EachHasAnErrorTextOfItsOwn) {
     EXPECT_EQ(tandem_join(nullptr, nullptr), TANDEM_INVALID_ARGUMENT);
   }).join();
   EXPECT_EQ(mine, tandem_error_text());
+}
+
+TEST_F(Threads, AForkedChildHasNoClientsAndTheParentKeepsIts) {
+  const tandem_client client = join(1);
+  const pid_t child = fork();
+  if (child == 0) {
+    tandem_status status = TANDEM_STATUS_INIT;
+    tandem_client other = 0;
+    const bool right = tandem_get_status(client, &status) == TANDEM_INVALID_HANDLE &&
+                       tandem_leave(client) == TANDEM_INVALID_HANDLE &&
+                       tandem_join(nullptr, &other) == TANDEM_TRANSPORT && other == 0;
+    _exit(right ? 0 : 1);
+  }
+  int ended = -1;
+  ASSERT_EQ(waitpid(child, &ended, 0), child);
+  EXPECT_EQ(ended, 0);
+  tandem_status status = TANDEM_STATUS_INIT;
+  EXPECT_EQ(tandem_get_status(client, &status), TANDEM_OK);
+  EXPECT_EQ(tandem_leave(client), TANDEM_OK);
 }
 
 }  // namespace

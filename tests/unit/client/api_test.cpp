@@ -1,7 +1,10 @@
 // tandem::Client over DDS, without a server that one could play with: what an application sees before that.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
+#include <memory>
+#include <optional>
 #include <thread>
 
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -100,6 +103,42 @@ TEST_F(ClientApi, ASampleDoesNotWaitForThePollInWork) {
   for (int i = 0; i < 200 && lines == 0; ++i) client->update(0.05);
   EXPECT_EQ(lines, 1);
   EXPECT_EQ(client->status()->phase, ClientPhase::kRefused);
+}
+
+TEST_F(ClientApi, AClientMayGoWithinTheLogFunctionOfAnother) {
+  transport::DdsOptions dds;
+  dds.session = options.session = "logged";
+  auto server = transport::make_dds_server_port(dds);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  transport::SessionMessage session;
+  session.session = options.session;
+  session.epoch = 1;
+  session.capacity = 1;
+  session.streams.emplace_back();
+  session.lattice_unit = 1;  // as above
+  session.types = {{"ball", 1, 0, transport::Shape::kSphere, {}}};
+  ASSERT_TRUE((*server)->write(session).has_value());
+
+  std::optional<Client> gone;
+  const auto told = std::make_shared<std::atomic<int>>(0);
+  ClientOptions others = options;
+  others.log = [told](LogLevel, std::string_view) { ++*told; };
+  bool logged = false;
+  options.background = false;
+  options.log = [&](LogLevel, std::string_view) {
+    gone.reset();
+    logged = true;
+  };
+  auto client = Client::connect(options);
+  auto other = Client::connect(others);
+  ASSERT_TRUE(client && other);
+  gone.emplace(std::move(*other));
+  for (int i = 0; i < 200 && !logged; ++i) client->update(0.05);
+  EXPECT_TRUE(logged);
+  for (int i = 0; i < 200 && told.use_count() > 2; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(told.use_count(), 2)
+      << "this one's and that in `others`: the client left, and its function is gone";
 }
 
 TEST_F(ClientApi, TypesTellWhatBodiesLookLike) {
