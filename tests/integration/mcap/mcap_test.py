@@ -36,7 +36,7 @@ def install(folder):
     for name in ("package.json", "package-lock.json", "read.mjs"):
         shutil.copy(HERE / name, folder)
     done = subprocess.run(
-        ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=folder, capture_output=True, text=True, check=False
+        ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--fetch-retries=1", "--fetch-retry-mintimeout=1000"], cwd=folder, capture_output=True, text=True, check=False
     )  # fmt: skip
     if done.returncode != 0:
         print(f"not run: npm cannot install the packages: {done.stderr.strip()[-300:]}")
