@@ -340,8 +340,8 @@ ClientStatus ClientCore::status() const {
 
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
-  pictures_.want();
   if (epoch_ && epoch_->played) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer, last_poll_ns_);
+  pictures_.want();  // last: without memory for a first picture, the next call tries again
 }
 
 std::optional<Drawable> ClientCore::drawable() {

@@ -144,7 +144,7 @@ void ClientCore::load(transport::SnapshotMessage&& snapshot, Now now) {
   e.snapshot.clear();
   e.assembly.drop_through(snapshot.frame);
   follow_uncorrected();
-  e.pictures.on_loaded(e.timeline, e.pacer, now.steady_ns);
+  if (pictures_.wanted()) e.pictures.on_loaded(e.timeline, e.pacer, now.steady_ns);
   e.joining = false;
   e.played = true;
   e.input_missing_ns.reset();

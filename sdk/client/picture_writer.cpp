@@ -11,15 +11,12 @@ PictureWriter::PictureWriter(PictureExchange& exchange, const transport::Session
                .pacer = Pacer(session.frame_rate_hz)} {}
 
 void PictureWriter::on_loaded(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns) {
-  if (!exchange_.wanted()) return;
   jumps_.assign(timeline.state(timeline.applied()).capacity(), 0);
   accelerations_.forget(jumps_.size());
-  picture_.load = exchange_.count_load();
-  picture_.before = nullptr;
-  picture_.agreed = draw_agreed(timeline);
-  picture_.agreed_ns = now_ns;
-  draw_ahead(timeline);
-  show(pacer);
+  Picture next = picture_;
+  next.load = exchange_.count_load();
+  next.before = nullptr;
+  show_agreed(next, timeline, pacer, now_ns);
 }
 
 void PictureWriter::on_applied(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns) {
@@ -28,43 +25,48 @@ void PictureWriter::on_applied(const ClientTimeline& timeline, const Pacer& pace
     const bool moved = record.kind == LifecycleKind::kSpawn || record.kind == LifecycleKind::kTeleport;
     if (moved) ++jumps_[record.slot];
   }
-  picture_.before = picture_.agreed;
-  picture_.agreed = draw_agreed(timeline);
-  picture_.agreed_ns = now_ns;
-  draw_ahead(timeline);
-  show(pacer);
+  Picture next = picture_;
+  next.before = next.agreed;
+  show_agreed(next, timeline, pacer, now_ns);
 }
 
 void PictureWriter::on_simulated(const ClientTimeline& timeline, const Pacer& pacer) {
   if (!follows()) return;
-  draw_ahead(timeline);
-  show(pacer);
+  Picture next = picture_;
+  draw_ahead(timeline, next);
+  show(next, pacer);
 }
 
 void PictureWriter::on_clock(const Pacer& pacer) {
-  if (follows()) show(pacer);
+  if (follows()) show(picture_, pacer);
 }
 
-void PictureWriter::draw_ahead(const ClientTimeline& timeline) {
+void PictureWriter::show_agreed(Picture& next, const ClientTimeline& timeline, const Pacer& pacer,
+                                std::int64_t now_ns) {
+  accelerations_.gravity = timeline.drive().gravity;
+  const State& state = instead_ != nullptr ? *instead_ : timeline.state(timeline.applied());
+  next.agreed = draw(state, timeline.applied(), next);
+  next.agreed_ns = now_ns;
+  draw_ahead(timeline, next);
+  show(next, pacer);
+}
+
+void PictureWriter::draw_ahead(const ClientTimeline& timeline, Picture& next) {
   const bool is_ahead = timeline.now() > timeline.applied() && instead_ == nullptr;
   if (is_ahead)
     accelerations_.learn(timeline.state(timeline.now() - 1), timeline.state(timeline.now()),
                          timeline.drive().gravity);
-  picture_.ahead = is_ahead ? draw(timeline.state(timeline.now()), timeline.now()) : picture_.agreed;
+  next.ahead = is_ahead ? draw(timeline.state(timeline.now()), timeline.now(), next) : next.agreed;
 }
 
-const DrawnFrame* PictureWriter::draw_agreed(const ClientTimeline& timeline) {
-  accelerations_.gravity = timeline.drive().gravity;
-  return draw(instead_ != nullptr ? *instead_ : timeline.state(timeline.applied()), timeline.applied());
-}
-
-const DrawnFrame* PictureWriter::draw(const State& state, Frame frame) {
-  DrawnFrame& drawn = exchange_.unused(picture_);
+const DrawnFrame* PictureWriter::draw(const State& state, Frame frame, const Picture& next) {
+  DrawnFrame& drawn = exchange_.unused(next);
   client::draw(state, frame, jumps_, accelerations_, drawn);
   return &drawn;
 }
 
-void PictureWriter::show(const Pacer& pacer) {
+void PictureWriter::show(const Picture& next, const Pacer& pacer) {
+  picture_ = next;
   picture_.pacer = pacer;
   exchange_.show(picture_);
 }

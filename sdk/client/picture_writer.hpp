@@ -12,7 +12,8 @@
 namespace tandem::client {
 
 /// Follows a timeline and shows what is new of it. Costs nothing until somebody samples; from then on a copy
-/// of what is drawn for each frame that is applied or simulated ahead. Not thread-safe.
+/// of what is drawn for each frame that is applied or simulated ahead. Where memory runs out, the picture
+/// before stays. Not thread-safe.
 class PictureWriter {
  public:
   /// `exchange` must outlive it.
@@ -24,7 +25,7 @@ class PictureWriter {
     accelerations_.forget(jumps_.size());
   }
 
-  /// A snapshot was loaded, or somebody samples for the first time.
+  /// Once somebody samples: of the snapshot that is held, and of each that is loaded.
   void on_loaded(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
   /// After ClientTimeline::apply().
   void on_applied(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
@@ -36,10 +37,11 @@ class PictureWriter {
   void on_clock(const Pacer& pacer);
 
  private:
-  [[nodiscard]] const DrawnFrame* draw(const State& state, Frame frame);
-  [[nodiscard]] const DrawnFrame* draw_agreed(const ClientTimeline& timeline);
-  void draw_ahead(const ClientTimeline& timeline);
-  void show(const Pacer& pacer);
+  // `next` is the picture in the making.
+  [[nodiscard]] const DrawnFrame* draw(const State& state, Frame frame, const Picture& next);
+  void show_agreed(Picture& next, const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
+  void draw_ahead(const ClientTimeline& timeline, Picture& next);
+  void show(const Picture& next, const Pacer& pacer);
   /// False until a first picture was made: there is nothing that it could follow.
   [[nodiscard]] bool follows() const { return picture_.agreed != nullptr; }
 

@@ -43,16 +43,19 @@ struct Sampler::Run {
   std::array<Extra, kPositionChannels> extra{};
 };
 
-// Another epoch: whatever is alive in it is new.
+// Another epoch: whatever is alive in it is new. Where memory runs out on the way, the next sample begins
+// again.
 void Sampler::begin(const Picture& picture) {
+  const std::size_t capacity = picture.agreed->alive.size();
+  epoch_ = 0;
+  for (auto& axis : place_) axis.assign(capacity, 0);
+  for (auto& axis : speed_) axis.assign(capacity, 0);
+  turns_.assign(picture.agreed->has_orientations() ? capacity : 0, Rotation{0, 0, 0, 1});
+  alive_.assign(capacity, 0);
+  reuse_.assign(capacity, 0);
+  jumps_.assign(capacity, 0);
+  capacity_ = capacity;
   epoch_ = picture.epoch;
-  capacity_ = picture.agreed->alive.size();
-  for (auto& axis : place_) axis.assign(capacity_, 0);
-  for (auto& axis : speed_) axis.assign(capacity_, 0);
-  turns_.assign(picture.agreed->has_orientations() ? capacity_ : 0, Rotation{0, 0, 0, 1});
-  alive_.assign(capacity_, 0);
-  reuse_.assign(capacity_, 0);
-  jumps_.assign(capacity_, 0);
 }
 
 bool Sampler::tell_changes(const Picture& picture, Run& run) {

@@ -39,7 +39,7 @@ class Sampler {
                   const Picture& picture, const Run& run);
 
   std::size_t capacity_ = 0;
-  Epoch epoch_ = 0;
+  Epoch epoch_ = 0;  ///< 0: none
   std::uint64_t load_ = 0;
   std::int64_t last_ns_ = 0, last_at_ns_ = 0;  ///< when it was taken, and of when it was
   double last_frame_ = 0;
