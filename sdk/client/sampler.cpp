@@ -9,6 +9,7 @@ namespace {
 
 constexpr float kVelocityScale = 1.0F / 64;
 constexpr double kSpinScale = 1.0 / (1 << 28);
+constexpr double kLeastSmoothingS = 1e-6;  // shorter counts as 0: floats end where velocities divide by it
 constexpr double kMostSmoothingS = 10;
 
 template <class T>
@@ -182,14 +183,16 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
     return std::max(0.0, static_cast<double>(to_ns) - static_cast<double>(from_ns));
   };
   const double period_ns = picture.pacer.period_ns();
-  const SampledMoment moment =
-      moment_at(picture, request.mode, at_ns, last_frame_, later(last_at_ns_, at_ns) / period_ns);
+  const double moved_on = later(last_at_ns_, at_ns) / period_ns;
+  const SampledMoment moment = moment_at(picture, request.mode, at_ns, last_frame_, moved_on);
   const double smoothing_s =
       request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMostSmoothingS) : kSmoothingS;
   Smoothing smoothing;
   if (request.mode == SampleMode::kExtrapolate) {
-    const double elapsed = later(last_ns_, now_ns) / period_ns;
-    const double constant = smoothing_s * 1e9 / period_ns;
+    // By the clock, and where moments are asked for that leap ahead of it, over the leap: an offset that was
+    // carried on further than it has decayed would grow from leap to leap.
+    const double elapsed = std::max(later(last_ns_, now_ns) / period_ns, moved_on);
+    const double constant = smoothing_s >= kLeastSmoothingS ? smoothing_s * 1e9 / period_ns : 0;
     smoothing = Smoothing::exponential(elapsed, constant);
   }
   for (Run run; run.begin < capacity; run.begin += kRun) {

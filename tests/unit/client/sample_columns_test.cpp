@@ -154,5 +154,32 @@ TEST_F(SampleColumnsTest, NoNumberMakesAPlaceThatIsNone) {
   }
 }
 
+TEST_F(SampleColumnsTest, HoweverBrieflyCorrectionsAreBlendedInNoSampleSpoilsTheNext) {
+  join();
+  core->start_sampling();
+  play(10);
+  const auto sound = [this](const SampleRequest& request) {
+    take(request);
+    for (const float place : sample.positions) ASSERT_TRUE(std::isfinite(place)) << request.smoothing_s;
+    for (const float speed : sample.velocities) ASSERT_TRUE(std::isfinite(speed)) << request.smoothing_s;
+  };
+  for (const double smoothing_s : {1e-41, 1e-38, 1e-7, 1e-6, 1e-3}) {
+    frame();
+    sound({.smoothing_s = smoothing_s});
+    sound({.smoothing_s = smoothing_s});  // the clock stands
+    // Moments to and fro, while it does.
+    for (int i = 0; i < 200; ++i) {
+      sound({.at_ns = now_ns - 1000 * kMs, .smoothing_s = smoothing_s});
+      sound({.at_ns = now_ns + 1000 * kMs, .smoothing_s = smoothing_s});
+    }
+  }
+  play(30);
+  sound({});
+  const Taken smoothed = sample;
+  sound({.smoothing_s = 0});
+  for (std::size_t i = 0; i < sample.positions.size(); ++i)
+    EXPECT_NEAR(smoothed.positions[i], sample.positions[i], 0.5);
+}
+
 }  // namespace
 }  // namespace tandem::client
