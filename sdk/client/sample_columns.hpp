@@ -26,10 +26,10 @@ template <class T>
 /// but for `alive` and `changes`.
 struct SampleColumns {
   std::size_t capacity = 0;
-  Column<float> positions = {};           ///< x y z, scene units
-  Column<float> velocities = {};          ///< x y z, scene units per second: how fast `positions` moves
-  Column<float> orientations = {};        ///< x y z w of norm 1; left as they are where a session has none
-  Column<float> angular_velocities = {};  ///< x y z, rad/s, in the world's frame; likewise
+  Column<float> positions = {};     ///< x y z, scene units
+  Column<float> velocities = {};    ///< x y z, scene units/s: how fast `positions` move, correction included
+  Column<float> orientations = {};  ///< x y z w of norm 1; left as they are where a session has none
+  Column<float> angular_velocities = {};  ///< x y z, rad/s, world's frame; without corrections; likewise
   Column<std::uint16_t> types = {};       ///< index into the session's types
   Column<std::uint8_t> alive = {};        ///< 0 or 1
   Column<std::uint8_t> reuse = {};        ///< counts the bodies that the slot has held, wraps

@@ -30,7 +30,7 @@ class Bodies:
     COLUMNS: tuple[str, ...] = tuple(COLUMNS)
 
     positions: Optional[np.ndarray]  #: (n, 3) float32: x, y, z; scene units
-    velocities: Optional[np.ndarray]  #: (n, 3) float32; scene units / s, as the bodies move on the server
+    velocities: Optional[np.ndarray]  #: (n, 3) float32; scene units / s: how fast `positions` move
     angular_velocities: Optional[np.ndarray]  #: (n, 3) float32, in the world's frame; rad / s
     types: Optional[np.ndarray]  #: (n,) uint16: an index into types()
     alive: Optional[np.ndarray]  #: (n,) bool: the slot holds a body. Where not, the others say nothing

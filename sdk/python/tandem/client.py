@@ -44,7 +44,11 @@ def sessions(domain: int = 0, wait: float = 2.0) -> list[SessionInfo]:
 
 
 class Sample(Bodies):
-    """Bodies as they should be drawn at a moment."""
+    """Bodies as they should be drawn at a moment.
+
+    `velocities` contain a correction that is being blended in, as `positions` do; with smoothing 0 they are as the
+    bodies move on the server. `angular_velocities` contain none.
+    """
 
     changes: Optional[np.ndarray]  #: (n,) uint8: a Change, against the client's previous sample
 

@@ -1,5 +1,6 @@
 // Where samples go, and of which moment they are.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -152,6 +153,28 @@ TEST_F(SampleColumnsTest, NoNumberMakesAPlaceThatIsNone) {
     for (const float place : sample.positions) EXPECT_TRUE(std::isfinite(place));
     for (const float speed : sample.velocities) EXPECT_TRUE(std::isfinite(speed));
   }
+}
+
+TEST_F(SampleColumnsTest, AVelocityIsHowFastThePlaceMovesWithTheCorrectionBlendedIn) {
+  join();
+  core->start_sampling();
+  for (int i = 0; i < 20; ++i) {
+    frame();
+    take({});
+  }
+  const Taken first = take({});
+  now_ns += kMs;
+  take({});
+  for (std::size_t i = 0; i < first.positions.size(); ++i) {
+    const float speed = first.velocities[i];
+    EXPECT_NEAR((sample.positions[i] - first.positions[i]) / 1e-3F, speed, 0.05 + 0.03 * std::abs(speed));
+  }
+  const std::vector<float> blending = sample.velocities;
+  take({.smoothing_s = 0});
+  float largest = 0;
+  for (std::size_t i = 0; i < blending.size(); ++i)
+    largest = std::max(largest, std::abs(blending[i] - sample.velocities[i]));
+  EXPECT_GT(largest, 0.5F) << "there was no correction";
 }
 
 TEST_F(SampleColumnsTest, HoweverBrieflyCorrectionsAreBlendedInNoSampleSpoilsTheNext) {
