@@ -320,6 +320,7 @@ bool Host::Impl::produce_frame(bool snapshot_due) {
   const auto frame = source->next(snapshot_due, outbox);
   if (!frame) {
     state = State::kEnded;
+    if (live != nullptr) error = live->error();
     return false;
   }
   const std::int64_t produced = clock();

@@ -82,7 +82,7 @@ class Host {
     kWaiting,   ///< announced; joiners are served, frame 1 waits for participants
     kRunning,
     kRefused,  ///< another server owns the session: see error()
-    kEnded,    ///< the source has no frame any more
+    kEnded,    ///< the source has no frame any more: see error()
   };
 
   /// `simulation` and `port` must outlive the host. `simulation` was not stepped yet; its bodies now are the
@@ -107,7 +107,8 @@ class Host {
   [[nodiscard]] std::int64_t next_wake_ns() const;
 
   [[nodiscard]] State state() const;
-  /// Set in kRefused: kConflict, naming the other server.
+  /// Set in kRefused: kConflict, naming the other server; and in kEnded, where a simulation ran:
+  /// kInvalidArgument, its body columns are not `capacity` long any more.
   [[nodiscard]] const std::optional<Error>& error() const;
   [[nodiscard]] const FrameReport& report() const;
   [[nodiscard]] Outbox& outbox();

@@ -20,8 +20,13 @@ std::optional<FrameSource::Made> LiveSource::next(bool snapshot_follows, Outbox&
   apply(next_frame());
   simulation_->step();
   const std::int64_t stepped_ns = clock();
+  const engine::Bodies bodies = simulation_->bodies();
+  if (auto good = stream_.check(bodies); !good) {
+    error_ = good.error();
+    return std::nullopt;
+  }
   if (snapshot_follows) stream_.round_next();
-  const Stream::FrameResult frame = stream_.produce(simulation_->bodies(), simulation_->events());
+  const Stream::FrameResult frame = stream_.produce(bodies, simulation_->events());
   return Made{.frame = frame.frame,
               .last_input = frame.last_input,
               .hash = frame.hash,

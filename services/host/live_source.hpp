@@ -2,6 +2,7 @@
 // A simulation that runs, as a source of frames: inputs, step, stream.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "services/host/frame_source.hpp"
@@ -35,6 +36,8 @@ class LiveSource final : public FrameSource {
 
   /// An input of the server's own. Returns the frame it acts on. Errors: as Host::inject().
   Result<Frame> inject(const engine::Input& input, Outbox& outbox);
+  /// Why there is no next frame; set once next() gave none.
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
   [[nodiscard]] const engine::Simulation& simulation() const { return *simulation_; }
   [[nodiscard]] Stream& stream() { return stream_; }
 
@@ -58,6 +61,7 @@ class LiveSource final : public FrameSource {
   std::vector<engine::Input> immediate_;  // in the order of arrival
   Frame scheduling_frame_ = 0;
   std::uint32_t scheduled_now_ = 0;  // for scheduling_frame_
+  std::optional<Error> error_;
 };
 
 }  // namespace tandem::host

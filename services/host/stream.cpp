@@ -13,6 +13,23 @@
 namespace tandem::host {
 namespace {
 
+Result<void> check_columns(const Layout& layout, const engine::Bodies& bodies) {
+  const std::size_t capacity = layout.capacity;
+  bool whole = bodies.alive.size() == capacity && bodies.type.size() == capacity;
+  const auto look_at = [&](const auto& columns) {
+    for (const auto& column : columns) whole = whole && column.size() == capacity;
+  };
+  look_at(bodies.position);
+  look_at(bodies.velocity);
+  if (groups_of(layout).orientation) {
+    look_at(bodies.orientation);
+    look_at(bodies.angular_velocity);
+  }
+  if (whole) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("the simulation has body columns that are not of {} slots", capacity));
+}
+
 Result<void> check(const StreamConfig& config, const StreamStart& start) {
   const auto refuse = [](std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
@@ -27,18 +44,9 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
           config.budget, config.quality->target_mbit_per_s, least));
     }
   }
-  const std::uint32_t capacity = config.layout.capacity;
-  bool whole = start.bodies.alive.size() == capacity && start.bodies.type.size() == capacity;
-  for (const auto& column : start.bodies.position) whole = whole && column.size() == capacity;
-  for (const auto& column : start.bodies.velocity) whole = whole && column.size() == capacity;
-  if (groups_of(config.layout).orientation) {
-    if (start.bodies.orientation[0].empty())
-      return refuse("the stream has orientations, which the simulation's bodies do not have");
-    for (const auto& column : start.bodies.orientation) whole = whole && column.size() == capacity;
-    for (const auto& column : start.bodies.angular_velocity) whole = whole && column.size() == capacity;
-  }
-  if (!whole) return refuse(fmt::format("body columns that are not of {} slots", capacity));
-  return {};
+  if (groups_of(config.layout).orientation && start.bodies.orientation[0].empty())
+    return refuse("the stream has orientations, which the simulation's bodies do not have");
+  return check_columns(config.layout, start.bodies);
 }
 
 }  // namespace
@@ -106,7 +114,7 @@ Result<std::size_t> largest_delta_bytes(const StreamConfig& config) {
 }
 
 Result<Stream> Stream::create(StreamConfig config, const StreamStart& start) {
-  if (auto good = check(config, start); !good) return tl::unexpected(good.error());
+  if (auto good = host::check(config, start); !good) return tl::unexpected(good.error());
   auto timeline = ServerTimeline::create(config.layout, start.epoch, config.local);
   if (!timeline) return tl::unexpected(timeline.error());
   return Stream(std::make_unique<Impl>(std::move(config), start, std::move(*timeline)));
@@ -116,6 +124,10 @@ Stream::Stream(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Stream::Stream(Stream&&) noexcept = default;
 Stream& Stream::operator=(Stream&&) noexcept = default;
 Stream::~Stream() = default;
+
+Result<void> Stream::check(const engine::Bodies& bodies) const {
+  return check_columns(impl_->config.layout, bodies);
+}
 
 Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
                                     EncodeObserver* observer) {

@@ -65,9 +65,11 @@ class Stream {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
     std::int64_t mirror_ns = 0;                  ///< putting the bodies on the lattice; 0 without a clock
   };
-  /// The next frame, from the bodies after a step and what happened to their slots in it; tells
-  /// `observer`, if any. Allocates nothing
-  /// after the first few frames.
+  /// That a frame can be made of these. Errors: kInvalidArgument (columns not as long as the stream's
+  /// capacity).
+  [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
+  /// The next frame, from the bodies after a step, that check() takes, and what happened to their slots in
+  /// it; tells `observer`, if any. Allocates nothing after the first few frames.
   FrameResult produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
                       EncodeObserver* observer = nullptr);
 

@@ -152,7 +152,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
     if (host.poll(now_ns, wall_ns())) hashes.add(host.report().frame, host.report().hash);
-    if (host.state() == host::Host::State::kRefused) return Ending::kRefused;
+    if (host.error()) return Ending::kRefused;
     if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
     if (host.state() == host::Host::State::kRunning) {
       if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;

@@ -25,6 +25,11 @@ using transport::wall_ns;
 constexpr double kFinest = 0.25;
 constexpr double kCoarsest = 4;
 
+// Nothing, where it is no number.
+std::int64_t to_ns(double seconds, double most) {
+  return seconds > 0 ? static_cast<std::int64_t>(std::min(seconds, most) * 1e9) : 0;
+}
+
 Result<void> choose_turns(const ServerOptions& options, bool turns, const CodecTraits& traits,
                           host::StreamConfig& stream) {
   std::vector<host::BodySize> sizes;
@@ -114,12 +119,15 @@ struct Server::Impl {
   Impl(Impl&&) = delete;
   Impl& operator=(Impl&&) = delete;
 
+  [[nodiscard]] bool over() const {
+    return host->state() == host::Host::State::kRefused || host->state() == host::Host::State::kEnded;
+  }
   bool poll(std::int64_t longest_ns) {
-    if (host->state() == host::Host::State::kRefused || publisher.gave_up()) return false;
+    if (over() || publisher.gave_up()) return false;
     host->poll(steady_ns(), wall_ns());
     for (const std::string& line : host->take_notices())
       if (log) log(line);
-    if (host->state() == host::Host::State::kRefused) {
+    if (over()) {
       error = host->error().value_or(error);
       return false;
     }
@@ -160,22 +168,28 @@ Result<Server> Server::start(const ServerOptions& options, engine::Simulation& s
   return Server(std::make_unique<Impl>(options, std::move(*port), std::move(*host)));
 }
 
-bool Server::poll(double wait_s) {
-  return impl_->poll(static_cast<std::int64_t>(std::clamp(wait_s, 0.0, 1.0) * 1e9));
-}
+bool Server::poll(double wait_s) { return impl_ != nullptr && impl_->poll(to_ns(wait_s, 1)); }
 
 bool Server::run_for(double seconds) {
-  const std::int64_t end_ns = steady_ns() + static_cast<std::int64_t>(std::clamp(seconds, 0.0, 1e9) * 1e9);
+  if (impl_ == nullptr) return false;
+  const std::int64_t end_ns = steady_ns() + to_ns(seconds, 1e9);
   for (std::int64_t left_ns = end_ns - steady_ns(); left_ns > 0; left_ns = end_ns - steady_ns())
     if (!impl_->poll(left_ns)) return false;
   return true;
 }
 
-const Error& Server::error() const { return impl_->error; }
+const Error& Server::error() const {
+  static const Error kMovedFrom{ErrorCode::kOutOfOrder, "the server was moved from"};
+  return impl_ == nullptr ? kMovedFrom : impl_->error;
+}
 
-Result<std::uint64_t> Server::inject(const engine::Input& input) { return impl_->host->inject(input); }
+Result<std::uint64_t> Server::inject(const engine::Input& input) {
+  if (impl_ == nullptr) return tl::unexpected(error());
+  return impl_->host->inject(input);
+}
 
 ServerStatus Server::status() const {
+  if (impl_ == nullptr) return {};
   const host::Host& host = *impl_->host;
   const host::HostTotals totals = host.totals();
   return {.frame = host.frame(),

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "sdk/core/lattice/hash.hpp"
@@ -72,6 +73,30 @@ TEST(Publish, BodiesThatAreNoneAnyMoreAreTakenOffAndSaidAndTheSessionGoesOn) {
   const std::vector<std::string> notices = bench.host->take_notices();
   EXPECT_TRUE(std::ranges::any_of(
       notices, [](const auto& line) { return line.find("2 bodies removed") != line.npos; }));
+}
+
+TEST(Publish, ASimulationWhoseColumnsShrinkEndsTheSessionAndIsNamed) {
+  using Change = std::function<void(FakeSimulation&)>;
+  const Change changes[] = {
+      [](auto& s) { s.position[0].resize(1); },  [](auto& s) { std::vector<float>().swap(s.velocity[2]); },
+      [](auto& s) { s.alive.resize(3); },        [](auto& s) { s.type.resize(5); },
+      [](auto& s) { s.orientation[3].clear(); }, [](auto& s) { s.angular_velocity[1].resize(2); }};
+  for (const Change& change : changes) {
+    Bench bench(turning_config());
+    bench.simulation.on_step = [&](std::uint64_t step) {
+      if (step == 5) change(bench.simulation);
+    };
+    for (int i = 0; i < 20; ++i) {
+      bench.poll();
+      bench.now += Bench::kPeriod;
+    }
+    EXPECT_EQ(bench.host->state(), Host::State::kEnded);
+    ASSERT_TRUE(bench.host->error().has_value());
+    EXPECT_EQ(bench.host->error()->code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(bench.host->error()->message.find("not of 4 slots"), std::string::npos);
+    EXPECT_EQ(bench.port.deltas.size(), 4U);
+    EXPECT_EQ(bench.simulation.steps, 5U);
+  }
 }
 
 TEST(Publish, FramesContinueFromAStartFrame) {

@@ -17,14 +17,16 @@ class Standing : public engine::Simulation {
   [[nodiscard]] std::uint32_t capacity() const override { return 2; }
   [[nodiscard]] double dt_s() const override { return 0.01; }
   [[nodiscard]] engine::Vec3 gravity() const override { return {0, 0, 0}; }
-  void step() override { ++steps; }
+  void step() override {
+    if (++steps == shrinks_at) zeros.resize(1);
+  }
   [[nodiscard]] engine::Bodies bodies() const override {
     return {{zeros, zeros, zeros}, {zeros, zeros, zeros}, alive, types};
   }
   std::vector<float> zeros = std::vector<float>(2, 0);
   std::vector<std::uint8_t> alive = std::vector<std::uint8_t>(2, 1);
   std::vector<std::uint16_t> types = std::vector<std::uint16_t>(2, 0);
-  int steps = 0;
+  int steps = 0, shrinks_at = 0;
 };
 
 class ServerApi : public ::testing::Test {
@@ -80,6 +82,43 @@ TEST_F(ServerApi, ItStepsAtTheSimulationsRateAndRefusesWhatTheSimulationDoes) {
   const auto refused = server.inject({.kind = 1, .values = {0, -9, 0}});
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(ServerApi, ColumnsThatShrinkEndTheSessionAndSayWhy) {
+  options.session = "shrinking";
+  standing.shrinks_at = 3;
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  while (server->poll()) ASSERT_LT(standing.steps, 4);
+  EXPECT_EQ(server->error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(server->error().message.find("columns"), std::string::npos);
+  EXPECT_EQ(server->status().frame, 2U);
+  EXPECT_FALSE(server->run_for(1));
+}
+
+TEST_F(ServerApi, TimesThatAreNoneAreNoTime) {
+  options.session = "times";
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  EXPECT_TRUE(server->poll(kNan));
+  EXPECT_TRUE(server->poll(-std::numeric_limits<double>::infinity()));
+  EXPECT_TRUE(server->run_for(kNan));
+  EXPECT_TRUE(server->run_for(-1));
+}
+
+TEST_F(ServerApi, WhatAServerWasMovedFromHasEnded) {
+  options.session = "moved";
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  Server moved = std::move(*server);
+  EXPECT_FALSE(server->poll());
+  EXPECT_FALSE(server->run_for(1));
+  EXPECT_EQ(server->error().code, ErrorCode::kOutOfOrder);
+  EXPECT_EQ(server->inject({}).error().code, ErrorCode::kOutOfOrder);
+  EXPECT_EQ(server->status().frame, 0U);
+  EXPECT_TRUE(moved.poll());
+  *server = std::move(moved);
+  EXPECT_TRUE(server->poll());
 }
 
 TEST_F(ServerApi, ASecondServerOfASessionEndsAndSaysWhy) {

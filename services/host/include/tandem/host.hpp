@@ -65,8 +65,9 @@ struct ServerStatus {
   double frame_ms_p50 = 0, frame_ms_p99 = 0;  ///< step, predict, encode, apply
 };
 
-/// One server of one session, at the simulation's rate (1 / dt_s). Movable. All members from one thread,
-/// which is the one that calls the simulation; a thread of the server's own does the sending.
+/// One server of one session, at the simulation's rate (1 / dt_s). Movable; what it was moved from has ended
+/// (kOutOfOrder). All members from one thread, which is the one that calls the simulation; a thread of the
+/// server's own does the sending.
 class __attribute__((visibility("default"))) Server {
  public:
   /// `simulation` must outlive the server; it was not stepped yet, and its bodies now are the start frame.
@@ -80,16 +81,20 @@ class __attribute__((visibility("default"))) Server {
   /// Ends the session; what was queued is sent first.
   ~Server();
 
-  /// Does what is due, which may be a step of the simulation, and waits at most `wait_s` for the next thing.
-  /// False once the session cannot go on: see error().
+  /// Does what is due, which may be a step of the simulation, and waits at most `wait_s`, 0..1, for the next
+  /// thing. What is below the range or no number counts as 0, what is above it as 1. False once the session
+  /// cannot go on: see error().
   bool poll(double wait_s = 0.05);
-  /// Polls for so long, or until the session cannot go on; returns as poll().
+  /// Polls for so long, or until the session cannot go on; returns as poll(). What is negative or no number
+  /// counts as 0: then it does nothing.
   bool run_for(double seconds);
   /// kConflict: another server has the session. kTransport: a frame could not be written for 10 s.
+  /// kInvalidArgument: the simulation's body columns are not `capacity` long any more.
   [[nodiscard]] const Error& error() const;
 
   /// An input of the server's own, as if a participant had sent it now; returns the frame it acts on.
-  /// Errors: kInvalidArgument (refused by the simulation), kCapacity (too many at once).
+  /// Errors: kInvalidArgument (refused by the simulation), kCapacity (too many at once), kOutOfOrder (moved
+  /// from).
   Result<std::uint64_t> inject(const engine::Input& input);
   [[nodiscard]] ServerStatus status() const;
 

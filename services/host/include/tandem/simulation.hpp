@@ -42,7 +42,8 @@ struct Classification {
 
 /// The bodies after a step, in slot order, structure of arrays, each `capacity` long; scene units and per
 /// second. Valid until the next step(). Values of dead slots are unspecified. Either both of the optional
-/// groups are there or none, in every frame the same.
+/// groups are there or none, in every frame the same. Where a column that is streamed has another length
+/// after a step, the session ends with an error.
 struct Bodies {
   std::array<std::span<const float>, 3> position;
   std::array<std::span<const float>, 3> velocity;
