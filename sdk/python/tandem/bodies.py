@@ -55,6 +55,8 @@ class Bodies:
 
         Fields of other names are left alone. The numbers of a body lie side by side, bodies at any stride.
         """
+        if not isinstance(arrays, (np.ndarray, Mapping)):
+            raise TypeError(f"needs a structured array or a mapping of arrays, not {type(arrays).__name__}")
         names = arrays.dtype.names or () if isinstance(arrays, np.ndarray) else arrays.keys()
         wanted = [name for name in cls.COLUMNS if name in names]
         if not wanted:

@@ -107,6 +107,8 @@ class Client:
         role = Role.OBSERVER if observe else Role.PARTICIPANT
         if log is not None and not callable(log):
             raise TypeError("log must be a function of a level and a line")
+        if "\0" in session:  # C would read the name only up to there
+            raise Error(Result.INVALID_ARGUMENT, "a session's name has no NUL")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
         self._connection = _client.Connection(domain, session, role, lead, background, echo, told)
         # At the end of the program, too: before the interpreter is gone that the log function needs.
@@ -205,7 +207,7 @@ class Client:
     def send_bytes(self, data: Union[bytes, bytearray, memoryview]) -> int:
         """At most 1,024 bytes for the server's simulation, which knows what they mean. Returns the input's
         number."""
-        return self._connection.send_bytes(bytes(data))
+        return self._connection.send_bytes(bytes(memoryview(data)))
 
     def scene(self) -> Scene:
         """The scene of the session. As geometry() and types() it also raises NOT_READY before a session is known,

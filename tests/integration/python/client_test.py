@@ -129,6 +129,8 @@ class Playing(unittest.TestCase):
             ({"types": np.zeros(BODIES, np.int16)}, TypeError),
             ({"places": np.zeros((BODIES, 3), np.float32)}, ValueError),
             (np.zeros((BODIES, 3), np.float32), ValueError),
+            ([1], TypeError),
+            ("positions", TypeError),
         ):
             with self.assertRaises(error):
                 self.client.sample(out=out)
@@ -156,6 +158,10 @@ class Playing(unittest.TestCase):
                 self.client.send_gravity(what)
         with self.assertRaises(TypeError):
             self.client.send_gravity((1, 2))
+        for what in (10, "text", None, [1, 2]):
+            with self.assertRaises(TypeError):
+                self.client.send_bytes(what)
+        self.assertTrue(self.client.send_bytes(memoryview(bytearray(b"any buffer"))[::2]))
 
     def test_an_observer_may_not_send(self):
         with join(observe=True) as observer:
@@ -216,7 +222,7 @@ class Playing(unittest.TestCase):
             self.assertIsNone(client.next_event())
 
     def test_bad_arguments(self):
-        for options in ({"session": "a*"}, {"session": ""}, {"domain": 231}, {"lead": 2**20}):
+        for options in ({"session": "a*"}, {"session": "default\0x"}, {"session": ""}, {"domain": 231}, {"lead": 2**20}):
             with self.refused(Result.INVALID_ARGUMENT):
                 tandem.Client(**{"domain": stage.DOMAIN, **options})
         with self.assertRaises(TypeError):

@@ -78,6 +78,14 @@ class Package(unittest.TestCase):
         with self.assertRaises(ValueError):
             tandem.State(["changes"])
 
+    def test_what_would_be_taken_for_something_else_is_refused(self):
+        for arrays in ([1], "positions", None, tandem.State()):
+            with self.assertRaises(TypeError):
+                tandem.Sample.into(arrays)
+        with self.assertRaises(tandem.Error) as raised:
+            tandem.Client("default\0x")
+        self.assertEqual(raised.exception.code, tandem.Result.INVALID_ARGUMENT)
+
 
 if __name__ == "__main__":
     unittest.main()
