@@ -14,11 +14,11 @@ int main(void) {
   columns.positions = p;
   int failed = tandem_join(&options, &client) || tandem_wait_until_playing(client, 10) ||
                tandem_send_gravity(client, gravity, NULL);
-  for (double next = 0; !failed && next < 150;) {
-    failed = tandem_update(client, 0.1) || tandem_sample(client, NULL, &columns, &frame);
-    if (failed || frame.frame < next) continue;
-    next = frame.frame + 30;
-    printf("frame %.1f: body 0 at %.2f %.2f %.2f\n", frame.frame, p[0], p[1], p[2]);
+  for (int line = 0; !failed && line < 5; ++line) {
+    const double next = frame.frame + 30;
+    do failed = tandem_update(client, 0.1) || tandem_sample(client, NULL, &columns, &frame);
+    while (!failed && frame.frame < next);
+    if (!failed) printf("frame %.1f: body 0 at %.2f %.2f %.2f\n", frame.frame, p[0], p[1], p[2]);
   }
   if (failed) puts(tandem_error_text());
   return tandem_leave(client) || failed;
