@@ -14,7 +14,7 @@
 #include <iterator>
 
 #include "services/lab/bandwidth_columns.hpp"
-#include "services/tool/output_file.hpp"
+#include "services/recording/output_file.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -25,7 +25,7 @@ using Rows = std::span<const BandwidthRow>;
 constexpr std::size_t kFramesAPoint = 10;
 
 Result<void> write_file(const std::string& path, std::string_view text) {
-  return tool::OutputFile::create(path).and_then([&](tool::OutputFile&& file) {
+  return recording::OutputFile::create(path).and_then([&](recording::OutputFile&& file) {
     return file.write(std::as_bytes(std::span(text))).and_then([&] { return file.commit(); });
   });
 }

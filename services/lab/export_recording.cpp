@@ -12,9 +12,9 @@
 #include "services/lab/recorded_bodies.hpp"
 #include "services/lab/trajectory.hpp"
 #include "services/recording/mcap_writer.hpp"
+#include "services/recording/output_file.hpp"
 #include "services/recording/playback.hpp"
 #include "services/scenes/scene.hpp"
-#include "services/tool/output_file.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -55,7 +55,7 @@ class Reader {
 };
 
 Result<void> write_whole(const std::string& path, const std::string& text) {
-  auto file = tool::OutputFile::create(path);
+  auto file = recording::OutputFile::create(path);
   if (!file) return tl::unexpected(file.error());
   return file->write(std::as_bytes(std::span(text))).and_then([&file] { return file->commit(); });
 }
@@ -91,6 +91,9 @@ std::vector<engine::Shape> shapes_of(const transport::SessionMessage& session) {
 Result<void> export_states(const std::string& recording, const std::string& npy) {
   const auto sidecar = sidecar_path(npy);
   if (!sidecar) return tl::unexpected(sidecar.error());
+  for (const std::string& output : {npy, *sidecar}) {
+    if (auto distinct = recording::check_distinct(recording, output); !distinct) return distinct;
+  }
   auto reader = Reader::open(recording);
   if (!reader) return tl::unexpected(reader.error());
   const transport::SessionMessage session = reader->playback().session();
@@ -143,9 +146,10 @@ Result<void> export_states(const std::string& recording, const std::string& npy)
 }
 
 Result<void> export_points(const std::string& recording, const std::string& mcap, std::uint32_t every) {
+  if (auto distinct = recording::check_distinct(recording, mcap); !distinct) return distinct;
   auto reader = Reader::open(recording);
   if (!reader) return tl::unexpected(reader.error());
-  auto file = tool::OutputFile::create(mcap);
+  auto file = recording::OutputFile::create(mcap);
   if (!file) return tl::unexpected(file.error());
   constexpr const char* kTopic = "/bodies";
   recording::McapWriter writer([&file](std::span<const std::byte> bytes) { return file->write(bytes); },

@@ -234,8 +234,8 @@ Result<std::string> sidecar_path(const std::string& npy) {
   return npy.substr(0, npy.size() - kSuffix.size()) + ".json";
 }
 
-TrajectoryWriter::TrajectoryWriter(tool::OutputFile npy, tool::OutputFile sidecar, std::uint32_t bodies,
-                                   std::size_t channels)
+TrajectoryWriter::TrajectoryWriter(recording::OutputFile npy, recording::OutputFile sidecar,
+                                   std::uint32_t bodies, std::size_t channels)
     : npy_(std::move(npy)),
       sidecar_(std::move(sidecar)),
       bodies_(bodies),
@@ -246,9 +246,9 @@ Result<TrajectoryWriter> TrajectoryWriter::create(const std::string& npy, std::u
                                                   std::size_t channels) {
   auto sidecar_name = sidecar_path(npy);
   if (!sidecar_name) return tl::unexpected(sidecar_name.error());
-  auto rows = tool::OutputFile::create(npy);
+  auto rows = recording::OutputFile::create(npy);
   if (!rows) return tl::unexpected(rows.error());
-  auto sidecar = tool::OutputFile::create(*sidecar_name);
+  auto sidecar = recording::OutputFile::create(*sidecar_name);
   if (!sidecar) return tl::unexpected(sidecar.error());
   if (auto written = rows->write(bytes_of(header(0, bodies, channels))); !written)
     return tl::unexpected(written.error());

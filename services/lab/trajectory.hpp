@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "services/engine/shape/shape.hpp"
-#include "services/tool/output_file.hpp"
+#include "services/recording/output_file.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 
@@ -78,9 +78,9 @@ class TrajectoryWriter {
   Result<void> finish(const TrajectoryInfo& info);
 
  private:
-  TrajectoryWriter(tool::OutputFile npy, tool::OutputFile sidecar, std::uint32_t bodies,
+  TrajectoryWriter(recording::OutputFile npy, recording::OutputFile sidecar, std::uint32_t bodies,
                    std::size_t channels);
-  tool::OutputFile npy_, sidecar_;
+  recording::OutputFile npy_, sidecar_;
   std::uint32_t bodies_;
   std::size_t channels_;
   std::uint64_t rows_ = 0;

@@ -236,9 +236,9 @@ void McapWriter::write_record(std::uint8_t opcode, std::span<const std::byte> co
 }
 
 void McapWriter::write(std::span<const std::byte> bytes) {
-  size_ += bytes.size();
   summary_crc_ = crc32(bytes, summary_crc_);
   if (written_ && !bytes.empty()) written_ = sink_(bytes);
+  if (written_) size_ += bytes.size();
 }
 
 }  // namespace tandem::recording

@@ -1,7 +1,5 @@
 #include "services/recording/recorder.hpp"
 
-#include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "sdk/client/scheduled_inputs.hpp"
@@ -9,18 +7,13 @@
 namespace tandem::recording {
 
 Result<Recorder> Recorder::create(const std::string& path, Compression compression) {
-  File file(std::fopen(path.c_str(), "wb"));
-  if (!file) return fail(ErrorCode::kIo, path + ": cannot create: " + std::strerror(errno));
-  std::setvbuf(file.get(), nullptr, _IONBF, 0);  // a chunk is whole on the disk as soon as it is written
-  return Recorder(path, std::move(file), compression);
+  return OutputFile::create(path).map(
+      [&](OutputFile&& file) { return Recorder(std::move(file), compression); });
 }
 
-Recorder::Recorder(std::string path, File file, Compression compression)
-    : path_(std::move(path)), file_(std::move(file)) {
-  const auto sink = [name = path_, to = file_.get()](std::span<const std::byte> bytes) -> Result<void> {
-    if (std::fwrite(bytes.data(), 1, bytes.size(), to) == bytes.size()) return {};
-    return fail(ErrorCode::kIo, name + ": cannot write: " + std::strerror(errno));
-  };
+Recorder::Recorder(OutputFile file, Compression compression)
+    : file_(std::make_unique<OutputFile>(std::move(file))) {
+  const auto sink = [to = file_.get()](std::span<const std::byte> bytes) { return to->write(bytes); };
   writer_ = std::make_unique<McapWriter>(sink, compression);
   writer_->declare<transport::SessionMessage>();
   writer_->declare<transport::SnapshotMessage>();
@@ -32,20 +25,38 @@ Recorder::Recorder(std::string path, File file, Compression compression)
   writer_->declare<transport::InputMessage>();
   writer_->declare<transport::ClientStatusMessage>();
   writer_->end_chunk();
-  totals_.fixed_bytes = writer_->size_bytes();
+  counted_.fixed_bytes = writer_->size_bytes();
+  settle();
 }
 
 template <class M>
 void Recorder::write(const M& message, std::int64_t wall_ns, std::int64_t publish_ns) {
-  Share& share = totals_.topics[M::kTopic];
+  Share& share = counted_.topics[M::kTopic];
   ++share.messages;
   share.bytes += writer_->add(message, wall_ns, publish_ns);
+}
+
+void Recorder::settle() {
+  if (!good() || writer_->size_bytes() == settled_bytes_) return;  // a chunk is still open, or lost
+  settled_bytes_ = writer_->size_bytes();
+  totals_ = counted_;
+}
+
+void Recorder::end_chunk() {
+  writer_->end_chunk();
+  settle();
+}
+
+template <class M>
+void Recorder::add_plain(const M& message, std::int64_t wall_ns, std::int64_t publish_ns) {
+  write(message, wall_ns, publish_ns);
+  settle();
 }
 
 void Recorder::add(const transport::SessionMessage& session, std::int64_t wall_ns) {
   if (!session_ || session_->epoch != session.epoch) unpromised_.clear();
   session_ = session;
-  write(session, wall_ns, wall_ns);
+  add_plain(session, wall_ns, wall_ns);
 }
 
 void Recorder::add(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns) {
@@ -55,41 +66,46 @@ void Recorder::add(const transport::SnapshotMessage& snapshot, std::int64_t wall
 
 // All that a reader needs to begin here stands in one chunk.
 void Recorder::start(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns) {
-  writer_->end_chunk();
+  end_chunk();
   const std::uint64_t before = writer_->size_bytes();
   if (session_) write(*session_, wall_ns, wall_ns);
   write(snapshot, wall_ns, wall_ns);
   for (const auto& [number, input] : unpromised_) write(input, wall_ns, wall_ns);
   writer_->end_chunk();
-  totals_.start_bytes += writer_->size_bytes() - before;
+  counted_.start_bytes += writer_->size_bytes() - before;
   started_ns_ = wall_ns;
+  if (good()) named_ = file_->take_name();
+  settle();
 }
 
 void Recorder::add(const transport::ScheduledInputMessage& input, std::int64_t wall_ns) {
   unpromised_.emplace(input.number, input);
   if (unpromised_.size() > client::ScheduledInputs::kKept) unpromised_.erase(unpromised_.begin());
-  write(input, wall_ns, wall_ns);
+  add_plain(input, wall_ns, wall_ns);
 }
 
 void Recorder::add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns) {
   write(client::to_message(delta, epoch, stream_), wall_ns, delta.server_time_ns);
   unpromised_.erase(unpromised_.begin(), unpromised_.upper_bound(delta.last_input));
-  ++totals_.frames;
-  totals_.payload_bytes += delta.payload.size();
+  ++counted_.frames;
+  counted_.payload_bytes += delta.payload.size();
+  settle();
 }
 
 void Recorder::add(const transport::ReplyMessage& reply, std::int64_t wall_ns) {
-  write(reply, wall_ns, reply.server_time_ns);
+  add_plain(reply, wall_ns, reply.server_time_ns);
 }
 void Recorder::add(const transport::ServerStatusMessage& status, std::int64_t wall_ns) {
-  write(status, wall_ns, wall_ns);
+  add_plain(status, wall_ns, wall_ns);
 }
-void Recorder::add(const transport::AckMessage& ack, std::int64_t wall_ns) { write(ack, wall_ns, wall_ns); }
+void Recorder::add(const transport::AckMessage& ack, std::int64_t wall_ns) {
+  add_plain(ack, wall_ns, wall_ns);
+}
 void Recorder::add(const transport::InputMessage& input, std::int64_t wall_ns) {
-  write(input, wall_ns, wall_ns);
+  add_plain(input, wall_ns, wall_ns);
 }
 void Recorder::add(const transport::ClientStatusMessage& status, std::int64_t wall_ns) {
-  write(status, wall_ns, wall_ns);
+  add_plain(status, wall_ns, wall_ns);
 }
 
 bool Recorder::snapshot_due(std::int64_t wall_ns) const {
@@ -104,20 +120,21 @@ void Recorder::cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns
   message.frame = timeline.applied();
   message.total_bytes = static_cast<std::uint32_t>(snapshot_.size());
   message.bytes = snapshot_;
+  end_chunk();
+  ++counted_.snapshots_cut;
   start(message, wall_ns);
-  ++totals_.snapshots_cut;
 }
 
 Result<void> Recorder::finish() {
-  writer_->end_chunk();
+  end_chunk();
   const std::uint64_t before = writer_->size_bytes();
   auto finished = writer_->finish();
-  totals_.file_bytes = writer_->size_bytes();
-  totals_.fixed_bytes += totals_.file_bytes - before;
+  totals_.fixed_bytes += writer_->size_bytes() - before;
+  totals_.file_bytes = file_->written_bytes();
+  if (!file_->has_name()) totals_ = {};  // there will be no file
+  if (!named_) return named_;
   if (!finished) return finished;
-  if (std::fclose(file_.release()) != 0)
-    return fail(ErrorCode::kIo, path_ + ": cannot write: " + std::strerror(errno));
-  return {};
+  return file_->has_name() ? file_->close() : Result<void>();
 }
 
 }  // namespace tandem::recording

@@ -3,7 +3,6 @@
 // (idl/PROTOCOL.md, "Recordings").
 
 #include <cstdint>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,18 +10,19 @@
 
 #include "sdk/client/client_core.hpp"
 #include "services/recording/mcap_writer.hpp"
+#include "services/recording/output_file.hpp"
 
 namespace tandem::recording {
 
-/// Writes messages in the order in which the client took them in. The file is there under its name from the
-/// start, and readable up to the last chunk however the process ends. Times are wall clock in ns. Not
-/// thread-safe.
+/// Writes messages in the order in which the client took them in. The file is a new one, and has its name
+/// from the first snapshot on: without one, an older file of that name stays. From then on it is readable up
+/// to the last chunk however the process ends. Times are wall clock in ns. Not thread-safe.
 class Recorder {
  public:
   /// Between the snapshots that a recorder cuts itself: how much a replay computes at most to get anywhere.
   static constexpr std::int64_t kSnapshotNs = 60'000'000'000;
 
-  /// Errors: kIo.
+  /// Errors: kIo, as OutputFile::create().
   static Result<Recorder> create(const std::string& path, Compression compression);
 
   void add(const transport::SessionMessage& session, std::int64_t wall_ns);
@@ -44,8 +44,8 @@ class Recorder {
   void cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns);
 
   /// False after an error: nothing more is written.
-  [[nodiscard]] bool good() const { return writer_->written().has_value(); }
-  /// Ends the file. Errors: kIo, also of anything written before.
+  [[nodiscard]] bool good() const { return named_ && writer_->written(); }
+  /// Ends the file, or drops it where no snapshot came. Errors: kIo, also of anything written before.
   [[nodiscard]] Result<void> finish();
 
   /// By topic: messages, and their bytes before compression.
@@ -55,33 +55,35 @@ class Recorder {
   struct Totals {
     std::uint64_t frames = 0, payload_bytes = 0;
     std::uint64_t snapshots_cut = 0;
-    std::uint64_t file_bytes = 0;   ///< of all
+    std::uint64_t file_bytes = 0;   ///< of all; 0 where the file was dropped
     std::uint64_t start_bytes = 0;  ///< of these, the chunks of snapshots and their sessions
     std::uint64_t fixed_bytes = 0;  ///< of these, what a file without messages has
     std::map<std::string, Share> topics;
   };
-  /// Valid after finish().
+  /// Valid after finish(): of what is in the file, so not of a chunk that could not be written.
   [[nodiscard]] const Totals& totals() const { return totals_; }
 
  private:
-  struct Closer {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  using File = std::unique_ptr<std::FILE, Closer>;
-  Recorder(std::string path, File file, Compression compression);
+  Recorder(OutputFile file, Compression compression);
   template <class M>
   void write(const M& message, std::int64_t wall_ns, std::int64_t publish_ns);
+  template <class M>
+  void add_plain(const M& message, std::int64_t wall_ns, std::int64_t publish_ns);
+  void settle();
+  void end_chunk();
   void start(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns);
 
-  std::string path_;
-  File file_;
+  std::unique_ptr<OutputFile> file_;  // stays where it is: the writer's sink
+  Result<void> named_;
   std::unique_ptr<McapWriter> writer_;  // stays where it is
   std::optional<transport::SessionMessage> session_;
   StreamId stream_;
   /// Those that no delta in the file has promised yet: whoever starts from a snapshot needs them behind it.
   std::map<std::uint64_t, transport::ScheduledInputMessage> unpromised_;
   std::optional<std::int64_t> started_ns_;  // the last snapshot
-  Totals totals_;
+  Totals counted_;                          // with the open chunk
+  Totals totals_;                           // up to the last chunk that is in the file
+  std::uint64_t settled_bytes_ = 0;         // of the file then
   transport::Bytes snapshot_;
 };
 

@@ -82,7 +82,8 @@ void add_record(CLI::App& app, Run& run) {
       "Recorded are what a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, TandemDelta, "
       "TandemReply to it,\n"
       "TandemServerStatus), what it sends, and a snapshot of the agreed state once a minute. The file is "
-      "readable while it grows.\n"
+      "readable while it grows;\n"
+      "until the first snapshot it is FILE.part, and an older FILE stays.\n"
       "Exit 1 on any hash mismatch, when no frame came, or when the file could not be written.");
   command->callback([options, &run] { run = [options] { return run_record(*options); }; });
 }

@@ -190,6 +190,20 @@ TEST_F(ExportRecording, AFileCutShortIsExportedUpToTheTear) {
   EXPECT_LT((*trajectory)->frames(), 200U);
 }
 
+TEST_F(ExportRecording, TheRecordingItselfIsNotWrittenOver) {
+  FakeServer server(1000, kBodies);
+  record(server);
+  std::filesystem::rename(path("x.mcap"), path("x.npy"));
+  for (const auto& exported :
+       {export_points(path("x.npy"), path("x.npy"), 1), export_states(path("x.npy"), path("x.npy"))}) {
+    ASSERT_FALSE(exported);
+    EXPECT_EQ(exported.error().code, ErrorCode::kInvalidArgument);
+  }
+  std::filesystem::rename(path("x.npy"), path("y.mcap.part"));
+  EXPECT_FALSE(export_points(path("y.mcap.part"), path("y.mcap"), 1));
+  EXPECT_TRUE(recording::Playback::open(path("y.mcap.part")));
+}
+
 TEST_F(ExportRecording, WhatCannotBeExportedIsRefusedInALineThatNamesIt) {
   const auto message = [this](const char* out) {
     const auto exported = export_states(path("x.mcap"), path(out));

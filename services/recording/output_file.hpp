@@ -1,0 +1,62 @@
+#pragma once
+// A file that takes its name when it is worth having: complete, or readable as far as it goes.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "tandem/result.hpp"
+
+namespace tandem::recording {
+
+/// Writes to `path`.part, a new file, and renames it: whoever has an older file of that name open or mapped
+/// keeps it as it was. Destroyed before it has its name, it leaves nothing behind; a process that is killed
+/// leaves the .part, which the next run replaces. Not thread-safe.
+class OutputFile {
+ public:
+  /// Follows symbolic links, so that they stay. Errors: kIo, naming the file and the reason: also where
+  /// `path` exists and may not be written or is no regular file.
+  static Result<OutputFile> create(const std::string& path);
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  ~OutputFile();
+
+  /// Hands the bytes to the system at once. Errors: kIo, as when the disk is full.
+  Result<void> write(std::span<const std::byte> bytes);
+  /// Overwrites bytes at the start, as for a header that is known only afterwards.
+  Result<void> rewrite_start(std::span<const std::byte> bytes);
+  /// Takes its name; more may follow. No effect where it has it.
+  Result<void> take_name();
+  [[nodiscard]] bool has_name() const { return !unnamed_; }
+  /// Everything is on the disk, under whichever name.
+  Result<void> close();
+  /// close(), then take_name().
+  Result<void> commit();
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// What write() handed over, the part of a failed one too that the system took.
+  [[nodiscard]] std::uint64_t written_bytes() const { return written_bytes_; }
+
+ private:
+  struct Closer {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  OutputFile(std::string path, std::FILE* file);
+  [[nodiscard]] tl::unexpected<Error> failure(const char* what) const;
+  [[nodiscard]] std::string part() const { return path_ + ".part"; }
+
+  std::string path_;
+  bool unnamed_ = true;  // the .part is there and ours to remove
+  std::uint64_t written_bytes_ = 0;
+  std::unique_ptr<std::FILE, Closer> file_;
+};
+
+/// Refuses to write what is being read. Errors: kInvalidArgument where `output`, or the .part that becomes
+/// it, is the file `input`.
+[[nodiscard]] Result<void> check_distinct(const std::string& input, const std::string& output);
+
+}  // namespace tandem::recording

@@ -1,0 +1,97 @@
+#include "services/recording/output_file.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+namespace tandem::recording {
+namespace {
+
+namespace fs = std::filesystem;
+
+class OutputFileTest : public ::testing::Test {
+ protected:
+  OutputFileTest() { fs::create_directories(folder); }
+  ~OutputFileTest() override { fs::remove_all(folder); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return folder / name; }
+  [[nodiscard]] std::string content(const std::string& name) const {
+    std::ifstream file(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void put(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
+  static Result<void> write(OutputFile& file, const std::string& text) {
+    return file.write(std::as_bytes(std::span(text)));
+  }
+  [[nodiscard]] std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+  }
+
+  const fs::path folder = fs::temp_directory_path() / ("output-" + std::to_string(::getpid()));
+};
+
+TEST_F(OutputFileTest, ReplacesAFileOnlyWhenItIsComplete) {
+  put("x", "old");
+  {
+    auto file = OutputFile::create(path("x"));
+    ASSERT_TRUE(file) << file.error().message;
+    ASSERT_TRUE(write(*file, "new"));
+    EXPECT_EQ(content("x"), "old");
+  }
+  EXPECT_EQ(content("x"), "old");
+  EXPECT_EQ(files(), 1U);
+  auto file = OutputFile::create(path("x"));
+  ASSERT_TRUE(file && write(*file, "new"));
+  EXPECT_EQ(file->written_bytes(), 3U);
+  ASSERT_TRUE(file->commit());
+  EXPECT_EQ(content("x"), "new");
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(OutputFileTest, WhoReadsTheOldFileKeepsIt) {
+  put("x", "old");
+  std::ifstream reader(path("x"));
+  auto file = OutputFile::create(path("x"));
+  ASSERT_TRUE(file && file->take_name());
+  ASSERT_TRUE(write(*file, "newer"));
+  EXPECT_EQ(content("x"), "newer") << "written on under its name";
+  EXPECT_EQ((std::string(std::istreambuf_iterator<char>(reader), {})), "old");
+}
+
+TEST_F(OutputFileTest, ALinkStaysALink) {
+  fs::create_directory(folder / "there");
+  put("there/x", "old");
+  fs::create_symlink("there/x", path("link"));
+  fs::create_symlink("link", path("chain"));
+  fs::create_symlink("there/y", path("dangling"));
+  for (const char* name : {"chain", "dangling"}) {
+    auto file = OutputFile::create(path(name));
+    ASSERT_TRUE(file && write(*file, "new") && file->commit());
+    EXPECT_TRUE(fs::is_symlink(path(name)));
+    EXPECT_EQ(content(name), "new");
+  }
+  EXPECT_EQ(content("there/x"), "new");
+  EXPECT_TRUE(fs::is_symlink(path("link")));
+}
+
+TEST_F(OutputFileTest, WhatIsNoRegularFileIsRefusedAndStays) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  fs::create_symlink("pipe", path("link"));
+  fs::create_symlink("circle", path("circle"));
+  fs::create_directory(folder / "folder");
+  for (const char* name : {"pipe", "link", "folder", "circle", "nowhere/x"}) {
+    const auto file = OutputFile::create(path(name));
+    ASSERT_FALSE(file) << name;
+    EXPECT_EQ(file.error().code, ErrorCode::kIo);
+    EXPECT_EQ(file.error().message.find(path(name)), 0U) << file.error().message;
+  }
+  EXPECT_TRUE(fs::is_fifo(path("pipe")));
+  EXPECT_EQ(files(), 4U);
+}
+
+}  // namespace
+}  // namespace tandem::recording

@@ -1,0 +1,125 @@
+#include "services/recording/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "fake_server.hpp"
+#include "services/recording/playback.hpp"
+
+namespace tandem::recording {
+namespace {
+
+using client::FakeServer;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+// A disk that is full when a file has so many bytes.
+class FullDisk {
+ public:
+  explicit FullDisk(std::uint64_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  FullDisk(FullDisk&&) = delete;
+  FullDisk& operator=(FullDisk&&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+class RecorderTest : public ::testing::Test {
+ protected:
+  ~RecorderTest() override { std::filesystem::remove(path); }
+
+  Recorder create() const { return std::move(*Recorder::create(path, Compression::kNone)); }
+  void join(Recorder& recorder) {
+    recorder.add(server.session, wall_ns);
+    recorder.add(server.snapshot(), wall_ns);
+  }
+  void frames(Recorder& recorder, int count) {
+    for (int i = 0; i < count; ++i) {
+      const transport::DeltaMessage delta = server.advance(wall_ns);
+      recorder.add(server.session.epoch,
+                   {.frame = delta.frame,
+                    .last_input = delta.last_input,
+                    .server_time_ns = delta.server_time_ns,
+                    .hash = delta.hash,
+                    .payload = delta.payload},
+                   wall_ns);
+      wall_ns += kSecond;
+    }
+  }
+
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("recorder-" + std::to_string(::getpid()) + ".mcap");
+  FakeServer server;
+  std::int64_t wall_ns = 1'700'000'000 * kSecond;
+};
+
+TEST_F(RecorderTest, WithoutASnapshotAnOlderRecordingStays) {
+  std::ofstream(path) << "older";
+  {
+    Recorder recorder = create();
+    recorder.add(server.session, wall_ns);
+    ASSERT_TRUE(recorder.finish());
+    EXPECT_EQ(recorder.totals().file_bytes, 0U);
+    EXPECT_TRUE(recorder.totals().topics.empty());
+  }
+  EXPECT_EQ(std::filesystem::file_size(path), 5U);
+  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+}
+
+TEST_F(RecorderTest, ARecordingThatIsPlayedMayBeRecordedOver) {
+  {
+    Recorder recorder = create();
+    join(recorder);
+    frames(recorder, 50);
+    ASSERT_TRUE(recorder.finish());
+  }
+  const auto playback = Playback::open(path);
+  ASSERT_TRUE(playback && (*playback)->next());
+  Recorder recorder = create();
+  join(recorder);
+  EXPECT_FALSE(std::filesystem::exists(path + ".part")) << "it has its name";
+  for (int frame = 1; frame <= 50; ++frame) EXPECT_EQ((*playback)->next(), Playback::Step::kFrame);
+  EXPECT_EQ((*playback)->timeline().hash(), server.hashes.at(50));
+}
+
+TEST_F(RecorderTest, AfterAFailedWriteItCountsWhatIsInTheFile) {
+  Recorder recorder = create();
+  join(recorder);
+  frames(recorder, 20);
+  const std::uint64_t whole = std::filesystem::file_size(path);
+  {
+    const FullDisk full(whole + 100);
+    frames(recorder, 20);
+    EXPECT_FALSE(recorder.good());
+    EXPECT_FALSE(recorder.finish());
+  }
+  const Recorder::Totals& totals = recorder.totals();
+  EXPECT_EQ(totals.file_bytes, std::filesystem::file_size(path));
+  EXPECT_EQ(totals.file_bytes, whole + 100);
+  const auto playback = Playback::open(path);
+  ASSERT_TRUE(playback);
+  std::uint64_t played = 0;
+  ASSERT_EQ((*playback)->next(), Playback::Step::kStarted);
+  while ((*playback)->next() == Playback::Step::kFrame) ++played;
+  EXPECT_EQ(totals.frames, played);
+  EXPECT_EQ(totals.topics.at(transport::DeltaMessage::kTopic).messages, played);
+}
+
+}  // namespace
+}  // namespace tandem::recording
