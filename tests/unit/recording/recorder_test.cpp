@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "fake_server.hpp"
 #include "services/recording/playback.hpp"
+#include "tests/unit/client/fake_server.hpp"
 
 namespace tandem::recording {
 namespace {
