@@ -83,6 +83,8 @@ class Gateway {
   [[nodiscard]] Counts& counts() { return counts_; }
   [[nodiscard]] std::size_t viewers() const { return viewers_.size(); }
   [[nodiscard]] Frame frame() const { return frame_; }
+  /// There is a session, and whoever announced it is there.
+  [[nodiscard]] bool server_alive() const { return alive_; }
   [[nodiscard]] const std::optional<transport::SessionMessage>& session() const { return session_; }
 
  private:

@@ -114,6 +114,7 @@ class Service final : public WebServer::Handler {
     for (std::size_t i = 0; i < kClosings.size(); ++i)
       refused[std::string(kClosings[i].reason)] = counts.refused[i];
     const nlohmann::ordered_json health{{"phase", phase_name(client_.core().phase())},
+                                        {"server_alive", gateway_.server_alive()},
                                         {"epoch", gateway_.session() ? gateway_.session()->epoch : 0},
                                         {"frame", gateway_.frame()},
                                         {"viewers", gateway_.viewers()},

@@ -106,6 +106,7 @@ def restarts(stage):
     stage.viewer("viewer", "--seconds", 25)
     stage.wait(lambda: len(stage.hashes("viewer")) > 60, "60 frames")
     stage.kill("before")
+    stage.wait(lambda: not stage.health()["server_alive"], "the gateway to say that the server is gone")
     stage.wait(lambda: stage.health()["phase"] == "playing", "the gateway to go on")
     stage.server("after")
 

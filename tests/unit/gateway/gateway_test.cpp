@@ -31,11 +31,14 @@ TEST_F(GatewayTest, SaysThatThereIsNoSessionAndThenWhichOne) {
   const ViewerId id = *gateway.admit();
   EXPECT_EQ(only<AbsentMessage>(read(id)).size(), 1U);
   EXPECT_TRUE(read(id).empty());
+  EXPECT_FALSE(gateway.server_alive());
   gateway.on_session(fake_session());
   const auto told = only<SessionMessage>(read(id));
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].epoch, kEpoch);
+  EXPECT_TRUE(gateway.server_alive());
   gateway.on_server_alive(false);
+  EXPECT_FALSE(gateway.server_alive());
   EXPECT_EQ(only<AbsentMessage>(read(id)).size(), 1U);
   gateway.on_server_alive(true);
   EXPECT_EQ(only<SessionMessage>(read(id)).size(), 1U);
