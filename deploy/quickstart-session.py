@@ -1,5 +1,5 @@
 """Runs one server and three clients over loopback DDS, shows them live and compares their hash logs frame by frame. With
---view: a server, two participants and a gateway for browsers, until Ctrl-C.
+--view: a server, two participants and a gateway for browsers, until Ctrl-C, for 12 hours at most.
 
 Started by deploy/quickstart, which builds the programs first. Standard library only.
 """
@@ -22,6 +22,7 @@ import time
 import urllib.request
 
 OBSERVER_DELAY_S = 5
+VIEW_LIMIT_S = 12 * 3600
 START_LIMIT_S = 30  # for discovery and joining, for a slow machine's frames and, at the end, for leaving
 FRAME_RATE_HZ = 30
 LOOPBACK = (
@@ -181,7 +182,7 @@ class View(Session):
         self.token = secrets.token_urlsafe(16)
 
     def longest(self):
-        return 12 * 3600
+        return VIEW_LIMIT_S + 3 * START_LIMIT_S
 
     def logging(self, name):
         return []
@@ -268,7 +269,7 @@ def make_certificate(certificate, key, address):
 
 
 def view(session):
-    """Runs until somebody ends it."""
+    """Runs until somebody ends it, or for VIEW_LIMIT_S."""
     session.start_all()
     deadline = time.monotonic() + START_LIMIT_S
     while not session.plays():
@@ -280,8 +281,9 @@ def view(session):
     if session.options.lan:
         subprocess.run(["qrencode", "-t", "ANSIUTF8", "-m", "2", address], check=False)
         print("The certificate is of this run, so browsers ask whether to go on.")
-    print(f"open {address}\nCtrl-C ends it", flush=True)
-    while True:
+    print(f"open {address}\nCtrl-C ends it, and so do {VIEW_LIMIT_S // 3600} hours", flush=True)
+    deadline = time.monotonic() + VIEW_LIMIT_S
+    while time.monotonic() < deadline:
         session.check_running()
         time.sleep(0.2)
 
@@ -415,6 +417,7 @@ def main():
                 with View(options, folder) as session:
                     print(f"{options.scene}, {options.bodies} bodies, on DDS domain {session.common[1]}, loopback only", flush=True)
                     view(session)
+                return 0
             with Session(options, folder) as session:
                 print(f"{options.scene}, {options.bodies} bodies, {options.seconds} s: tandemd and three `tandem join` on DDS"
                       f" domain {session.common[1]}, loopback only", flush=True)  # fmt: skip

@@ -3,6 +3,7 @@
 import importlib.util
 import pathlib
 import re
+import subprocess
 import unittest
 
 path = pathlib.Path(__file__).resolve().parents[3] / "deploy" / "quickstart-session.py"
@@ -70,6 +71,13 @@ class LiveLine(unittest.TestCase):
         line = quickstart.live_line(2, top)
         self.assertIn("1.50 of 50.00 Mbit/s (3.00 %)", line)
         self.assertIn("participant 2 ms, observer 3 ms", line)
+
+
+class Usage(unittest.TestCase):
+    def test_what_is_of_the_viewer_goes_with_view(self):
+        for flags in (["--port", "9000"], ["--lan"]):
+            done = subprocess.run([path.with_name("quickstart"), *flags], capture_output=True, text=True, check=False, timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (2, f"quickstart: {flags[0]} goes with --view\n"))
 
 
 class Tilts(unittest.TestCase):
