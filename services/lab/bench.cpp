@@ -8,6 +8,8 @@
 #include <memory>
 #include <system_error>
 
+#include "services/tool/print_error.hpp"
+
 namespace tandem::lab {
 namespace {
 
@@ -16,7 +18,7 @@ CLI::Range positive() { return CLI::Range(std::numeric_limits<double>::min(), 1e
 }  // namespace
 
 int report(const std::string& command, const Error& error) {
-  fmt::print(stderr, "tandem {}: {}\n", command, error.message);
+  tool::print_error(fmt::format("tandem {}: {}\n", command, error.message));
   return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
 }
 

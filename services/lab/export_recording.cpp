@@ -15,6 +15,7 @@
 #include "services/recording/output_file.hpp"
 #include "services/recording/playback.hpp"
 #include "services/scenes/scene.hpp"
+#include "services/tool/print_error.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -45,7 +46,9 @@ class Reader {
   [[nodiscard]] const Playback& playback() const { return *playback_; }
   [[nodiscard]] const ClientTimeline& timeline() const { return playback_->timeline(); }
   [[nodiscard]] const State& state() const { return timeline().state(timeline().applied()); }
-  void tell(const std::string& what) const { fmt::print(stderr, "tandem export: {} {}\n", path_, what); }
+  void tell(const std::string& what) const {
+    tool::print_error(fmt::format("tandem export: {} {}\n", path_, what));
+  }
 
  private:
   Reader(std::string path, std::unique_ptr<Playback> playback)

@@ -13,14 +13,12 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/scenes/script.hpp"
+#include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
 namespace {
 
 constexpr std::int64_t kTellWaitingNs = 2 * kSecond;
-
-// fmt::print would throw where stderr takes no more, and in a thread end the process.
-void print_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 }  // namespace
 

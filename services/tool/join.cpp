@@ -13,6 +13,7 @@
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
+#include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -43,7 +44,7 @@ int run_join(const JoinOptions& options) {
     }
     auto client = HeadlessClient::create(one);
     if (!client) {
-      fmt::print(stderr, "tandem join: {}\n", client.error().message);
+      print_error(fmt::format("tandem join: {}\n", client.error().message));
       return 1;
     }
     clients.push_back(std::move(*client));

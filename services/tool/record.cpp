@@ -9,6 +9,7 @@
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
+#include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -44,7 +45,7 @@ int run_record(RecordOptions options) {
   if (!options.plain) options.client.compression = recording::Compression::kZstd;
   auto client = HeadlessClient::create(options.client);
   if (!client) {
-    fmt::print(stderr, "tandem record: {}\n", client.error().message);
+    print_error(fmt::format("tandem record: {}\n", client.error().message));
     return 1;
   }
   (*client)->run(signals.stop());

@@ -9,8 +9,9 @@ namespace tandem::tool {
 
 using recording::Playback;
 
-RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& config)
-    : playback_(&playback), session_(playback.session()) {
+RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& config,
+                               accounts::TokenBucket& seeks)
+    : playback_(&playback), seeks_(&seeks), clock_ns_(config.clock_ns), session_(playback.session()) {
   transport::StreamMessage stream = playback.stream();
   stream.id = {};
   session_.streams.assign(1, std::move(stream));
@@ -52,7 +53,7 @@ transport::Reason RecordedSource::accept(const engine::Input& input, const host:
   if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return Reason::kRecording;
   if (input.values.size() != 1 || !input.bytes.empty()) return Reason::kInvalid;
   if (!(input.values[0] >= 0 && input.values[0] <= playback_->length_s())) return Reason::kInvalid;
-  if (sought_s_) return Reason::kRateLimited;
+  if (sought_s_ || !seeks_->take(clock_ns_())) return Reason::kRateLimited;
   sought_s_ = input.values[0];
   acts_on = frame();
   return Reason::kNone;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "services/accounts/token_bucket.hpp"
 #include "services/host/frame_source.hpp"
 #include "services/host/host.hpp"
 #include "services/recording/playback.hpp"
@@ -15,8 +16,11 @@ namespace tandem::tool {
 /// inputs goes out as it is. Of inputs it takes kSeek, and ends with it.
 class RecordedSource final : public host::FrameSource {
  public:
-  /// `playback` holds a state, outlives this, and is stepped by nobody else meanwhile.
-  RecordedSource(recording::Playback& playback, const host::ServiceConfig& config);
+  /// `playback` holds a state, outlives this, and is stepped by nobody else meanwhile. `seeks` says how often
+  /// one may seek, over all the runs that share it, by the clock of `config`, which must be there; it
+  /// outlives this.
+  RecordedSource(recording::Playback& playback, const host::ServiceConfig& config,
+                 accounts::TokenBucket& seeks);
 
   [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
   [[nodiscard]] Frame frame() const override { return timeline().applied(); }
@@ -38,6 +42,8 @@ class RecordedSource final : public host::FrameSource {
   [[nodiscard]] const ClientTimeline& timeline() const { return playback_->timeline(); }
 
   recording::Playback* playback_;
+  accounts::TokenBucket* seeks_;
+  std::int64_t (*clock_ns_)();
   transport::SessionMessage session_;
   std::optional<double> sought_s_;
   Result<recording::Playback::Step> ending_ = recording::Playback::Step::kFrame;

@@ -12,11 +12,13 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/accounts/token_bucket.hpp"
 #include "services/heap/heap.hpp"
 #include "services/host/publisher.hpp"
 #include "services/signals/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
+#include "services/tool/print_error.hpp"
 #include "services/tool/recorded_source.hpp"
 
 namespace tandem::tool {
@@ -52,15 +54,26 @@ struct Served {
   std::optional<double> sought_s;  ///< a client wants to go on there
 };
 
-/// Publishes the run at hand to its end, or until a client seeks.
-Result<Served> serve(Playback& playback, const ReplayOptions& options, Epoch epoch,
+/// What all runs of a replay have in common.
+struct ReplayState {
+  Epoch epoch = 0;      ///< the last; 0 before the first
+  bool sought = false;  ///< a client did
+  accounts::TokenBucket seeks{1, 1};
+};
+
+/// Publishes the run at hand to its end, or until a client seeks. `hold`: no frame, and no end of its own.
+Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplayState& state, bool hold,
                      const std::atomic<bool>& stop) {
+  const bool first = state.epoch == 0;
+  // An epoch of its own for each run, as frames follow one another within one.
+  state.epoch = std::max<Epoch>(state.epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
   host::ServiceConfig config;
   config.session = options.session;
-  config.epoch = epoch;
+  config.epoch = state.epoch;
   config.frame_rate_hz = std::clamp(playback.session().frame_rate_hz * options.rate, 1.0, 1000.0);
   config.window_ceiling = std::min(playback.session().window_ceiling, config.window_ceiling);
-  config.wait_for = options.wait_for;
+  if (first) config.wait_for = options.wait_for;
+  if (hold) config.wait_for = UINT32_MAX;  // more than there can be
   config.clock_ns = &steady_ns;
   transport::DdsOptions dds;
   dds.domain = options.domain;
@@ -70,13 +83,14 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, Epoch epo
   dds.stop = &stop;
   const auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
-  auto frames = std::make_unique<RecordedSource>(playback, config);
+  auto frames = std::make_unique<RecordedSource>(playback, config, state.seeks);
   const RecordedSource& source = *frames;
   const auto host = host::Host::create(config, std::move(frames), **port);
   if (!host) return tl::unexpected(host.error());
-  fmt::print(
-      stderr, "tandem replay: session '{}' on domain {}, epoch {}, {} slots, from frame {} ({:.1f} s)\n",
-      options.session, options.domain, epoch, playback.session().capacity, source.frame(), playback.time_s());
+  print_error(
+      fmt::format("tandem replay: session '{}' on domain {}, epoch {}, {} slots, {} frame {} ({:.1f} s)\n",
+                  options.session, options.domain, config.epoch, playback.session().capacity,
+                  hold ? "at its end," : "from", source.frame(), playback.time_s()));
   host::Publisher publisher((*host)->outbox(), **port);
   while (!stop && (*host)->state() != host::Host::State::kEnded) {
     (*host)->poll(steady_ns(), wall_ns());
@@ -85,7 +99,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, Epoch epo
       return fail(ErrorCode::kTransport,
                   "a frame could not be written for 10 s: " + publisher.last_failure());
     for (const std::string& notice : (*host)->take_notices())
-      fmt::print(stderr, "tandem replay: {}\n", notice);
+      print_error(fmt::format("tandem replay: {}\n", notice));
     const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
   }
@@ -101,19 +115,21 @@ Result<Step> go_to(Playback& playback, double from_s) {
   return step;
 }
 
-/// From `from_s` to the end of the file, or until stopped.
-Result<void> play(Playback& playback, const ReplayOptions& options, Epoch& epoch,
+/// From `from_s` to the end of the file, or until stopped. Who seeks may want to seek back: then it stays
+/// there.
+Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState& state,
                   const std::atomic<bool>& stop) {
   auto step = go_to(playback, options.from_s);
   if (step && *step == Step::kEnd)
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("no frame at {:.1f} s or later; the recording has {:.1f} s", options.from_s,
                             playback.length_s()));
-  // An epoch of its own for each run, as frames follow one another within one.
-  while (step && *step != Step::kEnd && !stop) {
-    epoch = std::max<Epoch>(epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
-    const auto served = serve(playback, options, epoch, stop);
+  while (step && !stop) {
+    const bool at_end = *step == Step::kEnd;
+    if (at_end && (options.loop || !state.sought)) break;
+    const auto served = serve(playback, options, state, at_end, stop);
     if (!served) return tl::unexpected(served.error());
+    if (served->sought_s) state.sought = true;
     step = served->sought_s ? go_to(playback, *served->sought_s) : served->behind;
   }
   if (!step) return tl::unexpected(step.error());
@@ -124,11 +140,11 @@ Result<void> replay(const ReplayOptions& options, const std::atomic<bool>& stop)
   auto playback = Playback::open(options.file);
   if (!playback) return tl::unexpected(playback.error());
   if (const auto torn = (*playback)->torn_at())
-    fmt::print(stderr, "tandem replay: {} is cut short at byte {}; replayed up to there\n", options.file,
-               *torn);
-  Epoch epoch = 0;
+    print_error(fmt::format("tandem replay: {} is cut short at byte {}; replayed up to there\n", options.file,
+                            *torn));
+  ReplayState state;
   do {
-    if (auto played = play(**playback, options, epoch, stop); !played)
+    if (auto played = play(**playback, options, state, stop); !played)
       return fail(played.error().code, options.file + ": " + played.error().message);
   } while (options.loop && !stop);
   return {};
@@ -139,7 +155,7 @@ int run_replay(const ReplayOptions& options) {
   const HeapTrimmer trimmer;
   const auto done = replay(options, signals.stop());
   if (done) return 0;
-  fmt::print(stderr, "tandem replay: {}\n", done.error().message);
+  print_error(fmt::format("tandem replay: {}\n", done.error().message));
   return 1;
 }
 
@@ -158,7 +174,8 @@ void add_replay(CLI::App& app, Run& run) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--loop", options->loop, "Again from there at its end, until stopped");
-  command->add_option("--wait-for", options->wait_for, "Participants that must play before the first frame")
+  command
+      ->add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
       ->check(CLI::Range(0U, 256U))
       ->capture_default_str();
   command->footer(
@@ -166,7 +183,9 @@ void add_replay(CLI::App& app, Run& run) {
       "begins) is\n"
       "an epoch of its own. Participants may seek, which begins another; all other inputs are refused. --rate changes "
       "how\n"
-      "often frames come, not what they say: velocities stay those of the recorded time. A file that is cut short is\n"
+      "often frames come, not what they say: velocities stay those of the recorded time. At its end a replay ends, "
+      "but one\n"
+      "in which somebody sought stays there, until it is sought back or stopped. A file that is cut short is\n"
       "replayed up to there. Exit 1 when it cannot be read.");
   command->callback([options, &run] { run = [options] { return run_replay(*options); }; });
 }

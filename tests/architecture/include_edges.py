@@ -68,7 +68,7 @@ EDGES = {
     "services/gateway/main.cpp": ["services/gateway", "services/heap", "services/signals"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
-    + ["services/heap", "services/host", "services/recording", "services/scenes", "services/signals"],
+    + ["services/accounts", "services/heap", "services/host", "services/recording", "services/scenes", "services/signals"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": SIMULATION
     + TIMELINE

@@ -148,6 +148,23 @@ def check_seek(programs, file, truth):
     expect_epochs(programs, "watcher", truth, 2)
 
 
+def check_end(programs, file, truth):
+    """Somebody goes to the end: the replay stays there, with those who are there, and nobody is waited for again."""
+    script = programs.folder / "to_end.textproto"
+    script.write_text("inputs { frame: 30 seek_s: 5.7 }", encoding="utf-8")
+    replay = programs.start(programs.tandem, "replay", file, "--wait-for", 2)
+    watcher = programs.join("stays", "--seconds", 600)
+    finish(programs.join("to_end", "--input-script", script, "--seconds", 4), "the client that seeks the end")
+    assert replay.poll() is None, replay.communicate()[1]
+    (session,) = json.loads(finish(programs.start(programs.tandem, "top", "--once", "--json"), "top")[0])["sessions"]
+    assert session["frame"] == max(truth), session
+    for process, what in ((watcher, "the client that stays"), (replay, "replay")):
+        process.send_signal(signal.SIGINT)
+        finish(process, what)
+    _, to_end = expect_epochs(programs, "stays", truth, 2)
+    assert to_end[-1] == max(truth), to_end
+
+
 def check_loop(programs, file, truth):
     """Twice round, beside `tandem top`."""
     client = programs.join("rounds", "--seconds", 5)
@@ -157,7 +174,8 @@ def check_loop(programs, file, truth):
     replay.send_signal(signal.SIGINT)
     finish(replay, "replay")
     rounds = expect_epochs(programs, "rounds", truth, 2)
-    assert rounds[0][0] == rounds[1][0] > min(truth), rounds
+    # Nobody is waited for again: the second round goes on while the client joins.
+    assert min(truth) < rounds[0][0] <= rounds[1][0] < rounds[0][-1], rounds
     assert [each["session"] for each in seen["sessions"]] == ["default"], seen
 
 
@@ -221,6 +239,7 @@ def main():
             check_whole(programs, file, truth)
             check_jump(programs, file, truth)
             check_seek(programs, file, truth)
+            check_end(programs, file, truth)
             check_loop(programs, file, truth)
             check_torn(programs, file, truth)
             check_export(programs, file, truth)

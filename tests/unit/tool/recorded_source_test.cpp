@@ -63,7 +63,8 @@ class RecordedSourceTest : public ::testing::Test {
     EXPECT_TRUE(step && *step != Step::kEnd);
     config.epoch = epoch;
     config.frame_rate_hz = 1;
-    return source.emplace(*playback, config);
+    config.clock_ns = [] { return now_ns; };
+    return source.emplace(*playback, config, seeks);
   }
   // Frames to the end; each has the server's hash, and so has the state.
   Frame play() {
@@ -88,6 +89,8 @@ class RecordedSourceTest : public ::testing::Test {
   std::unique_ptr<Playback> playback;
   host::ServiceConfig config;
   host::Outbox outbox{host::Outbox::Limits{}};
+  accounts::TokenBucket seeks{1, 1};
+  static inline std::int64_t now_ns = 0;
   std::optional<RecordedSource> source;
 };
 
@@ -129,6 +132,18 @@ TEST_F(RecordedSourceTest, ASeekEndsItAndAnotherGoesOnThere) {
   EXPECT_EQ(source->frame(), 132U);  // recorded at 131 s
   EXPECT_EQ(source->hash(), server.hashes.at(132));
   EXPECT_EQ(play(), kFrames - 132);
+}
+
+TEST_F(RecordedSourceTest, SeeksAreLimitedOverAllEpochs) {
+  open(0);
+  EXPECT_EQ(accept(transport::InputKind::kSeek, {1e9}), Reason::kInvalid) << "and takes nothing";
+  EXPECT_EQ(accept(transport::InputKind::kSeek, {50}), Reason::kNone);
+  open(50, 5001);
+  now_ns += kSecond * 9 / 10;
+  EXPECT_EQ(accept(transport::InputKind::kSeek, {60}), Reason::kRateLimited);
+  EXPECT_TRUE(source->next(false, outbox)) << "the run goes on";
+  now_ns += kSecond / 5;
+  EXPECT_EQ(accept(transport::InputKind::kSeek, {60}), Reason::kNone);
 }
 
 TEST_F(RecordedSourceTest, SeeksBackAsOftenAsOneLikes) {
