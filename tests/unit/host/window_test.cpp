@@ -166,6 +166,9 @@ TEST(Window, WaitForHoldsFrameOneUntilThatManyParticipantsPlay) {
   ASSERT_EQ(bench.port.snapshots.size(), 1U) << "joiners are served while the server waits";
   EXPECT_EQ(bench.port.snapshots[0].frame, 0U);
   bench.playing(1, 0);
+  bench.send(bench.gravity(1, 1));
+  bench.run_ms(100);
+  ASSERT_FALSE(bench.port.scheduled.empty()) << "inputs are taken while the server waits";
   bench.enter(3, Role::kObserver);
   bench.run_ms(1000);
   EXPECT_EQ(bench.host->frame(), 0U);
