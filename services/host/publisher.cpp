@@ -12,6 +12,13 @@ Publisher::Publisher(Outbox& outbox, transport::ServerPort& port, std::chrono::n
       patience_(patience),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
+void Publisher::flush() const {
+  constexpr int kMostTicks = 200;
+  constexpr std::chrono::milliseconds kTick(5);
+  for (int i = 0; i < kMostTicks && outbox_->size() > 0 && !gave_up(); ++i)
+    std::this_thread::sleep_for(kTick);
+}
+
 void Publisher::stop() {
   thread_.request_stop();
   outbox_->wake();

@@ -26,6 +26,8 @@ class Publisher {
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
+  /// Waits until the outbox is empty, for a second at most, or until nothing more is written.
+  void flush() const;
   /// Ends the thread; what is still queued then is not written. Blocks for one write at most.
   void stop();
   /// Writes that failed since the start. Thread-safe.

@@ -27,6 +27,14 @@ bool valid_goal(const QualityGoal& goal, const CodecParameters& parameters) {
          parameters.threshold <= goal.largest_threshold && goal.largest_threshold <= kPositionLimit;
 }
 
+QualityGoal quality_goal(const Lattice& lattice, double target_mbit_per_s, double finest, double coarsest) {
+  const auto units = [&lattice](double distance) {
+    return static_cast<std::int32_t>(
+        std::clamp(std::round(distance * lattice.position_scale()), 1.0, double{kPositionLimit}));
+  };
+  return {target_mbit_per_s, units(finest), units(coarsest)};
+}
+
 StepRule step_rule(const CodecTraits& traits) {
   if (traits.reads_gains) return StepRule::kLeave;
   return traits.takes_tables ? StepRule::kFollowAbove : StepRule::kFollow;

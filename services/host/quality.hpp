@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
+#include "services/host/lattice_choice.hpp"
 #include "services/host/residual_statistics.hpp"
 
 namespace tandem::host {
@@ -19,6 +20,13 @@ struct QualityGoal {
   std::int32_t smallest_threshold = 1;  ///< lattice units; no finer than this, whatever there is room for
   std::int32_t largest_threshold = 1;   ///< the stated maximum error; no coarser, even above the target
 };
+
+/// Where nobody says otherwise automatic quality moves between these multiples of the stated threshold.
+inline constexpr double kFinestShare = 0.25, kCoarsestShare = 4;
+
+/// The goal with thresholds in scene units, as far as the lattice has them.
+[[nodiscard]] QualityGoal quality_goal(const Lattice& lattice, double target_mbit_per_s, double finest,
+                                       double coarsest);
 
 /// How quantisation steps follow what is corrected.
 enum class StepRule : std::uint8_t {

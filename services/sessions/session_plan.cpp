@@ -14,10 +14,6 @@
 namespace tandem::sessions {
 namespace {
 
-// Automatic quality moves between these multiples of the threshold it starts from.
-constexpr double kFinest = 0.25;
-constexpr double kCoarsest = 4;
-
 std::vector<std::byte> codec_tables(const scenes::TrainedTable& table, const Groups& groups) {
   std::vector<std::byte> bytes;
   const auto append = [&bytes](const std::vector<std::uint8_t>& lengths) {
@@ -92,7 +88,7 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
   const double threshold_m =
       choice.automatic ? std::min(stated_m, choice.max_error_m.value_or(stated_m)) : stated_m;
-  const double finest_m = choice.automatic ? threshold_m * kFinest : threshold_m;
+  const double finest_m = choice.automatic ? threshold_m * host::kFinestShare : threshold_m;
   const auto lattice = host::choose_lattice(finest_m, scene.extent_m, scene.dt_s);
   if (!lattice) return tl::unexpected(lattice.error());
   const scenes::TrainedTable* trained = scenes::nearest_table(scene.trained, choice.bodies, threshold_m);
@@ -103,12 +99,8 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
 
   host::StreamConfig stream;
   if (choice.automatic) {
-    const auto units = [&](double metres) {
-      return static_cast<std::int32_t>(
-          std::clamp(std::round(metres * lattice->position_scale()), 1.0, double{kPositionLimit}));
-    };
-    stream.quality = host::QualityGoal{choice.target_mbit_per_s, units(finest_m),
-                                       units(choice.max_error_m.value_or(threshold_m * kCoarsest))};
+    stream.quality = host::quality_goal(*lattice, choice.target_mbit_per_s, finest_m,
+                                        choice.max_error_m.value_or(threshold_m * host::kCoarsestShare));
   }
   stream.lattice = *lattice;
   stream.layout.capacity = choice.bodies;

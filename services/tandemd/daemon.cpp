@@ -8,7 +8,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
@@ -194,12 +193,6 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   return {};
 }
 
-// What was queued last still goes out, unless the middleware does not take it.
-void flush(const host::Outbox& outbox) {
-  for (int i = 0; i < 200 && outbox.size() > 0; ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-}
-
 }  // namespace
 
 int run_daemon(const Options& options, const std::atomic<bool>& stop) {
@@ -226,7 +219,7 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
   const Ending ending = serve(**host, **port, script, hashes, publisher, options, stop);
-  flush((*host)->outbox());
+  publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {
     spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());

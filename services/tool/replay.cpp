@@ -39,13 +39,7 @@ struct ReplayOptions {
   std::uint32_t wait_for = 0;
 };
 
-// What was queued last goes out, and whoever reads has `taking` to take it.
-void let_go(const host::Outbox& outbox, std::chrono::milliseconds taking) {
-  constexpr int kMostTicks = 200;
-  constexpr std::chrono::milliseconds kTick(5);
-  for (int i = 0; i < kMostTicks && outbox.size() > 0; ++i) std::this_thread::sleep_for(kTick);
-  std::this_thread::sleep_for(taking);
-}
+// How long whoever reads has to take what was written last.
 constexpr std::chrono::milliseconds kTakingFrames(500), kTakingReplies(50);
 
 /// How a run was left.
@@ -103,7 +97,10 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
     const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
   }
-  if (!stop) let_go((*host)->outbox(), source.sought_s() ? kTakingReplies : kTakingFrames);
+  if (!stop) {
+    publisher.flush();
+    std::this_thread::sleep_for(source.sought_s() ? kTakingReplies : kTakingFrames);
+  }
   return source.ending().map([&](Step behind) { return Served{behind, source.sought_s()}; });
 }
 

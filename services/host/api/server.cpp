@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <thread>
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
@@ -20,10 +19,6 @@ namespace {
 
 using transport::steady_ns;
 using transport::wall_ns;
-
-// Of automatic quality, in thresholds.
-constexpr double kFinest = 0.25;
-constexpr double kCoarsest = 4;
 
 // Nothing, where it is no number.
 std::int64_t to_ns(double seconds, double most) {
@@ -47,7 +42,7 @@ Result<host::StreamConfig> plan(const ServerOptions& options, const engine::Simu
   const auto traits = codec_traits(options.codec);
   if (!traits) return tl::unexpected(traits.error());
   const bool automatic = options.target_mbit_per_s != 0;  // what is no number is refused with its goal
-  const double finest = automatic ? options.threshold * kFinest : options.threshold;
+  const double finest = automatic ? options.threshold * host::kFinestShare : options.threshold;
   const auto lattice = host::choose_lattice(finest, options.extent, simulation.dt_s());
   if (!lattice) return tl::unexpected(lattice.error());
   const auto parameters = host::codec_parameters(*lattice, options.threshold, 0, 0);
@@ -60,11 +55,8 @@ Result<host::StreamConfig> plan(const ServerOptions& options, const engine::Simu
   stream.layout.codec = options.codec;
   stream.layout.parameters.codec = *parameters;
   if (automatic) {
-    const auto units = [&](double distance) {
-      return static_cast<std::int32_t>(std::lround(distance * lattice->position_scale()));
-    };
-    stream.quality =
-        host::QualityGoal{options.target_mbit_per_s, units(finest), units(options.threshold * kCoarsest)};
+    stream.quality = host::quality_goal(*lattice, options.target_mbit_per_s, finest,
+                                        options.threshold * host::kCoarsestShare);
   }
   const bool turns = !simulation.bodies().orientation[0].empty();
   if (auto chosen = choose_turns(options, turns, *traits, stream); !chosen)
@@ -110,10 +102,7 @@ struct Server::Impl {
         port(std::move(the_port)),
         host(std::move(the_host)),
         publisher(host->outbox(), *port) {}
-  ~Impl() {
-    for (int i = 0; i < 200 && host->outbox().size() > 0 && !publisher.gave_up(); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
+  ~Impl() { publisher.flush(); }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   Impl(Impl&&) = delete;
