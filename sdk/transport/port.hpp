@@ -33,7 +33,13 @@ class ServerPort {
   /// Session announcements of other live servers in the same partition, newest of each.
   virtual void take_sessions(std::vector<Received<SessionMessage>>& out) = 0;
 
+  /// Writers of deltas and snapshots for streams 0 .. count - 1, each in its stream_partition(); before the
+  /// session is announced, and while nobody else calls the port. Those of stream 0 are there from the start.
+  /// `count`: 1 .. kMaxStreams; those that are there stay. Errors: kInvalidArgument, kTransport.
+  virtual Result<void> open_streams(std::uint32_t count) = 0;
+
   virtual Result<void> write(const SessionMessage&) = 0;
+  /// By message.stream.id, as snapshots. Errors: also kInvalidArgument, for a stream that is not open.
   virtual Result<void> write(const DeltaMessage&) = 0;
   virtual Result<void> write(const ScheduledInputMessage&) = 0;
   virtual Result<void> write(const SnapshotMessage&) = 0;
@@ -48,8 +54,9 @@ class ServerPort {
 
   virtual void take(std::vector<Received<InputMessage>>& out) = 0;
   virtual void take(std::vector<Received<AckMessage>>& out) = 0;
-  /// The delta, scheduled-input and snapshot writers all have a matched reader in that participant.
-  [[nodiscard]] virtual bool joined(const ParticipantId& participant) = 0;
+  /// The scheduled-input writer and the stream's delta and snapshot writers all have a matched reader in that
+  /// participant. False for a stream that is not open.
+  [[nodiscard]] virtual bool joined(const ParticipantId& participant, std::uint32_t stream) = 0;
   /// The participant still has a live acknowledgement writer.
   [[nodiscard]] virtual bool alive(const ParticipantId& participant) = 0;
   /// Nothing is left of the participant: it said so itself, or was silent for longer than its lease.
@@ -111,6 +118,9 @@ class ClientPort {
 
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
 [[nodiscard]] Result<void> check_session_name(const std::string& name);
+
+/// Where the deltas and snapshots of a stream are: SESSION for stream 0, SESSION/k for stream k > 0.
+[[nodiscard]] std::string stream_partition(const std::string& session, std::uint32_t stream);
 
 /// Where the replies to a client with an account are: SESSION/ID, the id as 16 hex digits.
 [[nodiscard]] std::string reply_partition(const std::string& session, ClientId client);

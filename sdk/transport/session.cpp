@@ -34,6 +34,12 @@ void complete_layouts(SessionMessage& session) {
   }
 }
 
+std::string stream_partition(const std::string& session, std::uint32_t stream) {
+  std::string partition = session;
+  if (stream > 0) partition.append(1, '/').append(std::to_string(stream));
+  return partition;
+}
+
 std::string reply_partition(const std::string& session, ClientId client) {
   return session + '/' + to_hex(client);
 }

@@ -17,7 +17,7 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTr
   for (const auto& [id, account] : roster.accounts()) {
     if (!joins(account) || !wants(account) || transfer.serves(id, now_ns)) continue;
     if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
-    if (port.joined(account.from)) ready_.push_back(id);
+    if (port.joined(account.from, 0)) ready_.push_back(id);
   }
   if (ready_.empty()) {
     collecting_since_ns_.reset();

@@ -23,7 +23,8 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
                                                     .length_s = playback.length_s(),
                                                     .from_s = playback.time_s(),
                                                     .from_frame = frame(),
-                                                    .frame_rate_hz = playback.session().frame_rate_hz});
+                                                    .frame_rate_hz = playback.session().frame_rate_hz,
+                                                    .stream = playback.stream().id.id});
   session_.window_ceiling = config.window_ceiling;
   playback.timeline().rename(config.epoch, {});
 }

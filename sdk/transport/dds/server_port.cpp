@@ -18,9 +18,7 @@ class DdsServerPort final : public ServerPort {
   struct Endpoints {
     Node node;
     Writer<SessionMessage> session;
-    Writer<DeltaMessage> delta;
     Writer<ScheduledInputMessage> scheduled;
-    Writer<SnapshotMessage> snapshot;
     Writer<ReplyMessage> reply;
     Writer<ServerStatusMessage> status;
     dds::Announcements others;
@@ -28,8 +26,10 @@ class DdsServerPort final : public ServerPort {
     Reader<AckMessage> ack;
   };
 
-  DdsServerPort(Endpoints endpoints, std::string session)
-      : endpoints_(std::move(endpoints)), session_(std::move(session)) {}
+  DdsServerPort(Endpoints endpoints, const DdsOptions& options)
+      : endpoints_(std::move(endpoints)),
+        session_(options.session),
+        delta_depth_(static_cast<std::int32_t>(options.delta_depth)) {}
 
   [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
 
@@ -38,12 +38,34 @@ class DdsServerPort final : public ServerPort {
     endpoints_.others.book().list_live(out);
   }
 
+  Result<void> open_streams(std::uint32_t count) override {
+    if (count == 0 || count > kMaxStreams) return fail(ErrorCode::kInvalidArgument, "1 to 8 streams");
+    while (streams_.size() < count) {
+      const auto stream = static_cast<std::uint32_t>(streams_.size());
+      // Those of stream 0 share the node's publisher.
+      const std::string partition = stream == 0 ? std::string() : stream_partition(session_, stream);
+      auto delta = endpoints_.node.writer<DeltaMessage>("deltas", delta_depth_, partition);
+      if (!delta) return tl::unexpected(delta.error());
+      auto snapshot = endpoints_.node.writer<SnapshotMessage>(
+          "snapshots", Topic<SnapshotMessage>::kQos.writer_depth, partition);
+      if (!snapshot) return tl::unexpected(snapshot.error());
+      streams_.push_back({std::move(*delta), std::move(*snapshot)});
+    }
+    return {};
+  }
+
   Result<void> write(const SessionMessage& message) override { return endpoints_.session.write(message); }
-  Result<void> write(const DeltaMessage& message) override { return endpoints_.delta.write(message); }
+  Result<void> write(const DeltaMessage& message) override {
+    if (message.stream.id >= streams_.size()) return not_open();
+    return streams_[message.stream.id].delta.write(message);
+  }
   Result<void> write(const ScheduledInputMessage& message) override {
     return endpoints_.scheduled.write(message);
   }
-  Result<void> write(const SnapshotMessage& message) override { return endpoints_.snapshot.write(message); }
+  Result<void> write(const SnapshotMessage& message) override {
+    if (message.stream.id >= streams_.size()) return not_open();
+    return streams_[message.stream.id].snapshot.write(message);
+  }
   Result<void> write(const ReplyMessage& message) override {
     const auto own = replies_.find(message.client);
     if (own != replies_.end()) return own->second.write(message);
@@ -67,9 +89,10 @@ class DdsServerPort final : public ServerPort {
   void take(std::vector<Received<InputMessage>>& out) override { endpoints_.input.take(dropped_, out); }
   void take(std::vector<Received<AckMessage>>& out) override { endpoints_.ack.take(dropped_, out); }
 
-  [[nodiscard]] bool joined(const ParticipantId& participant) override {
-    return reads(endpoints_.delta.get(), participant) && reads(endpoints_.scheduled.get(), participant) &&
-           reads(endpoints_.snapshot.get(), participant);
+  [[nodiscard]] bool joined(const ParticipantId& participant, std::uint32_t stream) override {
+    return stream < streams_.size() && reads(streams_[stream].delta.get(), participant) &&
+           reads(endpoints_.scheduled.get(), participant) &&
+           reads(streams_[stream].snapshot.get(), participant);
   }
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return endpoints_.ack.alive(participant) || endpoints_.input.alive(participant);
@@ -83,6 +106,15 @@ class DdsServerPort final : public ServerPort {
   void wake() override { endpoints_.node.wake(); }
 
  private:
+  struct Stream {
+    Writer<DeltaMessage> delta;
+    Writer<SnapshotMessage> snapshot;
+  };
+
+  static tl::unexpected<Error> not_open() {
+    return fail(ErrorCode::kInvalidArgument, "a stream that is not open");
+  }
+
   static bool reads(dds_entity_t writer, const ParticipantId& participant) {
     std::vector<dds_instance_handle_t> readers(64);
     for (;;) {
@@ -121,6 +153,8 @@ class DdsServerPort final : public ServerPort {
 
   Endpoints endpoints_;
   std::string session_;
+  std::int32_t delta_depth_;
+  std::vector<Stream> streams_;
   // Of the writing thread.
   std::map<ClientId, Writer<ReplyMessage>> replies_;
   std::deque<ClientId> strangers_;
@@ -133,11 +167,8 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   if (auto named = check_session_name(options.session); !named) return tl::unexpected(named.error());
   auto node = Node::create(options, "tandemd " + options.session, options.session);
   if (!node) return tl::unexpected(node.error());
-  const auto depth = static_cast<std::int32_t>(options.delta_depth);
   auto session = node->writer<SessionMessage>("session");
-  auto delta = node->writer<DeltaMessage>("deltas", depth);
   auto scheduled = node->writer<ScheduledInputMessage>("scheduled inputs");
-  auto snapshot = node->writer<SnapshotMessage>("snapshots");
   auto reply = node->writer<ReplyMessage>("replies");
   auto status = node->writer<ServerStatusMessage>("server status");
   // Looked at now and then: what others say about themselves must not wake the simulation.
@@ -148,14 +179,16 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   const auto check = [&failed](const auto& part) {
     if (!part && failed == nullptr) failed = &part.error();
   };
-  check(session), check(delta), check(scheduled), check(snapshot), check(reply), check(status);
+  check(session), check(scheduled), check(reply), check(status);
   check(others), check(input), check(ack);
   if (failed != nullptr) return tl::unexpected(*failed);
-  return std::make_unique<DdsServerPort>(
-      DdsServerPort::Endpoints{std::move(*node), std::move(*session), std::move(*delta),
-                               std::move(*scheduled), std::move(*snapshot), std::move(*reply),
-                               std::move(*status), std::move(*others), std::move(*input), std::move(*ack)},
-      options.session);
+  auto port = std::make_unique<DdsServerPort>(
+      DdsServerPort::Endpoints{std::move(*node), std::move(*session), std::move(*scheduled),
+                               std::move(*reply), std::move(*status), std::move(*others), std::move(*input),
+                               std::move(*ack)},
+      options);
+  if (auto opened = port->open_streams(1); !opened) return tl::unexpected(opened.error());
+  return port;
 }
 
 }  // namespace tandem::transport

@@ -49,7 +49,7 @@ class Fabric {
 
   // What ports do.
   Index add_participant(const std::string& session);
-  /// `partition`: within the session; empty for what all its readers read.
+  /// `partition`: of its own within the session; empty for what all its readers read.
   Index add_writer(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});
   /// Reads what has no partition, and `partition`.
   Index add_reader(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});

@@ -81,32 +81,40 @@ class SimulatedServerPort final : public ServerPort {
  public:
   SimulatedServerPort(std::shared_ptr<Fabric> fabric, const std::string& session, std::uint32_t delta_depth)
       : member_(std::move(fabric), session),
+        delta_depth_(delta_depth),
         session_(member_.writer<SessionMessage>()),
-        delta_(member_.writer<DeltaMessage>(delta_depth)),
         scheduled_(member_.writer<ScheduledInputMessage>(kScheduledDepth)),
-        snapshot_(member_.writer<SnapshotMessage>(kSnapshotWriterDepth)),
         reply_(member_.writer<ReplyMessage>()),
         status_(member_.writer<ServerStatusMessage>()),
         others_(member_.reader<SessionMessage>(kSessionReaderDepth)),
         input_(member_.reader<InputMessage>(kInputDepth)),
-        ack_(member_.reader<AckMessage>(16)) {}
+        ack_(member_.reader<AckMessage>(16)) {
+    open_stream();
+  }
 
   [[nodiscard]] ParticipantId self() const override { return member_.id(); }
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
     member_.refresh(others_, book_);
     book_.list_live(out);
   }
+  Result<void> open_streams(std::uint32_t count) override {
+    if (count == 0 || count > kMaxStreams) return fail(ErrorCode::kInvalidArgument, "1 to 8 streams");
+    while (streams_.size() < count) open_stream();
+    return {};
+  }
   Result<void> write(const SessionMessage& message) override {
     return member_.fabric().write(session_, 0, message);
   }
   Result<void> write(const DeltaMessage& message) override {
-    return member_.fabric().write(delta_, 0, message);
+    if (message.stream.id >= streams_.size()) return not_open();
+    return member_.fabric().write(streams_[message.stream.id].delta, 0, message);
   }
   Result<void> write(const ScheduledInputMessage& message) override {
     return member_.fabric().write(scheduled_, 0, message);
   }
   Result<void> write(const SnapshotMessage& message) override {
-    return member_.fabric().write(snapshot_, 0, message);
+    if (message.stream.id >= streams_.size()) return not_open();
+    return member_.fabric().write(streams_[message.stream.id].snapshot, 0, message);
   }
   Result<void> write(const ReplyMessage& message) override {
     const auto own = replies_.find(message.client);
@@ -129,10 +137,10 @@ class SimulatedServerPort final : public ServerPort {
   }
   void take(std::vector<Received<InputMessage>>& out) override { member_.take(input_, Limits{}, out); }
   void take(std::vector<Received<AckMessage>>& out) override { member_.take(ack_, Limits{}, out); }
-  [[nodiscard]] bool joined(const ParticipantId& participant) override {
-    return member_.fabric().reaches(delta_, participant) &&
+  [[nodiscard]] bool joined(const ParticipantId& participant, std::uint32_t stream) override {
+    return stream < streams_.size() && member_.fabric().reaches(streams_[stream].delta, participant) &&
            member_.fabric().reaches(scheduled_, participant) &&
-           member_.fabric().reaches(snapshot_, participant);
+           member_.fabric().reaches(streams_[stream].snapshot, participant);
   }
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return member_.fabric().hears(ack_, participant);
@@ -144,9 +152,24 @@ class SimulatedServerPort final : public ServerPort {
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
  private:
+  struct Stream {
+    Fabric::Index delta = 0, snapshot = 0;
+  };
+  void open_stream() {
+    const auto stream = static_cast<std::uint32_t>(streams_.size());
+    const std::string partition = stream_partition(member_.session(), stream);
+    streams_.push_back({member_.writer<DeltaMessage>(delta_depth_, partition),
+                        member_.writer<SnapshotMessage>(kSnapshotWriterDepth, partition)});
+  }
+  static tl::unexpected<Error> not_open() {
+    return fail(ErrorCode::kInvalidArgument, "a stream that is not open");
+  }
+
   Member member_;
-  Fabric::Index session_, delta_, scheduled_, snapshot_, reply_, status_;
+  std::uint32_t delta_depth_;
+  Fabric::Index session_, scheduled_, reply_, status_;
   Fabric::Index others_, input_, ack_;
+  std::vector<Stream> streams_;
   std::map<ClientId, Fabric::Index> replies_;
   SessionBook book_;
 };
@@ -176,7 +199,8 @@ class SimulatedClientPort final : public ClientPort {
     limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     if (stream_ && stream_->epoch == session.epoch) return {};
     close_readers();
-    stream_ = Stream{session.epoch, member_.reader<DeltaMessage>(delta_depth_),
+    partition_ = stream_partition(member_.session(), stream.id.id);
+    stream_ = Stream{session.epoch, member_.reader<DeltaMessage>(delta_depth_, partition_),
                      member_.reader<ScheduledInputMessage>(kScheduledDepth),
                      member_.reader<ReplyMessage>(1, reply_partition(member_.session(), client))};
     return {};
@@ -187,7 +211,7 @@ class SimulatedClientPort final : public ClientPort {
     stream_.reset();
   }
   Result<void> open_snapshots() override {
-    if (!snapshots_) snapshots_ = member_.reader<SnapshotMessage>(kSnapshotReaderDepth);
+    if (!snapshots_) snapshots_ = member_.reader<SnapshotMessage>(kSnapshotReaderDepth, partition_);
     return {};
   }
   void close_snapshots() override {
@@ -234,6 +258,7 @@ class SimulatedClientPort final : public ClientPort {
   std::uint32_t delta_depth_;
   Fabric::Index ack_, input_, status_, sessions_;
   std::optional<Stream> stream_;
+  std::string partition_;  // of its deltas and snapshots
   std::optional<Fabric::Index> snapshots_;
   Limits limits_;
   SessionBook book_;

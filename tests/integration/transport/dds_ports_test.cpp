@@ -6,6 +6,7 @@
 #include <limits>
 #include <thread>
 
+#include "sdk/transport/dds/node.hpp"
 #include "tests/integration/transport/loopback.hpp"
 
 namespace tandem::transport {
@@ -42,7 +43,7 @@ class DdsPorts : public ::testing::Test {
     EXPECT_TRUE(server.write(session));
     EXPECT_TRUE(client.open_stream(session, session.streams[0], kClient));
     EXPECT_TRUE(client.open_snapshots());
-    EXPECT_TRUE(eventually([&] { return server.joined(client.self()) && server.alive(client.self()); }));
+    EXPECT_TRUE(eventually([&] { return server.joined(client.self(), 0) && server.alive(client.self()); }));
     return session;
   }
   /// The next `count` messages of a type.
@@ -70,6 +71,47 @@ class DdsPorts : public ::testing::Test {
 
   DdsOptions options_;
 };
+
+// The reader of stream 1 is a bare node, so that nothing is asked of the client's side.
+TEST_F(DdsPorts, DeltasAndSnapshotsOfASecondStreamAreInAPartitionOfTheirOwn) {
+  const auto server = this->server();
+  const auto client = this->client();
+  ASSERT_TRUE(server->open_streams(2));
+  const SessionMessage session = join(*server, *client);
+  EXPECT_FALSE(server->joined(client->self(), 1)) << "it reads stream 0 alone";
+  EXPECT_FALSE(server->joined(client->self(), 2));
+  auto node = dds::Node::create(options_, "reader of stream 1", stream_partition(options_.session, 1));
+  ASSERT_TRUE(node);
+  auto deltas = node->reader<DeltaMessage>("deltas");
+  auto snapshots = node->reader<SnapshotMessage>("snapshots");
+  auto inputs = node->reader<ScheduledInputMessage>("scheduled inputs", {.partitions = {options_.session}});
+  ASSERT_TRUE(deltas && snapshots && inputs);
+  ASSERT_TRUE(eventually([&] { return server->joined(node->self(), 1); }));
+  EXPECT_FALSE(server->joined(node->self(), 0));
+
+  DeltaMessage first = a_delta(kEpoch, 1), second = first;
+  SnapshotMessage cut = a_snapshot(kEpoch, 1);
+  second.stream.id = cut.stream.id = 1;
+  ASSERT_TRUE(server->write(first));
+  ASSERT_TRUE(server->write(second));
+  ASSERT_TRUE(server->write(cut));
+  std::atomic<std::uint64_t> dropped = 0;
+  std::vector<Received<DeltaMessage>> got;
+  std::vector<Received<SnapshotMessage>> cuts;
+  ASSERT_TRUE(eventually([&] {
+    deltas->take(dropped, got);
+    snapshots->take(dropped, cuts);
+    return !got.empty() && !cuts.empty();
+  }));
+  EXPECT_EQ(got.size(), 1U);
+  EXPECT_EQ(got[0].message, second);
+  EXPECT_EQ(cuts[0].message, cut);
+  const auto of_first = receive<DeltaMessage>(*client, 1);
+  EXPECT_EQ(of_first.size(), 1U);
+  EXPECT_EQ(of_first[0].message, first);
+  second.stream.id = 2;
+  EXPECT_EQ(server->write(second).error().code, ErrorCode::kInvalidArgument) << "not open";
+}
 
 TEST_F(DdsPorts, SessionNamesWithWildcardsAreRefused) {
   for (const char* name : {"", "*", "a?", "a/b", "a b"}) {
@@ -152,7 +194,7 @@ TEST_F(DdsPorts, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
   const SessionMessage session = join(*server, *owner);
   ASSERT_TRUE(other->open_stream(session, session.streams[0], kClient + 1));
   ASSERT_TRUE(other->open_snapshots());
-  ASSERT_TRUE(eventually([&] { return server->joined(other->self()); }));
+  ASSERT_TRUE(eventually([&] { return server->joined(other->self(), 0); }));
   ReplyMessage reply;
   reply.client = kClient;
   reply.epoch = kEpoch;
@@ -238,7 +280,7 @@ TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapsh
   const auto scheduled = receive<ScheduledInputMessage>(*client, 256);
   ASSERT_EQ(scheduled.size(), 256U) << "keep-last 256";
   for (std::size_t i = 0; i < 256; ++i) EXPECT_EQ(scheduled[i].message.number, 45 + i);
-  ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self(), 0); }));
   ASSERT_TRUE(server->write(a_snapshot(kEpoch, 21)));
   EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message.frame, 21U);
   ASSERT_TRUE(server->write(a_delta(kEpoch, 21)));
@@ -317,12 +359,12 @@ TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   const ParticipantId id = client->self();
   const SessionMessage session = a_session(options_.session, kEpoch);
   ASSERT_TRUE(eventually([&] { return server->alive(id); }));
-  EXPECT_FALSE(server->joined(id));
+  EXPECT_FALSE(server->joined(id, 0));
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots());
-  ASSERT_TRUE(eventually([&] { return server->joined(id); }));
+  ASSERT_TRUE(eventually([&] { return server->joined(id, 0); }));
   client->close_snapshots();
-  EXPECT_TRUE(eventually([&] { return !server->joined(id); }));
+  EXPECT_TRUE(eventually([&] { return !server->joined(id, 0); }));
   client.reset();
   EXPECT_TRUE(eventually([&] { return !server->alive(id); }));
 }
@@ -399,7 +441,7 @@ TEST_F(DdsPorts, OversizeAndMisshapenSamplesAreDroppedAndCounted) {
   session.streams[0].max_snapshot_bytes = 2000;
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots());
-  ASSERT_TRUE(eventually([&] { return server->joined(client->self()); }));
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self(), 0); }));
   ASSERT_TRUE(server->write(a_delta(kEpoch, 1, 1001)));
   DeltaMessage misshapen = a_delta(kEpoch, 2);
   misshapen.part = misshapen.parts = 3;

@@ -53,7 +53,7 @@ class DdsProcesses : public ::testing::Test {
             if (known_.insert(ack.from).second) ids.push_back(ack.from);
           }
           return ids.size() == count && std::all_of(ids.begin(), ids.end(), [&](const ParticipantId& id) {
-                   return server.joined(id) && server.alive(id);
+                   return server.joined(id, 0) && server.alive(id);
                  });
         },
         30s))

@@ -96,6 +96,10 @@ class FakePort final : public transport::ServerPort {
   void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
     out.insert(out.end(), rivals.begin(), rivals.end());
   }
+  Result<void> open_streams(std::uint32_t count) override {
+    open_stream_count = std::max(open_stream_count, count);
+    return {};
+  }
   Result<void> write(const transport::SessionMessage& m) override { return keep(sessions, m, "session"); }
   Result<void> write(const transport::DeltaMessage& m) override { return keep(deltas, m, "delta"); }
   Result<void> write(const transport::ScheduledInputMessage& m) override {
@@ -111,7 +115,9 @@ class FakePort final : public transport::ServerPort {
   void close_replies(transport::ClientId client) override { reply_writers.erase(client); }
   void take(std::vector<transport::Received<transport::InputMessage>>& out) override { move(inputs, out); }
   void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
-  [[nodiscard]] bool joined(const transport::ParticipantId& id) override { return !unmatched.contains(id); }
+  [[nodiscard]] bool joined(const transport::ParticipantId& id, std::uint32_t stream) override {
+    return stream < open_stream_count && !unmatched.contains(id);
+  }
   [[nodiscard]] bool alive(const transport::ParticipantId& id) override { return !dead.contains(id); }
   [[nodiscard]] bool ended(const transport::ParticipantId& id) override { return gone.contains(id); }
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
@@ -129,7 +135,8 @@ class FakePort final : public transport::ServerPort {
   std::set<transport::ClientId> reply_writers;
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written
-  int failing_writes = 0;          // the next so many deltas are refused
+  std::uint32_t open_stream_count = 1;
+  int failing_writes = 0;  // the next so many deltas are refused
   ErrorCode failure = ErrorCode::kTransport;
 
  private:

@@ -88,7 +88,7 @@ struct Pair {
     EXPECT_TRUE(open_stream(*client));
     EXPECT_TRUE(client->open_snapshots());
     run(100 * kMs);
-    EXPECT_TRUE(server->joined(client->self()));
+    EXPECT_TRUE(server->joined(client->self(), 0));
   }
   void run(std::int64_t duration_ns) { network.advance_to(network.now_ns() + duration_ns); }
   Network network;
@@ -119,12 +119,61 @@ TEST(Simulated, WritersReachOnlyReadersTheyAreMatchedWith) {
   EXPECT_FALSE(server->alive(client->self()));
   network.advance_to(10 * kMs);
   EXPECT_TRUE(server->alive(client->self()));
-  EXPECT_FALSE(server->joined(client->self())) << "no snapshot reader yet";
+  EXPECT_FALSE(server->joined(client->self(), 0)) << "no snapshot reader yet";
   ASSERT_TRUE(server->write(delta(2)));
   ASSERT_TRUE(client->open_snapshots());
   network.advance_to(30 * kMs);
-  EXPECT_TRUE(server->joined(client->self()));
+  EXPECT_TRUE(server->joined(client->self(), 0));
   EXPECT_EQ(frames(*client), range(2, 2)) << "deltas are volatile";
+}
+
+TEST(Simulated, DeltasAndSnapshotsOfAStreamReachOnlyThoseWhoOpenedIt) {
+  Network network(NetworkOptions{});
+  const auto server = std::move(*network.make_server("s"));
+  const auto thin = std::move(*network.make_client("s"));
+  const auto rich = std::move(*network.make_client("s"));
+  SessionMessage two = session();
+  two.streams.push_back(two.streams[0]);
+  two.streams[1].id.id = 1;
+  ASSERT_TRUE(server->open_streams(2));
+  ASSERT_TRUE(server->open_streams(1)) << "what is open stays";
+  for (const auto& [client, stream] : {std::pair{thin.get(), 0U}, std::pair{rich.get(), 1U}}) {
+    ASSERT_TRUE(client->open_stream(two, two.streams[stream], 77));
+    ASSERT_TRUE(client->open_snapshots());
+  }
+  network.advance_to(100 * kMs);
+  EXPECT_TRUE(server->joined(rich->self(), 1));
+  EXPECT_FALSE(server->joined(rich->self(), 0));
+  EXPECT_TRUE(server->joined(thin->self(), 0));
+  EXPECT_FALSE(server->joined(thin->self(), 1));
+  for (const std::uint32_t stream : {0U, 1U}) {
+    DeltaMessage message = delta(10 + stream);
+    SnapshotMessage cut = snapshot(20 + stream);
+    message.stream.id = cut.stream.id = stream;
+    ASSERT_TRUE(server->write(message));
+    ASSERT_TRUE(server->write(cut));
+  }
+  ASSERT_TRUE(server->write(scheduled(1)));
+  network.advance_to(200 * kMs);
+  EXPECT_EQ(frames(*thin), range(10, 10));
+  EXPECT_EQ(frames(*rich), range(11, 11));
+  EXPECT_EQ(take<SnapshotMessage>(*thin).at(0).message.frame, 20U);
+  EXPECT_EQ(take<SnapshotMessage>(*rich).at(0).message.frame, 21U);
+  EXPECT_EQ(take<ScheduledInputMessage>(*thin).size(), 1U);
+  EXPECT_EQ(take<ScheduledInputMessage>(*rich).size(), 1U) << "inputs are those of all";
+}
+
+TEST(Simulated, AStreamThatIsNotOpenIsNotWritten) {
+  Network network(NetworkOptions{});
+  const auto server = std::move(*network.make_server("s"));
+  EXPECT_FALSE(server->open_streams(0));
+  EXPECT_FALSE(server->open_streams(9));
+  DeltaMessage message = delta(1);
+  SnapshotMessage cut = snapshot(1);
+  message.stream.id = cut.stream.id = 1;
+  EXPECT_EQ(server->write(message).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(server->write(cut).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_FALSE(server->joined(server->self(), 1));
 }
 
 TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
@@ -295,7 +344,7 @@ TEST(Simulated, AKilledClientIsNoticedAfterTheLeaseAndAClosedOneAtOnce) {
   EXPECT_TRUE(pair.server->alive(first_id));
   pair.run(kMs);
   EXPECT_FALSE(pair.server->alive(first_id));
-  EXPECT_FALSE(pair.server->joined(first_id));
+  EXPECT_FALSE(pair.server->joined(first_id, 0));
   EXPECT_FALSE(pair.client->write(ack(1, 1)));
 }
 
