@@ -67,6 +67,7 @@ std::int64_t ClientCore::poll(Now now) {
   if (epoch_ != nullptr) {
     take_stream(now);
     take_replies(now);
+    if (statistics_.frames_applied > 0) statistics_.costs.receive_ns += measure() - poll_began_ns_;
     if (epoch_->joining) join(now);
     if (!epoch_->joining) play(now, since_ns);
     if (epoch_->joining) join(now);
@@ -145,6 +146,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   }
   epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*playable), options_.lead,
                                         join_attempts_, pictures_);
+  epoch_->timeline.set_clock(options_.measure_ns);
   epoch_->join_began_ns = now.steady_ns;
   epoch_->joiner.start(now.steady_ns);
   ++statistics_.epochs;
@@ -211,8 +213,10 @@ void ClientCore::send_ack(Now now) {
   ack.role_wanted = options_.role;
   ack.clock_ns = now.steady_ns;
   ack.join_attempt = epoch_->joiner.attempt();
+  const std::int64_t began_ns = measure();
   // A failed write is tried again at the next poll, as the acknowledgement stays due.
   ack_due_ = !port_.write(ack).has_value();
+  if (statistics_.frames_applied > 0) statistics_.costs.acknowledge_ns += measure() - began_ns;
   last_ack_ns_ = now.steady_ns;
 }
 

@@ -201,6 +201,10 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
     if (options_.measure_ns != nullptr) {
       statistics_.frame_cost.add(cost_ns);
       statistics_.recent_cost.add(cost_ns);
+      const ClientTimeline::Timings timings = e.timeline.timings();
+      statistics_.costs.predict_ns += cost_ns - timings.decode_ns - timings.hash_ns;
+      statistics_.costs.decode_ns += timings.decode_ns;
+      statistics_.costs.hash_ns += timings.hash_ns;
     }
     if (statistics_.first_applied_ns == 0) statistics_.first_applied_ns = now.steady_ns;
     statistics_.last_applied_ns = now.steady_ns;

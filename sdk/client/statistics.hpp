@@ -23,6 +23,15 @@ enum class ResyncReason : std::uint8_t {
 };
 inline constexpr std::size_t kResyncReasons = 7;
 
+/// What playing took since the first applied frame, by kind. Zero without CoreOptions::measure_ns.
+struct CostTotals {
+  std::int64_t receive_ns = 0;      ///< taking what the port holds
+  std::int64_t predict_ns = 0;      ///< predicted steps
+  std::int64_t decode_ns = 0;       ///< decoding deltas and correcting by them
+  std::int64_t hash_ns = 0;         ///< checking the agreed states
+  std::int64_t acknowledge_ns = 0;  ///< writing acknowledgements
+};
+
 /// Counts since the client was made; they survive rejoins and epochs.
 struct Statistics {
   std::uint64_t frames_applied = 0;
@@ -43,6 +52,7 @@ struct Statistics {
   DurationHistogram input_latency;  ///< sent to the frame it acted on applied
   DurationHistogram frame_cost;     ///< decode, apply and simulate, per applied frame
   DurationHistogram recent_cost;    ///< the same since the last status report
+  CostTotals costs;
 
   void add_latency(std::int64_t latency_ns) {
     latency.add(latency_ns);

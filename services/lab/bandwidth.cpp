@@ -209,8 +209,9 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.client.step(1);
   lane.snaps.before(lane.client.state(frame.frame));
   auto applied = lane.client.apply(frame.frame, frame.last_input, frame.hash, frame.payload);
-  lane.decode.add(lane.client.timings().decode_ns);
-  lane.apply.add(lane.client.timings().apply_ns);
+  const ClientTimeline::Timings timings = lane.client.timings();
+  lane.decode.add(timings.decode_ns);
+  lane.apply.add(timings.hash_ns + timings.predict_ns);
   if (!applied) return applied;
   const State& agreed = lane.client.state(frame.frame);
   lane.snaps.after(agreed, lane.client.touched(), frame.lifecycle);

@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench client` measures: the time that a client takes.
+// What `tandem bench client --in-memory` measures: the time that a client's own code takes.
 
 #include <cstdint>
 #include <string>

@@ -224,6 +224,14 @@ nlohmann::ordered_json HeadlessClient::report() const {
   out["latency_ms"] = pair(figures.latency);
   out["input_latency_ms"] = pair(figures.input_latency);
   out["client_ms"] = pair(figures.frame_cost);
+  const double frames = std::max<double>(1, static_cast<double>(figures.frames_applied));
+  const auto mean_ms = [frames](std::int64_t total_ns) { return static_cast<double>(total_ns) / 1e6 / frames; };
+  out["cost_ms"] = {{"receive", mean_ms(figures.costs.receive_ns)},
+                    {"predict", mean_ms(figures.costs.predict_ns)},
+                    {"decode", mean_ms(figures.costs.decode_ns)},
+                    {"hash", mean_ms(figures.costs.hash_ns)},
+                    {"acknowledge", mean_ms(figures.costs.acknowledge_ns)}};
+  out["played_s"] = static_cast<double>(figures.last_applied_ns - figures.first_applied_ns) / 1e9;
   out["join_ms"] = first_join_ms_ ? nlohmann::ordered_json(*first_join_ms_) : nlohmann::ordered_json(nullptr);
   out["inputs_sent"] = figures.inputs_sent;
   out["inputs_refused"] = figures.inputs_refused;

@@ -144,6 +144,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   Stopwatch watch(m.clock);
   const bool ahead = m.now > m.applied;
   if (!ahead) m.simulate(frame);
+  m.timings.predict_ns = watch.lap_ns();
   State& state = m.at(frame).state;
   m.parts.delta.set_gravity(m.at(frame).input.drive.gravity);
   const auto delta = m.parts.delta.decode(state, payload);
@@ -154,8 +155,9 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.inputs.forget(frame);
   m.timings.decode_ns = watch.lap_ns();
   m.hash = m.parts.hash(state);
+  m.timings.hash_ns = watch.lap_ns();
   m.resimulate();
-  m.timings.apply_ns = watch.lap_ns();
+  m.timings.predict_ns += watch.lap_ns();
   if (m.hash != hash) {
     return fail(ErrorCode::kMismatch, "frame " + std::to_string(frame) + " is " + to_hex(m.hash) +
                                           ", the server has " + to_hex(hash));

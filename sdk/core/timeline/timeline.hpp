@@ -144,10 +144,10 @@ class ClientTimeline {
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< of the last apply()
   [[nodiscard]] const StreamParameters& parameters() const;          ///< in force at applied()
 
-  /// Of the last apply(): decoding and correcting the frame; checking its hash and re-simulating. Zero
-  /// without a clock.
+  /// Of the last apply(): simulating up to the frame, where step() had not, and again beyond it; decoding and
+  /// correcting; checking its hash. Zero without a clock.
   struct Timings {
-    std::int64_t decode_ns = 0, apply_ns = 0;
+    std::int64_t predict_ns = 0, decode_ns = 0, hash_ns = 0;
   };
   [[nodiscard]] Timings timings() const;
   /// For measurement only, as ServerTimeline::set_clock().

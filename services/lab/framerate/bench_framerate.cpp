@@ -8,21 +8,17 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <map>
 #include <memory>
-#include <sstream>
 
 #include "services/lab/bench.hpp"
+#include "services/lab/framerate/child.hpp"
 #include "services/lab/framerate/enclave.hpp"
 #include "services/lab/framerate/framerate.hpp"
 #include "services/lab/paper_numbers.hpp"
 
 namespace tandem::lab {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kCommand = "bench framerate";
 // What the thesis's phone did with the full simulation of its first scene with 10,000 bodies.
@@ -43,18 +39,6 @@ struct FramerateOptions {
   bool json = false;
 };
 
-/// `tandemd` beside this program, as installed and as built, or else in PATH.
-std::string find_server(const fs::path& self) {
-  std::vector<fs::path> places{self.parent_path() / "tandemd", self.parent_path() / "../tandemd/tandemd"};
-  const char* const search = std::getenv("PATH");
-  std::istringstream folders(search == nullptr ? "" : search);
-  for (std::string folder; std::getline(folders, folder, ':');)
-    places.push_back(fs::path(folder) / "tandemd");
-  const auto found = std::find_if(places.begin(), places.end(),
-                                  [](const fs::path& place) { return access(place.c_str(), X_OK) == 0; });
-  return found == places.end() ? std::string() : found->lexically_normal().string();
-}
-
 bool streams(const FramerateOptions& options) {
   return std::any_of(options.methods.begin(), options.methods.end(),
                      [](const std::string& method) { return method != kClientOnly; });
@@ -64,9 +48,9 @@ bool streams(const FramerateOptions& options) {
 Result<void> prepare(FramerateOptions& options) {
   options.setup.link.delay_ns = std::llround(options.delay_ms * 1e6);
   options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
-  options.setup.tandem = fs::read_symlink("/proc/self/exe").string();
+  options.setup.tandem = own_path();
   if (!streams(options) || options.setup.kind == LinkKind::kMemory) return {};
-  options.setup.tandemd = options.tandemd.empty() ? find_server(options.setup.tandem) : options.tandemd;
+  options.setup.tandemd = options.tandemd.empty() ? find_server() : options.tandemd;
   if (access(options.setup.tandemd.c_str(), X_OK) != 0)
     return fail(ErrorCode::kInvalidArgument, "no tandemd found; say where it is with --server");
   if (const auto tried = make_enclave("10.77.0.1"); !tried) {

@@ -13,6 +13,11 @@
 
 namespace tandem::lab {
 
+/// Of the program that runs.
+[[nodiscard]] std::string own_path();
+/// `tandemd` beside this program, as installed and as built, or else in PATH; empty: nowhere.
+[[nodiscard]] std::string find_server();
+
 struct ChildPlace {
   const Enclave* enclave = nullptr;  ///< network namespace; null: this one's
   std::string cgroup_procs;          ///< file to write the new process to; empty: none
