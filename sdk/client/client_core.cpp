@@ -48,6 +48,7 @@ SampleColumns make_room(const Drawable& drawable, Sample& out) {
 
 ClientCore::ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener)
     : options_(std::move(options)),
+      preference_(read_preference(options_.prefer)),
       port_(port),
       listener_(listener != nullptr ? *listener : silent_),
       status_report_(options_.role == transport::Role::kObserver ? 2 * kSecond : kSecond) {}
@@ -59,7 +60,7 @@ std::int64_t ClientCore::poll(Now now) {
   last_poll_ns_ = now.steady_ns;
   poll_began_ns_ = measure();
   server_alive_ = port_.server_alive();
-  if (epoch_ != nullptr && epoch_->joining && (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
+  if (epoch_ != nullptr && epoch_->played.joining && (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
     epoch_->silence_ns = 0;
     port_.pass_over_session(transport::PassOver::kWhileThereIsAnother);
   }
@@ -68,9 +69,10 @@ std::int64_t ClientCore::poll(Now now) {
     take_stream(now);
     take_replies(now);
     if (statistics_.frames_applied > 0) statistics_.costs.receive_ns += measure() - poll_began_ns_;
-    if (epoch_->joining) join(now);
-    if (!epoch_->joining) play(now, since_ns);
-    if (epoch_->joining) join(now);
+    if (epoch_->played.joining) begin(now);
+    if (!epoch_->played.joining) play(now, since_ns);
+    if (epoch_->played.joining) begin(now);
+    consider_streams(now);
     show_clock();
     if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
   }
@@ -83,12 +85,14 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
   std::int64_t due = std::min(now.steady_ns + kMaxSleepNs, status_report_.due_ns());
   if (epoch_ != nullptr) {
     due = std::min(due, next_ack_ns());
-    if (epoch_->joining) {
-      due = std::min(due, epoch_->joiner.next_due_ns());
-    } else if (epoch_->assembly.front() != nullptr && !epoch_->input_missing_ns) {
+    if (epoch_->next && epoch_->next->joining) due = std::min(due, epoch_->next->joiner.next_due_ns());
+    if (epoch_->played.joining) {
+      due = std::min(due, epoch_->played.joiner.next_due_ns());
+    } else if (epoch_->played.assembly.front() != nullptr && !epoch_->played.input_missing_ns) {
       due = now.steady_ns;  // more than one poll applies
-    } else if (epoch_->pacer.known() && epoch_->timeline.now() < epoch_->timeline.applied() + epoch_->lead) {
-      due = std::min(due, epoch_->pacer.due_ns(epoch_->timeline.now() + 1));
+    } else if (epoch_->pacer.known() &&
+               epoch_->played.timeline.now() < epoch_->played.timeline.applied() + epoch_->lead) {
+      due = std::min(due, epoch_->pacer.due_ns(epoch_->played.timeline.now() + 1));
     }
   }
   // Never in the past and never a busy loop, whatever the estimates say.
@@ -99,12 +103,17 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
 // bytes than many a delta.
 std::int64_t ClientCore::next_ack_ns() const {
   const EpochState& e = *epoch_;
-  if (e.joining) return last_ack_ns_ + (e.part_unacknowledged ? EpochState::kPartAckNs : kJoiningRepeatNs);
-  if (options_.role == transport::Role::kObserver) return last_ack_ns_ + 2 * kPlayingRepeatNs;
-  const std::int64_t repeat_ns = last_ack_ns_ + kPlayingRepeatNs;
-  if (e.timeline.applied() == acknowledged_) return repeat_ns;
+  const auto repeat_joining_ns = [this](const FollowedStream& joined) {
+    return last_ack_ns_ + (joined.part_unacknowledged ? EpochState::kPartAckNs : kJoiningRepeatNs);
+  };
+  if (e.played.joining) return repeat_joining_ns(e.played);
+  const std::int64_t changing_ns = e.next ? repeat_joining_ns(*e.next) : INT64_MAX;
+  if (options_.role == transport::Role::kObserver)
+    return std::min(changing_ns, last_ack_ns_ + 2 * kPlayingRepeatNs);
+  const std::int64_t repeat_ns = std::min(changing_ns, last_ack_ns_ + kPlayingRepeatNs);
+  if (e.played.timeline.applied() == acknowledged_) return repeat_ns;
   const double period_ns = 1e9 / e.session.frame_rate_hz;
-  if (e.timeline.applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))
+  if (e.played.timeline.applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))
     return last_ack_ns_;
   // Without a further delta the server may be waiting.
   const auto quiet_ns = statistics_.last_applied_ns + static_cast<std::int64_t>(1.25 * period_ns);
@@ -119,7 +128,11 @@ void ClientCore::take_sessions(Now now) {
       const auto& message = announcement.message;
       if (!options_.session.empty() && message.session != options_.session) continue;
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
-      if (!same) adopt(announcement, now);
+      if (!same) {
+        adopt(announcement, now);
+      } else if (epoch_ && message.streams != session_->streams) {
+        adopt_streams(message, now);
+      }
       if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
     }
     // Of one that cannot be played the next is looked at; each once, so this ends.
@@ -128,7 +141,7 @@ void ClientCore::take_sessions(Now now) {
 
 // A new epoch: everything of the old one is dropped, unseen.
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
-  port_.close_stream();
+  port_.close_streams();
   join_attempts_ = join_attempt();
   epoch_.reset();
   pictures_.clear();
@@ -137,18 +150,15 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   session_from_ = announcement.from;
   refusal_.clear();
   listener_.on_session(*session_);
-  auto playable = choose_stream(*session_);
-  if (!playable) {
-    ++statistics_.refused_messages;
-    refusal_ = playable.error().message;
-    log(LogLevel::kError, refusal_);
+  auto chosen = choose_stream(*session_);
+  if (!chosen) {
+    refuse(chosen.error());
     return;
   }
-  epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*playable), options_.lead,
-                                        join_attempts_, pictures_);
-  epoch_->timeline.set_clock(options_.measure_ns);
+  epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*chosen), options_.lead,
+                                        pictures_);
   epoch_->join_began_ns = now.steady_ns;
-  epoch_->joiner.start(now.steady_ns);
+  start_join(epoch_->played, now);
   ++statistics_.epochs;
   if (epoch_->lead < options_.lead) {
     log(LogLevel::kWarning, "lead " + std::to_string(options_.lead) + " asked for, the session allows " +
@@ -157,6 +167,18 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   log(LogLevel::kInfo, "found session '" + session_->session + "', scene '" + session_->scene + "', " +
                            std::to_string(session_->capacity) + " slots, epoch " +
                            std::to_string(session_->epoch));
+  tell_stream();
+}
+
+void ClientCore::refuse(const Error& why) {
+  port_.close_streams();
+  join_attempts_ = join_attempt();
+  epoch_.reset();
+  pictures_.clear();
+  sent_.clear(outcomes_);
+  ++statistics_.refused_messages;
+  refusal_ = why.message;
+  log(LogLevel::kError, refusal_);
 }
 
 void ClientCore::take_replies(Now now) {
@@ -195,24 +217,30 @@ void ClientCore::report_outcomes() {
 }
 
 void ClientCore::send_ack(Now now) {
-  if (!epoch_->joiner.asked()) return;
+  EpochState& e = *epoch_;
+  const bool changes = e.next && e.next->joiner.asked();
+  FollowedStream& joined = changes ? *e.next : e.played;
+  if (!joined.joiner.asked()) return;
   transport::AckMessage ack;
   ack.client = options_.id;
-  ack.epoch = epoch_->session.epoch;
-  ack.stream = epoch_->stream.id;
-  ack.phase = epoch_->joining ? transport::Phase::kJoining : transport::Phase::kPlaying;
-  if (epoch_->joining) {
-    epoch_->part_unacknowledged = false;
-    ack.snapshot_frame = epoch_->snapshot.frame();
-    ack.snapshot_parts = epoch_->snapshot.parts();
-    ack.missing = epoch_->snapshot.missing();
-  } else {
-    ack.applied = acknowledged_ = epoch_->timeline.applied();
-    ack.simulated = epoch_->timeline.now();
+  ack.epoch = e.session.epoch;
+  ack.stream = joined.stream.id;
+  const bool joins = changes || e.played.joining;
+  ack.phase = joins ? transport::Phase::kJoining : transport::Phase::kPlaying;
+  if (joins) {
+    joined.part_unacknowledged = false;
+    ack.snapshot_frame = joined.snapshot.frame();
+    ack.snapshot_parts = joined.snapshot.parts();
+    ack.missing = joined.snapshot.missing();
+  }
+  // Who changes the stream says both: the snapshot that comes in, and how far it plays.
+  if (!e.played.joining) {
+    ack.applied = acknowledged_ = e.played.timeline.applied();
+    ack.simulated = e.played.timeline.now();
   }
   ack.role_wanted = options_.role;
   ack.clock_ns = now.steady_ns;
-  ack.join_attempt = epoch_->joiner.attempt();
+  ack.join_attempt = joined.joiner.attempt();
   const std::int64_t began_ns = measure();
   // A failed write is tried again at the next poll, as the acknowledgement stays due.
   ack_due_ = !port_.write(ack).has_value();
@@ -235,19 +263,19 @@ void ClientCore::send_status(Now now) {
                                   std::to_string(std::lround(period_ms)) + " ms");
     }
     status.epoch = epoch_->session.epoch;
-    status.stream = epoch_->stream.id;
-    status.applied = epoch_->joining ? 0 : epoch_->timeline.applied();
+    status.stream = epoch_->played.stream.id;
+    status.applied = epoch_->played.joining ? 0 : epoch_->played.timeline.applied();
     status.role =
         static_cast<std::uint32_t>(epoch_->reply ? epoch_->reply->role : transport::Role::kObserver);
-    status.phase =
-        static_cast<std::uint32_t>(epoch_->joining ? transport::Phase::kJoining : transport::Phase::kPlaying);
+    status.phase = static_cast<std::uint32_t>(epoch_->played.joining ? transport::Phase::kJoining
+                                                                     : transport::Phase::kPlaying);
   }
   // Best effort: one lost second of figures is made good by the next.
   static_cast<void>(port_.write(status));
 }
 
 ClientPhase ClientCore::phase() const {
-  if (epoch_) return epoch_->joining ? ClientPhase::kJoining : ClientPhase::kPlaying;
+  if (epoch_) return epoch_->played.joining ? ClientPhase::kJoining : ClientPhase::kPlaying;
   return session_ ? ClientPhase::kRefused : ClientPhase::kSearching;
 }
 
@@ -268,7 +296,7 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
   input.client = options_.id;
   input.epoch = epoch_->session.epoch;
   input.number = sent_.next_number();
-  input.client_frame = epoch_->timeline.now();
+  input.client_frame = epoch_->played.timeline.now();
   input.kind = static_cast<std::uint32_t>(kind);
   input.values = std::move(values);
   input.bytes = std::move(bytes);
@@ -295,15 +323,17 @@ void ClientCore::echo(const transport::InputMessage& gravity, Now now) {
 
 void ClientCore::show_clock() {
   EpochState& e = *epoch_;
-  if (!e.joining) e.echo.on_simulated(e.timeline.now());
+  if (!e.played.joining) e.echo.on_simulated(e.played.timeline.now());
   e.pictures.on_echo(e.echo.shown());
   e.pictures.on_clock(e.pacer);
 }
 
 const transport::SessionMessage* ClientCore::session() const { return session_ ? &*session_ : nullptr; }
-const transport::StreamMessage* ClientCore::stream() const { return epoch_ ? &epoch_->stream : nullptr; }
+const transport::StreamMessage* ClientCore::stream() const {
+  return epoch_ ? &epoch_->played.stream : nullptr;
+}
 const ClientTimeline* ClientCore::timeline() const {
-  return phase() == ClientPhase::kPlaying ? &epoch_->timeline : nullptr;
+  return phase() == ClientPhase::kPlaying ? &epoch_->played.timeline : nullptr;
 }
 const transport::ReplyMessage* ClientCore::reply() const {
   return epoch_ && epoch_->reply ? &*epoch_->reply : nullptr;
@@ -312,7 +342,9 @@ std::optional<std::int64_t> ClientCore::server_wall_ns(std::int64_t steady_ns) c
   if (!epoch_ || !epoch_->pacer.clock().known()) return std::nullopt;
   return steady_ns + epoch_->pacer.clock().offset_ns();
 }
-std::uint32_t ClientCore::join_attempt() const { return epoch_ ? epoch_->joiner.attempt() : join_attempts_; }
+std::uint32_t ClientCore::join_attempt() const {
+  return epoch_ ? epoch_->played.joiner.attempt() : join_attempts_;
+}
 
 ClientStatus ClientCore::status() const {
   ClientStatus out = figures(statistics_);
@@ -333,9 +365,11 @@ ClientStatus ClientCore::status() const {
     out.reason = describe(epoch_->reply->reason);
   }
   out.lead = epoch_->lead;
-  if (!epoch_->joining) {
-    out.frame = epoch_->timeline.applied();
-    out.state_hash = epoch_->timeline.hash();
+  out.stream = chooser_->chosen().name;
+  out.stream_reason = chooser_->reason();
+  if (!epoch_->played.joining) {
+    out.frame = epoch_->played.timeline.applied();
+    out.state_hash = epoch_->played.timeline.hash();
   }
   out.round_trip_ms = static_cast<double>(epoch_->pacer.clock().round_trip_ns()) / 1e6;
   out.jitter_ms = epoch_->pacer.jitter_ms();
@@ -344,7 +378,8 @@ ClientStatus ClientCore::status() const {
 
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
-  if (epoch_ && epoch_->played) epoch_->pictures.on_loaded(epoch_->timeline, epoch_->pacer, last_poll_ns_);
+  if (epoch_ && epoch_->has_played)
+    epoch_->pictures.on_loaded(epoch_->played.timeline, epoch_->pacer, last_poll_ns_);
   pictures_.want();  // last: without memory for a first picture, the next call tries again
 }
 
@@ -357,7 +392,7 @@ std::optional<Drawable> ClientCore::drawable() {
 void ClientCore::show_uncorrected(bool on) {
   if (on == shows_uncorrected_) return;
   shows_uncorrected_ = on;
-  if (epoch_ && !epoch_->joining) follow_uncorrected();
+  if (epoch_ && !epoch_->played.joining) follow_uncorrected();
 }
 
 std::optional<Drift> ClientCore::drift() const {

@@ -17,6 +17,7 @@
 #include "sdk/client/sent_inputs.hpp"
 #include "sdk/client/statistics.hpp"
 #include "sdk/client/status_report.hpp"
+#include "sdk/client/stream_choice.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/client_types.hpp"
@@ -34,7 +35,8 @@ struct CoreOptions {
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
-  bool echo = false;  ///< samples show a gravity of this client's as soon as it is sent
+  std::string prefer;  ///< of streams: see read_preference()
+  bool echo = false;   ///< samples show a gravity of this client's as soon as it is sent
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -45,6 +47,10 @@ class CoreListener {
  public:
   virtual ~CoreListener() = default;
   virtual void on_session(const transport::SessionMessage& /*session*/) {}
+  /// One of the session's that was heard of last: it is joined, or, where the client plays already, its state
+  /// of the frame applied last is held, and what follows is of this stream.
+  virtual void on_stream(const transport::StreamMessage& /*stream*/) {}
+  virtual void on_server_status(const transport::ServerStatusMessage& /*status*/) {}
   /// Loaded: the state of `snapshot.frame` is held.
   virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
   /// New to this client, and in its timeline.
@@ -118,11 +124,13 @@ class ClientCore {
     std::vector<transport::Received<transport::ScheduledInputMessage>> inputs;
     std::vector<transport::Received<transport::SnapshotMessage>> snapshots;
     std::vector<transport::Received<transport::ReplyMessage>> replies;
+    std::vector<transport::Received<transport::ServerStatusMessage>> statuses;
   };
 
   // client_core.cpp: sessions, acknowledgements, input, status
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
+  void refuse(const Error& why);
   void take_replies(Now now);
   void report_outcomes();
   void echo(const transport::InputMessage& gravity, Now now);
@@ -132,18 +140,40 @@ class ClientCore {
   void send_status(Now now);
   [[nodiscard]] std::int64_t next_due_ns(Now now) const;
 
-  // client_stream.cpp: join, play, join again
+  // client_stream.cpp: take in, play
   void take_stream(Now now);
+  /// Null, and counted, where it is none that is followed.
+  [[nodiscard]] FollowedStream* followed(const StreamId& stream);
   void take_deltas(Now now);
   void take_scheduled();
   void take_snapshots(Now now);
-  void join(Now now);
-  [[nodiscard]] bool too_old(Frame snapshot) const;
-  void load(transport::SnapshotMessage&& snapshot, Now now);
+  /// False when there is nothing to apply, or not yet, or it was lost. The delta stays at the front.
+  bool apply_front(FollowedStream& to, Now now, std::int64_t since_last_poll_ns);
   void play(Now now, std::int64_t since_last_poll_ns);
   void play_ahead(Now now);
+
+  // client_join.cpp: join, join again
+  /// The one that a snapshot is wanted of; null: none.
+  [[nodiscard]] FollowedStream* joined_stream();
+  void start_join(FollowedStream& to, Now now);
+  /// Returns the snapshot once it is loaded.
+  [[nodiscard]] std::optional<transport::SnapshotMessage> join(FollowedStream& to, Now now);
+  [[nodiscard]] bool load(FollowedStream& to, const transport::SnapshotMessage& snapshot, Now now);
+  void begin(Now now);
   void follow_uncorrected();
-  void rejoin(ResyncReason reason, const std::string& why, Now now);
+  void lose(FollowedStream& from, ResyncReason reason, const std::string& why, Now now);
+
+  // client_change.cpp: choose, change
+  [[nodiscard]] Result<FollowedStream> choose_stream(const transport::SessionMessage& session);
+  [[nodiscard]] Result<FollowedStream> follow(const transport::SessionMessage& session) const;
+  void tell_stream();
+  void consider_streams(Now now);
+  void change_stream(Now now);
+  void follow_next(Now now);
+  void move_over(Now now);
+  void show_other(Frame left_at, Now now);
+  void give_up_change(const std::string& why, Now now);
+  void adopt_streams(const transport::SessionMessage& session, Now now);
 
   /// Counts what is not of this epoch and this server.
   template <class M>
@@ -156,12 +186,6 @@ class ClientCore {
       ++statistics_.stale_messages;
       return false;
     }
-    if constexpr (requires { received.message.stream; }) {
-      if (received.message.stream != epoch_->stream.id) {
-        ++statistics_.stale_messages;
-        return false;
-      }
-    }
     epoch_->silence_ns = 0;
     return true;
   }
@@ -173,6 +197,7 @@ class ClientCore {
   }
 
   CoreOptions options_;
+  StreamPreference preference_;
   transport::ClientPort& port_;
   CoreListener silent_;
   CoreListener& listener_;
@@ -188,9 +213,10 @@ class ClientCore {
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   transport::ParticipantId session_from_;
-  std::string refusal_;                ///< why it is not
-  std::unique_ptr<EpochState> epoch_;  ///< null while there is no playable session
-  std::uint32_t join_attempts_ = 0;    ///< of the epochs before it
+  std::string refusal_;                   ///< why it is not
+  std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
+  std::optional<StreamChooser> chooser_;  ///< of that session
+  std::uint32_t join_attempts_ = 0;       ///< of the epochs before it
 
   bool server_alive_ = false;
   bool ack_due_ = false;

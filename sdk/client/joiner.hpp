@@ -1,6 +1,7 @@
 #pragma once
 // The way into a session: when to ask for a snapshot, and which one to take.
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -42,6 +43,9 @@ class Joiner {
   /// dropped.
   [[nodiscard]] std::optional<transport::SnapshotMessage> choose(std::optional<Frame> first_buffered,
                                                                  std::int64_t now_ns);
+
+  /// Another joiner of the same client asked up to `attempt` meanwhile.
+  void continue_after(std::uint32_t attempt) { attempt_ = std::max(attempt_, attempt); }
 
   [[nodiscard]] std::uint32_t attempt() const { return attempt_; }
   [[nodiscard]] bool asked() const { return asked_; }

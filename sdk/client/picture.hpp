@@ -66,13 +66,13 @@ struct GravityEcho {
 /// All that one sample() reads, of one moment. The frames belong to a PictureExchange.
 struct Picture {
   Epoch epoch = 0;
-  double lattice_unit = 0;             ///< scene units
-  std::uint64_t load = 0;              ///< number of the snapshot: across two, every body may have jumped
-  const DrawnFrame* before = nullptr;  ///< the agreed frame before `agreed`; null right after a snapshot
-  const DrawnFrame* agreed = nullptr;  ///< the last frame agreed with the server
-  const DrawnFrame* ahead = nullptr;   ///< the last frame simulated; `agreed` when nothing is ahead of it
-  std::int64_t agreed_ns = 0;          ///< steady time at which `agreed` was
-  std::optional<GravityEcho> echo = {};     ///< to be shown
+  double lattice_unit = 0;               ///< scene units
+  std::uint64_t load = 0;                ///< number of the snapshot: across two, every body may have jumped
+  const DrawnFrame* before = nullptr;    ///< the agreed frame before `agreed`; null right after a snapshot
+  const DrawnFrame* agreed = nullptr;    ///< the last frame agreed with the server
+  const DrawnFrame* ahead = nullptr;     ///< the last frame simulated; `agreed` when nothing is ahead of it
+  std::int64_t agreed_ns = 0;            ///< steady time at which `agreed` was
+  std::optional<GravityEcho> echo = {};  ///< to be shown
   Pacer pacer;
 };
 

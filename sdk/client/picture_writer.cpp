@@ -30,6 +30,12 @@ void PictureWriter::on_applied(const ClientTimeline& timeline, const Pacer& pace
   show_agreed(next, timeline, pacer, now_ns);
 }
 
+void PictureWriter::on_changed(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns) {
+  if (!follows()) return;
+  Picture next = picture_;
+  show_agreed(next, timeline, pacer, now_ns);
+}
+
 void PictureWriter::on_simulated(const ClientTimeline& timeline, const Pacer& pacer) {
   if (!follows()) return;
   Picture next = picture_;

@@ -29,6 +29,8 @@ class PictureWriter {
   void on_loaded(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
   /// After ClientTimeline::apply().
   void on_applied(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
+  /// Another timeline of the same session tells of the same frame; what it says elsewise is blended in.
+  void on_changed(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns);
   /// Frames beyond the agreed one were simulated, or simulated again.
   void on_simulated(const ClientTimeline& timeline, const Pacer& pacer);
   /// From the next on_clock() on.

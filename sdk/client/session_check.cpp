@@ -1,5 +1,6 @@
 #include "sdk/client/session_check.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -52,20 +53,35 @@ Result<void> check_stream(const transport::SessionMessage& session, const transp
 }  // namespace
 
 Result<Playable> choose_stream(const transport::SessionMessage& session) {
+  return playable_streams(session).and_then([&](const std::vector<std::size_t>& playable) {
+    return ClientTimeline::create(session.streams[playable.front()].layout)
+        .map([&](ClientTimeline&& timeline) {
+          return Playable{playable.front(), std::move(timeline)};
+        });
+  });
+}
+
+Result<std::vector<std::size_t>> playable_streams(const transport::SessionMessage& session) {
   if (auto good = check_session(session); !good) {
     return fail(good.error().code, "session refused: " + good.error().message);
   }
   Error refused{ErrorCode::kMalformed, "session refused: no stream can be played"};
+  std::vector<std::size_t> playable;
   for (std::size_t i = 0; i < session.streams.size(); ++i) {
     const transport::StreamMessage& stream = session.streams[i];
     const auto good = check_stream(session, stream);
-    auto timeline = good ? ClientTimeline::create(stream.layout) : tl::unexpected<Error>(good.error());
-    if (timeline) return Playable{i, std::move(*timeline)};
+    const auto timeline = good ? ClientTimeline::create(stream.layout) : tl::unexpected<Error>(good.error());
+    const bool listed_twice = std::any_of(playable.begin(), playable.end(), [&](std::size_t other) {
+      return session.streams[other].id.id == stream.id.id;
+    });
+    if (timeline && !listed_twice) playable.push_back(i);
+    if (timeline) continue;
     if (i == 0) refused.code = timeline.error().code;
     refused.message +=
         (i == 0 ? ": stream " : "; stream ") + std::to_string(stream.id.id) + ": " + timeline.error().message;
   }
-  return tl::unexpected<Error>(std::move(refused));
+  if (playable.empty()) return tl::unexpected<Error>(std::move(refused));
+  return playable;
 }
 
 }  // namespace tandem::client

@@ -2,6 +2,7 @@
 // Which stream of an announced session can this build play?
 
 #include <cstddef>
+#include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/messages.hpp"
@@ -20,5 +21,9 @@ struct Playable {
 /// kMalformed (a session-wide value out of range); when no stream can be played, what the first one has
 /// (kMismatch, kMalformed, kUnsupported, kInvalidArgument), with every stream's reason in the message.
 [[nodiscard]] Result<Playable> choose_stream(const transport::SessionMessage& session);
+
+/// The same check of all: indices of the streams that can be played, at least one. Errors: as
+/// choose_stream().
+[[nodiscard]] Result<std::vector<std::size_t>> playable_streams(const transport::SessionMessage& session);
 
 }  // namespace tandem::client

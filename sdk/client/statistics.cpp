@@ -17,6 +17,7 @@ ClientStatus figures(const Statistics& statistics) {
   out.client_ms_p50 = statistics.frame_cost.quantile_ms(0.5);
   out.client_ms_p99 = statistics.frame_cost.quantile_ms(0.99);
   out.join_ms = static_cast<double>(statistics.join_ns) / 1e6;
+  out.stream_changes = statistics.stream_changes;
   out.inputs_sent = statistics.inputs_sent;
   out.inputs_acted = statistics.inputs_acted;
   out.inputs_refused = statistics.inputs_refused;

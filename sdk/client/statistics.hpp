@@ -39,6 +39,7 @@ struct Statistics {
   std::uint64_t resyncs = 0;  ///< by loss, gap or refusal; a first join and a new epoch are none
   std::array<std::uint64_t, kResyncReasons> resyncs_by_reason{};
   std::uint64_t epochs = 0;
+  std::uint64_t stream_changes = 0;  ///< to another one of the same session
   std::uint64_t hash_mismatches = 0;
   std::uint64_t refused_messages = 0;  ///< malformed deltas, snapshots, scheduled inputs, sessions
   std::uint64_t stale_messages = 0;    ///< of another epoch

@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -88,23 +87,25 @@ class ClientPort {
   /// False when the writer of the session's announcement is gone (server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;
 
-  /// Subscribes to the deltas of `stream`, one of the session's, to scheduled inputs and to replies to
-  /// `client` and to everybody, with the stream's limits. Calling it again for another epoch drops what was
-  /// buffered.
+  /// Subscribes to the deltas of `stream`, one of the session's, with its limits, beside those that are open;
+  /// with the first of an epoch also to scheduled inputs and to replies to `client` and to everybody. Calling
+  /// it for another epoch ends what was open. Errors: kTransport; what was open before stays so.
   virtual Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                                    ClientId client) = 0;
+  /// Ends the subscriptions to the deltas and snapshots of one stream.
+  virtual void close_stream(std::uint32_t stream) = 0;
   /// Ends all subscriptions that open_stream() and open_snapshots() made.
-  virtual void close_stream() = 0;
-  /// Subscribes to the snapshots of the stream that is open; close when one was taken. No effect while open.
-  virtual Result<void> open_snapshots() = 0;
-  virtual void close_snapshots() = 0;
+  virtual void close_streams() = 0;
+  /// Subscribes to the snapshots of a stream that is open; close when one was taken. No effect while they
+  /// are.
+  virtual Result<void> open_snapshots(std::uint32_t stream) = 0;
+  virtual void close_snapshots(std::uint32_t stream) = 0;
 
   virtual void take(std::vector<Received<DeltaMessage>>& out) = 0;
   virtual void take(std::vector<Received<ScheduledInputMessage>>& out) = 0;
   virtual void take(std::vector<Received<SnapshotMessage>>& out) = 0;
   virtual void take(std::vector<Received<ReplyMessage>>& out) = 0;
-  /// The newest figures of a server, since the last call; for who shows them. A port may have none.
-  [[nodiscard]] virtual std::optional<Received<ServerStatusMessage>> take_status() { return std::nullopt; }
+  virtual void take(std::vector<Received<ServerStatusMessage>>& out) = 0;
 
   virtual Result<void> write(const AckMessage&) = 0;
   virtual Result<void> write(const InputMessage&) = 0;

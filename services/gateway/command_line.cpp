@@ -49,6 +49,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--domain", options.domain, "DDS domain")
       ->check(CLI::Range(0U, transport::kMaxDomain))
       ->capture_default_str();
+  app.add_option(
+         "--prefer", options.prefer,
+         "Of a session's streams: auto, bandwidth, computing, error, or a name; all viewers play the same")
+      ->capture_default_str();
   app.add_option("--listen", options.web.address, "IPv4 or IPv6 address; 0.0.0.0 or :: for all of the host's")
       ->capture_default_str();
   app.add_option("--port", options.web.port, "TCP port; 0 for any free one")

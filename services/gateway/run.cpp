@@ -27,6 +27,7 @@ using transport::steady_ns;
 client::CoreOptions core_options(const Options& options) {
   client::CoreOptions core;
   core.session = options.session;
+  core.prefer = options.prefer;
   core.id = client::random_client_id();
   core.log = [](LogLevel level, std::string_view line) {
     constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};

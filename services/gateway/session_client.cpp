@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "sdk/client/session_check.hpp"
-
 namespace tandem::gateway {
 
 SessionClient::SessionClient(client::CoreOptions options, transport::ClientPort& port)
@@ -14,7 +12,7 @@ std::int64_t SessionClient::poll(Gateway& gateway, client::Now now) {
   now_ns_ = now.steady_ns;
   const std::int64_t due_ns = core_.poll(now);
   gateway.on_server_alive(port_.server_alive());
-  if (const auto status = port_.take_status()) gateway.on_status(status->message);
+  if (untold_) gateway.on_session(*std::exchange(untold_, std::nullopt));
   gateway_ = nullptr;
   return std::min(due_ns, gateway.poll(now.steady_ns));
 }
@@ -43,14 +41,19 @@ Result<std::uint64_t> SessionClient::send(transport::InputKind kind, std::vector
   return core_.send(kind, std::move(values), std::move(bytes), {.steady_ns = now_ns, .wall_ns = 0});
 }
 
-// Viewers are told of the stream that is there for them; where none can be played, they say why themselves.
-void SessionClient::on_session(const transport::SessionMessage& session) {
-  transport::SessionMessage told = session;
-  if (const auto playable = client::choose_stream(session)) {
-    told.streams = {session.streams[playable->stream]};
-    stream_ = told.streams.front().id;
-  }
+// Viewers are told of the one stream that is there for them; where none can be played, they say why
+// themselves.
+void SessionClient::on_session(const transport::SessionMessage& session) { untold_ = session; }
+
+void SessionClient::on_stream(const transport::StreamMessage& stream) {
+  transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
+  told.streams = {stream};
+  stream_ = stream.id;
   gateway_->on_session(told);
+}
+
+void SessionClient::on_server_status(const transport::ServerStatusMessage& status) {
+  if (status.stream == stream_.id) gateway_->on_status(status);
 }
 
 void SessionClient::on_scheduled(const transport::ScheduledInputMessage& input) {

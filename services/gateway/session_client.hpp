@@ -32,12 +32,16 @@ class SessionClient final : public World, private client::CoreListener {
 
  private:
   void on_session(const transport::SessionMessage& session) override;
+  void on_stream(const transport::StreamMessage& stream) override;
+  void on_server_status(const transport::ServerStatusMessage& status) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void on_outcome(const client::InputOutcome& outcome) override;
 
   transport::ClientPort& port_;
   client::ClientCore core_;
+  std::optional<transport::SessionMessage>
+      untold_;                  // not yet told of: its stream comes next, or none can be played
   StreamId stream_;             // played
   Gateway* gateway_ = nullptr;  // during a poll
   std::int64_t now_ns_ = 0;     // of it

@@ -56,6 +56,7 @@ void Recorder::add_plain(const M& message, std::int64_t wall_ns, std::int64_t pu
 void Recorder::add(const transport::SessionMessage& session, std::int64_t wall_ns) {
   if (!session_ || session_->epoch != session.epoch) unpromised_.clear();
   session_ = session;
+  stream_ = session.streams.front().id;
   add_plain(session, wall_ns, wall_ns);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// --domain and --session, as every command that speaks DDS has them.
+// --domain and --session, as every command that speaks DDS has them, and what clients have.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -20,6 +20,16 @@ inline void add_endpoint_options(CLI::App& command, std::uint32_t& domain, std::
         const auto ok = transport::check_session_name(name);
         return ok ? std::string() : ok.error().message;
       })
+      ->capture_default_str();
+}
+
+/// --prefer, of what a client is told. Outlives `command`.
+inline void add_prefer_option(CLI::App& command, std::string& prefer) {
+  command
+      .add_option(
+          "--prefer", prefer,
+          "Of a session's streams: auto (fewest bits, where they are cheap to follow), bandwidth (fewest "
+          "bits), computing (cheapest), error (smallest), or a name")
       ->capture_default_str();
 }
 

@@ -50,6 +50,7 @@ Result<void> HeadlessClient::open() {
   core.id = client::random_client_id();
   core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options_.lead;
+  core.prefer = options_.prefer;
   core.measure_ns = transport::steady_ns;
   core.log = [this](LogLevel, std::string_view line) { tell(std::string(line)); };
   transport::DdsOptions dds;
@@ -128,7 +129,15 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
       if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
     }
   }
-  if (recorder_) recorder_->add(session, transport::wall_ns());
+}
+
+// A recording is of one stream at a time: whatever is told of it begins with where it is held.
+void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
+  if (!recorder_) return;
+  transport::SessionMessage session = *core_->session();
+  session.streams = {stream};
+  recorder_->add(session, transport::wall_ns());
+  if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), transport::wall_ns());
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
@@ -152,7 +161,6 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
 
 void HeadlessClient::record(client::Now now) {
   if (!recorder_) return;
-  static_cast<void>(recording_port_->take_status());
   if (core_->timeline() != nullptr && recorder_->snapshot_due(now.wall_ns))
     recorder_->cut_snapshot(*core_->timeline(), now.wall_ns);
 }
@@ -195,6 +203,7 @@ void HeadlessClient::tell_live(client::Now now) {
   line["mbit_per_s"] = bytes * 8 / kBitsPerMbit / span_s;
   line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
   line["resyncs"] = figures.resyncs;
+  line["stream"] = core_->status().stream;
   print_error(line.dump() + '\n');
   live_ns_ = now.steady_ns;
   live_bytes_ = figures.payload_bytes;
@@ -242,6 +251,9 @@ nlohmann::ordered_json HeadlessClient::report() const {
   out["role"] = status.role == ClientRole::kParticipant ? "participant" : "observer";
   out["lead"] = status.lead;
   out["epochs"] = figures.epochs;
+  out["stream"] = status.stream;
+  out["stream_reason"] = status.stream_reason;
+  out["stream_changes"] = figures.stream_changes;
   out["discovery_ms"] = session_ns_ != 0 ? static_cast<double>(session_ns_ - started_ns_) / 1e6 : 0.0;
   out["inputs_acted"] = figures.inputs_acted;
   out["inputs_unknown"] = figures.inputs_unknown;

@@ -26,6 +26,7 @@ struct HeadlessOptions {
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
   const char* command = "join";                                        ///< in front of lines for humans
+  std::string prefer = "auto";                                         ///< of streams; see CoreOptions
   bool live = false;                                                   ///< a JSON line a second on stderr
   bool quiet = false;                                                  ///< no lines for humans on stderr
   std::uint32_t index = 0;                                             ///< of several clients, in live lines
@@ -70,6 +71,7 @@ class HeadlessClient final : public client::CoreListener {
   Result<void> open();
   Result<void> load_script(double dt_s);
   void on_session(const transport::SessionMessage& session) override;
+  void on_stream(const transport::StreamMessage& stream) override;
   void on_snapshot(const transport::SnapshotMessage& snapshot) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;

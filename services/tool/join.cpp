@@ -88,6 +88,7 @@ void add_join(CLI::App& app, Run& run) {
   command->add_option("--lead", client.lead, "Frames to simulate beyond the last delta")
       ->check(CLI::Range(0, 1))
       ->capture_default_str();
+  add_prefer_option(*command, client.prefer);
   command
       ->add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       ->check(CLI::PositiveNumber);

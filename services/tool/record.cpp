@@ -68,6 +68,8 @@ void add_record(CLI::App& app, Run& run) {
   HeadlessOptions& client = options->client;
   command->add_option("file", client.capture, "The file, FILE.mcap")->required();
   add_endpoint_options(*command, client.domain, client.session);
+  client.prefer = "bandwidth";
+  add_prefer_option(*command, client.prefer);
   command
       ->add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       ->check(CLI::PositiveNumber);

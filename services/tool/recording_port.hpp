@@ -27,9 +27,10 @@ class RecordingPort final : public transport::ClientPort {
                            transport::ClientId client) override {
     return port_->open_stream(session, stream, client);
   }
-  void close_stream() override { port_->close_stream(); }
-  Result<void> open_snapshots() override { return port_->open_snapshots(); }
-  void close_snapshots() override { port_->close_snapshots(); }
+  void close_stream(std::uint32_t stream) override { port_->close_stream(stream); }
+  void close_streams() override { port_->close_streams(); }
+  Result<void> open_snapshots(std::uint32_t stream) override { return port_->open_snapshots(stream); }
+  void close_snapshots(std::uint32_t stream) override { port_->close_snapshots(stream); }
 
   void take(std::vector<transport::Received<transport::DeltaMessage>>& out) override { port_->take(out); }
   void take(std::vector<transport::Received<transport::ScheduledInputMessage>>& out) override {
@@ -41,10 +42,10 @@ class RecordingPort final : public transport::ClientPort {
     port_->take(out);
     for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, transport::wall_ns());
   }
-  [[nodiscard]] std::optional<transport::Received<transport::ServerStatusMessage>> take_status() override {
-    auto status = port_->take_status();
-    if (status) recorder_->add(status->message, transport::wall_ns());
-    return status;
+  void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override {
+    const std::size_t before = out.size();
+    port_->take(out);
+    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, transport::wall_ns());
   }
 
   Result<void> write(const transport::AckMessage& message) override { return record(message); }

@@ -270,7 +270,7 @@ class Run {
     poll(5000 * kMs);
     for (std::size_t i = 0; i < honest_.successor_deltas.size(); ++i) {
       port_.deltas.push_back(from_server(honest_.successor_deltas[i]));
-      if (port_.snapshots_open) port_.snapshots.push_back(from_server(honest_.successor_snapshots[i]));
+      if (!port_.snapshots_open.empty()) port_.snapshots.push_back(from_server(honest_.successor_snapshots[i]));
       poll(100 * kMs);
     }
     require(core_->phase() == ClientPhase::kPlaying);

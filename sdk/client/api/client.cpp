@@ -62,6 +62,7 @@ client::CoreOptions core_options(const tandem_options& options) {
   core.role = static_cast<transport::Role>(options.role);
   core.lead = options.lead;
   core.echo = options.echo != 0;
+  if (options.prefer != nullptr) core.prefer = options.prefer;
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {
     core.log = [log = options.log, user = options.user](LogLevel level, std::string_view line) {
@@ -189,6 +190,9 @@ tandem_result tandem_get_status(tandem_client client, tandem_status* status) noe
     out.jitter_ms = s.jitter_ms;
     write_text(s.scene, out.scene);
     write_text(s.reason, out.reason);
+    write_text(s.stream, out.stream);
+    write_text(s.stream_reason, out.stream_reason);
+    out.stream_changes = s.stream_changes;
     write_struct(out, status);
     return kOk;
   });

@@ -35,6 +35,9 @@ struct ClientOptions {
   bool background = true;
   /// EXPERIMENTAL. sample() shows the application's own gravity before the server has said when it acts.
   bool echo = false;
+  /// Of the session's streams: "auto", "bandwidth", "computing", "error" or a name; see
+  /// tandem_options::prefer.
+  std::string prefer = "auto";
   /// One line for a human. Called from the thread that does the work; must return soon, and must not call the
   /// client. What it throws is dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -138,6 +141,7 @@ class Client {
     c.lead = options.lead;
     c.background = options.background ? 1 : 0;
     c.echo = options.echo ? 1 : 0;
+    c.prefer = options.prefer.c_str();
     if (options.log) {
       client.log_ = std::make_unique<Log>(options.log);
       c.log = &call_log;
@@ -395,6 +399,9 @@ inline Result<ClientStatus> Client::status() const {
   s.inputs_refused = c.inputs_refused;
   s.inputs_unknown = c.inputs_unknown;
   s.queue_high_water = c.queue_high_water;
+  s.stream = c.stream;
+  s.stream_reason = c.stream_reason;
+  s.stream_changes = c.stream_changes;
   return s;
 }
 

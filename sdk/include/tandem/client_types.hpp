@@ -44,6 +44,9 @@ struct ClientStatus {
   double client_ms_p50 = 0, client_ms_p99 = 0;  ///< decode, apply and simulate, a frame
   double join_ms = 0;  ///< last join: from learning of the session, or of the loss, to playing
   double round_trip_ms = 0, jitter_ms = 0;
+  std::string stream;                ///< that is played or joined: its name, or its number
+  std::string stream_reason;         ///< why that one, for a human
+  std::uint64_t stream_changes = 0;  ///< from one stream of a session to another
   std::uint64_t inputs_sent = 0, inputs_acted = 0, inputs_refused = 0, inputs_unknown = 0;
   std::uint32_t queue_high_water = 0;  ///< deltas that waited at once, at most
 };

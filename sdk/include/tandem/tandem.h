@@ -157,10 +157,15 @@ typedef struct tandem_options {
   uint32_t echo;
   tandem_log log; /**< may be null */
   void* user;     /**< handed to `log` */
+  /** Of the session's streams: "auto" (fewest bits, where that costs this processor little), "bandwidth"
+   * (fewest bits), "computing" (cheapest), "error" (smallest), or a stream's name. A stream is changed while
+   * it is played when processor or link cannot follow it, or another suits better, but for one that was
+   * named. Null: "auto". */
+  const char* prefer;
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL }
 
 /** Starts looking for a session; returns at once, whether a server is there or not.
  * @param options  null: the defaults
@@ -218,14 +223,15 @@ typedef struct tandem_status {
   double jitter_ms;
   char scene[72];
   char reason[256]; /**< why role or phase is not what was asked for; empty where it is */
+  char stream[40];  /**< name of the stream that is played, or joined; its number where it has no name */
+  char stream_reason[152]; /**< why that one, for a human */
+  uint64_t stream_changes; /**< from one stream of a session to another */
 } tandem_status;
 /** An empty one, to be filled in. */
 #define TANDEM_STATUS_INIT                                                                                  \
   {                                                                                                         \
     sizeof(tandem_status), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, \
-        0, 0, 0, {0}, {                                                                                     \
-      0                                                                                                     \
-    }                                                                                                       \
+        0, 0, 0, {0}, {0}, {0}, {0}, 0                                                                      \
   }
 
 /** How the client stands. */

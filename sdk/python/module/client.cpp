@@ -48,7 +48,7 @@ void log_line(void* user, tandem_log_level level, const char* line) {
 class Connection {
  public:
   Connection(std::uint32_t domain, const std::string& session, tandem_role role, std::uint32_t lead,
-             bool background, bool echo, const py::object& log) {
+             bool background, bool echo, const std::string& prefer, const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
     options.session = session.c_str();
@@ -56,6 +56,7 @@ class Connection {
     options.lead = lead;
     options.background = background ? 1 : 0;
     options.echo = echo ? 1 : 0;
+    options.prefer = prefer.c_str();
     if (!log.is_none()) {
       log_ = std::make_unique<py::function>(log);
       options.log = &log_line;
@@ -111,7 +112,8 @@ class Connection {
         "latency_ms_p99"_a = s.latency_ms_p99, "input_latency_ms_p50"_a = s.input_latency_ms_p50,
         "input_latency_ms_p99"_a = s.input_latency_ms_p99, "client_ms_p50"_a = s.client_ms_p50,
         "client_ms_p99"_a = s.client_ms_p99, "join_ms"_a = s.join_ms, "round_trip_ms"_a = s.round_trip_ms,
-        "jitter_ms"_a = s.jitter_ms, "scene"_a = s.scene, "reason"_a = s.reason);
+        "jitter_ms"_a = s.jitter_ms, "scene"_a = s.scene, "reason"_a = s.reason, "stream"_a = s.stream,
+        "stream_reason"_a = s.stream_reason, "stream_changes"_a = s.stream_changes);
   }
 
   /// `arrays`: the eight columns in the order of tandem_columns, None for what is not wanted. Returns the
@@ -292,7 +294,7 @@ PYBIND11_MODULE(_client, m) {
   m.def("clock_ns", &tandem_clock_ns);
   py::class_<Connection>(m, "Connection")
       .def(py::init<std::uint32_t, const std::string&, tandem_role, std::uint32_t, bool, bool,
-                    const py::object&>())
+                    const std::string&, const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
       .def("wait_until_playing", &Connection::wait_until_playing)

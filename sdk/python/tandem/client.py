@@ -89,6 +89,7 @@ class Client:
         lead: int = 1,
         background: bool = True,
         echo: bool = False,
+        prefer: str = "auto",
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -100,6 +101,7 @@ class Client:
         background  a thread of the client's own does the work. False: the application calls update(), at least
                     once a frame, and everything happens in there
         echo        EXPERIMENTAL: sample() shows the application's own gravity at once
+        prefer      of the session's streams: "auto", "bandwidth", "computing", "error", or a stream's name
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start).
@@ -110,7 +112,7 @@ class Client:
         if "\0" in session:  # C would read the name only up to there
             raise Error(Result.INVALID_ARGUMENT, "a session's name has no NUL")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
-        self._connection = _client.Connection(domain, session, role, lead, background, echo, told)
+        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, told)
         # At the end of the program, too: before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
 

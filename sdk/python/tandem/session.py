@@ -119,6 +119,9 @@ class Status(_FromNative):
     jitter_ms: float
     scene: str
     reason: str  #: why role or phase is not what was asked for; empty where it is
+    stream: str  #: name of the stream that is played or joined; its number where it has no name
+    stream_reason: str  #: why that one
+    stream_changes: int  #: from one stream of a session to another
 
 
 @dataclass(frozen=True)

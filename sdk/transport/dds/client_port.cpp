@@ -1,4 +1,8 @@
+#include <algorithm>
+#include <iterator>
+#include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
@@ -40,60 +44,73 @@ class DdsClientPort final : public ClientPort {
 
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override {
-    limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
-    if (stream_ && epoch_ == session.epoch) {
-      stream_->delta.set_limits(limits_);
-      if (snapshots_) snapshots_->set_limits(limits_);
+    if (epoch_ != session.epoch) {
+      // New readers, because the old ones may already have been handed scheduled inputs of the new epoch,
+      // which are sent once to each reader.
+      close_streams();
+    }
+    if (!common_) {
+      auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");
+      if (!scheduled) return tl::unexpected(scheduled.error());
+      auto reply = endpoints_.node.reader<ReplyMessage>(
+          "replies", {.partitions = {options_.session, reply_partition(options_.session, client)}});
+      if (!reply) return tl::unexpected(reply.error());
+      common_.emplace(Common{std::move(*scheduled), std::move(*reply)});
+      epoch_ = session.epoch;
+    }
+    const Limits limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
+    if (const auto open = streams_.find(stream.id.id); open != streams_.end()) {
+      open->second.set_limits(limits);
       return {};
     }
-    // New readers, because the old ones may already have been handed scheduled inputs of the new epoch, which
-    // are sent once to each reader.
-    stream_.reset();
-    epoch_ = session.epoch;
     // As deep as the writer's, or what was repaired after a lost link would push itself out. It is memory
     // only while the application does not take it.
     const auto depth = static_cast<std::int32_t>(
         delta_depth(session.frame_rate_hz, session.window_ceiling, stream.max_delta_bytes));
-    auto delta = endpoints_.node.reader<DeltaMessage>("deltas", {.depth = depth});
+    auto delta = reader<DeltaMessage>("deltas", stream.id.id, depth);
     if (!delta) return tl::unexpected(delta.error());
-    auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");
-    if (!scheduled) return tl::unexpected(scheduled.error());
-    auto reply = endpoints_.node.reader<ReplyMessage>(
-        "replies", {.partitions = {options_.session, reply_partition(options_.session, client)}});
-    if (!reply) return tl::unexpected(reply.error());
-    delta->set_limits(limits_);
-    stream_.emplace(Stream{std::move(*delta), std::move(*scheduled), std::move(*reply)});
+    streams_.emplace(stream.id.id, Stream{std::move(*delta), std::nullopt, {}})
+        .first->second.set_limits(limits);
     return {};
   }
-  void close_stream() override {
-    snapshots_.reset();
-    stream_.reset();
+  void close_stream(std::uint32_t stream) override { streams_.erase(stream); }
+  void close_streams() override {
+    streams_.clear();
+    common_.reset();
     epoch_.reset();
   }
-  Result<void> open_snapshots() override {
-    if (snapshots_) return {};
-    auto reader = endpoints_.node.reader<SnapshotMessage>("snapshots");
-    if (!reader) return tl::unexpected(reader.error());
-    reader->set_limits(limits_);
-    snapshots_.emplace(std::move(*reader));
+  Result<void> open_snapshots(std::uint32_t stream) override {
+    const auto open = streams_.find(stream);
+    if (open == streams_.end()) return fail(ErrorCode::kOutOfOrder, "that stream is not open");
+    if (open->second.snapshots) return {};
+    auto snapshots = reader<SnapshotMessage>("snapshots", stream, Topic<SnapshotMessage>::kQos.reader_depth);
+    if (!snapshots) return tl::unexpected(snapshots.error());
+    open->second.snapshots.emplace(std::move(*snapshots));
+    open->second.set_limits(open->second.limits);
     return {};
   }
-  void close_snapshots() override { snapshots_.reset(); }
+  void close_snapshots(std::uint32_t stream) override {
+    if (const auto open = streams_.find(stream); open != streams_.end()) open->second.snapshots.reset();
+  }
 
   void take(std::vector<Received<DeltaMessage>>& out) override {
-    if (stream_) stream_->delta.take(dropped_, out);
+    for (auto& [id, stream] : streams_) stream.deltas.take(dropped_, out);
   }
   void take(std::vector<Received<ScheduledInputMessage>>& out) override {
-    if (stream_) stream_->scheduled.take(dropped_, out);
+    if (common_) common_->scheduled.take(dropped_, out);
   }
   void take(std::vector<Received<SnapshotMessage>>& out) override {
-    if (snapshots_) snapshots_->take(dropped_, out);
+    for (auto& [id, stream] : streams_) {
+      if (stream.snapshots) stream.snapshots->take(dropped_, out);
+    }
   }
   void take(std::vector<Received<ReplyMessage>>& out) override {
-    if (stream_) stream_->reply.take(dropped_, out);
+    if (common_) common_->reply.take(dropped_, out);
   }
-  [[nodiscard]] std::optional<Received<ServerStatusMessage>> take_status() override {
-    return std::exchange(server_status_, std::nullopt);
+  void take(std::vector<Received<ServerStatusMessage>>& out) override {
+    auto& statuses = endpoints_.servers.statuses();
+    std::move(statuses.begin(), statuses.end(), std::back_inserter(out));
+    statuses.clear();
   }
 
   Result<void> write(const AckMessage& message) override { return endpoints_.ack.write(message); }
@@ -106,27 +123,41 @@ class DdsClientPort final : public ClientPort {
 
  private:
   struct Stream {
-    Reader<DeltaMessage> delta;
+    Reader<DeltaMessage> deltas;
+    std::optional<Reader<SnapshotMessage>> snapshots;
+    Limits limits;
+
+    void set_limits(const Limits& in_force) {
+      limits = in_force;
+      deltas.set_limits(limits);
+      if (snapshots) snapshots->set_limits(limits);
+    }
+  };
+  /// What all streams of an epoch have in common.
+  struct Common {
     Reader<ScheduledInputMessage> scheduled;
     Reader<ReplyMessage> reply;
   };
 
+  template <class M>
+  Result<Reader<M>> reader(const std::string& name, std::uint32_t stream, std::int32_t depth) {
+    dds::ReaderOptions options{.depth = depth};
+    if (stream != 0) options.partitions = {stream_partition(options_.session, stream)};
+    return endpoints_.node.reader<M>(name, options);
+  }
+
   void refresh() {
     endpoints_.servers.refresh(options_.session, dropped_, [this](const ParticipantId& server) {
-      return stream_ && (stream_->delta.alive(server) || stream_->reply.alive(server));
+      const auto delivers = [&server](auto& open) { return open.second.deltas.alive(server); };
+      return std::ranges::any_of(streams_, delivers) || (common_ && common_->reply.alive(server));
     });
-    auto& statuses = endpoints_.servers.statuses();
-    if (!statuses.empty()) server_status_ = std::move(statuses.back());
-    statuses.clear();
   }
 
   Endpoints endpoints_;
   DdsOptions options_;
-  std::optional<Stream> stream_;
-  std::optional<Reader<SnapshotMessage>> snapshots_;
-  std::optional<Received<ServerStatusMessage>> server_status_;
-  std::optional<Epoch> epoch_;  // of the open stream
-  Limits limits_;               // of the open stream
+  std::map<std::uint32_t, Stream> streams_;  // by id
+  std::optional<Common> common_;             // once a stream was opened
+  std::optional<Epoch> epoch_;               // of what is open
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 

@@ -99,13 +99,13 @@ Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint
 }
 
 Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint32_t depth,
-                                 std::string partition) {
+                                 std::vector<std::string> partitions) {
   const auto index = static_cast<Index>(readers_.size());
   Reader reader;
   reader.participant = participant;
   reader.topic = topic;
   reader.depth = depth;
-  reader.partition = std::move(partition);
+  reader.partitions = std::move(partitions);
   readers_.push_back(std::move(reader));
   participants_[participant].readers.push_back(index);
   for (Index writer = 0; writer < writers_.size(); ++writer) add_pair(writer, index);
@@ -117,7 +117,7 @@ void Fabric::add_pair(Index writer, Index reader) {
   const Reader& to = readers_[reader];
   const bool fits = from.topic == to.topic && from.participant != to.participant &&
                     participants_[from.participant].session == participants_[to.participant].session &&
-                    (from.partition.empty() || from.partition == to.partition);
+                    std::ranges::find(to.partitions, from.partition) != to.partitions.end();
   if (!fits || from.closed || to.closed || gone(from.participant) || gone(to.participant)) return;
   const auto index = static_cast<Index>(pairs_.size());
   Pair pair;

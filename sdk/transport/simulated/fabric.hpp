@@ -49,10 +49,10 @@ class Fabric {
 
   // What ports do.
   Index add_participant(const std::string& session);
-  /// `partition`: of its own within the session; empty for what all its readers read.
+  /// `partition`: of its own within the session; empty: the session's, which readers read by default.
   Index add_writer(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});
-  /// Reads what has no partition, and `partition`.
-  Index add_reader(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});
+  Index add_reader(Index participant, std::size_t topic, std::uint32_t depth,
+                   std::vector<std::string> partitions = {{}});
   void close_writer(Index writer);
   void close_reader(Index reader);
   void close_participant(Index participant);
@@ -126,7 +126,7 @@ class Fabric {
     Index participant = 0;
     std::size_t topic = 0;
     std::uint32_t depth = 1;
-    std::string partition;
+    std::vector<std::string> partitions;
     bool closed = false;
     std::deque<Arrived> arrived;
     std::vector<Index> pairs;

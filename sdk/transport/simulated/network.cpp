@@ -39,8 +39,8 @@ class Member {
     return fabric_->add_writer(self_, kTopic<M>, depth, std::move(partition));
   }
   template <class M>
-  Fabric::Index reader(std::uint32_t depth = 1, std::string partition = {}) {
-    return fabric_->add_reader(self_, kTopic<M>, depth, std::move(partition));
+  Fabric::Index reader(std::uint32_t depth = 1, std::vector<std::string> partitions = {{}}) {
+    return fabric_->add_reader(self_, kTopic<M>, depth, std::move(partitions));
   }
   template <class M>
   void take(Fabric::Index reader, const Limits& limits, std::vector<Received<M>>& out) {
@@ -121,7 +121,7 @@ class SimulatedServerPort final : public ServerPort {
     return member_.fabric().write(own == replies_.end() ? reply_ : own->second, message.client, message);
   }
   Result<void> write(const ServerStatusMessage& message) override {
-    return member_.fabric().write(status_, 0, message);
+    return member_.fabric().write(status_, message.stream, message);
   }
   Result<void> open_replies(ClientId client) override {
     if (replies_.contains(client)) return {};
@@ -182,7 +182,8 @@ class SimulatedClientPort final : public ClientPort {
         ack_(member_.writer<AckMessage>()),
         input_(member_.writer<InputMessage>(kInputDepth)),
         status_(member_.writer<ClientStatusMessage>()),
-        sessions_(member_.reader<SessionMessage>(kSessionReaderDepth)) {}
+        sessions_(member_.reader<SessionMessage>(kSessionReaderDepth)),
+        server_status_(member_.reader<ServerStatusMessage>(8)) {}
 
   [[nodiscard]] ParticipantId self() const override { return member_.id(); }
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
@@ -192,43 +193,62 @@ class SimulatedClientPort final : public ClientPort {
   void pass_over_session(PassOver until) override { book_.pass_over_current(until); }
   [[nodiscard]] bool server_alive() override {
     member_.refresh(sessions_, book_);
-    return stream_ ? book_.epoch_live(stream_->epoch) : book_.any_live();
+    return common_ ? book_.epoch_live(common_->epoch) : book_.any_live();
   }
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override {
-    limits_ = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
-    if (stream_ && stream_->epoch == session.epoch) return {};
-    close_readers();
-    partition_ = stream_partition(member_.session(), stream.id.id);
-    stream_ = Stream{session.epoch, member_.reader<DeltaMessage>(delta_depth_, partition_),
-                     member_.reader<ScheduledInputMessage>(kScheduledDepth),
-                     member_.reader<ReplyMessage>(1, reply_partition(member_.session(), client))};
+    if (common_ && common_->epoch != session.epoch) close_streams();
+    if (!common_)
+      common_ = Common{session.epoch, member_.reader<ScheduledInputMessage>(kScheduledDepth),
+                       member_.reader<ReplyMessage>(1, {{}, reply_partition(member_.session(), client)})};
+    const auto [open, is_new] = streams_.try_emplace(stream.id.id);
+    if (is_new) open->second.deltas = member_.reader<DeltaMessage>(delta_depth_, partitions(stream.id.id));
+    open->second.limits = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
     return {};
   }
-  void close_stream() override {
-    close_snapshots();
-    close_readers();
-    stream_.reset();
+  void close_stream(std::uint32_t stream) override {
+    close_snapshots(stream);
+    if (const auto open = streams_.find(stream); open != streams_.end()) {
+      member_.fabric().close_reader(open->second.deltas);
+      streams_.erase(open);
+    }
   }
-  Result<void> open_snapshots() override {
-    if (!snapshots_) snapshots_ = member_.reader<SnapshotMessage>(kSnapshotReaderDepth, partition_);
+  void close_streams() override {
+    while (!streams_.empty()) close_stream(streams_.begin()->first);
+    if (!common_) return;
+    member_.fabric().close_reader(common_->scheduled);
+    member_.fabric().close_reader(common_->reply);
+    common_.reset();
+  }
+  Result<void> open_snapshots(std::uint32_t stream) override {
+    const auto open = streams_.find(stream);
+    if (open == streams_.end()) return fail(ErrorCode::kOutOfOrder, "that stream is not open");
+    if (!open->second.snapshots)
+      open->second.snapshots = member_.reader<SnapshotMessage>(kSnapshotReaderDepth, partitions(stream));
     return {};
   }
-  void close_snapshots() override {
-    if (snapshots_) member_.fabric().close_reader(*snapshots_);
-    snapshots_.reset();
+  void close_snapshots(std::uint32_t stream) override {
+    const auto open = streams_.find(stream);
+    if (open == streams_.end() || !open->second.snapshots) return;
+    member_.fabric().close_reader(*open->second.snapshots);
+    open->second.snapshots.reset();
   }
   void take(std::vector<Received<DeltaMessage>>& out) override {
-    if (stream_) member_.take(stream_->delta, limits_, out);
+    for (const auto& [id, stream] : streams_) member_.take(stream.deltas, stream.limits, out);
   }
   void take(std::vector<Received<ScheduledInputMessage>>& out) override {
-    if (stream_) member_.take(stream_->scheduled, limits_, out);
+    if (common_) member_.take(common_->scheduled, Limits{}, out);
   }
   void take(std::vector<Received<SnapshotMessage>>& out) override {
-    if (snapshots_) member_.take(*snapshots_, limits_, out);
+    for (const auto& [id, stream] : streams_) {
+      if (stream.snapshots) member_.take(*stream.snapshots, stream.limits, out);
+    }
   }
   void take(std::vector<Received<ReplyMessage>>& out) override {
-    if (stream_) member_.take(stream_->reply, limits_, out);
+    if (common_) member_.take(common_->reply, Limits{}, out);
+  }
+  void take(std::vector<Received<ServerStatusMessage>>& out) override {
+    member_.take(server_status_, Limits{}, out);
   }
   Result<void> write(const AckMessage& message) override {
     return member_.fabric().write(ack_, message.client, message);
@@ -244,23 +264,24 @@ class SimulatedClientPort final : public ClientPort {
 
  private:
   struct Stream {
-    Epoch epoch = 0;
-    Fabric::Index delta = 0, scheduled = 0, reply = 0;
+    Fabric::Index deltas = 0;
+    std::optional<Fabric::Index> snapshots;
+    Limits limits;
   };
-  void close_readers() {
-    if (!stream_) return;
-    for (const Fabric::Index reader : {stream_->delta, stream_->scheduled, stream_->reply}) {
-      member_.fabric().close_reader(reader);
-    }
+  /// What all streams of an epoch have in common.
+  struct Common {
+    Epoch epoch = 0;
+    Fabric::Index scheduled = 0, reply = 0;
+  };
+  [[nodiscard]] std::vector<std::string> partitions(std::uint32_t stream) const {
+    return {stream_partition(member_.session(), stream)};
   }
 
   Member member_;
   std::uint32_t delta_depth_;
-  Fabric::Index ack_, input_, status_, sessions_;
-  std::optional<Stream> stream_;
-  std::string partition_;  // of its deltas and snapshots
-  std::optional<Fabric::Index> snapshots_;
-  Limits limits_;
+  Fabric::Index ack_, input_, status_, sessions_, server_status_;
+  std::map<std::uint32_t, Stream> streams_;  // by id
+  std::optional<Common> common_;             // once a stream was opened
   SessionBook book_;
 };
 

@@ -1,5 +1,6 @@
 #include "sdk/web/module/web_port.hpp"
 
+#include <algorithm>
 #include <string>
 #include <variant>
 
@@ -21,7 +22,8 @@ void WebPort::disconnected() {
   server_alive_ = false;
   session_.reset();
   server_status_.reset();
-  close_stream();
+  status_is_new_ = false;
+  close_streams();
   out_.clear();
 }
 
@@ -64,6 +66,7 @@ Result<void> WebPort::accept(transport::ReplyMessage&& message, std::size_t size
 }
 Result<void> WebPort::accept(transport::ServerStatusMessage&& message, std::size_t /*size*/) {
   server_status_ = std::move(message);
+  status_is_new_ = true;
   return {};
 }
 Result<void> WebPort::accept(const transport::AbsentMessage& /*message*/, std::size_t /*size*/) {
@@ -91,28 +94,51 @@ void WebPort::take_sessions(std::vector<Received<transport::SessionMessage>>& ou
   if (session_) out.push_back({*std::exchange(session_, std::nullopt), gateway_});
 }
 
-Result<void> WebPort::open_stream(const transport::SessionMessage& /*session*/,
+// The gateway sends what it follows itself; there is nothing to subscribe to.
+Result<void> WebPort::open_stream(const transport::SessionMessage& session,
                                   const transport::StreamMessage& stream, transport::ClientId /*client*/) {
-  close_stream();
-  limits_ = {.max_delta_bytes = stream.max_delta_bytes, .max_snapshot_bytes = stream.max_snapshot_bytes};
+  if (epoch_ != session.epoch) close_streams();
+  epoch_ = session.epoch;
+  streams_[stream.id.id] = {.max_delta_bytes = stream.max_delta_bytes,
+                            .max_snapshot_bytes = stream.max_snapshot_bytes};
+  set_limits();
   deltas_.open = inputs_.open = replies_.open = true;
   return {};
 }
 
-void WebPort::close_stream() {
+// Those of the largest stream: what the client does not follow any more it passes over.
+void WebPort::set_limits() {
   limits_ = {};
+  if (streams_.empty()) return;
+  limits_ = {.max_delta_bytes = 0, .max_snapshot_bytes = 0};
+  for (const auto& [id, limits] : streams_) {
+    limits_.max_delta_bytes = std::max(limits_.max_delta_bytes, limits.max_delta_bytes);
+    limits_.max_snapshot_bytes = std::max(limits_.max_snapshot_bytes, limits.max_snapshot_bytes);
+  }
+}
+
+void WebPort::close_stream(std::uint32_t stream) {
+  streams_.erase(stream);
+  set_limits();
+  if (streams_.empty()) close_streams();
+}
+
+void WebPort::close_streams() {
+  epoch_ = 0;
+  streams_.clear();
+  set_limits();
   deltas_.close();
   inputs_.close();
   replies_.close();
-  close_snapshots();
+  snapshots_.close();
 }
 
-Result<void> WebPort::open_snapshots() {
+Result<void> WebPort::open_snapshots(std::uint32_t /*stream*/) {
   snapshots_.open = true;
   return {};
 }
 
-void WebPort::close_snapshots() { snapshots_.close(); }
+void WebPort::close_snapshots(std::uint32_t /*stream*/) { snapshots_.close(); }
 
 namespace {
 
@@ -129,6 +155,11 @@ void WebPort::take(std::vector<Received<transport::DeltaMessage>>& out) { move_a
 void WebPort::take(std::vector<Received<transport::ScheduledInputMessage>>& out) { move_all(inputs_, out); }
 void WebPort::take(std::vector<Received<transport::SnapshotMessage>>& out) { move_all(snapshots_, out); }
 void WebPort::take(std::vector<Received<transport::ReplyMessage>>& out) { move_all(replies_, out); }
+
+void WebPort::take(std::vector<Received<transport::ServerStatusMessage>>& out) {
+  if (status_is_new_) out.push_back({*server_status_, gateway_});
+  status_is_new_ = false;
+}
 
 template <class M>
 Result<void> WebPort::send(const M& message) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -50,13 +51,15 @@ class WebPort final : public transport::ClientPort {
   [[nodiscard]] bool server_alive() override { return server_alive_; }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId client) override;
-  void close_stream() override;
-  Result<void> open_snapshots() override;
-  void close_snapshots() override;
+  void close_stream(std::uint32_t stream) override;
+  void close_streams() override;
+  Result<void> open_snapshots(std::uint32_t stream) override;
+  void close_snapshots(std::uint32_t stream) override;
   void take(std::vector<transport::Received<transport::DeltaMessage>>& out) override;
   void take(std::vector<transport::Received<transport::ScheduledInputMessage>>& out) override;
   void take(std::vector<transport::Received<transport::SnapshotMessage>>& out) override;
   void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override;
+  void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override;
   Result<void> write(const transport::AckMessage& message) override;
   Result<void> write(const transport::InputMessage& message) override;
   Result<void> write(const transport::ClientStatusMessage& message) override;
@@ -89,9 +92,14 @@ class WebPort final : public transport::ClientPort {
   bool server_alive_ = false;
   transport::ParticipantId gateway_;  ///< another for each connection
   std::uint64_t connections_ = 0;
+  void set_limits();
+
+  Epoch epoch_ = 0;                                     ///< of what is open
+  std::map<std::uint32_t, transport::Limits> streams_;  ///< that are open, by id
   transport::Limits limits_;
   std::optional<transport::SessionMessage> session_;  ///< not yet taken
   std::optional<transport::ServerStatusMessage> server_status_;
+  bool status_is_new_ = false;  ///< not yet taken
   Queue<transport::DeltaMessage> deltas_;
   Queue<transport::ScheduledInputMessage> inputs_;
   Queue<transport::SnapshotMessage> snapshots_;

@@ -42,7 +42,7 @@ class DdsPorts : public ::testing::Test {
     const SessionMessage session = a_session(options_.session, kEpoch);
     EXPECT_TRUE(server.write(session));
     EXPECT_TRUE(client.open_stream(session, session.streams[0], kClient));
-    EXPECT_TRUE(client.open_snapshots());
+    EXPECT_TRUE(client.open_snapshots(0));
     EXPECT_TRUE(eventually([&] { return server.joined(client.self(), 0) && server.alive(client.self()); }));
     return session;
   }
@@ -193,7 +193,7 @@ TEST_F(DdsPorts, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
   const auto other = this->client();
   const SessionMessage session = join(*server, *owner);
   ASSERT_TRUE(other->open_stream(session, session.streams[0], kClient + 1));
-  ASSERT_TRUE(other->open_snapshots());
+  ASSERT_TRUE(other->open_snapshots(0));
   ASSERT_TRUE(eventually([&] { return server->joined(other->self(), 0); }));
   ReplyMessage reply;
   reply.client = kClient;
@@ -276,7 +276,7 @@ TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapsh
   const auto client = this->client();
   EXPECT_EQ(receive_sessions(*client)[0].message, session);
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
-  ASSERT_TRUE(client->open_snapshots());
+  ASSERT_TRUE(client->open_snapshots(0));
   const auto scheduled = receive<ScheduledInputMessage>(*client, 256);
   ASSERT_EQ(scheduled.size(), 256U) << "keep-last 256";
   for (std::size_t i = 0; i < 256; ++i) EXPECT_EQ(scheduled[i].message.number, 45 + i);
@@ -361,9 +361,9 @@ TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   ASSERT_TRUE(eventually([&] { return server->alive(id); }));
   EXPECT_FALSE(server->joined(id, 0));
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
-  ASSERT_TRUE(client->open_snapshots());
+  ASSERT_TRUE(client->open_snapshots(0));
   ASSERT_TRUE(eventually([&] { return server->joined(id, 0); }));
-  client->close_snapshots();
+  client->close_snapshots(0);
   EXPECT_TRUE(eventually([&] { return !server->joined(id, 0); }));
   client.reset();
   EXPECT_TRUE(eventually([&] { return !server->alive(id); }));
@@ -440,7 +440,7 @@ TEST_F(DdsPorts, OversizeAndMisshapenSamplesAreDroppedAndCounted) {
   session.streams[0].max_delta_bytes = 1000;
   session.streams[0].max_snapshot_bytes = 2000;
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
-  ASSERT_TRUE(client->open_snapshots());
+  ASSERT_TRUE(client->open_snapshots(0));
   ASSERT_TRUE(eventually([&] { return server->joined(client->self(), 0); }));
   ASSERT_TRUE(server->write(a_delta(kEpoch, 1, 1001)));
   DeltaMessage misshapen = a_delta(kEpoch, 2);

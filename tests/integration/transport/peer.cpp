@@ -38,7 +38,7 @@ int run_client(const DdsOptions& options, Frame last_wanted) {
     client.take_sessions(sessions);
   }
   const SessionMessage session = sessions.back().message;
-  if (!client.open_stream(session, session.streams[0], options.client) || !client.open_snapshots()) return 1;
+  if (!client.open_stream(session, session.streams[0], options.client) || !client.open_snapshots(0)) return 1;
   if (!client.write(test::an_ack(options.client, session.epoch, 0))) return 1;
   say("ready");
   Frame first = 0;

@@ -35,15 +35,19 @@ class Playground::Port final : public transport::ClientPort {
                            transport::ClientId client) override {
     return port_->open_stream(session, stream, client);
   }
-  void close_stream() override { port_->close_stream(); }
-  Result<void> open_snapshots() override { return port_->open_snapshots(); }
-  void close_snapshots() override { port_->close_snapshots(); }
+  void close_stream(std::uint32_t stream) override { port_->close_stream(stream); }
+  void close_streams() override { port_->close_streams(); }
+  Result<void> open_snapshots(std::uint32_t stream) override { return port_->open_snapshots(stream); }
+  void close_snapshots(std::uint32_t stream) override { port_->close_snapshots(stream); }
   void take(std::vector<transport::Received<transport::DeltaMessage>>& out) override { port_->take(out); }
   void take(std::vector<transport::Received<transport::ScheduledInputMessage>>& out) override {
     port_->take(out);
   }
   void take(std::vector<transport::Received<transport::SnapshotMessage>>& out) override { port_->take(out); }
   void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override { port_->take(out); }
+  void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override {
+    port_->take(out);
+  }
   Result<void> write(const transport::AckMessage& message) override { return written(message); }
   Result<void> write(const transport::InputMessage& message) override { return written(message); }
   Result<void> write(const transport::ClientStatusMessage& message) override { return written(message); }

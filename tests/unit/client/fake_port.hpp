@@ -1,6 +1,7 @@
 #pragma once
 // A client port whose other side is the test.
 
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -16,33 +17,40 @@ class FakePort : public transport::ClientPort {
   }
   void pass_over_session(transport::PassOver until) override { passed_over.push_back(until); }
   [[nodiscard]] bool server_alive() override { return alive; }
-  Result<void> open_stream(const transport::SessionMessage& session,
-                           const transport::StreamMessage& /*stream*/,
+  Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId /*client*/) override {
     opened_epochs.push_back(session.epoch);
-    stream_open = true;
+    streams_open.insert(stream.id.id);
     return {};
   }
-  void close_stream() override {
-    close_snapshots();
-    stream_open = false;
+  void close_stream(std::uint32_t stream) override {
+    close_snapshots(stream);
+    streams_open.erase(stream);
   }
-  Result<void> open_snapshots() override {
-    snapshots_open = true;
-    return {};
-  }
-  void close_snapshots() override {
-    snapshots_open = false;
+  void close_streams() override {
+    streams_open.clear();
+    snapshots_open.clear();
     snapshots.clear();
+  }
+  Result<void> open_snapshots(std::uint32_t stream) override {
+    snapshots_open.insert(stream);
+    return {};
+  }
+  void close_snapshots(std::uint32_t stream) override {
+    snapshots_open.erase(stream);
+    if (snapshots_open.empty()) snapshots.clear();
   }
   void take(std::vector<transport::Received<transport::DeltaMessage>>& out) override { move(deltas, out); }
   void take(std::vector<transport::Received<transport::ScheduledInputMessage>>& out) override {
     move(inputs, out);
   }
   void take(std::vector<transport::Received<transport::SnapshotMessage>>& out) override {
-    if (snapshots_open) move(snapshots, out);
+    if (!snapshots_open.empty()) move(snapshots, out);
   }
   void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override { move(replies, out); }
+  void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override {
+    move(server_statuses, out);
+  }
   Result<void> write(const transport::AckMessage& message) override {
     acks.push_back(message);
     return {};
@@ -59,7 +67,7 @@ class FakePort : public transport::ClientPort {
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
   bool alive = true;
-  bool stream_open = false, snapshots_open = false;
+  std::set<std::uint32_t> streams_open, snapshots_open;  ///< ids
   std::vector<transport::PassOver> passed_over;
   std::vector<Epoch> opened_epochs;
   std::vector<transport::Received<transport::SessionMessage>> sessions;
@@ -67,6 +75,7 @@ class FakePort : public transport::ClientPort {
   std::vector<transport::Received<transport::ScheduledInputMessage>> inputs;
   std::vector<transport::Received<transport::SnapshotMessage>> snapshots;
   std::vector<transport::Received<transport::ReplyMessage>> replies;
+  std::vector<transport::Received<transport::ServerStatusMessage>> server_statuses;
   std::vector<transport::AckMessage> acks;
   std::vector<transport::InputMessage> sent_inputs;
   std::vector<transport::ClientStatusMessage> statuses;

@@ -9,7 +9,7 @@ TEST_F(JoinTest, SubscribesToSnapshotsBeforeItSaysJoining) {
   start();
   port.sessions.push_back(from_server(server.session));
   poll();
-  EXPECT_TRUE(port.snapshots_open);
+  EXPECT_TRUE(!port.snapshots_open.empty());
   ASSERT_EQ(port.acks.size(), 1U);
   EXPECT_EQ(port.acks[0].phase, transport::Phase::kJoining);
   EXPECT_EQ(port.acks[0].join_attempt, 1U);
@@ -28,7 +28,7 @@ TEST_F(JoinTest, AfterTheSnapshotItFollowsTheDeltasBufferedMeanwhile) {
   poll();
   EXPECT_EQ(core->timeline()->applied(), 5U);
   EXPECT_EQ(recorder.loaded, std::vector<Frame>{3});
-  EXPECT_FALSE(port.snapshots_open);
+  EXPECT_FALSE(!port.snapshots_open.empty());
   EXPECT_EQ(port.acks.back().phase, transport::Phase::kPlaying);
   EXPECT_EQ(port.acks.back().applied, 5U);
   expect_agreed();

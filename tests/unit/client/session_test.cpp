@@ -199,13 +199,13 @@ TEST_F(SessionTest, WhatCannotBePlayedIsPassedOverAndTheNextIsLookedAt) {
 
 TEST_F(SessionTest, ARefusedClientHoldsNoReaderOfAStream) {
   join();
-  EXPECT_TRUE(port.stream_open);
+  EXPECT_TRUE(!port.streams_open.empty());
   FakeServer foreign(3000);
   foreign.session.streams[0].layout.codec = "morse";
   port.sessions.push_back({foreign.session, {{9}}});
   poll();
   EXPECT_EQ(core->phase(), ClientPhase::kRefused);
-  EXPECT_FALSE(port.stream_open) << "what comes would not be taken, and end every wait at once";
+  EXPECT_FALSE(!port.streams_open.empty()) << "what comes would not be taken, and end every wait at once";
 }
 
 TEST_F(SessionTest, AServerFromWhichNothingComesMakesRoomForAnother) {

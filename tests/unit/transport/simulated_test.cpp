@@ -86,7 +86,7 @@ struct Pair {
         client(std::move(*network.make_client("s", delta_depth))) {
     EXPECT_TRUE(server->write(session()));
     EXPECT_TRUE(open_stream(*client));
-    EXPECT_TRUE(client->open_snapshots());
+    EXPECT_TRUE(client->open_snapshots(0));
     run(100 * kMs);
     EXPECT_TRUE(server->joined(client->self(), 0));
   }
@@ -121,7 +121,7 @@ TEST(Simulated, WritersReachOnlyReadersTheyAreMatchedWith) {
   EXPECT_TRUE(server->alive(client->self()));
   EXPECT_FALSE(server->joined(client->self(), 0)) << "no snapshot reader yet";
   ASSERT_TRUE(server->write(delta(2)));
-  ASSERT_TRUE(client->open_snapshots());
+  ASSERT_TRUE(client->open_snapshots(0));
   network.advance_to(30 * kMs);
   EXPECT_TRUE(server->joined(client->self(), 0));
   EXPECT_EQ(frames(*client), range(2, 2)) << "deltas are volatile";
@@ -139,7 +139,7 @@ TEST(Simulated, DeltasAndSnapshotsOfAStreamReachOnlyThoseWhoOpenedIt) {
   ASSERT_TRUE(server->open_streams(1)) << "what is open stays";
   for (const auto& [client, stream] : {std::pair{thin.get(), 0U}, std::pair{rich.get(), 1U}}) {
     ASSERT_TRUE(client->open_stream(two, two.streams[stream], 77));
-    ASSERT_TRUE(client->open_snapshots());
+    ASSERT_TRUE(client->open_snapshots(stream));
   }
   network.advance_to(100 * kMs);
   EXPECT_TRUE(server->joined(rich->self(), 1));
@@ -184,7 +184,7 @@ TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
   ASSERT_TRUE(server->write(snapshot(1)));
   const auto client = std::move(*network.make_client("s"));
   ASSERT_TRUE(open_stream(*client));
-  ASSERT_TRUE(client->open_snapshots());
+  ASSERT_TRUE(client->open_snapshots(0));
   network.advance_to(100 * kMs);
   std::vector<Received<SessionMessage>> sessions;
   client->take_sessions(sessions);

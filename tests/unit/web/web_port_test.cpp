@@ -82,7 +82,7 @@ TEST_F(WebPortTest, MessagesOfAStreamAreTakenOnceItIsOpen) {
   ASSERT_EQ(taken.size(), 1U);
   EXPECT_EQ(taken[0].message, delta());
   EXPECT_TRUE(take<transport::DeltaMessage>(port).empty());
-  port.close_stream();
+  port.close_streams();
   ASSERT_TRUE(port.receive(envelope(delta())));
   EXPECT_TRUE(take<transport::DeltaMessage>(port).empty());
 }
@@ -94,7 +94,7 @@ TEST_F(WebPortTest, SnapshotsComeWhileTheyAreOpenAlone) {
   part.bytes.resize(3);
   ASSERT_TRUE(port.receive(envelope(part)));
   EXPECT_TRUE(take<transport::SnapshotMessage>(port).empty());
-  ASSERT_TRUE(port.open_snapshots());
+  ASSERT_TRUE(port.open_snapshots(0));
   ASSERT_TRUE(port.receive(envelope(part)));
   EXPECT_EQ(take<transport::SnapshotMessage>(port).size(), 1U);
 }

@@ -1,0 +1,235 @@
+#include "sdk/client/stream_choice.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace tandem::client {
+namespace {
+
+constexpr double kPeriodNs = 33'333'333;
+constexpr double kMs = 1e6;
+
+/// As a server announces them: a thin stream of many bits, a rich one whose step is dear.
+std::vector<StreamOffer> thin_and_rich(double thin_ms = 0.05, double rich_ms = 0.7) {
+  constexpr double kBodies = 10'000;
+  return {{.index = 0,
+           .id = {0, 0},
+           .name = "thin",
+           .is_ballistic = true,
+           .threshold = 4096,
+           .per_body_ns = thin_ms * kMs / kBodies,
+           .announced_ns = thin_ms * kMs},
+          {.index = 1,
+           .id = {1, 0},
+           .name = "rich",
+           .threshold = 4096,
+           .per_body_ns = rich_ms * kMs / kBodies,
+           .announced_ns = rich_ms * kMs}};
+}
+
+transport::ServerStatusMessage rate(std::uint32_t stream, double mbit_per_s) {
+  transport::ServerStatusMessage status;
+  status.stream = stream;
+  status.mbit_per_s = mbit_per_s;
+  return status;
+}
+
+/// A chooser and what it sees, second by second.
+class Watched {
+ public:
+  explicit Watched(const std::string& prefer = "auto", std::optional<double> own_step_ns = std::nullopt,
+                   std::vector<StreamOffer> offers = thin_and_rich())
+      : chooser(std::move(offers), read_preference(prefer), kPeriodNs, own_step_ns) {
+    static_cast<void>(chooser.reconsider({.now_ns = now_ns}));
+  }
+
+  /// Frames of the chosen stream take `thin_ms` or `rich_ms` and come at `rate_hz`. Counts the changes.
+  int pass(int seconds, double thin_ms, double rich_ms, double rate_hz = 30, double round_trip_ms = 20) {
+    int changes = 0;
+    for (int i = 0; i < seconds; ++i) {
+      const double cost_ms = name() == "thin" ? thin_ms : rich_ms;
+      for (int frame = 0; frame < static_cast<int>(rate_hz); ++frame)
+        chooser.on_frame(static_cast<std::int64_t>(cost_ms * kMs));
+      now_ns += kSecond;
+      if (chooser.reconsider(
+              {.now_ns = now_ns, .round_trip_ns = static_cast<std::int64_t>(round_trip_ms * kMs)}))
+        ++changes;
+    }
+    return changes;
+  }
+  [[nodiscard]] const std::string& name() const { return chooser.chosen().name; }
+
+  std::int64_t now_ns = 1000 * kSecond;
+  StreamChooser chooser;
+};
+
+TEST(StreamChoice, APreferenceIsReadFromText) {
+  using Kind = StreamPreference::Kind;
+  EXPECT_EQ(read_preference("").kind, Kind::kAutomatic);
+  EXPECT_EQ(read_preference("auto").kind, Kind::kAutomatic);
+  EXPECT_EQ(read_preference("bandwidth").kind, Kind::kBandwidth);
+  EXPECT_EQ(read_preference("computing").kind, Kind::kComputing);
+  EXPECT_EQ(read_preference("error").kind, Kind::kError);
+  EXPECT_EQ(read_preference("rich").kind, Kind::kNamed);
+  EXPECT_EQ(read_preference("rich").name, "rich");
+}
+
+TEST(StreamChoice, AFastMachineTakesTheFewestBits) {
+  EXPECT_EQ(Watched("auto", 5.0).name(), "rich");
+  EXPECT_EQ(Watched("bandwidth", 5.0).name(), "rich");
+  EXPECT_EQ(Watched("computing", 5.0).name(), "thin");
+}
+
+TEST(StreamChoice, ASlowMachineTakesTheCheapestStep) {
+  EXPECT_EQ(Watched("auto", 40.0).name(), "thin") << "8 times slower: 5.6 of 33 ms for the rich one";
+  EXPECT_EQ(Watched("bandwidth", 40.0).name(), "rich") << "but it keeps up";
+  EXPECT_EQ(Watched("bandwidth", 400.0).name(), "thin");
+}
+
+TEST(StreamChoice, WithoutAClockTheServersOwnCostsCount) {
+  EXPECT_EQ(measure_own_step(nullptr), std::nullopt);
+  EXPECT_EQ(measure_own_step([]() -> std::int64_t { return 77; }), std::nullopt) << "a clock that stands";
+  EXPECT_EQ(Watched("auto", std::nullopt).name(), "rich");
+  EXPECT_EQ(Watched("auto", std::nullopt, thin_and_rich(0.05, 9)).name(), "thin");
+}
+
+TEST(StreamChoice, SmallestErrorIsTakenWhereItIsWanted) {
+  auto offers = thin_and_rich();
+  offers[0].threshold = 1024;
+  EXPECT_EQ(Watched("error", 5.0, offers).name(), "thin");
+  EXPECT_EQ(Watched("auto", 5.0, offers).name(), "rich");
+}
+
+TEST(StreamChoice, ANamedStreamIsKeptWhateverItCosts) {
+  Watched watched("rich", 400.0);
+  EXPECT_EQ(watched.name(), "rich");
+  EXPECT_EQ(watched.pass(100, 1, 100), 0);
+}
+
+TEST(StreamChoice, ANameThatIsNotThereIsSaid) {
+  const Watched watched("velvet", 5.0);
+  EXPECT_EQ(watched.name(), "rich");
+  EXPECT_NE(watched.chooser.reason().find("no stream 'velvet'"), std::string::npos)
+      << watched.chooser.reason();
+}
+
+TEST(StreamChoice, AStreamThatTakesTooLongIsLeftAndNotTakenAgainSoon) {
+  Watched watched;
+  ASSERT_EQ(watched.name(), "rich");
+  EXPECT_EQ(watched.pass(2, 2, 25), 0) << "a moment is no reason";
+  EXPECT_EQ(watched.pass(2, 2, 25), 1);
+  EXPECT_EQ(watched.name(), "thin");
+  EXPECT_NE(watched.chooser.reason().find("a frame of rich takes 25.0 of 33.3 ms"), std::string::npos)
+      << watched.chooser.reason();
+  EXPECT_EQ(watched.pass(300, 2, 25), 0) << "what it took is remembered";
+}
+
+TEST(StreamChoice, AFrameNowAndThenIsNoReason) {
+  Watched watched;
+  for (int i = 0; i < 100; ++i) {
+    watched.chooser.on_frame(static_cast<std::int64_t>(90 * kMs));
+    EXPECT_EQ(watched.pass(1, 1, 1), 0);
+  }
+}
+
+TEST(StreamChoice, AFasterRateIsTakenOnceItIsKnown) {
+  Watched watched("auto", 40.0);  // thin: the other would take 5.6 ms
+  watched.chooser.on_status(rate(0, 0.3));
+  watched.chooser.on_status(rate(1, 0.07));
+  EXPECT_EQ(watched.pass(300, 1, 5.6), 0);
+  Watched wide("bandwidth", 400.0);  // thin, as the other would take 56 ms
+  EXPECT_EQ(wide.pass(300, 1, 5.6), 0);
+}
+
+TEST(StreamChoice, AStreamThatTurnsOutToTakeMoreBitsIsLeft) {
+  Watched watched;  // rich, by what its step promises
+  watched.chooser.on_status(rate(0, 0.1));
+  watched.chooser.on_status(rate(1, 0.3));
+  EXPECT_EQ(watched.pass(15, 1, 1), 0) << "not so soon";
+  EXPECT_EQ(watched.pass(15, 1, 1), 1);
+  EXPECT_EQ(watched.name(), "thin");
+  watched.chooser.on_status(rate(1, 0.09));
+  EXPECT_EQ(watched.pass(600, 1, 1), 0) << "hardly better is no reason";
+}
+
+TEST(StreamChoice, AThinLinkGetsFewerBits) {
+  Watched watched("computing");
+  ASSERT_EQ(watched.name(), "thin");
+  EXPECT_EQ(watched.pass(10, 1, 1), 0);
+  EXPECT_EQ(watched.pass(10, 1, 1, 15), 0) << "a server that is slow, or waits for others";
+  EXPECT_EQ(watched.pass(10, 1, 1, 15, 400), 1) << "what is sent waits on the way";
+  EXPECT_EQ(watched.name(), "rich");
+  EXPECT_NE(watched.chooser.reason().find("too thin for thin"), std::string::npos);
+}
+
+TEST(StreamChoice, ALinkThatFlapsBringsFewChanges) {
+  Watched watched("computing");
+  int changes = 0;
+  for (int minute = 0; minute < 60; ++minute) {
+    watched.chooser.on_loss(watched.now_ns);
+    watched.chooser.on_loss(watched.now_ns);
+    changes += watched.pass(60, 1, 1);
+  }
+  EXPECT_LE(changes, 12) << "in an hour";
+  EXPECT_GE(changes, 1);
+}
+
+TEST(StreamChoice, AJoinThatTakesLongTriesFewerBits) {
+  Watched watched("computing");
+  const auto joining = [&](int seconds) {
+    for (int i = 0; i < seconds; ++i) {
+      watched.now_ns += kSecond;
+      if (watched.chooser.reconsider({.now_ns = watched.now_ns, .joining_since_ns = 1000 * kSecond}))
+        return true;
+    }
+    return false;
+  };
+  EXPECT_FALSE(joining(9));
+  EXPECT_TRUE(joining(2));
+  EXPECT_EQ(watched.name(), "rich");
+  EXPECT_FALSE(joining(50)) << "nothing has fewer";
+}
+
+TEST(StreamChoice, AChangeThatWasGivenUpIsNotTriedAgainAtOnce) {
+  Watched watched;
+  ASSERT_EQ(watched.pass(4, 2, 25), 1);
+  watched.chooser.gave_up(watched.now_ns);
+  EXPECT_EQ(watched.name(), "rich");
+  EXPECT_EQ(watched.pass(50, 2, 25), 0);
+  EXPECT_GE(watched.pass(20, 2, 25), 1);
+}
+
+transport::SessionMessage two_streams(const std::string& scene) {
+  transport::SessionMessage session;
+  session.capacity = 10'000;
+  session.scene_description = scene;
+  session.streams.resize(2);
+  session.streams[0].layout.predictor = "ballistic";
+  session.streams[1].id.id = 1;
+  session.streams[1].client_cost_ns = 70;
+  session.streams[1].layout.predictor = "field";
+  return session;
+}
+
+TEST(StreamChoice, NamesComeFromTheScenesText) {
+  const auto offers = list_offers(two_streams("stream_names: \"thin\"\nstream_names: \"rich\"\n"), {1});
+  ASSERT_EQ(offers.size(), 1U);
+  EXPECT_EQ(offers[0].name, "rich");
+  EXPECT_EQ(offers[0].index, 1U);
+  EXPECT_EQ(offers[0].announced_ns, 700'000);
+  EXPECT_FALSE(offers[0].is_ballistic);
+}
+
+TEST(StreamChoice, StreamsWithoutANameHaveTheirNumber) {
+  for (const char* scene : {"", "stream_names: \"\"", "stream_names: {", "stream_names: 7 {"}) {
+    const auto offers = list_offers(two_streams(scene), {0, 1});
+    ASSERT_EQ(offers.size(), 2U);
+    EXPECT_EQ(offers[0].name, "0") << scene;
+    EXPECT_EQ(offers[1].name, "1") << scene;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::client
