@@ -1,7 +1,9 @@
 #include "services/tool/top_view.hpp"
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <array>
+#include <iterator>
 
 #include <nlohmann/json.hpp>
 
@@ -28,6 +30,7 @@ double share_percent(const transport::ServerStatusMessage& s) {
 
 Json json_of(const transport::ServerStatusMessage& s) {
   return {{"session", s.session},
+          {"stream", s.stream},
           {"epoch", s.epoch},
           {"frame", s.frame},
           {"uptime_s", s.uptime_s},
@@ -60,6 +63,7 @@ Json json_of(const transport::ServerStatusMessage& s) {
 Json json_of(const transport::ClientStatusMessage& c) {
   return {{"client", fmt::format("{:016x}", c.client)},
           {"session", c.session},
+          {"stream", c.stream.id},
           {"epoch", c.epoch},
           {"applied", c.applied},
           {"role", role_word(c.role)},
@@ -74,6 +78,32 @@ Json json_of(const transport::ClientStatusMessage& c) {
           {"inputs_sent", c.inputs_sent},
           {"inputs_refused", c.inputs_refused},
           {"queue_high_water", c.queue_high_water}};
+}
+
+bool played(const transport::ServerStatusMessage& s) { return s.participants + s.observers > 0; }
+
+/// A session's status: what its streams share, sums of what is each one's, and them all. The rates of a
+/// stream that nobody plays are those of a time when somebody did, and do not count.
+template <class Streams>
+Json json_of_session(Streams first, Streams last) {
+  transport::ServerStatusMessage sum = first->second.status;
+  Json streams = Json::array({json_of(sum)});
+  for (auto stream = std::next(first); stream != last; ++stream) {
+    const transport::ServerStatusMessage& s = stream->second.status;
+    streams.push_back(json_of(s));
+    if (played(s)) {
+      sum.mbit_per_s = s.mbit_per_s + (played(sum) ? sum.mbit_per_s : 0);
+      sum.corrected_per_frame = s.corrected_per_frame + (played(sum) ? sum.corrected_per_frame : 0);
+    }
+    sum.participants += s.participants;
+    sum.observers += s.observers;
+    sum.delta_bytes += s.delta_bytes;
+    sum.snapshot_bytes += s.snapshot_bytes;
+    sum.snapshots += s.snapshots;
+  }
+  Json session = json_of(sum);
+  session["streams"] = std::move(streams);
+  return session;
 }
 
 /// In at most five characters.
@@ -100,9 +130,9 @@ std::string printable(const std::string& text) {
 }  // namespace
 
 void TopView::update(const transport::ServerStatusMessage& status, std::int64_t now_ns) {
-  if (!shown(status.session) || (sessions_.size() >= kMostShown && !sessions_.contains(status.session)))
-    return;
-  sessions_[status.session] = {status, now_ns};
+  const StreamKey key{status.session, status.stream};
+  if (!shown(status.session) || (streams_.size() >= kMostShown && !streams_.contains(key))) return;
+  streams_[key] = {status, now_ns};
 }
 
 void TopView::update(const transport::ClientStatusMessage& status, std::int64_t now_ns) {
@@ -112,13 +142,24 @@ void TopView::update(const transport::ClientStatusMessage& status, std::int64_t 
 
 void TopView::forget_silent(std::int64_t now_ns) {
   const auto silent = [now_ns](const auto& entry) { return now_ns - entry.second.at_ns > kSilenceNs; };
-  std::erase_if(sessions_, silent);
+  std::erase_if(streams_, silent);
   std::erase_if(clients_, silent);
+}
+
+bool TopView::several(const std::string& session) const {
+  const auto first = streams_.lower_bound({session, 0});
+  return first != streams_.end() && std::next(first) != streams_.end() &&
+         std::next(first)->first.first == session;
 }
 
 std::string TopView::to_json() const {
   Json sessions = Json::array();
-  for (const auto& [name, heard] : sessions_) sessions.push_back(json_of(heard.status));
+  for (auto first = streams_.begin(); first != streams_.end();) {
+    const auto last = std::find_if(
+        first, streams_.end(), [&](const auto& entry) { return entry.first.first != first->first.first; });
+    sessions.push_back(json_of_session(first, last));
+    first = last;
+  }
   Json clients = Json::array();
   for (const auto& [id, heard] : clients_) clients.push_back(json_of(heard.status));
   return Json{{"sessions", sessions}, {"clients", clients}}.dump(-1, ' ', false,
@@ -131,11 +172,12 @@ std::string TopView::to_table() const {
       fmt::format("{:<20} {:>9} {:>6} {:>8} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}  {:<20} {}\n",
                   "SESSION", "FRAME", "HZ", "BODIES", "AT REST", "MBIT/S (OF RAW)", "CORRECTED", "FRAME MS",
                   "CLIENTS", "WINDOW", "STALLS", "DELTA REPLY IN SNAP", "CODEC, PREDICTOR, THRESHOLD");
-  for (const auto& [name, heard] : sessions_) {
+  for (const auto& [key, heard] : streams_) {
     const transport::ServerStatusMessage& s = heard.status;
     text += fmt::format(
         "{:<20} {:>9} {:>6.1f} {:>8} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {:<20} {}, {}, {:.3g}\n",
-        printable(s.session), s.frame, s.frame_rate_hz, s.bodies, s.at_rest,
+        several(s.session) ? fmt::format("{}/{}", printable(s.session), s.stream) : printable(s.session),
+        s.frame, s.frame_rate_hz, s.bodies, s.at_rest,
         fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
         s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls,
         fmt::format("{} {} {} {}", short_bytes(s.delta_bytes), short_bytes(s.reply_bytes),

@@ -22,8 +22,9 @@ class TopView {
   void update(const transport::ClientStatusMessage& status, std::int64_t now_ns);
   void forget_silent(std::int64_t now_ns);
 
-  [[nodiscard]] bool empty() const { return sessions_.empty() && clients_.empty(); }
-  /// {"sessions": [...], "clients": [...]}, one line; fields as in the status topics.
+  [[nodiscard]] bool empty() const { return streams_.empty() && clients_.empty(); }
+  /// {"sessions": [...], "clients": [...]}, one line; fields as in the status topics, of a session's streams
+  /// together, and "streams" with those of each.
   [[nodiscard]] std::string to_json() const;
   [[nodiscard]] std::string to_table() const;
 
@@ -36,7 +37,11 @@ class TopView {
   [[nodiscard]] bool shown(const std::string& session) const { return !only_ || *only_ == session; }
 
   std::optional<std::string> only_;
-  std::map<std::string, Heard<transport::ServerStatusMessage>> sessions_;
+  /// Name of the session, number of the stream.
+  using StreamKey = std::pair<std::string, std::uint32_t>;
+  [[nodiscard]] bool several(const std::string& session) const;
+
+  std::map<StreamKey, Heard<transport::ServerStatusMessage>> streams_;
   std::map<transport::ClientId, Heard<transport::ClientStatusMessage>> clients_;
 };
 
