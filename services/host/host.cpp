@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <utility>
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/host/audience.hpp"
 #include "services/host/claim.hpp"
 #include "services/host/inputs.hpp"
 #include "services/host/joins.hpp"
@@ -53,26 +55,41 @@ Result<void> check(const ServiceConfig& config) {
 
 Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
   if (auto good = check(config); !good) return good;
-  if (config.stream.layout.lead > 1) return refuse("lead must be 0 or 1");
-  if (config.types.size() != config.stream.layout.type_count)
-    return refuse(
-        fmt::format("{} body types, {} described", config.stream.layout.type_count, config.types.size()));
+  if (auto good = check_stream_names(config.streams); !good) return good;
+  const Layout& layout = config.streams.front().layout;
+  for (const StreamConfig& stream : config.streams) {
+    if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
+    if (stream.layout.lead != layout.lead) return refuse("all streams of a session have one lead");
+  }
+  if (config.types.size() != layout.type_count)
+    return refuse(fmt::format("{} body types, {} described", layout.type_count, config.types.size()));
   static_assert(engine::kMaxBodies == kMaxCapacity);
   const std::uint32_t capacity = simulation.capacity();
-  if (capacity != config.stream.layout.capacity)
-    return refuse(fmt::format("{} slots for a simulation of {}", config.stream.layout.capacity, capacity));
+  if (capacity != layout.capacity)
+    return refuse(fmt::format("{} slots for a simulation of {}", layout.capacity, capacity));
   return {};
+}
+
+// Names by id, of a source that has none of its own the numbers.
+std::vector<std::string> names_of(std::size_t streams, const LiveSource* live) {
+  std::vector<std::string> names;
+  for (std::uint32_t id = 0; id < streams; ++id)
+    names.push_back(live != nullptr ? live->config(id).name : std::to_string(id));
+  return names;
 }
 
 }  // namespace
 
 struct Host::Impl {
-  Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames, transport::ServerPort& endpoints)
+  Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames, LiveSource* simulated,
+       transport::ServerPort& endpoints)
       : config(std::move(configuration)),
         port(&endpoints),
         source(std::move(frames)),
+        live(simulated),
         outbox(config.outbox),
         roster({.epoch = config.epoch,
+                .streams = names_of(source->session().streams.size(), live),
                 .client_limit = config.client_limit,
                 .participant_limit = config.participant_limit,
                 .stall_timeout_ns = config.stall_timeout_ns,
@@ -81,11 +98,19 @@ struct Host::Impl {
         inputs(config.epoch, *source, outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
-        pacing(config.frame_rate_hz, config.free_rate),
-        status(config.session, config.epoch, outbox) {
+        pacing(config.frame_rate_hz, config.free_rate) {
+    const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
+    const std::vector<std::string> names = names_of(streams, live);
+    for (std::uint32_t id = 0; id < streams; ++id) {
+      lanes.emplace_back(id, config, outbox);
+      lanes.back().totals.name = names[id];
+    }
     report.frame = source->frame();
-    report.hash = source->hash();
+    report.deltas.reserve(streams);
   }
+
+  static Result<std::unique_ptr<Host>> create(ServiceConfig config, std::unique_ptr<FrameSource> source,
+                                              LiveSource* live, transport::ServerPort& port);
 
   // --- What the rules see ---
   [[nodiscard]] Roster::Now moment() const {
@@ -99,9 +124,13 @@ struct Host::Impl {
   [[nodiscard]] std::int64_t frame_awaited_until_ns() const {
     return state == State::kRunning ? pacing.suspended_from_ns() + pacing.period_ns() : INT64_MIN;
   }
-  [[nodiscard]] const Layout& layout() const { return source->session().streams[0].layout; }
-  [[nodiscard]] double threshold_m() const {
-    return source->parameters().codec.threshold * source->session().lattice_unit;
+  [[nodiscard]] double threshold_m(std::uint32_t stream) const {
+    return source->parameters(stream).codec.threshold * source->session().lattice_unit;
+  }
+  [[nodiscard]] std::uint32_t first_made() const {
+    std::uint32_t stream = 0;
+    while (!source->active()[stream]) ++stream;
+    return stream;
   }
   [[nodiscard]] std::int64_t clock() const { return config.clock_ns == nullptr ? 0 : config.clock_ns(); }
 
@@ -111,36 +140,49 @@ struct Host::Impl {
   void charge_waiting();
   void receive();
   void look_around();
-  bool advance_if_due(bool snapshot_due);
-  void make_snapshot();
+  [[nodiscard]] StreamSet snapshots_due();
+  bool advance_if_due(StreamSet snapshots_due);
+  void choose_streams(StreamSet joined);
+  void make_snapshots(StreamSet due);
   void publish_status();
   void plan_wake();
 
   void digest(const transport::Received<transport::AckMessage>& ack);
   void digest(const transport::Received<transport::InputMessage>& input);
-  bool produce_frame(bool snapshot_due);
+  bool produce_frame(StreamSet snapshots_due);
   [[nodiscard]] HostTotals totals_now() const;
   void note(std::string notice);
   void note_foreigner(transport::ClientId client);
   void note_mishaps();
-  void note_target();
+  void refuse_stream(const transport::Received<transport::AckMessage>& ack);
+  void note_target(std::uint32_t stream);
+
+  // What each stream has of its own.
+  struct Lane {
+    Lane(std::uint32_t stream, const ServiceConfig& config, Outbox& outbox)
+        : joins(stream), transfer(outbox), status(config.session, stream, config.epoch, outbox) {}
+    JoinDesk joins;
+    SnapshotTransfer transfer;
+    StatusDesk status;
+    StreamTotals totals;
+    bool out_of_reach = false;  // of its target of quality
+  };
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
 
   ServiceConfig config;
   transport::ServerPort* port;
   std::unique_ptr<FrameSource> source;
-  LiveSource* live = nullptr;  // the same, where a simulation runs
+  LiveSource* live;  // the same, where a simulation runs
   Outbox outbox;
   Roster roster;
   InputDesk inputs;
-  JoinDesk joins;
-  SnapshotTransfer transfer{outbox};
+  Audience audience;
+  std::deque<Lane> lanes;
   ReplyDesk replies;
   Claim claim;
   Pacing pacing;
   PublishTimes times;
-  StatusDesk status;
 
   State state = State::kClaiming;
   std::optional<Error> error;
@@ -166,7 +208,7 @@ struct Host::Impl {
 bool Host::Impl::poll() {
   if (!first_poll_ns) {
     first_poll_ns = now_ns;
-    status.start(now_ns);
+    for (Lane& lane : lanes) lane.status.start(now_ns);
   }
   bool produced = false;
   if (state == State::kClaiming) claim_name();
@@ -175,10 +217,10 @@ bool Host::Impl::poll() {
     receive();
     look_around();
     roster.refresh(moment());
-    const bool snapshot_due = joins.due(roster, *port, transfer, now_ns);
-    produced = advance_if_due(snapshot_due);
-    if (snapshot_due && (produced || now_ns >= frame_awaited_until_ns())) make_snapshot();
-    transfer.send(roster.accounts(), now_ns);
+    const StreamSet due = snapshots_due();
+    produced = advance_if_due(due);
+    if (due.any() && (produced || now_ns >= frame_awaited_until_ns())) make_snapshots(due);
+    for (Lane& lane : lanes) lane.transfer.send(roster.accounts(), now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
   }
@@ -226,12 +268,24 @@ void Host::Impl::receive() {
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
   claim.acknowledged(ack.message.epoch, ack.from, now_ns);
   const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
-  if (reason == Reason::kNone) return transfer.acknowledged(ack.message, now_ns);
+  if (reason == Reason::kNone) {
+    for (Lane& lane : lanes) lane.transfer.acknowledged(ack.message, now_ns);
+    return;
+  }
   ++totals.refused_messages;
+  if (reason == Reason::kNoStream) refuse_stream(ack);
   if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
   if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
     replies.refuse(ack.message.client, reason, now_ns, wall_ns);
   }
+}
+
+void Host::Impl::refuse_stream(const transport::Received<transport::AckMessage>& ack) {
+  Reason reason = Reason::kNone;
+  Account* const account = roster.find(ack.message.client, ack.from, reason);
+  if (account == nullptr) return replies.refuse(ack.message.client, Reason::kNoStream, now_ns, wall_ns);
+  account->reply.once = Reason::kNoStream;
+  account->reply.schedule.on_change();
 }
 
 void Host::Impl::digest(const transport::Received<transport::InputMessage>& input) {
@@ -262,7 +316,7 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
 
 void Host::Impl::note_mishaps() {
   engine::Mishaps now = live->simulation().mishaps();
-  const engine::Mishaps shown = live->stream().mishaps();
+  const engine::Mishaps shown = live->mirror().mishaps();
   now.removed += shown.removed;
   now.clamped += shown.clamped;
   if (now == noted_mishaps || now_ns - last_mishap_note_ns < kSecond) return;
@@ -272,15 +326,37 @@ void Host::Impl::note_mishaps() {
                    now.removed, now.clamped));
 }
 
-void Host::Impl::note_target() {
-  const Stream& stream = live->stream();
-  const QualityGoal& goal = *stream.config().quality;
-  if (!stream.target_out_of_reach()) {
-    note(fmt::format("the target of {} Mbit/s is kept again", goal.target_mbit_per_s));
+void Host::Impl::note_target(std::uint32_t stream) {
+  const Stream* const made = live->stream(stream);
+  if (made->target_out_of_reach() == lanes[stream].out_of_reach) return;
+  lanes[stream].out_of_reach = made->target_out_of_reach();
+  const StreamConfig& of = made->config();
+  const std::string which = of.name.empty() ? std::string() : " of stream " + of.name;
+  if (!made->target_out_of_reach()) {
+    note(fmt::format("the target of {} Mbit/s{} is kept again", of.quality->target_mbit_per_s, which));
     return;
   }
-  note(fmt::format("the target of {} Mbit/s is exceeded even at the largest threshold, {:.3g} m",
-                   goal.target_mbit_per_s, goal.largest_threshold * stream.config().lattice.unit));
+  note(fmt::format("the target of {} Mbit/s{} is exceeded even at the largest threshold, {:.3g} m",
+                   of.quality->target_mbit_per_s, which, of.quality->largest_threshold * of.lattice.unit));
+}
+
+StreamSet Host::Impl::snapshots_due() {
+  StreamSet due;
+  for (std::uint32_t id = 0; id < lanes.size(); ++id)
+    due[id] = lanes[id].joins.due(roster, *port, lanes[id].transfer, now_ns);
+  return due;
+}
+
+// Of a stream that ends nothing is left to be sent.
+void Host::Impl::choose_streams(StreamSet joined) {
+  const StreamSet before = source->active();
+  source->set_active(audience.wanted(roster, now_ns) | joined);
+  const StreamSet ended = before & ~source->active();
+  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
+    if (!ended[id]) continue;
+    lanes[id].transfer.end();
+    lanes[id].out_of_reach = false;
+  }
 }
 
 void Host::Impl::look_around() {
@@ -292,7 +368,7 @@ void Host::Impl::look_around() {
   if (error) state = State::kRefused;
 }
 
-bool Host::Impl::advance_if_due(bool snapshot_due) {
+bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
   if (state == State::kWaiting && roster.counted() >= config.wait_for) {
     state = State::kRunning;
     pacing.start(now_ns);
@@ -310,50 +386,69 @@ bool Host::Impl::advance_if_due(bool snapshot_due) {
   pacing.frame_started(now_ns, config.free_rate ? stalled : held);
   held = false;
   stalled = false;
-  return produce_frame(snapshot_due);
+  return produce_frame(snapshots_due);
 }
 
-bool Host::Impl::produce_frame(bool snapshot_due) {
+bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   roster.frame_starts(moment());
+  choose_streams({});
   const std::int64_t start = clock();
-  const bool was_out_of_reach = live != nullptr && live->stream().target_out_of_reach();
-  const auto frame = source->next(snapshot_due, outbox);
+  const auto frame = source->next(snapshots_due, outbox);
   if (!frame) {
     state = State::kEnded;
     if (live != nullptr) error = live->error();
     return false;
   }
   const std::int64_t produced = clock();
-  push_delta(outbox, config.epoch, *frame, wall_ns + (produced - start));
+  push_frame(outbox, config.epoch, *frame, wall_ns + (produced - start));
   times.published(frame->frame, now_ns);
-  if (live != nullptr) {
-    if (live->stream().target_out_of_reach() != was_out_of_reach) note_target();
-    note_mishaps();
+  if (live != nullptr) note_mishaps();
+  report.frame = frame->frame;
+  report.frame_ms = static_cast<double>(produced - start) * 1e-6;
+  report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
+  report.deltas.clear();
+  for (const FrameSource::MadeDelta& made : frame->deltas) {
+    report.deltas.push_back({made.stream, made.hash, made.payload.size(), made.corrected});
+    StreamTotals& of_stream = lanes[made.stream].totals;
+    ++of_stream.frames;
+    of_stream.payload_bytes += made.payload.size();
+    of_stream.corrected += made.corrected;
+    if (live != nullptr) note_target(made.stream);
   }
-  report = {.frame = frame->frame,
-            .hash = frame->hash,
-            .payload_bytes = frame->payload.size(),
-            .corrected = frame->corrected,
-            .frame_ms = static_cast<double>(produced - start) * 1e-6,
-            .step_ms = static_cast<double>(frame->step_ns) * 1e-6};
   ++totals.frames;
-  totals.payload_bytes += report.payload_bytes;
-  totals.corrected += report.corrected;
   frame_durations.add(produced - start);
-  status.frame_took(produced - start);
+  for (Lane& lane : lanes) lane.status.frame_took(produced - start);
   return true;
 }
 
-void Host::Impl::make_snapshot() {
-  source->snapshot(snapshot);
-  transfer.start(config.epoch, {}, source->frame(), snapshot, joins.ready(), now_ns);
-  joins.served(roster, now_ns);
-  ++totals.snapshots;
+void Host::Impl::make_snapshots(StreamSet due) {
+  choose_streams(due);
+  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
+    if (!due[id]) continue;
+    Lane& lane = lanes[id];
+    source->snapshot(id, snapshot);
+    lane.transfer.start(config.epoch, {.id = id, .generation = 0}, source->frame(), snapshot,
+                        lane.joins.ready(), now_ns);
+    lane.joins.served(roster, now_ns);
+    ++lane.totals.snapshots;
+  }
 }
 
 HostTotals Host::Impl::totals_now() const {
   HostTotals now = totals;
-  now.snapshot_bytes = transfer.bytes();
+  const StreamSet active = source->active();
+  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
+    StreamTotals stream = lanes[id].totals;
+    stream.made = active[id];
+    stream.snapshot_bytes = lanes[id].transfer.bytes();
+    stream.participants = roster.counted(id);
+    stream.observers = roster.watching(id);
+    now.corrected += stream.corrected;
+    now.payload_bytes += stream.payload_bytes;
+    now.snapshots += stream.snapshots;
+    now.snapshot_bytes += stream.snapshot_bytes;
+    now.streams.push_back(std::move(stream));
+  }
   now.reply_bytes = outbox.traffic().replies;
   now.input_bytes = outbox.traffic().scheduled_inputs;
   now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
@@ -367,18 +462,24 @@ HostTotals Host::Impl::totals_now() const {
 }
 
 void Host::Impl::publish_status() {
-  if (!status.due(now_ns)) return;
-  status.publish(totals_now(),
-                 {.frame = source->frame(),
-                  .bodies = source->agreed().alive_count(),
-                  .at_rest = source->agreed().rest_count(),
-                  .participants = roster.counted(),
-                  .observers = roster.watching(),
-                  .window = roster.window(),
-                  .threshold_m = threshold_m(),
-                  .codec = layout().codec,
-                  .predictor = layout().predictor},
-                 now_ns);
+  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
+    if (!lanes[id].status.due(now_ns)) continue;
+    const HostTotals now = totals_now();
+    const Layout& layout = source->session().streams[id].layout;
+    const bool made = source->active()[id];
+    lanes[id].status.publish(now,
+                             {.frame = source->frame(),
+                              .bodies = source->agreed(first_made()).alive_count(),
+                              .at_rest = made ? source->agreed(id).rest_count() : 0,
+                              .participants = now.streams[id].participants,
+                              .observers = now.streams[id].observers,
+                              .window = roster.window(),
+                              .made = made,
+                              .threshold_m = threshold_m(id),
+                              .codec = layout.codec,
+                              .predictor = layout.predictor},
+                             now_ns);
+  }
 }
 
 void Host::Impl::plan_wake() {
@@ -392,10 +493,12 @@ void Host::Impl::plan_wake() {
       at(std::max(now_ns, pacing.suspended_from_ns()) + *left + kMillisecond);
     }
   }
-  if (const auto due = joins.due_ns(transfer, now_ns))
-    at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
+  for (const Lane& lane : lanes) {
+    if (const auto due = lane.joins.due_ns(lane.transfer, now_ns))
+      at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
+  }
   for (const auto& [id, account] : roster.accounts()) {
-    const bool unmatched = account.present && account.phase == transport::Phase::kJoining;
+    const bool unmatched = joined_stream(account).has_value();
     if (unmatched || account.reply.schedule.changed()) at(now_ns + kShortWakeNs);
   }
   wake_ns = std::max(wake_ns, now_ns);
@@ -404,28 +507,26 @@ void Host::Impl::plan_wake() {
 Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation& simulation,
                                            transport::ServerPort& port) {
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
-  const auto drive = to_drive(config.stream.lattice, simulation.gravity(), simulation.damping_per_s());
-  if (!drive) return tl::unexpected(drive.error());
-  auto stream = Stream::create(config.stream, {.bodies = simulation.bodies(),
-                                               .drive = *drive,
-                                               .epoch = config.epoch,
-                                               .frame = config.start_frame,
-                                               .frame_rate_hz = config.frame_rate_hz});
-  if (!stream) return tl::unexpected(stream.error());
-  auto source = std::make_unique<LiveSource>(config, simulation, std::move(*stream));
-  LiveSource* const live = source.get();
-  return create(std::move(config), std::move(source), port).map([live](std::unique_ptr<Host> host) {
-    host->impl_->live = live;
-    return host;
-  });
+  auto source = LiveSource::create(config, simulation);
+  if (!source) return tl::unexpected(source.error());
+  LiveSource* const live = source->get();
+  return Impl::create(std::move(config), std::move(*source), live, port);
 }
 
 Result<std::unique_ptr<Host>> Host::create(ServiceConfig config, std::unique_ptr<FrameSource> source,
                                            transport::ServerPort& port) {
+  return Impl::create(std::move(config), std::move(source), nullptr, port);
+}
+
+Result<std::unique_ptr<Host>> Host::Impl::create(ServiceConfig config, std::unique_ptr<FrameSource> source,
+                                                 LiveSource* live, transport::ServerPort& port) {
   if (auto good = check(config); !good) return tl::unexpected(good.error());
   if (auto good = transport::check_announcement(source->session()); !good)
     return tl::unexpected(good.error());
-  return std::unique_ptr<Host>(new Host(std::make_unique<Impl>(std::move(config), std::move(source), port)));
+  const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
+  if (auto opened = port.open_streams(streams); !opened) return tl::unexpected(opened.error());
+  return std::unique_ptr<Host>(
+      new Host(std::make_unique<Impl>(std::move(config), std::move(source), live, port)));
 }
 
 Host::Host(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -446,16 +547,21 @@ Result<Frame> Host::inject(const engine::Input& input) {
   if (impl_->live == nullptr) return fail(ErrorCode::kUnsupported, "nothing is simulated here");
   return impl_->live->inject(input, impl_->outbox);
 }
-Result<void> Host::set_parameters(const StreamParameters& parameters) {
+Result<void> Host::set_parameters(const StreamParameters& parameters, std::uint32_t stream) {
   if (impl_->live == nullptr) return fail(ErrorCode::kUnsupported, "nothing is simulated here");
-  return impl_->live->stream().set_parameters(parameters);
+  Stream* const made = impl_->live->stream(stream);
+  if (made == nullptr) return fail(ErrorCode::kOutOfOrder, "nobody plays this stream");
+  return made->set_parameters(parameters);
 }
-const StreamParameters& Host::parameters() const { return impl_->source->parameters(); }
-double Host::threshold_m() const { return impl_->threshold_m(); }
+const StreamParameters& Host::parameters(std::uint32_t stream) const {
+  return impl_->source->parameters(stream);
+}
+double Host::threshold_m(std::uint32_t stream) const { return impl_->threshold_m(stream); }
+std::uint32_t Host::first_made() const { return impl_->first_made(); }
 const transport::SessionMessage& Host::session() const { return impl_->source->session(); }
 Frame Host::frame() const { return impl_->source->frame(); }
-const tandem::State& Host::agreed() const { return impl_->source->agreed(); }
-std::uint64_t Host::hash() const { return impl_->report.hash; }
+const tandem::State& Host::agreed() const { return impl_->source->agreed(impl_->first_made()); }
+std::uint64_t Host::hash() const { return impl_->source->hash(impl_->first_made()); }
 std::uint32_t Host::window() const { return impl_->roster.window(); }
 std::uint32_t Host::participants() const { return impl_->roster.counted(); }
 std::uint32_t Host::observers() const { return impl_->roster.watching(); }

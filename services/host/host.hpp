@@ -1,5 +1,5 @@
 #pragma once
-// The host: drives a full simulation, or whatever else frames come from, publishes its stream, and answers
+// The host: drives a full simulation, or whatever else frames come from, publishes its streams, and answers
 // its clients. All rules of behaviour over time (idl/STATES.md) live behind it; it owns no thread, reads no
 // clock and writes to no socket.
 
@@ -43,8 +43,9 @@ struct ServiceConfig {
 /// The same with a simulation that runs.
 struct HostConfig : ServiceConfig {
   Frame start_frame = 0;
-  /// Of all bodies; layout.capacity is the simulation's, its lead 0 or 1.
-  StreamConfig stream;
+  /// 1 to 8 ways of telling all bodies, of one lattice and one lead, 0 or 1; layout.capacity is the
+  /// simulation's. Several have names, each its own; clients of no preference play the first.
+  std::vector<StreamConfig> streams;
 
   std::string scene;
   std::string scene_description;
@@ -52,16 +53,31 @@ struct HostConfig : ServiceConfig {
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
 };
 
-/// One frame that was just produced.
-struct FrameReport {
-  Frame frame = 0;
+/// A stream's share of a frame.
+struct DeltaReport {
+  std::uint32_t stream = 0;
   std::uint64_t hash = 0;
   std::size_t payload_bytes = 0;
   std::uint32_t corrected = 0;
+};
+
+/// One frame that was just produced.
+struct FrameReport {
+  Frame frame = 0;
+  std::vector<DeltaReport> deltas;   ///< of each stream that was made, ascending
   double frame_ms = 0, step_ms = 0;  ///< whole frame (step, quantise, predict, encode, apply); engine alone
 };
 
-/// Counts since the start.
+/// Counts of one stream since the start.
+struct StreamTotals {
+  std::string name;
+  bool made = false;  ///< now
+  std::uint64_t frames = 0, corrected = 0, payload_bytes = 0;
+  std::uint64_t snapshots = 0, snapshot_bytes = 0;
+  std::uint32_t participants = 0, observers = 0;  ///< now
+};
+
+/// Counts since the start, of all streams together where streams differ.
 struct HostTotals {
   std::uint64_t frames = 0, corrected = 0;
   std::uint64_t payload_bytes = 0, snapshot_bytes = 0;  ///< of the deltas and snapshots themselves
@@ -70,6 +86,7 @@ struct HostTotals {
   std::uint64_t suspended_ms = 0;  ///< waiting past due, for participants or for the queue
   std::uint64_t refused_inputs = 0, refused_messages = 0, snapshots = 0, demotions = 0, clients_seen = 0;
   double frame_ms_p50 = 0, frame_ms_p99 = 0;
+  std::vector<StreamTotals> streams;  ///< in the order of their ids
 };
 
 /// Drives one session. Call poll() from one thread, whenever something arrived and at the latest at
@@ -119,13 +136,17 @@ class Host {
 
   /// What decoder and predicted step read (threshold, quantisation steps, gains, decay): see
   /// Stream::set_parameters(); kUnsupported without a simulation.
-  [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
-  [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
-  [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units
+  /// kOutOfOrder while the stream is not made.
+  [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters, std::uint32_t stream = 0);
+  /// Of a stream's next frame.
+  [[nodiscard]] const StreamParameters& parameters(std::uint32_t stream = 0) const;
+  [[nodiscard]] double threshold_m(std::uint32_t stream = 0) const;  ///< of the next frame, scene units
 
   [[nodiscard]] const transport::SessionMessage& session() const;
-  [[nodiscard]] Frame frame() const;                  ///< of the last delta
-  [[nodiscard]] const tandem::State& agreed() const;  ///< client state at frame()
+  [[nodiscard]] Frame frame() const;  ///< of the last delta
+  /// The first stream that is made: there is always one.
+  [[nodiscard]] std::uint32_t first_made() const;
+  [[nodiscard]] const tandem::State& agreed() const;  ///< client state at frame(), of first_made()
   [[nodiscard]] std::uint64_t hash() const;           ///< of agreed()
   [[nodiscard]] std::uint32_t window() const;         ///< in force
   [[nodiscard]] std::uint32_t participants() const;   ///< playing and waited for

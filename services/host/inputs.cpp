@@ -19,8 +19,7 @@ bool well_formed(const transport::InputMessage& input) {
 
 // A client that was handed a snapshot and sends input plays already, whichever topic is faster.
 bool may_play(const Account& account) {
-  return account.phase == transport::Phase::kPlaying ||
-         (account.join.served && account.join.served_attempt == account.attempt);
+  return account.phase == transport::Phase::kPlaying || was_served(account);
 }
 
 }  // namespace

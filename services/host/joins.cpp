@@ -3,21 +3,14 @@
 #include <algorithm>
 
 namespace tandem::host {
-namespace {
-
-bool wants(const Account& account) {
-  return !account.join.served || account.join.served_attempt != account.attempt;
-}
-
-}  // namespace
 
 bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
                    std::int64_t now_ns) {
   ready_.clear();
   for (const auto& [id, account] : roster.accounts()) {
-    if (!joins(account) || !wants(account) || transfer.serves(id, now_ns)) continue;
+    if (joined_stream(account) != stream_ || was_served(account) || transfer.serves(id, now_ns)) continue;
     if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
-    if (port.joined(account.from, 0)) ready_.push_back(id);
+    if (port.joined(account.from, stream_)) ready_.push_back(id);
   }
   if (ready_.empty()) {
     collecting_since_ns_.reset();
@@ -33,7 +26,7 @@ void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
     const auto known = roster.accounts().find(id);
     if (known == roster.accounts().end()) continue;
     if (known->second.join.served) roster.peer(known->second).snapshots_again.take(now_ns);
-    known->second.join = {.served = true, .served_attempt = known->second.attempt};
+    known->second.join = {.served = true, .served_attempt = known->second.attempt, .served_stream = stream_};
   }
   collecting_since_ns_.reset();
   served_at_ns_ = now_ns;

@@ -13,16 +13,18 @@
 
 namespace tandem::host {
 
-/// Decides when a snapshot is made, and for whom.
+/// Decides when a snapshot of one stream is made, and for whom.
 class JoinDesk {
  public:
+  explicit JoinDesk(std::uint32_t stream) : stream_(stream) {}
+
   static constexpr std::int64_t kCollectNs = 100 * kMillisecond;  ///< joiners of one snapshot
   static constexpr std::int64_t kSpacingNs = 250 * kMillisecond;  ///< between two snapshots at least
 
-  /// True when the time has come to make one snapshot for all who are ready: they say `joining`, all three
-  /// writers have matched their participant, they are not being sent one, they were not served for this
-  /// attempt, and where they were served before, their participant has not asked too often. While `transfer`
-  /// serves somebody there is no other snapshot.
+  /// True when the time has come to make one snapshot for all who are ready: they say `joining` and
+  /// name the stream, all three writers have matched their participant, they are not being sent one, they
+  /// were not served for this attempt, and where they were served before, their participant has not asked too
+  /// often. While `transfer` serves somebody there is no other snapshot.
   [[nodiscard]] bool due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
                          std::int64_t now_ns);
   /// Who was ready at the last due().
@@ -34,6 +36,7 @@ class JoinDesk {
                                                    std::int64_t now_ns) const;
 
  private:
+  std::uint32_t stream_;
   std::optional<std::int64_t> collecting_since_ns_;
   std::optional<std::int64_t> served_at_ns_;
   std::vector<transport::ClientId> ready_;

@@ -19,6 +19,7 @@ struct Lattice {
   [[nodiscard]] double position_scale() const { return 1.0 / unit; }
   /// 1/64 lattice unit per frame, per scene unit per second.
   [[nodiscard]] double velocity_scale() const { return 64.0 * dt_s / unit; }
+  bool operator==(const Lattice&) const = default;
 };
 
 inline constexpr int kMostHalvings = 12;   ///< finer gains nothing

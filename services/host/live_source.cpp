@@ -1,38 +1,129 @@
 #include "services/host/live_source.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <thread>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/host/publication.hpp"
 
 namespace tandem::host {
 
 using transport::Reason;
 
-LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation, Stream stream)
-    : simulation_(&simulation), stream_(std::move(stream)), clock_ns_(config.clock_ns) {
-  stream_.set_clock(clock_ns_);
-  session_ = session_message(config, stream_);
+namespace {
+
+// More than one core for a stream would be for its blocks: StreamConfig::local.
+std::uint32_t threads_for(std::size_t streams) {
+  return std::min(static_cast<std::uint32_t>(streams), std::max(1U, std::thread::hardware_concurrency()));
 }
 
-std::optional<FrameSource::Made> LiveSource::next(bool snapshot_follows, Outbox& /*outbox*/) {
+}  // namespace
+
+LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror,
+                       const Drive& drive)
+    : simulation_(&simulation),
+      mirror_(std::move(mirror)),
+      workers_(threads_for(config.streams.size())),
+      session_(session_message(config)),
+      frame_rate_hz_(config.frame_rate_hz),
+      clock_ns_(config.clock_ns),
+      frame_(config.start_frame),
+      drive_(drive) {
+  for (const StreamConfig& stream : config.streams) lanes_.push_back({stream, {}});
+}
+
+Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
+                                                       engine::Simulation& simulation) {
+  const Lattice& lattice = config.streams.front().lattice;
+  const auto drive = to_drive(lattice, simulation.gravity(), simulation.damping_per_s());
+  if (!drive) return tl::unexpected(drive.error());
+  auto mirror = make_mirror(config.streams, simulation.bodies());
+  if (!mirror) return tl::unexpected(mirror.error());
+  std::unique_ptr<LiveSource> source(new LiveSource(config, simulation, std::move(*mirror), *drive));
+  for (std::uint32_t id = 0; id < source->lanes_.size(); ++id) {
+    auto stream = source->begin(id);
+    const std::string& name = config.streams[id].name;
+    if (!stream && name.empty()) return tl::unexpected(stream.error());
+    if (!stream) return fail(stream.error().code, fmt::format("stream {}: {}", name, stream.error().message));
+    list_stream(*stream, source->session_);
+    if (id == 0) source->lanes_[id].stream.emplace(std::move(*stream));
+  }
+  return source;
+}
+
+Result<Stream> LiveSource::begin(std::uint32_t id) const {
+  std::vector<ScheduledDrive> pending;
+  for (const Waiting& waiting : scheduled_) pending.push_back(waiting.drive);
+  auto stream = Stream::create(lanes_[id].config, {.mirror = mirror_,
+                                                   .drive = drive_,
+                                                   .epoch = session_.epoch,
+                                                   .id = {.id = id, .generation = 0},
+                                                   .frame = frame_,
+                                                   .frame_rate_hz = frame_rate_hz_,
+                                                   .last_input = last_input_,
+                                                   .pending = pending});
+  if (stream) stream->set_clock(clock_ns_);
+  return stream;
+}
+
+StreamSet LiveSource::active() const {
+  StreamSet active;
+  for (std::size_t id = 0; id < lanes_.size(); ++id) active[id] = lanes_[id].stream.has_value();
+  return active;
+}
+
+void LiveSource::set_active(StreamSet streams) {
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    Lane& lane = lanes_[id];
+    if (!streams[id]) lane.stream.reset();
+    if (!streams[id] || lane.stream) continue;
+    auto stream = begin(id);
+    TANDEM_ASSERT(stream.has_value());  // it was begun once, from the same configuration
+    lane.stream.emplace(std::move(*stream));
+  }
+}
+
+const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
+  const Lane& lane = lanes_[id];
+  return lane.stream ? lane.stream->parameters() : lane.config.layout.parameters;
+}
+
+std::optional<FrameSource::Made> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
   const std::int64_t start_ns = clock();
   apply(next_frame());
   simulation_->step();
   const std::int64_t stepped_ns = clock();
   const engine::Bodies bodies = simulation_->bodies();
-  if (auto good = stream_.check(bodies); !good) {
+  if (auto good = mirror_.check(bodies); !good) {
     error_ = good.error();
     return std::nullopt;
   }
-  if (snapshot_follows) stream_.round_next();
-  const Stream::FrameResult frame = stream_.produce(bodies, simulation_->events());
-  return Made{.frame = frame.frame,
-              .last_input = frame.last_input,
-              .hash = frame.hash,
-              .payload = frame.payload,
-              .corrected = frame.corrected,
-              .step_ns = stepped_ns - start_ns};
+  mirror_.update(bodies, simulation_->events());
+  ++frame_;
+  deltas_.clear();
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    if (!lanes_[id].stream) continue;
+    if (snapshots_follow[id]) lanes_[id].stream->round_next();
+    deltas_.push_back({.stream = id});
+  }
+  make_deltas();
+  return Made{
+      .frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = stepped_ns - start_ns};
+}
+
+void LiveSource::make_deltas() {
+  workers_.run(static_cast<std::uint32_t>(deltas_.size()), 1, [this](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) {
+      MadeDelta& made = deltas_[i];
+      const Stream::FrameResult frame = lanes_[made.stream].stream->produce(mirror_);
+      made.hash = frame.hash;
+      made.payload = frame.payload;
+      made.corrected = frame.corrected;
+    }
+  });
 }
 
 Reason LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
@@ -54,21 +145,26 @@ Reason LiveSource::accept(const engine::Input& input, const InputOrigin& origin,
 
 Reason LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
                             const InputOrigin& origin, Outbox& outbox, Frame& acts_on) {
-  const auto drive = to_drive(stream_.config().lattice, effect.gravity, effect.damping_per_s);
+  const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);
   if (!drive) return Reason::kInvalid;
   // s + A: no client can have simulated it, as none is further than A beyond delta s - 1.
-  const Frame frame = next_frame() + stream_.config().layout.lead;
+  const Frame frame = next_frame() + session_.lead;
   if (scheduling_frame_ != frame) scheduled_now_ = 0;
   if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return Reason::kRateLimited;
-  const std::uint64_t number = stream_.last_input() + 1;
-  if (!stream_.schedule({.number = number, .frame = frame, .drive = *drive})) return Reason::kRateLimited;
+  if (scheduled_.size() >= kMaxPendingInputs) return Reason::kRateLimited;
+  const ScheduledDrive scheduled{.number = last_input_ + 1, .frame = frame, .drive = *drive};
+  for (Lane& lane : lanes_) {
+    // What one of them refuses, all do: they hold the same inputs, and the drive is checked above.
+    if (lane.stream && !lane.stream->schedule(scheduled)) return Reason::kInvalid;
+  }
+  ++last_input_;
   scheduling_frame_ = frame;
   ++scheduled_now_;
-  scheduled_.push_back({frame, input});
+  scheduled_.push_back({scheduled, input});
   acts_on = frame;
   const bool queued = outbox.push(transport::ScheduledInputMessage{
       .epoch = session_.epoch,
-      .number = number,
+      .number = scheduled.number,
       .frame = frame,
       .source_client = origin.client,
       .source_number = origin.number,
@@ -90,8 +186,11 @@ Result<Frame> LiveSource::inject(const engine::Input& input, Outbox& outbox) {
 }
 
 void LiveSource::apply(Frame s) {
-  const auto later = std::ranges::find_if(scheduled_, [s](const Waiting& w) { return w.frame > s; });
-  for (auto it = scheduled_.begin(); it != later; ++it) simulation_->apply(it->input);
+  const auto later = std::ranges::find_if(scheduled_, [s](const Waiting& w) { return w.drive.frame > s; });
+  for (auto it = scheduled_.begin(); it != later; ++it) {
+    simulation_->apply(it->input);
+    drive_ = it->drive.drive;
+  }
   scheduled_.erase(scheduled_.begin(), later);
   for (const engine::Input& input : immediate_) simulation_->apply(input);
   immediate_.clear();

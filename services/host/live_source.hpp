@@ -1,13 +1,15 @@
 #pragma once
-// A simulation that runs, as a source of frames: inputs, step, stream.
+// A simulation that runs, as a source of frames: inputs, step, streams.
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "services/host/frame_source.hpp"
 #include "services/host/host.hpp"
 #include "services/host/stream.hpp"
+#include "services/workers/workers.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::host {
@@ -16,21 +18,24 @@ inline constexpr std::size_t kMostImmediate = 1024;  ///< waiting for one step, 
 /// Scheduled inputs per frame, all clients together; those of lead + 1 frames fit kMaxPendingInputs.
 inline constexpr std::uint32_t kMostScheduledPerFrame = 100;
 
-/// Gives inputs their frame, hands them to the simulation in time, and streams what becomes of its bodies.
-/// One stream so far: a second one would be produced from the same step, side by side with the first. Not
+/// Gives inputs their frame, hands them to the simulation in time, and streams what becomes of its bodies:
+/// all streams follow one mirror, side by side, each on a thread of its own where there are cores. Not
 /// thread-safe.
 class LiveSource final : public FrameSource {
  public:
-  /// `simulation` must outlive it.
-  LiveSource(const HostConfig& config, engine::Simulation& simulation, Stream stream);
+  /// `simulation` must outlive it; its bodies now are those of config.start_frame. The first stream is made
+  /// from the start. Errors: as Host::create(), naming the stream where there are several.
+  static Result<std::unique_ptr<LiveSource>> create(const HostConfig& config, engine::Simulation& simulation);
 
   [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
-  [[nodiscard]] Frame frame() const override { return stream_.frame(); }
-  [[nodiscard]] const State& agreed() const override { return stream_.agreed(); }
-  [[nodiscard]] std::uint64_t hash() const override { return stream_.hash(); }
-  [[nodiscard]] const StreamParameters& parameters() const override { return stream_.parameters(); }
-  std::optional<Made> next(bool snapshot_follows, Outbox& outbox) override;
-  void snapshot(std::vector<std::byte>& out) override { stream_.snapshot(out); }
+  [[nodiscard]] Frame frame() const override { return frame_; }
+  [[nodiscard]] StreamSet active() const override;
+  void set_active(StreamSet streams) override;
+  [[nodiscard]] const State& agreed(std::uint32_t id) const override { return lanes_[id].stream->agreed(); }
+  [[nodiscard]] std::uint64_t hash(std::uint32_t id) const override { return lanes_[id].stream->hash(); }
+  [[nodiscard]] const StreamParameters& parameters(std::uint32_t id) const override;
+  std::optional<Made> next(StreamSet snapshots_follow, Outbox& outbox) override;
+  void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
   transport::Reason accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
                            Frame& acts_on) override;
 
@@ -39,24 +44,42 @@ class LiveSource final : public FrameSource {
   /// Why there is no next frame; set once next() gave none.
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
   [[nodiscard]] const engine::Simulation& simulation() const { return *simulation_; }
-  [[nodiscard]] Stream& stream() { return stream_; }
+  [[nodiscard]] const Mirror& mirror() const { return mirror_; }
+  [[nodiscard]] const StreamConfig& config(std::uint32_t id) const { return lanes_[id].config; }
+  /// Null while it is not made.
+  [[nodiscard]] Stream* stream(std::uint32_t id) { return lanes_[id].stream ? &*lanes_[id].stream : nullptr; }
 
  private:
+  struct Lane {
+    StreamConfig config;
+    std::optional<Stream> stream;
+  };
   struct Waiting {
-    Frame frame = 0;
+    ScheduledDrive drive;
     engine::Input input;
   };
+  LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror, const Drive& drive);
+
+  [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
   transport::Reason schedule(const engine::Input& input, const engine::Classification& effect,
                              const InputOrigin& origin, Outbox& outbox, Frame& acts_on);
   /// Hands the simulation all that acts on frame s, the one about to be stepped.
   void apply(Frame s);
-  [[nodiscard]] Frame next_frame() const { return stream_.frame() + 1; }
+  void make_deltas();
+  [[nodiscard]] Frame next_frame() const { return frame_ + 1; }
   [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
 
   engine::Simulation* simulation_;
-  Stream stream_;
+  Mirror mirror_;
+  std::vector<Lane> lanes_;
+  Workers workers_;
   transport::SessionMessage session_;
+  double frame_rate_hz_;
   std::int64_t (*clock_ns_)();
+  Frame frame_;
+  Drive drive_;                           // in force at frame_
+  std::uint64_t last_input_ = 0;          // number
+  std::vector<MadeDelta> deltas_;         // of the frame at hand
   std::vector<Waiting> scheduled_;        // in the order of their numbers, so ascending by frame
   std::vector<engine::Input> immediate_;  // in the order of arrival
   Frame scheduling_frame_ = 0;

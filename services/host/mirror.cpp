@@ -1,5 +1,7 @@
 #include "services/host/mirror.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,6 +33,23 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
       marks_(capacity),
       generations_(capacity) {
   lifecycle_.reserve(std::size_t{2} * capacity);
+}
+
+Result<void> Mirror::check(const engine::Bodies& bodies) const {
+  const std::size_t capacity = shown_.size();
+  bool whole = bodies.alive.size() == capacity && bodies.type.size() == capacity;
+  const auto look_at = [&](const auto& columns) {
+    for (const auto& column : columns) whole = whole && column.size() == capacity;
+  };
+  look_at(bodies.position);
+  look_at(bodies.velocity);
+  if (target_.groups().orientation) {
+    look_at(bodies.orientation);
+    look_at(bodies.angular_velocity);
+  }
+  if (whole) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("the simulation has body columns that are not of {} slots", capacity));
 }
 
 void Mirror::quantise(const engine::Bodies& bodies) {

@@ -1,6 +1,6 @@
 #pragma once
-// The engine's bodies on the lattice, frame by frame: what a codec encodes towards, and what happened to the
-// slots.
+// The engine's bodies on the lattice, frame by frame: what all streams encode towards, and what happened to
+// the slots.
 
 #include <cstdint>
 #include <span>
@@ -9,6 +9,7 @@
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "services/host/lattice_choice.hpp"
+#include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::host {
@@ -26,13 +27,16 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
 /// after construction. Not thread-safe.
 class Mirror {
  public:
-  /// `type_count`: types the session lists, 1 or more.
+  /// `type_count`: types the session lists, 1 or more. `groups`: those of all its streams together.
   Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {});
 
+  /// That it can take these. Errors: kInvalidArgument (columns not as long as the capacity).
+  [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
   /// The start state: everything shown is simply there, in generation 0.
   void start(const engine::Bodies& bodies);
-  /// After a step. `events` may be incomplete: births, deaths and types are read off the bodies themselves;
-  /// only reuse of a slot within the step and teleports need their event. Events out of range are ignored.
+  /// After a step, of bodies that check() takes. `events` may be incomplete: births, deaths and types are
+  /// read off the bodies themselves; only reuse of a slot within the step and teleports need their event.
+  /// Events out of range are ignored.
   void update(const engine::Bodies& bodies, std::span<const engine::Event> events);
 
   [[nodiscard]] const State& target() const { return target_; }

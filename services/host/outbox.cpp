@@ -7,11 +7,12 @@
 
 namespace tandem::host {
 
-// Parts before the last are not counted: they never come without it.
+// Deltas are not counted: they never come without the end of their frame.
 std::uint32_t* Outbox::count_of(const Outgoing& message, std::uint32_t& limit) {
-  if (const auto* delta = std::get_if<transport::DeltaMessage>(&message)) {
+  if (std::holds_alternative<transport::DeltaMessage>(message)) return nullptr;
+  if (std::holds_alternative<EndOfFrame>(message)) {
     limit = limits_.frames;
-    return delta->part + 1 == delta->parts ? &frames_ : nullptr;
+    return &frames_;
   }
   if (std::holds_alternative<transport::SnapshotMessage>(message)) {
     limit = limits_.snapshots;
@@ -59,13 +60,10 @@ bool Outbox::push(Outgoing message) {
 
 std::optional<Outgoing> Outbox::pop(std::chrono::nanoseconds timeout) {
   std::unique_lock lock(mutex_);
-  writing_frame_ = false;
   if (queue_.empty() && timeout.count() > 0) ready_.wait_for(lock, timeout);
   if (queue_.empty()) return std::nullopt;
   std::optional<Outgoing> message(std::move(queue_.front()));
   queue_.pop_front();
-  const auto* const delta = std::get_if<transport::DeltaMessage>(&*message);
-  writing_frame_ = delta != nullptr && delta->part + 1 == delta->parts;
   std::uint32_t limit = 0;
   if (std::uint32_t* const count = count_of(*message, limit)) --*count;
   return message;
@@ -80,7 +78,7 @@ std::size_t Outbox::size() const {
 
 std::uint32_t Outbox::unwritten_frames() const {
   const std::scoped_lock lock(mutex_);
-  return frames_ + (writing_frame_ ? 1U : 0U);
+  return frames_;
 }
 
 Outbox::Traffic Outbox::traffic() const {
@@ -98,6 +96,7 @@ namespace {
 struct Write {
   transport::ServerPort& port;
 
+  Result<void> operator()(const EndOfFrame& /*end*/) const { return {}; }
   Result<void> operator()(const OpenReplies& open) const { return port.open_replies(open.client); }
   Result<void> operator()(const CloseReplies& close) const {
     port.close_replies(close.client);

@@ -23,27 +23,30 @@ struct CloseReplies {
   transport::ClientId client = 0;
 };
 
+/// All deltas of a frame, one a stream that is made, are in front of this.
+struct EndOfFrame {};
+
 using Outgoing =
     std::variant<transport::SessionMessage, transport::DeltaMessage, transport::ScheduledInputMessage,
                  transport::SnapshotMessage, transport::ReplyMessage, transport::ServerStatusMessage,
-                 OpenReplies, CloseReplies>;
+                 OpenReplies, CloseReplies, EndOfFrame>;
 
 /// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
 /// for one producer and one consumer.
 class Outbox {
  public:
   struct Limits {
-    std::uint32_t frames = 8;      ///< whole deltas, whatever their number of parts
+    std::uint32_t frames = 8;      ///< whatever their number of streams and parts
     std::uint32_t snapshots = 64;  ///< parts of snapshots
     std::uint32_t control = 1024;  ///< everything else
   };
   explicit Outbox(const Limits& limits) : limits_(limits) {}
 
-  /// Room for one more delta; stays true until the producer pushes one.
+  /// Room for the deltas of one more frame; stays true until the producer pushes its end.
   [[nodiscard]] bool has_frame_room() const;
   [[nodiscard]] bool has_control_room() const;
-  /// False, and nothing queued, when the message's kind is at its limit. All parts of a delta count once,
-  /// with the last; check has_frame_room() before the first.
+  /// False, and nothing queued, when the message's kind is at its limit. The deltas of a frame count once,
+  /// with its end; check has_frame_room() before the first.
   [[nodiscard]] bool push(Outgoing message);
 
   /// The oldest message, or nothing after `timeout`. Asking for the next says that the one before is written.
@@ -52,7 +55,7 @@ class Outbox {
   void wake();
 
   [[nodiscard]] std::size_t size() const;
-  /// Deltas pushed and not yet written.
+  /// Frames of which some delta is pushed and not yet written.
   [[nodiscard]] std::uint32_t unwritten_frames() const;
   /// Of all messages of a kind pushed so far, in their byte form (sdk/transport/cdr.hpp).
   struct Traffic {
@@ -71,7 +74,6 @@ class Outbox {
   Limits limits_;
   std::deque<Outgoing> queue_;
   std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
-  bool writing_frame_ = false;  // the last pop() handed out the last part of a delta
   std::size_t high_water_ = 0;
   Traffic traffic_;
   transport::Bytes cdr_;  // kept to reuse its memory

@@ -18,6 +18,10 @@ constexpr std::int64_t kForgetNs = 60'000'000'000;   // and its account deleted,
 
 }  // namespace
 
+std::string Roster::of_stream(std::uint32_t stream) const {
+  return rules_.streams.size() < 2 ? std::string() : " of stream " + rules_.streams[stream];
+}
+
 std::string client_name(transport::ClientId id) { return fmt::format("{:016x}", id); }
 
 void Roster::note(Account& account, std::string_view what, std::int64_t now_ns) {
@@ -62,20 +66,28 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (account != nullptr && account->from != from) return Reason::kForeignClient;
   if (ack.protocol_version != transport::kProtocolVersion) return Reason::kProtocolVersion;
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
-  const bool plays = ack.phase == Phase::kPlaying;
+  if (!lists(ack.stream)) return Reason::kNoStream;
+  // It goes on with the stream that it plays until it has the other's snapshot. Its `playing` may have been
+  // overwritten by what it says now.
+  const bool changes = account != nullptr && ack.phase == Phase::kJoining && ack.applied > 0 &&
+                       ack.stream.id != account->stream &&
+                       (account->phase == Phase::kPlaying || was_served(*account));
+  const bool plays = ack.phase == Phase::kPlaying || changes;
   const bool readable = ack.client != 0 && (plays || ack.phase == Phase::kJoining) &&
                         (ack.role_wanted == Role::kParticipant || ack.role_wanted == Role::kObserver);
   if (!readable || (plays && ack.applied > now.frame)) return Reason::kInvalid;
   if (account == nullptr) account = admit(ack, from, now.ns);
   if (account == nullptr) return Reason::kFull;
 
-  const bool starts_over = account->phase == Phase::kJoining || account->attempt != ack.join_attempt;
-  if (account->phase != ack.phase || account->wanted != ack.role_wanted) account->reply.schedule.on_change();
+  if (account->wanted != ack.role_wanted) account->reply.schedule.on_change();
+  const bool starts_over = follow_stream(*account, ack, changes, now);
   if (plays && starts_over) {
     account->timed_from = now.frame;
     const std::int64_t frames = transport::ack_spacing(rules_.fixed_window.value_or(rules_.window_ceiling));
     if (frames > 1) account->round_trip.expect(std::min(frames * now.period_ns, transport::kAckSpacingNs));
-    note(*account, ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer",
+    note(*account,
+         (ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer") +
+             of_stream(account->stream),
          now.ns);
   } else if (plays && ack.applied > account->applied && ack.applied > account->timed_from) {
     // The frame that has waited longest for this acknowledgement, as they are not sent for each.
@@ -85,15 +97,34 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   // A joiner, also one whose `joining` was overwritten by its `playing`, counts only once it has caught up
   // again.
   if (!plays || starts_over || ack.role_wanted == Role::kObserver) account->counted = false;
-  account->phase = ack.phase;
   account->wanted = ack.role_wanted;
-  account->attempt = ack.join_attempt;
   account->applied = ack.applied;
   account->clock_ns = ack.clock_ns;
   account->reply.schedule.on_clock();
   account->heard_ns = now.ns;
   account->present = true;
   return Reason::kNone;
+}
+
+bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now) {
+  const struct {
+    Phase phase;
+    std::uint32_t stream, attempt;
+    std::optional<std::uint32_t> next_stream;
+  } before{account.phase, account.stream, account.attempt, account.next_stream};
+  account.attempt = ack.join_attempt;
+  account.phase = changes ? Phase::kPlaying : ack.phase;
+  account.next_stream = changes ? std::optional(ack.stream.id) : std::nullopt;
+  if (!changes) account.stream = ack.stream.id;
+  if (account.phase != before.phase || account.stream != before.stream ||
+      account.next_stream != before.next_stream)
+    account.reply.schedule.on_change();
+  if (account.phase != Phase::kPlaying || before.phase != Phase::kPlaying) return true;
+  // It asked for a snapshot of another stream, and now it plays that one, or gave it up.
+  if (before.next_stream && account.stream != before.stream && account.stream == *before.next_stream)
+    note(account, "changed to stream " + rules_.streams[account.stream], now.ns);
+  const bool expected = changes || before.next_stream || account.attempt == before.attempt;
+  return !expected || (account.stream != before.stream && account.stream != before.next_stream);
 }
 
 Account* Roster::find(transport::ClientId id, const transport::ParticipantId& from, Reason& reason) {
@@ -196,9 +227,21 @@ std::uint32_t Roster::counted() const {
       std::ranges::count_if(accounts_, [](const auto& entry) { return entry.second.counted; }));
 }
 
+std::uint32_t Roster::counted(std::uint32_t stream) const {
+  return static_cast<std::uint32_t>(std::ranges::count_if(accounts_, [stream](const auto& entry) {
+    return entry.second.counted && entry.second.stream == stream;
+  }));
+}
+
 std::uint32_t Roster::watching() const {
   return static_cast<std::uint32_t>(std::ranges::count_if(
       accounts_, [](const auto& entry) { return entry.second.plays() && !entry.second.counted; }));
+}
+
+std::uint32_t Roster::watching(std::uint32_t stream) const {
+  return static_cast<std::uint32_t>(std::ranges::count_if(accounts_, [stream](const auto& entry) {
+    return entry.second.plays() && !entry.second.counted && entry.second.stream == stream;
+  }));
 }
 
 }  // namespace tandem::host

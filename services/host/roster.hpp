@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "sdk/transport/limits.hpp"
@@ -32,6 +33,7 @@ struct InputAccount {
 struct JoinAccount {
   bool served = false;
   std::uint32_t served_attempt = 0;
+  std::uint32_t served_stream = 0;
 };
 
 struct ReplyAccount {
@@ -47,7 +49,9 @@ struct Account {
   transport::ParticipantId from;
   transport::Phase phase = transport::Phase::kJoining;
   transport::Role wanted = transport::Role::kObserver;
-  bool present = true;   ///< its participant lives and it was heard of lately
+  std::uint32_t stream = 0;                  ///< that it plays, or joins
+  std::optional<std::uint32_t> next_stream;  ///< that it joins while it goes on playing `stream`
+  bool present = true;                       ///< its participant lives and it was heard of lately
   bool counted = false;  ///< a participant that plays and has caught up: the server waits for it
   bool demoted = false;
   bool kept_up = false;  ///< while demoted: since kept_up_since_ns
@@ -73,9 +77,24 @@ struct Peer {
   accounts::TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
 };
 
-/// It is there, and on its way into the session.
-[[nodiscard]] inline bool joins(const Account& account) {
-  return account.present && account.phase == transport::Phase::kJoining;
+/// The stream that it is on its way into, from outside or from another.
+[[nodiscard]] inline std::optional<std::uint32_t> joined_stream(const Account& account) {
+  if (!account.present) return std::nullopt;
+  if (account.phase == transport::Phase::kJoining) return account.stream;
+  return account.next_stream;
+}
+
+/// It was served a snapshot of the stream that it asked for last, since it asked.
+[[nodiscard]] inline bool was_served(const Account& account) {
+  return account.join.served && account.join.served_attempt == account.attempt &&
+         account.join.served_stream == account.next_stream.value_or(account.stream);
+}
+
+/// Whose deltas it applies, or will as soon as it has the snapshot that was cut for it.
+[[nodiscard]] inline bool needs(const Account& account, std::uint32_t stream) {
+  if (!account.present) return false;
+  if (account.phase == transport::Phase::kPlaying && account.stream == stream) return true;
+  return joined_stream(account) == stream && was_served(account);
 }
 
 /// Rules of clients, without I/O. Not thread-safe.
@@ -83,14 +102,15 @@ class Roster {
  public:
   struct Rules {
     Epoch epoch = 0;
+    std::vector<std::string> streams = {""};  ///< names by id; all of generation 0
     std::uint32_t client_limit = 256;
     std::uint32_t participant_limit = 16;  ///< clients of one DDS participant
     std::optional<std::int64_t> stall_timeout_ns;
     std::optional<std::uint32_t> fixed_window;
     std::uint32_t window_ceiling = 24;
   };
-  explicit Roster(const Rules& rules)
-      : rules_(rules), window_(rules.fixed_window.value_or(kSmallestWindow)) {}
+  explicit Roster(Rules rules)
+      : rules_(std::move(rules)), window_(rules_.fixed_window.value_or(kSmallestWindow)) {}
 
   /// Where the server stands when something happens.
   struct Now {
@@ -126,7 +146,9 @@ class Roster {
 
   [[nodiscard]] std::uint32_t window() const { return window_; }
   [[nodiscard]] std::uint32_t counted() const;
+  [[nodiscard]] std::uint32_t counted(std::uint32_t stream) const;
   [[nodiscard]] std::uint32_t watching() const;  ///< playing and not counted
+  [[nodiscard]] std::uint32_t watching(std::uint32_t stream) const;
   [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
   [[nodiscard]] Peer& peer(const Account& account) { return peers_.at(account.from); }
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
@@ -138,6 +160,14 @@ class Roster {
  private:
   Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
   using Accounts = std::map<transport::ClientId, Account>;
+  [[nodiscard]] bool lists(const StreamId& stream) const {
+    return stream.id < rules_.streams.size() && stream.generation == 0;
+  }
+  /// Which stream it plays and joins; true when it enters the session anew, or another stream without having
+  /// joined that first.
+  bool follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now);
+  /// " of stream NAME"; nothing of a session that has but one.
+  [[nodiscard]] std::string of_stream(std::uint32_t stream) const;
   void note(Account& account, std::string_view what, std::int64_t now_ns);
   Accounts::iterator forget(Accounts::iterator account);
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {

@@ -25,6 +25,11 @@ void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::spa
   started_ns_ = now_ns;
 }
 
+void SnapshotTransfer::end() {
+  parts_.clear();
+  receivers_.clear();
+}
+
 void SnapshotTransfer::admit(transport::ClientId client, std::int64_t now_ns) {
   receivers_[client] = {.holds = std::vector<bool>(parts_.size()), .heard_ns = now_ns, .progress_ns = now_ns};
   for (Part& part : parts_) ++part.lacking;
@@ -83,7 +88,7 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
   for (auto it = receivers_.begin(); it != receivers_.end();) {
     const transport::ClientId client = (it++)->first;
     const auto account = accounts.find(client);
-    if (account == accounts.end() || !joins(account->second)) dismiss(client);
+    if (account == accounts.end() || joined_stream(account->second) != head_.stream.id) dismiss(client);
   }
   if (receivers_.empty()) return;
   std::size_t flying = 0;

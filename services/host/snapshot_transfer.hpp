@@ -34,9 +34,12 @@ class SnapshotTransfer {
   /// A new snapshot for `receivers`, in the place of the one before. `bytes` is not empty.
   void start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
              std::span<const transport::ClientId> receivers, std::int64_t now_ns);
+  /// The snapshot is of no use any more.
+  void end();
   /// What a client that joins holds by now. Untrusted; runs that make no sense count for what they cover.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
-  /// Forgets receivers that do not join any more, and queues what the window and the outbox have room for.
+  /// Forgets receivers that do not join its stream any more, and queues what the window and the outbox have
+  /// room for.
   void send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
 
   /// This client is being sent the snapshot and, lately, said so: it needs no other.

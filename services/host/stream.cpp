@@ -8,27 +8,10 @@
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/predict/predictor.hpp"
-#include "services/host/mirror.hpp"
+#include "sdk/transport/limits.hpp"
 
 namespace tandem::host {
 namespace {
-
-Result<void> check_columns(const Layout& layout, const engine::Bodies& bodies) {
-  const std::size_t capacity = layout.capacity;
-  bool whole = bodies.alive.size() == capacity && bodies.type.size() == capacity;
-  const auto look_at = [&](const auto& columns) {
-    for (const auto& column : columns) whole = whole && column.size() == capacity;
-  };
-  look_at(bodies.position);
-  look_at(bodies.velocity);
-  if (groups_of(layout).orientation) {
-    look_at(bodies.orientation);
-    look_at(bodies.angular_velocity);
-  }
-  if (whole) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("the simulation has body columns that are not of {} slots", capacity));
-}
 
 Result<void> check(const StreamConfig& config, const StreamStart& start) {
   const auto refuse = [](std::string message) {
@@ -44,9 +27,18 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
           config.budget, config.quality->target_mbit_per_s, least));
     }
   }
-  if (groups_of(config.layout).orientation && start.bodies.orientation[0].empty())
-    return refuse("the stream has orientations, which the simulation's bodies do not have");
-  return check_columns(config.layout, start.bodies);
+  return {};
+}
+
+// What a stream with these groups tells of a mirror that may know orientations besides.
+State told(const State& shown, const Groups& groups) {
+  if (shown.groups() == groups) return shown;
+  State state(shown.capacity(), groups);
+  for (Slot slot = 0; slot < shown.capacity(); ++slot) {
+    if (shown.alive()[slot] != 0)
+      state.spawn(slot, shown.reuse()[slot], shown.type()[slot], shown.body(slot));
+  }
+  return state;
 }
 
 }  // namespace
@@ -54,13 +46,12 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
 struct Stream::Impl final : EncodeObserver {
   Impl(StreamConfig configuration, const StreamStart& start, ServerTimeline server)
       : config(std::move(configuration)),
-        mirror(config.lattice, config.layout.capacity, config.layout.type_count, groups_of(config.layout)),
         timeline(std::move(server)),
         parameters(config.layout.parameters),
         drive(start.drive) {
-    mirror.start(start.bodies);
-    timeline.start(start.frame, mirror.target(), start.drive);
-    bodies = mirror.target().alive_count();
+    const State state = told(start.mirror.target(), groups_of(config.layout));
+    timeline.start(start.frame, state, start.drive, start.last_input, start.pending);
+    bodies = state.alive_count();
     if (config.quality) {
       quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters.codec,
                       config.layout.capacity, start.frame_rate_hz, config.layout.radii);
@@ -83,19 +74,44 @@ struct Stream::Impl final : EncodeObserver {
   }
 
   void choose_parameters(const FrameResult& result);
-  [[nodiscard]] std::int64_t now_ns() const { return clock == nullptr ? 0 : clock(); }
+  std::span<const LifecycleRecord> records_of(const Mirror& mirror);
 
   StreamConfig config;
-  Mirror mirror;
   ServerTimeline timeline;
   StreamParameters parameters;  // of the next frame
   Drive drive;                  // of the start
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
-  EncodeObserver* other = nullptr;  // of the frame at hand
+  std::vector<LifecycleRecord> records;  // of the frame at hand, where the mirror's name groups of others
+  EncodeObserver* other = nullptr;       // of the frame at hand
   std::uint32_t bodies = 0;
   std::int64_t (*clock)() = nullptr;
 };
+
+Result<void> check_stream_names(std::span<const StreamConfig> streams) {
+  const auto refuse = [](std::string message) {
+    return fail(ErrorCode::kInvalidArgument, std::move(message));
+  };
+  if (streams.empty() || streams.size() > transport::kMaxStreams)
+    return refuse(
+        fmt::format("a session has 1 to {} streams, not {}", transport::kMaxStreams, streams.size()));
+  if (streams.size() == 1 && streams.front().name.empty()) return {};
+  constexpr std::size_t kMostCharacters = 32;
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  for (auto stream = streams.begin(); stream != streams.end(); ++stream) {
+    const std::string& name = stream->name;
+    if (name.empty() || name.size() > kMostCharacters || !std::ranges::all_of(name, allowed)) {
+      return refuse(
+          fmt::format("a stream's name has 1 to {} characters of a-z, 0-9, '_' and '-', unlike '{}'",
+                      kMostCharacters, name));
+    }
+    if (std::ranges::find(streams.begin(), stream, name, &StreamConfig::name) != stream)
+      return refuse(fmt::format("two streams are called '{}': give each a name of its own", name));
+  }
+  return {};
+}
 
 Result<void> choose_gains(StreamConfig& config) {
   // What the constants make of the predictor, which may be another than the name says.
@@ -107,15 +123,41 @@ Result<void> choose_gains(StreamConfig& config) {
   return {};
 }
 
-Result<std::size_t> largest_delta_bytes(const StreamConfig& config) {
-  return ServerTimeline::create(config.layout, Epoch{1}).map([](const ServerTimeline& timeline) {
-    return timeline.payload_bound();
-  });
+Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies) {
+  const StreamConfig& first = streams.front();
+  Groups groups;
+  for (const StreamConfig& stream : streams) {
+    if (stream.lattice != first.lattice || stream.layout.capacity != first.layout.capacity ||
+        stream.layout.type_count != first.layout.type_count)
+      return fail(ErrorCode::kInvalidArgument, "streams of another lattice, capacity or number of types");
+    groups.orientation = groups.orientation || groups_of(stream.layout).orientation;
+  }
+  if (groups.orientation && bodies.orientation[0].empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "the stream has orientations, which the simulation's bodies do not have");
+  }
+  Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups);
+  if (auto good = mirror.check(bodies); !good) return tl::unexpected(good.error());
+  mirror.start(bodies);
+  return mirror;
+}
+
+Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams) {
+  std::size_t largest = 0;
+  for (const StreamConfig& stream : streams) {
+    const auto timeline = ServerTimeline::create(stream.layout, Epoch{1});
+    if (!timeline && stream.name.empty()) return tl::unexpected(timeline.error());
+    if (!timeline) {
+      return fail(timeline.error().code, fmt::format("stream {}: {}", stream.name, timeline.error().message));
+    }
+    largest = std::max(largest, timeline->payload_bound());
+  }
+  return largest;
 }
 
 Result<Stream> Stream::create(StreamConfig config, const StreamStart& start) {
   if (auto good = host::check(config, start); !good) return tl::unexpected(good.error());
-  auto timeline = ServerTimeline::create(config.layout, start.epoch, config.local);
+  auto timeline = ServerTimeline::create(config.layout, start.epoch, config.local, start.id);
   if (!timeline) return tl::unexpected(timeline.error());
   return Stream(std::make_unique<Impl>(std::move(config), start, std::move(*timeline)));
 }
@@ -125,25 +167,24 @@ Stream::Stream(Stream&&) noexcept = default;
 Stream& Stream::operator=(Stream&&) noexcept = default;
 Stream::~Stream() = default;
 
-Result<void> Stream::check(const engine::Bodies& bodies) const {
-  return check_columns(impl_->config.layout, bodies);
+std::span<const LifecycleRecord> Stream::Impl::records_of(const Mirror& mirror) {
+  const Groups groups = groups_of(config.layout);
+  if (mirror.target().groups() == groups) return mirror.lifecycle();
+  records.assign(mirror.lifecycle().begin(), mirror.lifecycle().end());
+  for (LifecycleRecord& record : records) record.groups &= moves_all(groups);
+  return records;
 }
 
-Stream::FrameResult Stream::produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
-                                    EncodeObserver* observer) {
+Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer) {
   Impl& m = *impl_;
-  const std::int64_t began_ns = m.now_ns();
-  m.mirror.update(bodies, events);
-  const std::int64_t mirrored_ns = m.now_ns();
-  for (const LifecycleRecord& record : m.mirror.lifecycle()) {
+  const std::span<const LifecycleRecord> records = m.records_of(mirror);
+  for (const LifecycleRecord& record : records) {
     if (record.kind == LifecycleKind::kSpawn) ++m.bodies;
     if (record.kind == LifecycleKind::kDespawn) --m.bodies;
   }
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains ? &m : observer;
-  const FrameResult result{
-      m.timeline.advance(m.mirror.target(), m.mirror.lifecycle(), m.config.budget, listener),
-      m.mirror.lifecycle(), mirrored_ns - began_ns};
+  const FrameResult result{m.timeline.advance(mirror.target(), records, m.config.budget, listener), records};
   m.choose_parameters(result);
   return result;
 }
@@ -203,7 +244,6 @@ Frame Stream::frame() const { return impl_->timeline.frame(); }
 const State& Stream::agreed() const { return impl_->timeline.state(); }
 std::uint64_t Stream::hash() const { return impl_->timeline.hash(); }
 std::uint64_t Stream::last_input() const { return impl_->timeline.last_input(); }
-engine::Mishaps Stream::mishaps() const { return impl_->mirror.mishaps(); }
 std::uint32_t Stream::bodies() const { return impl_->bodies; }
 std::size_t Stream::payload_bound() const { return impl_->timeline.payload_bound(); }
 std::size_t Stream::snapshot_bound() const { return impl_->timeline.snapshot_bound(); }

@@ -1,17 +1,19 @@
 #pragma once
-// One stream: what becomes of the engine's bodies in a frame, up to the payload that travels. The host
-// publishes it; `tandem bench` measures it.
+// One stream: what becomes of the bodies that a mirror shows in a frame, up to the payload that travels. The
+// host publishes it; `tandem bench` measures it.
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
 #include "services/host/gains.hpp"
 #include "services/host/lattice_choice.hpp"
+#include "services/host/mirror.hpp"
 #include "services/host/quality.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
@@ -19,37 +21,50 @@
 namespace tandem::host {
 
 struct StreamConfig {
+  std::string name;                    ///< see check_stream_names(); empty: it has none
   Layout layout;                       ///< capacity: that of the bodies
   Lattice lattice;                     ///< of the session, so the same for all of its streams
   std::size_t budget = kNoBudget;      ///< bytes of a frame; spawns and parameters go first
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: so do decay and gains
-  LocalOptions local;
+  LocalOptions local;                  ///< streams share no threads: they are made side by side
 };
+
+/// Checks the names of a session's streams: each its own, of 1 to 32 characters of [a-z0-9_-]; a single one
+/// needs none. Errors: kInvalidArgument; also for none and for more than 8.
+[[nodiscard]] Result<void> check_stream_names(std::span<const StreamConfig> streams);
 
 /// Sets the decay and gains of the first frame, and what the later ones aim at, for a codec that reads them.
 /// Errors: those of the layout's predictor.
 [[nodiscard]] Result<void> choose_gains(StreamConfig& config);
 
-/// Most bytes a delta of this stream can take: what a transport must be ready for before the host exists.
+/// Most bytes a delta of these streams can take: what a transport must be ready for before the host exists.
 /// Errors: as Stream::create() for codec and predictor.
-[[nodiscard]] Result<std::size_t> largest_delta_bytes(const StreamConfig& config);
+[[nodiscard]] Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams);
 
-/// Where a stream begins: bodies that were not stepped yet.
+/// The bodies as all of `streams`, at least one, will show them; not stepped yet. Errors: kInvalidArgument
+/// (another lattice, capacity or number of types than the first stream's; body columns not `capacity` long;
+/// orientations that the bodies do not have).
+[[nodiscard]] Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies);
+
+/// Where a stream begins: what `mirror` shows at `frame`.
 struct StreamStart {
-  engine::Bodies bodies;
-  Drive drive;  ///< in force at `frame`
+  const Mirror& mirror;  ///< of the stream's lattice and capacity, with its groups or more
+  Drive drive;           ///< in force at `frame`
   Epoch epoch = 1;
+  StreamId id = {};
   Frame frame = 0;
-  double frame_rate_hz = 30;  ///< nominal; automatic quality counts in it
+  double frame_rate_hz = 30;                     ///< nominal; automatic quality counts in it
+  std::uint64_t last_input = 0;                  ///< number of the last scheduled input before it begins
+  std::span<const ScheduledDrive> pending = {};  ///< of those up to it, still to act; ascending
 };
 
-/// Puts bodies on the lattice, predicts, encodes and applies, one frame at a time, and chooses the parameters
+/// Predicts, encodes and applies, one frame at a time, and chooses the parameters
 /// of the next. Owns no thread, clock or socket; the same calls give the same bytes. Not thread-safe.
 class Stream {
  public:
-  /// Errors: kInvalidArgument (layout, goals, body columns not `capacity` long, orientations in the layout
-  /// that the bodies do not have), kUnsupported (codec, predictor), kMalformed (tables, constants).
+  /// Errors: kInvalidArgument (layout, goals), kUnsupported (codec, predictor), kMalformed (tables,
+  /// constants).
   static Result<Stream> create(StreamConfig config, const StreamStart& start);
   Stream(Stream&&) noexcept;
   Stream& operator=(Stream&&) noexcept;
@@ -63,15 +78,10 @@ class Stream {
   /// Of one frame; spans stay valid until the next.
   struct FrameResult : ServerTimeline::FrameResult {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
-    std::int64_t mirror_ns = 0;                  ///< putting the bodies on the lattice; 0 without a clock
   };
-  /// That a frame can be made of these. Errors: kInvalidArgument (columns not as long as the stream's
-  /// capacity).
-  [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
-  /// The next frame, from the bodies after a step, that check() takes, and what happened to their slots in
-  /// it; tells `observer`, if any. Allocates nothing after the first few frames.
-  FrameResult produce(const engine::Bodies& bodies, std::span<const engine::Event> events,
-                      EncodeObserver* observer = nullptr);
+  /// The next frame, towards what `mirror`, the one of its start, shows after a step; tells `observer`, if
+  /// any. Allocates nothing after the first few frames.
+  FrameResult produce(const Mirror& mirror, EncodeObserver* observer = nullptr);
 
   /// The next frame is rounded, so that a snapshot cut right after it is smaller. Does nothing with
   /// codecs whose corrections would leave few bodies round: CodecTraits::keeps_rounding.
@@ -99,8 +109,6 @@ class Stream {
   [[nodiscard]] std::uint64_t hash() const;        ///< of agreed()
   [[nodiscard]] std::uint64_t last_input() const;  ///< highest number scheduled
   [[nodiscard]] std::uint32_t bodies() const;      ///< alive in agreed()
-  /// Bodies that it could not show as the engine had them: not finite, off the lattice, no orientation.
-  [[nodiscard]] engine::Mishaps mishaps() const;
   [[nodiscard]] std::size_t payload_bound() const;
   [[nodiscard]] std::size_t snapshot_bound() const;
 

@@ -161,9 +161,10 @@ class CodeAccount final : public EncodeObserver {
 
 /// A stream with a client of its own, and what they were seen to do.
 struct Lane {
-  Lane(host::Stream server_side, ClientTimeline client_side)
-      : stream(std::move(server_side)), client(std::move(client_side)) {}
+  Lane(host::Mirror bodies, host::Stream server_side, ClientTimeline client_side)
+      : mirror(std::move(bodies)), stream(std::move(server_side)), client(std::move(client_side)) {}
 
+  host::Mirror mirror;
   host::Stream stream;
   ClientTimeline client;
   CodeAccount account;
@@ -178,7 +179,9 @@ Result<Lane> make_lane(host::StreamConfig config, const Replay& replay) {
   auto client = ClientTimeline::create(config.layout, {.run_blocks = config.local.run_blocks});
   if (!client) return tl::unexpected(client.error());
   const engine::Simulation& simulation = replay.simulation();
-  auto stream = host::Stream::create(std::move(config), {.bodies = simulation.bodies(),
+  auto mirror = host::make_mirror({&config, 1}, simulation.bodies());
+  if (!mirror) return tl::unexpected(mirror.error());
+  auto stream = host::Stream::create(std::move(config), {.mirror = *mirror,
                                                          .drive = replay.start_drive(),
                                                          .epoch = kEpoch,
                                                          .frame_rate_hz = 1 / simulation.dt_s()});
@@ -188,7 +191,7 @@ Result<Lane> make_lane(host::StreamConfig config, const Replay& replay) {
   std::vector<std::byte> snapshot;
   stream->snapshot(snapshot);
   if (auto loaded = client->load(snapshot, kEpoch); !loaded) return tl::unexpected(loaded.error());
-  return Lane(std::move(*stream), std::move(*client));
+  return Lane(std::move(*mirror), std::move(*stream), std::move(*client));
 }
 
 /// One frame of one stream: the server's half, then the client's.
@@ -198,10 +201,12 @@ Result<void> advance(Lane& lane, const Replay& replay) {
     if (!scheduled) return scheduled;
   }
   const engine::Simulation& simulation = replay.simulation();
-  const host::Stream::FrameResult frame =
-      lane.stream.produce(simulation.bodies(), simulation.events(), &lane.account);
+  const std::int64_t began_ns = steady_ns();
+  lane.mirror.update(simulation.bodies(), simulation.events());
+  const std::int64_t mirror_ns = steady_ns() - began_ns;
+  const host::Stream::FrameResult frame = lane.stream.produce(lane.mirror, &lane.account);
   lane.predict.add(frame.predict_ns);
-  lane.encode.add(frame.mirror_ns + frame.encode_ns);
+  lane.encode.add(mirror_ns + frame.encode_ns);
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
   lane.corrected += frame.corrected;
   lane.at_rest += lane.stream.agreed().rest_count();
@@ -222,7 +227,7 @@ Result<void> advance(Lane& lane, const Replay& replay) {
 
 /// What a joiner would be sent after the last frame: a snapshot of one frame more, which is rounded for it,
 /// in which bodies go on as they move.
-std::size_t snapshot_bytes(host::Stream& stream, const engine::Bodies& last) {
+std::size_t snapshot_bytes(host::Mirror& mirror, host::Stream& stream, const engine::Bodies& last) {
   std::array<std::vector<float>, 3> position;
   engine::Bodies bodies = last;
   for (std::size_t axis = 0; axis < position.size(); ++axis) {
@@ -234,7 +239,8 @@ std::size_t snapshot_bytes(host::Stream& stream, const engine::Bodies& last) {
     bodies.position[axis] = position[axis];
   }
   stream.round_next();
-  stream.produce(bodies, {});
+  mirror.update(bodies, {});
+  stream.produce(mirror);
   std::vector<std::byte> snapshot;
   stream.snapshot(snapshot);
   return snapshot.size();
@@ -255,7 +261,7 @@ BandwidthRow row_of(Lane& lane, double frames, const engine::Bodies& bodies) {
   lane.snaps.fill(row, stream.lattice.unit);
   row.corrected_per_frame = static_cast<double>(lane.corrected) / frames;
   row.at_rest_per_frame = static_cast<double>(lane.at_rest) / frames;
-  row.snapshot_bytes_per_body = static_cast<double>(snapshot_bytes(lane.stream, bodies)) /
+  row.snapshot_bytes_per_body = static_cast<double>(snapshot_bytes(lane.mirror, lane.stream, bodies)) /
                                 std::max(1U, lane.stream.agreed().alive_count());
   row.predict_ms = lane.predict.quantile_ms(0.5);
   row.encode_ms = lane.encode.quantile_ms(0.5);

@@ -132,12 +132,12 @@ Result<ClientCostRow> measure_client_cost(const scenes::Scene& scene, const Clie
   engine::Simulation& simulation = *source->simulation;
   auto config = sessions::plan_session(scene, setup.choice);
   if (!config) return tl::unexpected(config.error());
-  config->stream.layout.lead = 1;
+  config->streams[0].layout.lead = 1;
   config->wait_for = 2;
   config->clock_ns = &core_ns;
   ClientCostRow row{.scene = scene.name,
-                    .predictor = config->stream.layout.predictor,
-                    .codec = config->stream.layout.codec,
+                    .predictor = config->streams[0].layout.predictor,
+                    .codec = config->streams[0].layout.codec,
                     .bodies = setup.choice.bodies,
                     .frames = setup.frames};
 

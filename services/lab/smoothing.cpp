@@ -175,11 +175,11 @@ Result<SmoothingRow> measure_smoothing(const scenes::Scene& scene, const Smoothi
   if (!source) return tl::unexpected(source.error());
   auto config = sessions::plan_session(scene, setup.choice);
   if (!config) return tl::unexpected(config.error());
-  config->stream.layout.lead = 1;
+  config->streams[0].layout.lead = 1;
   SmoothingRow row{
       .scene = scene.name,
-      .predictor = config->stream.layout.predictor,
-      .codec = config->stream.layout.codec,
+      .predictor = config->streams[0].layout.predictor,
+      .codec = config->streams[0].layout.codec,
       .bodies = setup.choice.bodies,
       .threshold = setup.choice.threshold_m.value_or(scene.threshold_m) * setup.choice.threshold_scale};
 

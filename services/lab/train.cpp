@@ -22,7 +22,9 @@ Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
   const engine::Simulation& simulation = *source->simulation;
   auto replay = Replay::create(*source->simulation, std::move(source->script), config.lattice);
   if (!replay) return tl::unexpected(replay.error());
-  auto stream = host::Stream::create(config, {.bodies = simulation.bodies(), .drive = replay->start_drive()});
+  auto mirror = host::make_mirror({&config, 1}, simulation.bodies());
+  if (!mirror) return tl::unexpected(mirror.error());
+  auto stream = host::Stream::create(config, {.mirror = *mirror, .drive = replay->start_drive()});
   if (!stream) return tl::unexpected(stream.error());
   host::ResidualStatistics observed(config.layout.radii);
   for (Frame frame = 1; frame <= frames; ++frame) {
@@ -30,7 +32,8 @@ Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
     for (const ScheduledDrive& input : replay->scheduled()) {
       if (auto scheduled = stream->schedule(input); !scheduled) return tl::unexpected(scheduled.error());
     }
-    stream->produce(simulation.bodies(), simulation.events(), &observed);
+    mirror->update(simulation.bodies(), simulation.events());
+    stream->produce(*mirror, &observed);
     progress(frame);
   }
   return observed;

@@ -80,17 +80,25 @@ Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& c
   return {};
 }
 
-}  // namespace
+/// Of a stream, in metres.
+struct Thresholds {
+  double first = 0, finest = 0;
+};
 
-Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice) {
+Thresholds thresholds_of(const scenes::Scene& scene, const SessionChoice& choice) {
+  const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  if (!choice.automatic) return {stated_m, stated_m};
+  const double first_m = std::min(stated_m, choice.max_error_m.value_or(stated_m));
+  return {first_m, first_m * host::kFinestShare};
+}
+
+// On a lattice that the session's streams share.
+Result<host::StreamConfig> plan_on(const host::Lattice& session_lattice, const scenes::Scene& scene,
+                                   const SessionChoice& choice) {
   const auto traits = codec_traits(choice.codec);
   if (!traits) return tl::unexpected(traits.error());
-  const double stated_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
-  const double threshold_m =
-      choice.automatic ? std::min(stated_m, choice.max_error_m.value_or(stated_m)) : stated_m;
-  const double finest_m = choice.automatic ? threshold_m * host::kFinestShare : threshold_m;
-  const auto lattice = host::choose_lattice(finest_m, scene.extent_m, scene.dt_s);
-  if (!lattice) return tl::unexpected(lattice.error());
+  const host::Lattice* const lattice = &session_lattice;
+  const auto [threshold_m, finest_m] = thresholds_of(scene, choice);
   const scenes::TrainedTable* trained = scenes::nearest_table(scene.trained, choice.bodies, threshold_m);
   const scenes::TrainedTable table = trained == nullptr ? scenes::TrainedTable{} : *trained;
   const auto parameters =
@@ -122,23 +130,81 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   return stream;
 }
 
+tl::unexpected<Error> of_stream(const std::string& name, const Error& error) {
+  if (name.empty()) return tl::unexpected(error);
+  return fail(error.code, fmt::format("stream {}: {}", name, error.message));
+}
+
+}  // namespace
+
+SessionChoice choice_of(const SessionChoice& session, const StreamChoice& stream) {
+  SessionChoice choice = session;
+  choice.streams.clear();
+  choice.codec = stream.codec.value_or(session.codec);
+  choice.predictor = stream.predictor.value_or(session.predictor);
+  if (stream.threshold_m) {
+    choice.threshold_m = stream.threshold_m;
+    choice.automatic = false;
+  }
+  if (stream.target_mbit_per_s) {
+    choice.target_mbit_per_s = *stream.target_mbit_per_s;
+    choice.automatic = true;
+  }
+  if (stream.max_error_m) choice.max_error_m = stream.max_error_m;
+  if (stream.budget_bytes) choice.budget_bytes = stream.budget_bytes;
+  const auto traits = codec_traits(choice.codec);
+  if (traits && !traits->reads_threshold) choice.automatic = false;
+  return choice;
+}
+
+Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice) {
+  return host::choose_lattice(thresholds_of(scene, choice).finest, scene.extent_m, scene.dt_s)
+      .and_then([&](const host::Lattice& lattice) { return plan_on(lattice, scene, choice); });
+}
+
+Result<std::vector<StreamChoice>> usual_streams(const scenes::Scene& scene, const SessionChoice& choice) {
+  std::vector<StreamChoice> streams;
+  if (choice.predictor != "auto") return streams;
+  const auto one = plan_stream(scene, choice);
+  if (!one) return tl::unexpected(one.error());
+  if (one->layout.predictor != "field") return streams;
+  for (const auto& [name, predictor] : {std::pair{"thin", "ballistic"}, std::pair{"rich", "field"}}) {
+    streams.emplace_back();
+    streams.back().name = name;
+    streams.back().predictor = predictor;
+  }
+  return streams;
+}
+
 Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
-  return plan_stream(scene, choice).map([&](host::StreamConfig&& stream) {
-    host::HostConfig config;
-    config.stream = std::move(stream);
-    config.frame_rate_hz = 1 / scene.dt_s;
-    config.scene = scene.name;
-    config.scene_description = scene.text;
-    config.types.clear();
-    for (const scenes::BodyType& type : scene.types) {
-      config.types.push_back({.name = type.name,
-                              .radius = static_cast<float>(type.bounding_radius_m),
-                              .colour_rgba = type.colour_rgba,
-                              .shape = static_cast<transport::Shape>(type.shape.kind),
-                              .shape_values = type.shape.values});
-    }
-    return config;
+  const std::vector<StreamChoice> streams =
+      choice.streams.empty() ? std::vector<StreamChoice>(1) : choice.streams;
+  const auto finest = std::ranges::min_element(streams, {}, [&](const StreamChoice& stream) {
+    return thresholds_of(scene, choice_of(choice, stream)).finest;
   });
+  const auto lattice = host::choose_lattice(thresholds_of(scene, choice_of(choice, *finest)).finest,
+                                            scene.extent_m, scene.dt_s);
+  if (!lattice) return of_stream(finest->name, lattice.error());
+  host::HostConfig config;
+  for (const StreamChoice& stream : streams) {
+    auto planned = plan_on(*lattice, scene, choice_of(choice, stream));
+    if (!planned) return of_stream(stream.name, planned.error());
+    planned->name = stream.name;
+    config.streams.push_back(std::move(*planned));
+  }
+  if (auto named = host::check_stream_names(config.streams); !named) return tl::unexpected(named.error());
+  config.frame_rate_hz = 1 / scene.dt_s;
+  config.scene = scene.name;
+  config.scene_description = scene.text;
+  config.types.clear();
+  for (const scenes::BodyType& type : scene.types) {
+    config.types.push_back({.name = type.name,
+                            .radius = static_cast<float>(type.bounding_radius_m),
+                            .colour_rgba = type.colour_rgba,
+                            .shape = static_cast<transport::Shape>(type.shape.kind),
+                            .shape_values = type.shape.values});
+  }
+  return config;
 }
 
 }  // namespace tandem::sessions

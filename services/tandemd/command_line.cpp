@@ -4,8 +4,10 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
+#include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "sdk/core/codec/codec.hpp"
 #include "services/tandemd/config.hpp"
@@ -48,6 +50,15 @@ void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold(*length);
 }
 
+void add_streams(idl::ServerConfig& config, const std::vector<std::string>& texts) {
+  config.clear_stream();
+  for (const std::string& text : texts) {
+    auto stream = parse_stream(text);
+    if (!stream) throw CLI::ValidationError("--stream", stream.error().message);
+    *config.add_stream() = std::move(*stream);
+  }
+}
+
 void add_flags(CLI::App& app, idl::ServerConfig& config) {
   using Config = idl::ServerConfig;
   const Options defaults;
@@ -61,9 +72,19 @@ void add_flags(CLI::App& app, idl::ServerConfig& config) {
             fmt::format("{} [{}]", fmt::join(codec_names(), ", "), defaults.choice.codec));
   flags.add(
       "--predictor", &Config::mutable_predictor,
-      fmt::format("Predicted step of server and clients: ballistic, field, contact, or auto: field with "
-                  "codec tracker and at most {} spheres of about one size, else ballistic [{}]",
-                  sessions::kMostBodiesForField, defaults.choice.predictor));
+      fmt::format(
+          "Predicted step of server and clients: ballistic, field, contact, or auto: with codec "
+          "tracker and at most {} spheres of about one size a stream of ballistic and one of field, else "
+          "ballistic [{}]",
+          sessions::kMostBodiesForField, defaults.choice.predictor));
+  app.add_option_function<std::vector<std::string>>(
+         "--stream", [&config](const std::vector<std::string>& texts) { add_streams(config, texts); },
+         "One of up to 8 ways of telling the world, each for clients of other means; made while somebody plays "
+         "it. NAME:PREDICTOR, or NAME:key=value,... with codec, predictor, threshold, target-bandwidth, "
+         "max-error, budget; the rest as the flags of these names say. Clients of no preference play the first "
+         "[thin:ballistic and rich:field where --predictor auto is field]")
+      ->type_name("NAME:SPEC")
+      ->allow_extra_args(false);
   app.add_option_function<std::string>(
          "--threshold", [&config](const std::string& text) { set_threshold(config, text); },
          "Position error above which a body is corrected, in metres, or auto: chosen at run time [the "

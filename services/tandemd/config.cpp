@@ -51,7 +51,7 @@ bool is_length(double metres) { return within(metres, 1e-9, 1e9); }
 /// Numbers that may be words.
 Result<void> check_words(const ServerConfig& config, Options& options) {
   if (config.has_window() && config.window() != "auto") {
-    const std::uint32_t most = host::HostConfig().window_ceiling;
+    const std::uint32_t most = host::ServiceConfig().window_ceiling;
     options.window = number<std::uint32_t>(config.window());
     if (!options.window || *options.window < 1 || *options.window > most)
       return refuse("window", fmt::format("1 to {} frames, or auto", most));
@@ -113,6 +113,62 @@ Result<void> check_quality(const ServerConfig& config, const sessions::SessionCh
   return {};
 }
 
+sessions::StreamChoice choice_of(const idl::Stream& stream) {
+  sessions::StreamChoice choice;
+  choice.name = stream.name();
+  if (stream.has_codec()) choice.codec = stream.codec();
+  if (stream.has_predictor()) choice.predictor = stream.predictor();
+  if (stream.has_threshold()) choice.threshold_m = stream.threshold();
+  if (stream.has_target_bandwidth()) choice.target_mbit_per_s = stream.target_bandwidth();
+  if (stream.has_max_error()) choice.max_error_m = stream.max_error();
+  if (stream.has_budget_bytes()) choice.budget_bytes = stream.budget_bytes();
+  return choice;
+}
+
+/// What a stream says for itself, and that it goes with what is said for all.
+Result<void> check_stream(const idl::Stream& stream, const ServerConfig& config,
+                          const sessions::SessionChoice& common) {
+  const auto wrong = [&stream](const std::string& what) {
+    return refuse("stream", fmt::format("{}: {}", stream.name(), what));
+  };
+  const sessions::SessionChoice choice = sessions::choice_of(common, choice_of(stream));
+  const CodecTraits traits = traits_of(choice.codec);
+  if (stream.has_predictor() && config.has_predictor() && stream.predictor() != config.predictor()) {
+    return refuse("predictor", fmt::format("{}, but --stream {} says {}: say it there alone",
+                                           config.predictor(), stream.name(), stream.predictor()));
+  }
+  if (stream.has_threshold() && !is_length(stream.threshold()))
+    return wrong("a threshold is a positive length");
+  if (stream.has_threshold() && (stream.has_target_bandwidth() || stream.has_max_error()))
+    return wrong("either a threshold, or one that is chosen at run time by target-bandwidth and max-error");
+  if (stream.has_target_bandwidth() && !within(stream.target_bandwidth(), 0.001, 1e6))
+    return wrong("target-bandwidth is in Mbit/s, at least 0.001");
+  if (stream.has_target_bandwidth() && !traits.reads_threshold)
+    return wrong(fmt::format("codec {} has no threshold to reach a target-bandwidth with", choice.codec));
+  if (stream.has_max_error() && !is_length(stream.max_error()))
+    return wrong("max-error is a positive length");
+  if (stream.has_max_error() && !choice.automatic)
+    return wrong("max-error needs target-bandwidth, or --threshold auto");
+  if (stream.has_budget_bytes() && !traits.takes_budget)
+    return wrong("a budget needs codec limited or tracker");
+  if (stream.has_budget_bytes() && stream.budget_bytes() < sessions::kLeastBudgetBytes)
+    return wrong(fmt::format("a budget has at least {} bytes", sessions::kLeastBudgetBytes));
+  return {};
+}
+
+Result<void> check_streams(const ServerConfig& config, const sessions::SessionChoice& choice) {
+  if (config.stream_size() == 0) return {};
+  std::vector<host::StreamConfig> names;
+  for (const idl::Stream& stream : config.stream()) {
+    if (auto good = check_stream(stream, config, choice); !good) return good;
+    names.emplace_back();
+    names.back().name = stream.name();
+  }
+  if (names.front().name.empty()) return refuse("stream", "each needs a name");
+  if (auto named = host::check_stream_names(names); !named) return refuse("stream", named.error().message);
+  return {};
+}
+
 sessions::SessionChoice choice_of(const ServerConfig& config) {
   sessions::SessionChoice choice;
   choice.bodies = config.bodies();
@@ -125,6 +181,7 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
   if (config.has_max_error()) choice.max_error_m = config.max_error();
   if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
   if (config.has_threads()) choice.threads = config.threads();
+  for (const idl::Stream& stream : config.stream()) choice.streams.push_back(choice_of(stream));
   return choice;
 }
 
@@ -147,6 +204,52 @@ Result<ServerConfig> load_config(const std::string& path) {
   return config;
 }
 
+Result<idl::Stream> parse_stream(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  idl::Stream stream;
+  stream.set_name(text.substr(0, colon));
+  const auto wrong = [&](const std::string& what) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("'{}': {}", text, what));
+  };
+  if (colon == std::string::npos || colon + 1 == text.size())
+    return wrong("NAME:PREDICTOR, or NAME:key=value,...");
+  const auto set_number = [](const std::string& value, auto* to, auto set) {
+    const auto read = number<double>(value);
+    if (read) (to->*set)(*read);
+    return read.has_value();
+  };
+  for (std::size_t begin = colon + 1; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string item = text.substr(begin, end - begin);
+    begin = end + 1;
+    const std::size_t equals = item.find('=');
+    const std::string key = equals == std::string::npos ? "predictor" : item.substr(0, equals);
+    const std::string value = equals == std::string::npos ? item : item.substr(equals + 1);
+    bool good = !value.empty();
+    if (key == "predictor") {
+      good = good && !stream.has_predictor();
+      stream.set_predictor(value);
+    } else if (key == "codec") {
+      stream.set_codec(value);
+    } else if (key == "threshold") {
+      good = set_number(value, &stream, &idl::Stream::set_threshold);
+    } else if (key == "target-bandwidth") {
+      good = set_number(value, &stream, &idl::Stream::set_target_bandwidth);
+    } else if (key == "max-error") {
+      good = set_number(value, &stream, &idl::Stream::set_max_error);
+    } else if (key == "budget") {
+      const auto bytes = number<std::uint32_t>(value);
+      good = bytes.has_value();
+      stream.set_budget_bytes(bytes.value_or(0));
+    } else {
+      return wrong(fmt::format(
+          "'{}' is none of codec, predictor, threshold, target-bandwidth, max-error, budget", key));
+    }
+    if (!good) return wrong(fmt::format("what '{}' says of {} cannot be read", item, key));
+  }
+  return stream;
+}
+
 ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   // What a flag excludes goes with it, where only the file says it: a length, a scale and auto exclude each
   // other, quality follows auto, and auto and a budget need codecs that have them.
@@ -156,6 +259,9 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   if (flags.has_threshold()) file.clear_threshold_scale();
   if (flags.has_threshold() || !traits.reads_threshold) file.clear_threshold_auto();
   if (!traits.takes_budget) file.clear_budget_bytes();
+  // Streams are one whole, and a predictor is what they are told apart by.
+  if (flags.stream_size() > 0 || flags.has_predictor()) file.clear_stream();
+  if (flags.stream_size() > 0) file.clear_predictor();
   const bool automatic = flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto();
   if (!automatic) {
     file.clear_target_bandwidth();
@@ -186,6 +292,7 @@ Result<Options> check_config(const ServerConfig& config) {
   return check_words(config, options)
       .and_then([&] { return check_numbers(options); })
       .and_then([&] { return check_quality(config, options.choice); })
+      .and_then([&] { return check_streams(config, options.choice); })
       .map([&] { return options; });
 }
 

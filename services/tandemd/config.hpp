@@ -15,6 +15,11 @@ namespace tandem::daemon {
 /// What flags say wins over what the file says; and what a flag excludes goes with it.
 [[nodiscard]] idl::ServerConfig merge(const idl::ServerConfig& flags, idl::ServerConfig file);
 
+/// Reads what --stream says: NAME:ITEM,ITEM..., where an item is key=value (codec, predictor, threshold,
+/// target-bandwidth, max-error, budget, as the flags of these names), or a predictor alone. Errors:
+/// kInvalidArgument.
+[[nodiscard]] Result<idl::Stream> parse_stream(const std::string& text);
+
 /// Checks what needs no scene. Errors: kInvalidArgument naming the flag and what it takes.
 [[nodiscard]] Result<Options> check_config(const idl::ServerConfig& config);
 

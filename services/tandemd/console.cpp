@@ -30,6 +30,20 @@ std::string coding_text(const host::StreamConfig& stream) {
   return text;
 }
 
+namespace {
+
+// Who plays which; nothing of a single stream.
+std::string streams_text(const host::HostTotals& totals) {
+  std::string text;
+  for (const host::StreamTotals& stream : totals.streams) {
+    if (totals.streams.size() > 1)
+      text += fmt::format("  {} {}+{}", stream.name, stream.participants, stream.observers);
+  }
+  return text;
+}
+
+}  // namespace
+
 Console::Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
 Console::~Console() { clear_line(); }
 
@@ -54,9 +68,9 @@ void Console::show(host::Host& host, std::int64_t now_ns) {
       "frame {}  {:.1f} Hz  {:.2f} Mbit/s  {:.0f} corrected  {:.1f} ms  {} participants  {} observers "
       " window {}  threshold {:.3g} m  {}",
       host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s, frames > 0 ? corrected / frames : 0,
-      host.report().frame_ms, host.participants(), host.observers(), host.window(), host.threshold_m(),
-      gains_text(host.parameters()));
-  std::fputs(line.c_str(), stderr);
+      host.report().frame_ms, host.participants(), host.observers(), host.window(),
+      host.threshold_m(host.first_made()), gains_text(host.parameters(host.first_made())));
+  std::fputs((line + streams_text(totals)).c_str(), stderr);
   std::fflush(stderr);
   line_shown_ = true;
   last_ = totals;

@@ -33,37 +33,43 @@ int report_error(const Error& error, int exit_code) {
   return exit_code;
 }
 
-/// Lines `epoch,frame,hash`.
+/// Lines `epoch,frame,hash`, a file a stream.
 class HashLog {
  public:
-  [[nodiscard]] Result<void> open(const std::string& path, Epoch epoch) {
+  /// `path` for stream 0, `path`.k for stream k.
+  [[nodiscard]] Result<void> open(const std::string& path, Epoch epoch, std::size_t streams) {
     epoch_ = epoch;
-    path_ = path;
-    if (path.empty()) return {};
-    file_.reset(std::fopen(path.c_str(), "w"));
-    if (!file_) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", path));
-    std::setvbuf(file_.get(), nullptr, _IOLBF, BUFSIZ);  // whole lines, also of a server that is killed
+    for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
+      paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
+      files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
+      if (!files_.back()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", paths_.back()));
+      // Whole lines, also of a server that is killed.
+      std::setvbuf(files_.back().get(), nullptr, _IOLBF, BUFSIZ);
+    }
     return {};
   }
-  void add(Frame frame, std::uint64_t hash) {
-    if (file_) std::fputs(fmt::format("{},{},{}\n", epoch_, frame, to_hex(hash)).c_str(), file_.get());
+  void add(std::uint32_t stream, Frame frame, std::uint64_t hash) {
+    if (stream >= files_.size()) return;
+    std::fputs(fmt::format("{},{},{}\n", epoch_, frame, to_hex(hash)).c_str(), files_[stream].get());
   }
   /// A full disk shows at the latest here.
   [[nodiscard]] Result<void> close() {
-    if (!file_) return {};
-    const bool failed = std::ferror(file_.get()) != 0;
-    if (std::fclose(file_.release()) != 0 || failed) {
-      return fail(ErrorCode::kIo, fmt::format("{}: not all hashes could be written", path_));
+    Result<void> closed;
+    for (std::size_t stream = 0; stream < files_.size(); ++stream) {
+      const bool failed = std::ferror(files_[stream].get()) != 0;
+      if (std::fclose(files_[stream].release()) != 0 || failed)
+        closed = fail(ErrorCode::kIo, fmt::format("{}: not all hashes could be written", paths_[stream]));
     }
-    return {};
+    files_.clear();
+    return closed;
   }
 
  private:
   struct Close {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
-  std::unique_ptr<std::FILE, Close> file_;
-  std::string path_;
+  std::vector<std::unique_ptr<std::FILE, Close>> files_;
+  std::vector<std::string> paths_;
   Epoch epoch_ = 0;
 };
 
@@ -88,12 +94,18 @@ class ScriptSender {
 };
 
 Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& options) {
-  return sessions::plan_session(scene, options.choice).map([&](host::HostConfig config) {
+  sessions::SessionChoice choice = options.choice;
+  if (choice.streams.empty()) {
+    auto usual = sessions::usual_streams(scene, choice);
+    if (!usual) return tl::unexpected(usual.error());
+    choice.streams = std::move(*usual);
+  }
+  return sessions::plan_session(scene, choice).map([&](host::HostConfig config) {
     config.session = options.session;
     config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
     if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
     config.free_rate = options.free_rate;
-    config.stream.layout.lead = options.lead;
+    for (host::StreamConfig& stream : config.streams) stream.layout.lead = options.lead;
     config.window = options.window;
     config.stall_timeout_ns.reset();
     if (options.stall_timeout_s)
@@ -108,7 +120,7 @@ Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& op
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
                                                          const Options& options,
                                                          const std::atomic<bool>& stop) {
-  const auto largest = host::largest_delta_bytes(config.stream);
+  const auto largest = host::largest_delta_bytes(config.streams);
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;
@@ -147,10 +159,13 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
   std::optional<std::int64_t> end_ns;  // nothing counts while the name is claimed
   bool running = false;
-  hashes.add(host.frame(), host.hash());
+  hashes.add(host.first_made(), host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
-    if (host.poll(now_ns, wall_ns())) hashes.add(host.report().frame, host.report().hash);
+    if (host.poll(now_ns, wall_ns())) {
+      for (const host::DeltaReport& delta : host.report().deltas)
+        hashes.add(delta.stream, host.report().frame, delta.hash);
+    }
     if (host.error()) return Ending::kRefused;
     if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
     if (host.state() == host::Host::State::kRunning) {
@@ -177,6 +192,16 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       totals.frames, mbit_per_s, totals.frame_ms_p50, totals.frame_ms_p99, totals.clients_seen, totals.stalls,
       totals.suspended_ms, totals.refused_inputs);
   if (!json) return {};
+  nlohmann::ordered_json streams = nlohmann::ordered_json::array();
+  for (const host::StreamTotals& stream : totals.streams) {
+    const double bits = static_cast<double>(stream.payload_bytes) * 8 / kBitsPerMbit;
+    streams.push_back(
+        {{"name", stream.name},
+         {"frames", stream.frames},
+         {"mbit_per_s", stream.frames == 0 ? 0 : bits / static_cast<double>(stream.frames) * frame_rate_hz},
+         {"snapshots", stream.snapshots},
+         {"snapshot_bytes", stream.snapshot_bytes}});
+  }
   const nlohmann::ordered_json object{
       {"frames", totals.frames},
       {"mbit_per_s", mbit_per_s},
@@ -186,7 +211,8 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       {"refused_inputs", totals.refused_inputs},
       {"snapshots", totals.snapshots},
       {"snapshot_bytes", totals.snapshot_bytes},
-      {"demotions", totals.demotions}};
+      {"demotions", totals.demotions},
+      {"streams", streams}};
   const std::string line = object.dump() + '\n';
   if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     return fail(ErrorCode::kIo, "the report could not be written to stdout");
@@ -204,17 +230,22 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
   if (!simulation) return report_error(simulation.error(), 2);
   HashLog hashes;
-  if (const auto opened = hashes.open(options.hash_log, config->epoch); !opened)
+  if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
     return report_error(opened.error(), 1);
 
   auto port = open_port(*config, options, stop);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
-  const std::string coding = coding_text(config->stream);
+  const std::vector<host::StreamConfig> streams = config->streams;
   auto host = host::Host::create(std::move(*config), **simulation, **port);
   if (!host) return report_error(host.error(), 2);
+  const bool alone = streams.size() == 1 && streams[0].name.empty();
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
-               options.choice.bodies, coding, options.session, options.domain, (*host)->session().epoch);
+               options.choice.bodies,
+               alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
+               options.domain, (*host)->session().epoch);
+  for (const host::StreamConfig& stream : streams)
+    if (!alone) spdlog::info("stream {}: {}", stream.name, coding_text(stream));
 
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
@@ -227,9 +258,13 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   const auto closed = hashes.close();
   if (!closed) spdlog::error(closed.error().message);
   if (ending == Ending::kRefused) return report_error(*(*host)->error(), 1);
-  if (options.choice.automatic) spdlog::info("threshold at the end: {:.4g} m", (*host)->threshold_m());
-  if (const std::string gains = gains_text((*host)->parameters()); !gains.empty())
-    spdlog::info("at the end: {}", gains);
+  for (std::uint32_t id = 0; id < streams.size(); ++id) {
+    const std::string which = alone ? std::string() : " of stream " + streams[id].name;
+    if (streams[id].quality)
+      spdlog::info("threshold{} at the end: {:.4g} m", which, (*host)->threshold_m(id));
+    if (const std::string gains = gains_text((*host)->parameters(id)); !gains.empty())
+      spdlog::info("at the end{}: {}", which, gains);
+  }
   const auto printed = print_report((*host)->totals(), frame_rate_hz, options.json);
   if (!printed) spdlog::error(printed.error().message);
   if (ending == Ending::kCannotWrite) {

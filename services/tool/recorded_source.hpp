@@ -12,8 +12,9 @@
 
 namespace tandem::tool {
 
-/// Publishes a run of a playback as a session of its own; what was recorded of payloads, hashes and scheduled
-/// inputs goes out as it is. Of inputs it takes kSeek, and ends with it.
+/// Publishes a run of a playback as a session of its own, of the one stream that was recorded; what was
+/// recorded of payloads, hashes and scheduled inputs goes out as it is. Of inputs it takes kSeek, and ends
+/// with it.
 class RecordedSource final : public host::FrameSource {
  public:
   /// `playback` holds a state, outlives this, and is stepped by nobody else meanwhile. `seeks` says how often
@@ -24,11 +25,17 @@ class RecordedSource final : public host::FrameSource {
 
   [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
   [[nodiscard]] Frame frame() const override { return timeline().applied(); }
-  [[nodiscard]] const State& agreed() const override { return timeline().state(frame()); }
-  [[nodiscard]] std::uint64_t hash() const override { return timeline().hash(); }
-  [[nodiscard]] const StreamParameters& parameters() const override { return timeline().parameters(); }
-  std::optional<Made> next(bool snapshot_follows, host::Outbox& outbox) override;
-  void snapshot(std::vector<std::byte>& out) override { timeline().snapshot(out); }
+  [[nodiscard]] host::StreamSet active() const override { return {1}; }
+  void set_active(host::StreamSet /*streams*/) override {}
+  [[nodiscard]] const State& agreed(std::uint32_t /*stream*/) const override {
+    return timeline().state(frame());
+  }
+  [[nodiscard]] std::uint64_t hash(std::uint32_t /*stream*/) const override { return timeline().hash(); }
+  [[nodiscard]] const StreamParameters& parameters(std::uint32_t /*stream*/) const override {
+    return timeline().parameters();
+  }
+  std::optional<Made> next(host::StreamSet snapshots_follow, host::Outbox& outbox) override;
+  void snapshot(std::uint32_t /*stream*/, std::vector<std::byte>& out) override { timeline().snapshot(out); }
   transport::Reason accept(const engine::Input& input, const host::InputOrigin& origin, host::Outbox& outbox,
                            Frame& acts_on) override;
 
@@ -45,6 +52,7 @@ class RecordedSource final : public host::FrameSource {
   accounts::TokenBucket* seeks_;
   std::int64_t (*clock_ns_)();
   transport::SessionMessage session_;
+  MadeDelta delta_;  // the last
   std::optional<double> sought_s_;
   Result<recording::Playback::Step> ending_ = recording::Playback::Step::kFrame;
 };

@@ -51,13 +51,14 @@ ServerTimeline::ServerTimeline(ServerTimeline&&) noexcept = default;
 ServerTimeline& ServerTimeline::operator=(ServerTimeline&&) noexcept = default;
 ServerTimeline::~ServerTimeline() = default;
 
-void ServerTimeline::start(Frame frame, const State& state, const Drive& drive) {
+void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input,
+                           std::span<const ScheduledDrive> pending) {
   TANDEM_ASSERT(state.capacity() == impl_->state.capacity() && state.groups() == impl_->state.groups() &&
                 valid_drive(drive));
   impl_->frame = frame;
   impl_->state = state;
   impl_->drive = drive;
-  impl_->inputs.reset(0, {});
+  impl_->inputs.reset(last_input, pending);
   impl_->hash = impl_->parts.hash(impl_->state);
 }
 

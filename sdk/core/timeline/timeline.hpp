@@ -47,8 +47,10 @@ class ServerTimeline {
   ServerTimeline& operator=(const ServerTimeline&) = delete;
   ~ServerTimeline();
 
-  /// The agreed state at `frame` (frame 0: the start block), before the first advance().
-  void start(Frame frame, const State& state, const Drive& drive);
+  /// The agreed state at `frame` (frame 0: the start block), before the first advance(). Of a session that
+  /// went on before: `last_input`, the last number issued, and those up to it that are still to act.
+  void start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input = 0,
+             std::span<const ScheduledDrive> pending = {});
   /// Numbers must follow one another and frames must lie in the future. The last number issued for a frame
   /// wins. Errors: kOutOfOrder, kCapacity, kInvalidArgument (gravity out of range).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);

@@ -73,7 +73,7 @@ Result<host::HostConfig> configure(const ServerOptions& options, const engine::S
     return fail(ErrorCode::kInvalidArgument, "a server needs 1 to 65535 body types");
   return plan(options, simulation).map([&](host::StreamConfig&& stream) {
     host::HostConfig config;
-    config.stream = std::move(stream);
+    config.streams.push_back(std::move(stream));
     config.session = options.session;
     config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
     config.frame_rate_hz = 1 / simulation.dt_s();
@@ -144,7 +144,7 @@ Server::~Server() = default;
 Result<Server> Server::start(const ServerOptions& options, engine::Simulation& simulation) {
   auto config = configure(options, simulation);
   if (!config) return tl::unexpected(config.error());
-  const auto largest = host::largest_delta_bytes(config->stream);
+  const auto largest = host::largest_delta_bytes(config->streams);
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;

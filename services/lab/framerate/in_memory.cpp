@@ -52,7 +52,7 @@ Result<host::HostConfig> plan(const scenes::Scene& scene, const FramerateRow& ro
   choice.bodies = row.bodies;
   choice.codec = row.method;
   return sessions::plan_session(scene, choice).map([&](host::HostConfig&& config) {
-    config.stream.layout.lead = 1;
+    config.streams[0].layout.lead = 1;
     config.window = 2;
     config.free_rate = true;
     config.stall_timeout_ns.reset();

@@ -105,20 +105,22 @@ void World::start_server() {
   server_port_ = must(network_.make_server("default"));
   simulation_ = std::make_unique<Wanderers>(kBodies, options_.seed + epoch_);
   host::HostConfig config;
+  config.streams.resize(1);
   config.epoch = epoch_;
   config.start_frame = start_frame_;
-  config.stream.layout.lead = options_.lead;
+  config.streams[0].layout.lead = options_.lead;
   if (dice_.chance(0.3)) config.window = 2;
-  config.stream.layout.capacity = kBodies;
-  config.stream.layout.codec = options_.codec;
-  if (config.stream.layout.codec == "limited") config.stream.budget = 600;
-  if (config.stream.layout.codec == "entropy" || config.stream.layout.codec == "limited")
-    config.stream.layout.codec_tables = default_code_tables();
-  config.stream.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
-  config.stream.layout.parameters.codec = must(host::codec_parameters(config.stream.lattice, 0.01, 0.1, 2));
-  if (config.stream.layout.codec == "tracker") {
-    host::set_first_gains(config.stream.layout.predictor, config.stream.layout.parameters);
-    config.stream.gains = host::GainGoal{};
+  config.streams[0].layout.capacity = kBodies;
+  config.streams[0].layout.codec = options_.codec;
+  if (config.streams[0].layout.codec == "limited") config.streams[0].budget = 600;
+  if (config.streams[0].layout.codec == "entropy" || config.streams[0].layout.codec == "limited")
+    config.streams[0].layout.codec_tables = default_code_tables();
+  config.streams[0].lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
+  config.streams[0].layout.parameters.codec =
+      must(host::codec_parameters(config.streams[0].lattice, 0.01, 0.1, 2));
+  if (config.streams[0].layout.codec == "tracker") {
+    host::set_first_gains(config.streams[0].layout.predictor, config.streams[0].layout.parameters);
+    config.streams[0].gains = host::GainGoal{};
   }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};
   host_ = must(host::Host::create(config, *simulation_, *server_port_));
@@ -138,7 +140,8 @@ void World::kill_server() {
 void World::poll_server() {
   if (!host_ || server_frozen_ || now_ns_ < poll_server_ns_) return;
   // A publisher that lags now and then: what is queued leaves later.
-  if (host_->poll(now_ns_, wall_ns())) truth_.hashes[{epoch_, host_->report().frame}] = host_->report().hash;
+  if (host_->poll(now_ns_, wall_ns()))
+    truth_.hashes[{epoch_, host_->report().frame}] = host_->report().deltas.at(0).hash;
   for (; acted_seen_ < simulation_->acted.size(); ++acted_seen_) {
     const auto& [values, step] = simulation_->acted[acted_seen_];
     truth_.acted[{epoch_, values[0]}] = start_frame_ + step;

@@ -72,14 +72,19 @@ class Stage {
     network.advance_to(now_ns);
   }
 
-  Server& add_server(Epoch epoch, HostConfig config = {}) {
+  Server& add_server(Epoch epoch) {
+    HostConfig config;
+    return add_server(epoch, std::move(config));
+  }
+  Server& add_server(Epoch epoch, HostConfig config) {
     auto server = std::make_unique<Server>(
         Server{must(network.make_server("default")), client::Wanderers(16, seed_), nullptr});
     config.epoch = epoch;
-    config.stream.layout.capacity = 16;
-    config.stream.layout.codec = "selective";
-    config.stream.lattice = must(choose_lattice(0.01, 3, server->simulation.dt_s()));
-    config.stream.layout.parameters.codec = must(codec_parameters(config.stream.lattice, 0.01, 0, 0));
+    config.streams.resize(1);
+    config.streams[0].layout.capacity = 16;
+    config.streams[0].layout.codec = "selective";
+    config.streams[0].lattice = must(choose_lattice(0.01, 3, server->simulation.dt_s()));
+    config.streams[0].layout.parameters.codec = must(codec_parameters(config.streams[0].lattice, 0.01, 0, 0));
     server->host = must(Host::create(std::move(config), server->simulation, *server->port));
     servers.push_back(std::move(server));
     return *servers.back();

@@ -93,17 +93,19 @@ void Playground::start_server() {
   server_port_ = must(network_.make_server("default"));
   simulation_ = std::make_unique<client::Wanderers>(kBodies, seed_ + epoch_);
   host::HostConfig config;
+  config.streams.resize(1);
   config.epoch = ++epoch_;
   config.scene = "playground";
   config.scene_description =
       "gravity { y: -5 } bounds { low { x: -2 y: -2 z: -2 } high { x: 2 y: 2 z: 2 } }"
       " planes { normal { y: 2 } } spheres { centre { x: 1 } radius_m: 0.5 }";
-  config.stream.layout.lead = 1;
-  config.stream.layout.capacity = kBodies;
-  config.stream.layout.codec = "entropy";
-  config.stream.layout.codec_tables = default_code_tables();
-  config.stream.lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
-  config.stream.layout.parameters.codec = must(host::codec_parameters(config.stream.lattice, 0.01, 0.1, 2));
+  config.streams[0].layout.lead = 1;
+  config.streams[0].layout.capacity = kBodies;
+  config.streams[0].layout.codec = "entropy";
+  config.streams[0].layout.codec_tables = default_code_tables();
+  config.streams[0].lattice = must(host::choose_lattice(0.01, 3, simulation_->dt_s()));
+  config.streams[0].layout.parameters.codec =
+      must(host::codec_parameters(config.streams[0].lattice, 0.01, 0.1, 2));
   config.types = {{"plank", 0.1F, 0xFFU, transport::Shape::kBox, {1, 2, 0.5F}}};
   host_ = must(host::Host::create(config, *simulation_, *server_port_));
 }

@@ -159,7 +159,7 @@ TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
   EXPECT_TRUE(refused([](HostConfig& c) { c.session.clear(); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.frame_rate_hz = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.frame_rate_hz = std::nan(""); }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.lead = 2; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.streams[0].layout.lead = 2; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.window = 0; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.window = 25; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.client_limit = 0; }));
@@ -173,9 +173,9 @@ TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
   EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].radius = std::nanf(""); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].radius = -1; }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].shape = transport::Shape::kBox; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.codec = "morse"; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.predictor = "oracle"; }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.stream.layout.parameters.codec.threshold = 0; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.streams[0].layout.codec = "morse"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.streams[0].layout.predictor = "oracle"; }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.streams[0].layout.parameters.codec.threshold = 0; }));
 }
 
 TEST(HostCreate, RefusesASimulationWhoseColumnsAreTooShort) {
@@ -199,7 +199,7 @@ TEST(HostCreate, DescribesTheSessionCompletely) {
   EXPECT_EQ(session, bench.host->session());
   EXPECT_EQ(session.epoch, config.epoch);
   EXPECT_EQ(session.capacity, 4U);
-  EXPECT_EQ(session.lattice_unit, config.stream.lattice.unit);
+  EXPECT_EQ(session.lattice_unit, config.streams[0].lattice.unit);
   EXPECT_EQ(session.lead, 1U);
   EXPECT_EQ(session.window_ceiling, 24U);
   EXPECT_EQ(session.scene, "half_pipe");
@@ -207,7 +207,7 @@ TEST(HostCreate, DescribesTheSessionCompletely) {
   ASSERT_EQ(session.streams.size(), 1U);
   const auto& stream = session.streams[0];
   EXPECT_EQ(stream.id, StreamId{});
-  EXPECT_EQ(stream.layout, config.stream.layout);
+  EXPECT_EQ(stream.layout, config.streams[0].layout);
   EXPECT_EQ(stream.layout_hash, transport::layout_hash(session, stream));
   EXPECT_GT(stream.max_delta_bytes, 0U);
   EXPECT_GT(stream.max_snapshot_bytes, 0U);

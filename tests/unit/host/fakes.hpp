@@ -169,10 +169,11 @@ class FakePort final : public transport::ServerPort {
   HostConfig config;
   config.session = "unit";
   config.epoch = 1'700'000'000'000;
-  config.stream.layout.capacity = 4;
-  config.stream.layout.codec = "selective";
-  config.stream.lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
-  config.stream.layout.parameters.codec = *codec_parameters(config.stream.lattice, 1.0 / 64, 0, 0);
+  config.streams.resize(1);
+  config.streams[0].layout.capacity = 4;
+  config.streams[0].layout.codec = "selective";
+  config.streams[0].lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
+  config.streams[0].layout.parameters.codec = *codec_parameters(config.streams[0].lattice, 1.0 / 64, 0, 0);
   config.claim_ns = 0;
   return config;
 }
@@ -180,9 +181,9 @@ class FakePort final : public transport::ServerPort {
 /// The same for bodies that turn.
 [[nodiscard]] inline HostConfig turning_config() {
   HostConfig config = test_config();
-  config.stream.layout.codec = "tracker";
-  config.stream.layout.groups = {kPositionGroup, kOrientationGroup};
-  config.stream.layout.radii.assign(config.stream.layout.type_count, 1000);
+  config.streams[0].layout.codec = "tracker";
+  config.streams[0].layout.groups = {kPositionGroup, kOrientationGroup};
+  config.streams[0].layout.radii.assign(config.streams[0].layout.type_count, 1000);
   return config;
 }
 
@@ -193,8 +194,8 @@ class Bench {
 
   explicit Bench(HostConfig config = test_config(), std::uint32_t capacity = 4)
       : simulation(capacity), port(participant(0xAA)) {
-    config.stream.layout.capacity = capacity;
-    if (groups_of(config.stream.layout).orientation) simulation.turn();
+    config.streams[0].layout.capacity = capacity;
+    if (groups_of(config.streams[0].layout).orientation) simulation.turn();
     auto made = Host::create(std::move(config), simulation, port);
     if (!made) throw std::runtime_error(made.error().message);
     host = std::move(*made);

@@ -78,17 +78,17 @@ TEST(Gains, AreChosenAtRunTimeForTrackerAlone) {
   ASSERT_TRUE(scene);
   sessions::SessionChoice choice;
   choice.bodies = 1000;
-  EXPECT_TRUE(sessions::plan_session(*scene, choice)->stream.gains);
+  EXPECT_TRUE(sessions::plan_session(*scene, choice)->streams[0].gains);
   choice.codec = "entropy";
-  EXPECT_FALSE(sessions::plan_session(*scene, choice)->stream.gains);
+  EXPECT_FALSE(sessions::plan_session(*scene, choice)->streams[0].gains);
 }
 
 TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
   HostConfig config = test_config();
-  config.stream.layout.codec = "tracker";
-  config.stream.layout.codec_tables.clear();
-  config.stream.layout.parameters.step.decay = 13000;
-  config.stream.gains = GainGoal{};
+  config.streams[0].layout.codec = "tracker";
+  config.streams[0].layout.codec_tables.clear();
+  config.streams[0].layout.parameters.step.decay = 13000;
+  config.streams[0].gains = GainGoal{};
   Bench bench(config);
   bench.simulation.on_step = [&](std::uint64_t step) {  // to and fro: no force is worth remembering
     for (auto& column : bench.simulation.position) {
@@ -108,7 +108,7 @@ TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
     const auto applied = client.apply(delta.frame, delta.last_input, delta.hash, delta.payload);
     ASSERT_TRUE(applied) << applied.error().message;
   }
-  EXPECT_NE(bench.host->parameters(), config.stream.layout.parameters);
+  EXPECT_NE(bench.host->parameters(), config.streams[0].layout.parameters);
   EXPECT_EQ(client.parameters(), bench.host->parameters());
 }
 

@@ -76,7 +76,7 @@ TEST(GroupPlan, StepsAndTablesOfTurnsAreThoseThatWereTrained) {
   choice.codec = "entropy";
   const auto usual = plan_stream(scene, choice).value();
   EXPECT_TRUE(has_turn_steps(usual.layout.parameters.codec));
-  EXPECT_TRUE(host::largest_delta_bytes(usual));
+  EXPECT_TRUE(host::largest_delta_bytes({&usual, 1}));
 
   const std::vector<std::uint8_t> flat(256, 8);
   scenes::TrainedTable table;
@@ -85,7 +85,7 @@ TEST(GroupPlan, StepsAndTablesOfTurnsAreThoseThatWereTrained) {
   table.position_code_lengths = table.velocity_code_lengths = flat;
   scene.trained = {table};
   const auto partly = plan_stream(scene, choice).value();
-  EXPECT_TRUE(host::largest_delta_bytes(partly)) << "trained before bodies turned";
+  EXPECT_TRUE(host::largest_delta_bytes({&partly, 1})) << "trained before bodies turned";
   EXPECT_EQ(partly.layout.codec_tables.size(), 1024U);
 
   table.turn_range_rad = 0.25;

@@ -47,7 +47,7 @@ TEST_F(InputTest, AScheduledInputActsOnFrameSPlusLead) {
   EXPECT_EQ(scheduled.source_client, 1U);
   EXPECT_EQ(scheduled.source_number, 1U);
   EXPECT_EQ(scheduled.kind, static_cast<std::uint32_t>(transport::ScheduledKind::kDrive));
-  const Drive drive = *to_drive(test_config().stream.lattice, {0, 0, -5}, 0);
+  const Drive drive = *to_drive(test_config().streams[0].lattice, {0, 0, -5}, 0);
   EXPECT_EQ(scheduled.values, (std::vector<std::int32_t>{0, 0, drive.gravity[2], 0}));
 }
 
@@ -65,7 +65,7 @@ class LeadZero : public InputTest {
   LeadZero() : InputTest(config()) {}
   static HostConfig config() {
     HostConfig config = test_config();
-    config.stream.layout.lead = 0;
+    config.streams[0].layout.lead = 0;
     return config;
   }
 };

@@ -64,7 +64,7 @@ TEST_F(JoinTest, TheSnapshotIsCutRightAfterADeltaAndLeavesBehindIt) {
 
 TEST_F(JoinTest, TheFrameThatASnapshotIsCutAfterIsRoundedForItAndNoOther) {
   HostConfig config = test_config();
-  config.stream.layout.codec = "tracker";
+  config.streams[0].layout.codec = "tracker";
   Bench rounding(config);
   rounding.poll();
   rounding.run_to(10);
@@ -111,7 +111,8 @@ TEST_F(JoinTest, AClientTimelineStartsFromTheSnapshotAndFollows) {
   }
   EXPECT_EQ(client->applied(), bench.host->frame());
   EXPECT_EQ(client->hash(), bench.host->hash());
-  EXPECT_EQ(client->drive().gravity[2], to_drive(test_config().stream.lattice, {0, 0, -5}, 0)->gravity[2]);
+  EXPECT_EQ(client->drive().gravity[2],
+            to_drive(test_config().streams[0].lattice, {0, 0, -5}, 0)->gravity[2]);
 }
 
 TEST_F(JoinTest, TheSameJoinerGetsAnotherOnlyAfterItAsksAgainAndTheFirstStalled) {

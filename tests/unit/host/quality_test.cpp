@@ -155,13 +155,13 @@ TEST(Quality, ATargetOutOfReachIsSaidAfterTwoSecondsAndTakenBackAfterTwo) {
 
 TEST(Quality, ABudgetThatHoldsTheRateBelowTheTargetIsRefused) {
   HostConfig config = test_config();
-  config.stream.layout.codec = "limited";
-  config.stream.layout.codec_tables = default_code_tables();
-  config.stream.quality = QualityGoal{1, 1, kPositionLimit};
-  config.stream.budget = least_budget(*config.stream.quality, config.frame_rate_hz);
-  EXPECT_GT(config.stream.budget, kMbitBytes);
+  config.streams[0].layout.codec = "limited";
+  config.streams[0].layout.codec_tables = default_code_tables();
+  config.streams[0].quality = QualityGoal{1, 1, kPositionLimit};
+  config.streams[0].budget = least_budget(*config.streams[0].quality, config.frame_rate_hz);
+  EXPECT_GT(config.streams[0].budget, kMbitBytes);
   EXPECT_NO_THROW(Bench bench(config));
-  --config.stream.budget;
+  --config.streams[0].budget;
   EXPECT_THROW(Bench bench(config), std::runtime_error);
 }
 
@@ -208,7 +208,7 @@ TEST(Quality, LimitsThatExcludeTheThresholdAreRefused) {
   EXPECT_FALSE(valid_goal({std::nan(""), 1, 2000}, kStart));
   EXPECT_FALSE(valid_goal({0, 0, 2000}, kStart));
   HostConfig config = test_config();
-  config.stream.quality = QualityGoal{0, 1, 1};
+  config.streams[0].quality = QualityGoal{0, 1, 1};
   EXPECT_THROW(Bench bench(config), std::runtime_error);
 }
 
@@ -249,7 +249,7 @@ TEST_F(RuntimeQuality, ParametersSetByHandTravelInTheNextDeltaAndClientsFollow) 
   coarse.codec.threshold *= 16;
   coarse.codec.velocity_step *= 2;
   ASSERT_TRUE(bench.host->set_parameters(coarse));
-  EXPECT_EQ(client->parameters(), test_config().stream.layout.parameters);
+  EXPECT_EQ(client->parameters(), test_config().streams[0].layout.parameters);
   const Frame before = bench.host->frame();
   bench.run_ms(40);
   ASSERT_EQ(bench.host->frame(), before + 1);
@@ -263,14 +263,14 @@ TEST_F(RuntimeQuality, ParametersOutOfRangeAreRefusedAndChangeNothing) {
   StreamParameters bad = bench.host->parameters();
   bad.codec.position_step = 0;
   EXPECT_FALSE(bench.host->set_parameters(bad));
-  EXPECT_EQ(bench.host->parameters(), test_config().stream.layout.parameters);
+  EXPECT_EQ(bench.host->parameters(), test_config().streams[0].layout.parameters);
 }
 
 HostConfig automatic() {
   HostConfig config = test_config();
-  config.stream.layout.codec = "quantized";
-  config.stream.quality = QualityGoal{0.005, config.stream.layout.parameters.codec.threshold,
-                                      64 * config.stream.layout.parameters.codec.threshold};
+  config.streams[0].layout.codec = "quantized";
+  config.streams[0].quality = QualityGoal{0.005, config.streams[0].layout.parameters.codec.threshold,
+                                          64 * config.streams[0].layout.parameters.codec.threshold};
   return config;
 }
 
@@ -282,19 +282,19 @@ class AutomaticQuality : public RuntimeQuality {
 TEST_F(AutomaticQuality, TheHostFollowsItsTargetAndClientsFollowTheHost) {
   bench.run_ms(20'000);
   follow();
-  EXPECT_NE(bench.host->parameters(), automatic().stream.layout.parameters);
+  EXPECT_NE(bench.host->parameters(), automatic().streams[0].layout.parameters);
   EXPECT_EQ(client->parameters(), bench.host->parameters());
-  EXPECT_FALSE(bench.host->set_parameters(automatic().stream.layout.parameters))
+  EXPECT_FALSE(bench.host->set_parameters(automatic().streams[0].layout.parameters))
       << "nobody else decides then";
 }
 
 HostConfig automatic_turns() {
   HostConfig config = turning_config();
-  config.stream.layout.codec = "quantized";
-  config.stream.layout.radii.assign(config.stream.layout.type_count, 100'000);
-  CodecParameters& start = config.stream.layout.parameters.codec;
+  config.streams[0].layout.codec = "quantized";
+  config.streams[0].layout.radii.assign(config.streams[0].layout.type_count, 100'000);
+  CodecParameters& start = config.streams[0].layout.parameters.codec;
   start.turn_step = start.spin_step = kMaxStep;
-  config.stream.quality = QualityGoal{0.001, start.threshold, 64 * start.threshold};
+  config.streams[0].quality = QualityGoal{0.001, start.threshold, 64 * start.threshold};
   return config;
 }
 
@@ -313,7 +313,7 @@ class AutomaticTurns : public RuntimeQuality {
 TEST_F(AutomaticTurns, TheHostFollowsItsTargetWhereBodiesOnlyTurn) {
   bench.run_ms(20'000);
   follow();
-  const CodecParameters before = automatic_turns().stream.layout.parameters.codec;
+  const CodecParameters before = automatic_turns().streams[0].layout.parameters.codec;
   const CodecParameters now = bench.host->parameters().codec;
   EXPECT_GT(now.threshold, before.threshold);
   EXPECT_LT(now.turn_step, before.turn_step / 2) << "down slowly";
@@ -329,20 +329,20 @@ TEST(AutomaticSession, StartsFromTheScenesThresholdBetweenAQuarterAndTheStatedEr
   choice.target_mbit_per_s = 0.5;
   auto plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan);
-  ASSERT_TRUE(plan->stream.quality);
-  EXPECT_NEAR(plan->stream.layout.parameters.codec.threshold * plan->stream.lattice.unit, scene->threshold_m,
-              1e-6);
-  EXPECT_NEAR(plan->stream.quality->smallest_threshold * plan->stream.lattice.unit, scene->threshold_m / 4,
-              1e-6);
-  EXPECT_NEAR(plan->stream.quality->largest_threshold * plan->stream.lattice.unit, scene->threshold_m * 4,
-              1e-6);
+  ASSERT_TRUE(plan->streams[0].quality);
+  EXPECT_NEAR(plan->streams[0].layout.parameters.codec.threshold * plan->streams[0].lattice.unit,
+              scene->threshold_m, 1e-6);
+  EXPECT_NEAR(plan->streams[0].quality->smallest_threshold * plan->streams[0].lattice.unit,
+              scene->threshold_m / 4, 1e-6);
+  EXPECT_NEAR(plan->streams[0].quality->largest_threshold * plan->streams[0].lattice.unit,
+              scene->threshold_m * 4, 1e-6);
   choice.max_error_m = scene->threshold_m / 2;
   plan = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(plan) << "a smaller error is where it starts";
-  EXPECT_TRUE(valid_goal(*plan->stream.quality, plan->stream.layout.parameters.codec));
-  EXPECT_NEAR(plan->stream.layout.parameters.codec.threshold * plan->stream.lattice.unit,
+  EXPECT_TRUE(valid_goal(*plan->streams[0].quality, plan->streams[0].layout.parameters.codec));
+  EXPECT_NEAR(plan->streams[0].layout.parameters.codec.threshold * plan->streams[0].lattice.unit,
               scene->threshold_m / 2, 1e-6);
-  EXPECT_EQ(plan->stream.quality->largest_threshold, plan->stream.layout.parameters.codec.threshold);
+  EXPECT_EQ(plan->streams[0].quality->largest_threshold, plan->streams[0].layout.parameters.codec.threshold);
 }
 
 }  // namespace

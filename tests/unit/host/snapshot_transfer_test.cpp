@@ -31,6 +31,7 @@ class SnapshotTransferTest : public ::testing::Test {
   void join(ClientId client) {
     Account& account = accounts[client];
     account.id = client;
+    account.stream = kStream.id;
     account.phase = transport::Phase::kJoining;
     assemblies.try_emplace(client, std::size_t{1} << 24U);
   }

@@ -19,35 +19,51 @@ void disturb(FakeSimulation& simulation, std::uint64_t step) {
   if (step % 11 == 0) simulation.alive[3] ^= 1U;
 }
 
-StreamStart start_of(const FakeSimulation& simulation, const HostConfig& config) {
-  return {.bodies = simulation.bodies(),
-          .drive = to_drive(config.stream.lattice, simulation.gravity(), 0).value(),
-          .epoch = config.epoch,
-          .frame_rate_hz = config.frame_rate_hz};
-}
+/// A stream and the mirror that it follows.
+struct Show {
+  Mirror mirror;
+  Stream stream;
+
+  static Result<Show> create(const HostConfig& config, const FakeSimulation& simulation) {
+    auto mirror = make_mirror(config.streams, simulation.bodies());
+    if (!mirror) return tl::unexpected(mirror.error());
+    auto stream = Stream::create(
+        config.streams[0], {.mirror = *mirror,
+                            .drive = to_drive(config.streams[0].lattice, simulation.gravity(), 0).value(),
+                            .epoch = config.epoch,
+                            .frame_rate_hz = config.frame_rate_hz});
+    if (!stream) return tl::unexpected(stream.error());
+    return Show{std::move(*mirror), std::move(*stream)};
+  }
+  Stream::FrameResult produce(const FakeSimulation& simulation, EncodeObserver* observer = nullptr) {
+    mirror.update(simulation.bodies(), simulation.events());
+    return stream.produce(mirror, observer);
+  }
+};
 
 TEST(Stream, ProducesWhatAHostPublishes) {
   HostConfig config = test_config();
-  config.stream.layout.codec = "tracker";
-  config.stream.gains = GainGoal{};
-  config.stream.quality = QualityGoal{0.004, 64, 1 << 20};
+  config.streams[0].layout.codec = "tracker";
+  config.streams[0].gains = GainGoal{};
+  config.streams[0].quality = QualityGoal{0.004, 64, 1 << 20};
   Bench bench(config);
   bench.simulation.on_step = [&](std::uint64_t step) { disturb(bench.simulation, step); };
   bench.run_to(200);
 
   FakeSimulation simulation(4);
-  Stream stream = Stream::create(config.stream, start_of(simulation, config)).value();
+  Show show = Show::create(config, simulation).value();
+  Stream& stream = show.stream;
   ASSERT_EQ(bench.port.deltas.size(), 200U);
   for (const transport::DeltaMessage& published : bench.port.deltas) {
     simulation.step();
     disturb(simulation, simulation.steps);
-    const Stream::FrameResult frame = stream.produce(simulation.bodies(), simulation.events());
+    const Stream::FrameResult frame = show.produce(simulation);
     ASSERT_EQ(frame.frame, published.frame);
     ASSERT_EQ(frame.hash, published.hash);
     ASSERT_TRUE(std::ranges::equal(frame.payload, published.payload)) << "frame " << frame.frame;
   }
   EXPECT_EQ(stream.parameters(), bench.host->parameters());
-  EXPECT_NE(stream.parameters(), config.stream.layout.parameters) << "something was chosen";
+  EXPECT_NE(stream.parameters(), config.streams[0].layout.parameters) << "something was chosen";
   EXPECT_EQ(stream.bodies(), stream.agreed().alive_count());
 }
 
@@ -55,43 +71,45 @@ TEST(Stream, RoundsOnlyWhereCorrectionsKeepIt) {
   for (const std::string_view codec : codec_names()) {
     SCOPED_TRACE(codec);
     HostConfig config = test_config();
-    config.stream.layout.codec = codec;
-    config.stream.layout.codec_tables = synthetic::tables_for(codec);
+    config.streams[0].layout.codec = codec;
+    config.streams[0].layout.codec_tables = synthetic::tables_for(codec);
     FakeSimulation simulation(4);
     for (auto& column : simulation.position) std::iota(column.begin(), column.end(), 0.12345F);
-    Stream stream = Stream::create(config.stream, start_of(simulation, config)).value();
+    Show show = Show::create(config, simulation).value();
+    Stream& stream = show.stream;
     const State before = stream.agreed();
     stream.round_next();
-    stream.produce(simulation.bodies(), {});
+    show.produce(simulation);
     EXPECT_EQ(stream.agreed() == before, codec != "tracker");
   }
 }
 
 TEST(Stream, CanBeMovedWhileItsParametersAreChosen) {
   HostConfig config = test_config();
-  config.stream.layout.codec = "quantized";
-  config.stream.quality = QualityGoal{0.004, 64, 1 << 20};
+  config.streams[0].layout.codec = "quantized";
+  config.streams[0].quality = QualityGoal{0.004, 64, 1 << 20};
   FakeSimulation simulation(4);
-  Stream first = Stream::create(config.stream, start_of(simulation, config)).value();
-  Stream second = std::move(first);
+  Show first = Show::create(config, simulation).value();
+  Show second = std::move(first);
   for (int frame = 0; frame < 60; ++frame) {
     simulation.step();
     disturb(simulation, simulation.steps);
-    second.produce(simulation.bodies(), simulation.events());
+    second.produce(simulation);
   }
-  EXPECT_NE(second.parameters(), config.stream.layout.parameters);
-  EXPECT_FALSE(second.set_parameters(config.stream.layout.parameters)) << "nobody else decides then";
+  EXPECT_NE(second.stream.parameters(), config.streams[0].layout.parameters);
+  EXPECT_FALSE(second.stream.set_parameters(config.streams[0].layout.parameters))
+      << "nobody else decides then";
 }
 
 TEST(Stream, CountsWhatItCorrectsForTraining) {
   const HostConfig config = test_config();
   FakeSimulation simulation(4);
-  Stream stream = Stream::create(config.stream, start_of(simulation, config)).value();
+  Show show = Show::create(config, simulation).value();
   ResidualStatistics statistics;
   std::uint64_t corrected = 0;
   for (int frame = 0; frame < 20; ++frame) {
     for (float& y : simulation.position[1]) y += 0.1F * static_cast<float>(frame);
-    corrected += stream.produce(simulation.bodies(), {}, &statistics).corrected;
+    corrected += show.produce(simulation, &statistics).corrected;
   }
   EXPECT_GT(corrected, 0U);
   EXPECT_EQ(statistics.bodies, corrected);
@@ -101,26 +119,26 @@ TEST(Stream, ShowsHowBodiesTurn) {
   const HostConfig config = turning_config();
   FakeSimulation simulation(4);
   simulation.turn();
-  auto created = Stream::create(config.stream, start_of(simulation, config));
+  auto created = Show::create(config, simulation);
   ASSERT_TRUE(created) << created.error().message;
   for (int frame = 1; frame <= 30; ++frame) {
     const float half = 0.05F * static_cast<float>(frame);
     simulation.orientation[2][1] = std::sin(half);
     simulation.orientation[3][1] = std::cos(half);
     simulation.angular_velocity[2][1] = 3;
-    created->produce(simulation.bodies(), {});
+    created->produce(simulation);
   }
-  const Quaternion turned = created->agreed().quaternion(1);
-  const double reached = config.stream.layout.parameters.codec.threshold / 1000.0;
+  const Quaternion turned = created->stream.agreed().quaternion(1);
+  const double reached = config.streams[0].layout.parameters.codec.threshold / 1000.0;
   EXPECT_NEAR(2 * std::atan2(turned[2], turned[3]), 3.0, reached);
-  EXPECT_EQ(created->agreed().quaternion(0), kNoTurn);
+  EXPECT_EQ(created->stream.agreed().quaternion(0), kNoTurn);
 }
 
 TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
   const HostConfig config = turning_config();
   FakeSimulation simulation(4);
   const auto refused = [&] {
-    const auto stream = Stream::create(config.stream, start_of(simulation, config));
+    const auto stream = Show::create(config, simulation);
     return stream ? std::string() : stream.error().message;
   };
   EXPECT_NE(refused().find("orientations"), std::string::npos) << refused();
@@ -135,9 +153,9 @@ TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
 
 TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {
   HostConfig config = test_config();
-  config.stream.layout.capacity = 5;
+  config.streams[0].layout.capacity = 5;
   const FakeSimulation simulation(4);
-  const auto stream = Stream::create(config.stream, start_of(simulation, config));
+  const auto stream = Show::create(config, simulation);
   ASSERT_FALSE(stream);
   EXPECT_EQ(stream.error().code, ErrorCode::kInvalidArgument);
 }

@@ -13,12 +13,13 @@ Result<MemoryUse> measure(std::uint32_t bodies) {
       [bodies]() -> Result<HostedSimulation> {
         HostedSimulation hosted;
         hosted.simulation = std::make_unique<Bouncing>(bodies);
-        hosted.config.stream.lattice = *host::choose_lattice(0.05, 1000, Bouncing::kDt);
-        hosted.config.stream.layout.parameters.codec =
-            *host::codec_parameters(hosted.config.stream.lattice, 0.05, 0, 0);
-        hosted.config.stream.layout.capacity = bodies;
-        hosted.config.stream.layout.codec = "entropy";
-        hosted.config.stream.layout.codec_tables = default_code_tables();
+        hosted.config.streams.resize(1);
+        hosted.config.streams[0].lattice = *host::choose_lattice(0.05, 1000, Bouncing::kDt);
+        hosted.config.streams[0].layout.parameters.codec =
+            *host::codec_parameters(hosted.config.streams[0].lattice, 0.05, 0, 0);
+        hosted.config.streams[0].layout.capacity = bodies;
+        hosted.config.streams[0].layout.codec = "entropy";
+        hosted.config.streams[0].layout.codec_tables = default_code_tables();
         return hosted;
       },
       20);

@@ -247,9 +247,10 @@ TEST(SessionPlan, EveryCodecMakesASessionOfEveryPaperScene) {
       ASSERT_TRUE(config) << config.error().message;
       EXPECT_EQ(config->types.size(), scene->types.size());
       EXPECT_EQ(config->scene, name);
-      EXPECT_EQ(config->stream.budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
-      EXPECT_EQ(config->stream.layout.parameters.codec.threshold, 1 << config->stream.lattice.halvings);
-      const auto largest = host::largest_delta_bytes(config->stream);
+      EXPECT_EQ(config->streams[0].budget, std::string(codec) == "limited" ? kPaperBudgetBytes : kNoBudget);
+      EXPECT_EQ(config->streams[0].layout.parameters.codec.threshold,
+                1 << config->streams[0].lattice.halvings);
+      const auto largest = host::largest_delta_bytes(config->streams);
       ASSERT_TRUE(largest) << largest.error().message;
       EXPECT_GT(*largest, 0U);
     }
@@ -261,13 +262,13 @@ TEST(SessionPlan, ABudgetBindsTheCodecsThatServeWhoWaits) {
   ASSERT_TRUE(scene);
   sessions::SessionChoice choice;
   choice.bodies = 1000;
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, kNoBudget);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->streams[0].budget, kNoBudget);
   choice.budget_bytes = 200;
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, 200U);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->streams[0].budget, 200U);
   choice.codec = "limited";
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, 200U);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->streams[0].budget, 200U);
   choice.codec = "entropy";
-  EXPECT_EQ(sessions::plan_session(*scene, choice)->stream.budget, kNoBudget);
+  EXPECT_EQ(sessions::plan_session(*scene, choice)->streams[0].budget, kNoBudget);
 }
 
 TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
@@ -281,16 +282,139 @@ TEST(SessionPlan, ContactsTakeTheirConstantsFromEveryPaperScene) {
     choice.predictor = "contact";
     const auto config = sessions::plan_session(*scene, choice);
     ASSERT_TRUE(config) << config.error().message;
-    EXPECT_TRUE(host::largest_delta_bytes(config->stream));
-    const auto read = read_contact_constants(config->stream.layout.predictor_constants);
+    EXPECT_TRUE(host::largest_delta_bytes(config->streams));
+    const auto read = read_contact_constants(config->streams[0].layout.predictor_constants);
     ASSERT_TRUE(read);
     EXPECT_EQ(read->substeps, static_cast<std::int32_t>(scene->world.substeps));
     EXPECT_EQ(read->planes.size(), scene->world.planes.size());
-    EXPECT_NEAR(read->types[0].radius * config->stream.lattice.unit, scene->smallest_radius_m,
-                config->stream.lattice.unit);
+    EXPECT_NEAR(read->types[0].radius * config->streams[0].lattice.unit, scene->smallest_radius_m,
+                config->streams[0].lattice.unit);
     scene->world.types.clear();  // as of a recorded trajectory
     EXPECT_FALSE(sessions::plan_session(*scene, choice));
   }
+}
+
+TEST(StreamOption, IsANameAndAPredictorOrKeysAndValues) {
+  const auto plain = parse_stream("thin:ballistic");
+  ASSERT_TRUE(plain) << plain.error().message;
+  EXPECT_EQ(plain->name(), "thin");
+  EXPECT_EQ(plain->predictor(), "ballistic");
+  EXPECT_FALSE(plain->has_codec() || plain->has_threshold() || plain->has_budget_bytes());
+  const auto all = parse_stream("coarse:predictor=field,codec=entropy,threshold=0.2");
+  ASSERT_TRUE(all) << all.error().message;
+  EXPECT_EQ(all->predictor(), "field");
+  EXPECT_EQ(all->codec(), "entropy");
+  EXPECT_EQ(all->threshold(), 0.2);
+  const auto steered = parse_stream("m:ballistic,target-bandwidth=0.1,max-error=0.5,budget=900");
+  ASSERT_TRUE(steered) << steered.error().message;
+  EXPECT_EQ(steered->target_bandwidth(), 0.1);
+  EXPECT_EQ(steered->max_error(), 0.5);
+  EXPECT_EQ(steered->budget_bytes(), 900U);
+  for (const char* wrong : {"", "thin", "thin:", ":", "a:b,", "a:,b", "a:b,c", "a:speed=3", "a:threshold=x",
+                            "a:threshold=", "a:budget=-1", "a:predictor=b,c", "a:codec="}) {
+    const auto parsed = parse_stream(wrong);
+    EXPECT_TRUE(!parsed || parsed->name().empty()) << wrong;
+    if (parsed) continue;
+    EXPECT_EQ(parsed.error().message.find('\n'), std::string::npos);
+  }
+}
+
+TEST(StreamOption, WhatMakesNoSessionIsSaidInOneLine) {
+  const auto says = [](
+                        const std::vector<std::string>& streams, const std::string& text,
+                        const std::function<void(Config&)>& more = [](Config&) {}) {
+    const std::string said = refusal([&](Config& config) {
+      for (const std::string& stream : streams) *config.add_stream() = parse_stream(stream).value();
+      more(config);
+    });
+    EXPECT_NE(said.find(text), std::string::npos) << said;
+    EXPECT_EQ(said.find('\n'), std::string::npos);
+  };
+  says({"thin:ballistic", "thin:field"}, "two streams are called 'thin'");
+  says({"Thin:ballistic"}, "a stream's name has 1 to 32");
+  says({":ballistic"}, "each needs a name");
+  says({"a:field", "b:field", "c:field", "d:field", "e:field", "f:field", "g:field", "h:field", "i:field"},
+       "1 to 8 streams, not 9");
+  says({"thin:ballistic", "rich:field"}, "--stream rich says field",
+       [](Config& config) { config.set_predictor("ballistic"); });
+  says({"a:threshold=-1"}, "a threshold is a positive length");
+  says({"a:threshold=1,target-bandwidth=1"}, "either a threshold");
+  says({"a:codec=none,target-bandwidth=1"}, "codec none has no threshold");
+  says({"a:max-error=1"}, "max-error needs target-bandwidth");
+  says({"a:codec=entropy,budget=900"}, "a budget needs codec");
+  says({"a:codec=limited,budget=9"}, "at least 64 bytes");
+}
+
+TEST(StreamOption, OfTheCommandLineWinsOverTheFile) {
+  Config file = least();
+  *file.add_stream() = parse_stream("one:field").value();
+  Config flags;
+  EXPECT_EQ(merge(flags, file).stream_size(), 1);
+  flags.set_predictor("contact");
+  EXPECT_EQ(merge(flags, file).stream_size(), 0) << "a predictor for all";
+  flags.Clear();
+  *flags.add_stream() = parse_stream("two:ballistic").value();
+  *flags.add_stream() = parse_stream("three:field").value();
+  file.set_predictor("contact");
+  const Config both = merge(flags, file);
+  ASSERT_EQ(both.stream_size(), 2);
+  EXPECT_EQ(both.stream(0).name(), "two");
+  EXPECT_FALSE(both.has_predictor());
+}
+
+TEST(SessionPlan, StreamsShareTheLatticeOfTheFinestThreshold) {
+  const auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  sessions::SessionChoice choice;
+  choice.bodies = 1000;
+  choice.streams.resize(2);
+  choice.streams[0].name = "coarse";
+  choice.streams[0].codec = "entropy";
+  choice.streams[0].threshold_m = 4 * scene->threshold_m;
+  choice.streams[0].predictor = "ballistic";
+  choice.streams[1].name = "fine";
+  choice.streams[1].predictor = "field";
+  const auto config = sessions::plan_session(*scene, choice);
+  ASSERT_TRUE(config) << config.error().message;
+  ASSERT_EQ(config->streams.size(), 2U);
+  EXPECT_EQ(config->streams[0].lattice, config->streams[1].lattice);
+  EXPECT_EQ(config->streams[0].layout.parameters.codec.threshold,
+            4 * config->streams[1].layout.parameters.codec.threshold);
+  EXPECT_EQ(config->streams[0].layout.codec, "entropy");
+  EXPECT_EQ(config->streams[1].layout.predictor, "field");
+  const auto refused = [&] {
+    const auto planned = sessions::plan_session(*scene, choice);
+    return planned ? std::string("accepted") : planned.error().message;
+  };
+  choice.streams[1].threshold_m = 1e-12;
+  EXPECT_EQ(refused().find("stream fine: threshold 1e-12 is too fine"), 0U) << refused();
+  choice.streams[1].threshold_m = scene->threshold_m;
+  choice.streams[0].threshold_m = 1e9;
+  EXPECT_EQ(refused().find("stream coarse: threshold"), 0U) << refused();
+  choice.streams[0].threshold_m.reset();
+  choice.streams[1].predictor = "oracle";
+  EXPECT_EQ(refused().find("stream fine: "), 0U) << refused();
+}
+
+TEST(SessionPlan, TheUsualStreamsAreThinAndRichWhereFieldPays) {
+  const auto scene = scenes::load_scene("cube");
+  ASSERT_TRUE(scene);
+  sessions::SessionChoice choice;
+  choice.bodies = 1000;
+  const auto usual = [&] { return sessions::usual_streams(*scene, choice).value(); };
+  ASSERT_EQ(usual().size(), 2U);
+  EXPECT_EQ(usual()[0].name, "thin");
+  EXPECT_EQ(usual()[0].predictor, "ballistic");
+  EXPECT_EQ(usual()[1].name, "rich");
+  EXPECT_EQ(usual()[1].predictor, "field");
+  choice.codec = "entropy";
+  EXPECT_TRUE(usual().empty());
+  choice.codec = "tracker";
+  choice.predictor = "field";
+  EXPECT_TRUE(usual().empty()) << "said";
+  choice.predictor = "auto";
+  choice.bodies = sessions::kMostBodiesForField + 1;
+  EXPECT_TRUE(usual().empty());
 }
 
 TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
@@ -301,9 +425,9 @@ TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
     choice.bodies = bodies;
     choice.codec = codec;
     const auto config = *sessions::plan_session(*scene, choice);
-    EXPECT_EQ(config.stream.layout.predictor_constants.empty(),
-              config.stream.layout.predictor == "ballistic");
-    return config.stream.layout.predictor;
+    EXPECT_EQ(config.streams[0].layout.predictor_constants.empty(),
+              config.streams[0].layout.predictor == "ballistic");
+    return config.streams[0].layout.predictor;
   };
   EXPECT_EQ(predictor("tracker", 50000), "field");
   EXPECT_EQ(predictor("tracker", 50001), "ballistic");
@@ -319,7 +443,7 @@ TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
   choice.bodies = 1000;
   const auto threshold_m = [&] {
     const auto config = *sessions::plan_session(*scene, choice);
-    return config.stream.layout.parameters.codec.threshold * config.stream.lattice.unit;
+    return config.streams[0].layout.parameters.codec.threshold * config.streams[0].lattice.unit;
   };
   EXPECT_NEAR(threshold_m(), scene->threshold_m, 1e-9);
   choice.threshold_scale = 2;

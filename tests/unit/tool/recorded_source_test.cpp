@@ -69,9 +69,10 @@ class RecordedSourceTest : public ::testing::Test {
   // Frames to the end; each has the server's hash, and so has the state.
   Frame play() {
     Frame played = 0;
-    while (const auto made = source->next(false, outbox)) {
-      EXPECT_EQ(made->hash, server.hashes.at(made->frame));
-      EXPECT_EQ(source->hash(), made->hash);
+    while (const auto made = source->next({}, outbox)) {
+      EXPECT_EQ(made->deltas.size(), 1U);
+      EXPECT_EQ(made->deltas[0].hash, server.hashes.at(made->frame));
+      EXPECT_EQ(source->hash(0), made->deltas[0].hash);
       ++played;
     }
     return played;
@@ -108,29 +109,29 @@ TEST_F(RecordedSourceTest, PublishesEveryFrameUnderItsOwnEpoch) {
 
 TEST_F(RecordedSourceTest, ItsSnapshotsLetClientsJoinAtAnyFrame) {
   open(0);
-  for (int i = 0; i < 77; ++i) ASSERT_TRUE(source->next(false, outbox));
+  for (int i = 0; i < 77; ++i) ASSERT_TRUE(source->next({}, outbox));
   std::vector<std::byte> snapshot;
-  source->snapshot(snapshot);
+  source->snapshot(0, snapshot);
   auto late = ClientTimeline::create(server.session.streams[0].layout);
   ASSERT_TRUE(late);
   ASSERT_TRUE(late->load(snapshot, 5000));
   EXPECT_EQ(late->applied(), 77U);
   EXPECT_EQ(late->hash(), server.hashes.at(77));
-  while (const auto made = source->next(false, outbox))
-    ASSERT_TRUE(late->apply(made->frame, made->last_input, made->hash, made->payload));
+  while (const auto made = source->next({}, outbox))
+    ASSERT_TRUE(late->apply(made->frame, made->last_input, made->deltas[0].hash, made->deltas[0].payload));
   EXPECT_EQ(late->applied(), kFrames);
 }
 
 TEST_F(RecordedSourceTest, ASeekEndsItAndAnotherGoesOnThere) {
   open(0);
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(source->next(false, outbox));
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(source->next({}, outbox));
   EXPECT_EQ(accept(transport::InputKind::kSeek, {130.5}), Reason::kNone);
   EXPECT_EQ(source->sought_s(), 130.5);
-  EXPECT_FALSE(source->next(false, outbox));
+  EXPECT_FALSE(source->next({}, outbox));
   EXPECT_EQ(accept(transport::InputKind::kSeek, {3}), Reason::kRateLimited);
   open(*source->sought_s(), 5001);
   EXPECT_EQ(source->frame(), 132U);  // recorded at 131 s
-  EXPECT_EQ(source->hash(), server.hashes.at(132));
+  EXPECT_EQ(source->hash(0), server.hashes.at(132));
   EXPECT_EQ(play(), kFrames - 132);
 }
 
@@ -141,7 +142,7 @@ TEST_F(RecordedSourceTest, SeeksAreLimitedOverAllEpochs) {
   open(50, 5001);
   now_ns += kSecond * 9 / 10;
   EXPECT_EQ(accept(transport::InputKind::kSeek, {60}), Reason::kRateLimited);
-  EXPECT_TRUE(source->next(false, outbox)) << "the run goes on";
+  EXPECT_TRUE(source->next({}, outbox)) << "the run goes on";
   now_ns += kSecond / 5;
   EXPECT_EQ(accept(transport::InputKind::kSeek, {60}), Reason::kNone);
 }
