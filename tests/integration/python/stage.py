@@ -28,6 +28,8 @@ def common(session, domain=DOMAIN):
 def server(session, *arguments, scene="half_pipe", bodies=300, log=None, domain=DOMAIN):
     """Runs until the block ends; its hashes go to `log`."""
     hashes = ["--hash-log", log] if log else []
+    # One stream, so that there is one hash of a frame.
+    hashes += [] if {"--predictor", "--codec", "--stream"} & set(arguments) else ["--predictor", "field"]
     command = [os.environ["TANDEMD"], "--scene", scene, "--bodies", bodies, *common(session, domain), *hashes, *arguments]
     with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:

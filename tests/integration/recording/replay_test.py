@@ -53,7 +53,8 @@ def finish(process, what, code=0):
 def record(programs):
     """Six seconds of a session with scripted gravity."""
     file = programs.folder / "session.mcap"
-    server = programs.start(programs.tandemd, "--scene", "half_pipe", "--bodies", 500, "--scripted", "--rate", 60)
+    server = programs.start(programs.tandemd, "--scene", "half_pipe", "--bodies", 500, "--scripted", "--rate", 60,
+                            "--predictor", "field")  # fmt: skip
     try:
         recorder = programs.start(
             programs.tandem, "record", file, "--timeout", 60, "--seconds", 6, "--json",

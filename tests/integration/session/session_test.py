@@ -61,9 +61,11 @@ class Stage:
             )  # fmt: skip
 
     def server(self, name, *arguments, scene="half_pipe", bodies=400):
+        # One stream, so that there is one hash of a frame.
+        predictor = () if {"--predictor", "--codec", "--stream"} & set(arguments) else ("--predictor", "field")
         self.start(
             name, self.options.tandemd, "--scene", scene, "--bodies", bodies, "--json",
-            "--hash-log", self.log(name), *arguments,
+            "--hash-log", self.log(name), *predictor, *arguments,
         )  # fmt: skip
 
     def client(self, name, *arguments):
