@@ -5,6 +5,8 @@
 #include <dds/ddsc/dds_rhc.h>
 #include <dds/ddsi/ddsi_serdata.h>
 
+#include <atomic>
+
 namespace tandem::transport::dds {
 
 /// Hands on every sample with data as it arrives. The cache that Cyclone DDS makes by itself shares a history
@@ -25,10 +27,19 @@ class HistoryCache : public dds_rhc {
  private:
   static bool store(ddsi_rhc* self, const ddsi_writer_info* writer, ddsi_serdata* sample,
                     ddsi_tkmap_instance* instance);
+  static dds_return_t associate(dds_rhc* self, dds_reader* reader, const ddsi_sertype* type,
+                                ddsi_tkmap* instances);
+  static void free(ddsi_rhc* self);
   static const dds_rhc_ops kOps;
+
+  void hold(ddsi_tkmap_instance* instance);
 
   OnSample call_;
   void* argument_;
+  ddsi_tkmap* instances_ = nullptr;  // of the domain
+  // The instance of the last sample. One that nobody holds is freed after each sample and made anew for the
+  // next, which wakes Cyclone's collector each time.
+  std::atomic<ddsi_tkmap_instance*> held_ = nullptr;
 };
 
 }  // namespace tandem::transport::dds
