@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <csignal>
-#include <ctime>
 #include <thread>
 
 namespace tandem {
@@ -19,19 +18,29 @@ class SignalWatch {
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // inherited by all threads started from here on
-    thread_ = std::jthread([this](const std::stop_token& done) {
-      constexpr timespec kTick{.tv_sec = 0, .tv_nsec = 50'000'000};
-      while (!done.stop_requested()) {
-        if (sigtimedwait(&signals_, nullptr, &kTick) > 0) stop_.store(true, std::memory_order_relaxed);
+    thread_ = std::thread([this] {
+      while (!done_) {
+        // A process that was stopped and goes on gets here without a signal.
+        if (sigwaitinfo(&signals_, nullptr) > 0 && !done_) stop_.store(true, std::memory_order_relaxed);
       }
     });
   }
+  ~SignalWatch() {
+    done_ = true;
+    pthread_kill(thread_.native_handle(), SIGTERM);  // blocked in every thread: it ends the wait only
+    thread_.join();
+  }
+  SignalWatch(const SignalWatch&) = delete;
+  SignalWatch& operator=(const SignalWatch&) = delete;
+  SignalWatch(SignalWatch&&) = delete;
+  SignalWatch& operator=(SignalWatch&&) = delete;
+
   [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
 
  private:
   sigset_t signals_{};
-  std::atomic<bool> stop_{false};
-  std::jthread thread_;
+  std::atomic<bool> stop_{false}, done_{false};
+  std::thread thread_;
 };
 
 }  // namespace tandem

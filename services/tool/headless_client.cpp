@@ -234,7 +234,9 @@ nlohmann::ordered_json HeadlessClient::report() const {
   out["input_latency_ms"] = pair(figures.input_latency);
   out["client_ms"] = pair(figures.frame_cost);
   const double frames = std::max<double>(1, static_cast<double>(figures.frames_applied));
-  const auto mean_ms = [frames](std::int64_t total_ns) { return static_cast<double>(total_ns) / 1e6 / frames; };
+  const auto mean_ms = [frames](std::int64_t total_ns) {
+    return static_cast<double>(total_ns) / 1e6 / frames;
+  };
   out["cost_ms"] = {{"receive", mean_ms(figures.costs.receive_ns)},
                     {"predict", mean_ms(figures.costs.predict_ns)},
                     {"decode", mean_ms(figures.costs.decode_ns)},
