@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "sdk/transport/cdr.hpp"
+#include "sdk/transport/dds/doorbell.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
 #include "sdk/transport/limits.hpp"
 
@@ -40,9 +41,8 @@ class Arrivals {
     M message;
   };
 
-  /// Keeps `of_writer` samples of each writer. `guard`: a guard condition that each arrival triggers; 0:
-  /// none.
-  Arrivals(std::size_t of_writer, dds_entity_t guard) : of_writer_(of_writer), guard_(guard) {}
+  /// Keeps `of_writer` samples of each writer. `bell`: rung by each arrival; may be null.
+  Arrivals(std::size_t of_writer, Doorbell* bell) : of_writer_(of_writer), bell_(bell) {}
 
   void set_limits(const Limits& limits) {
     const std::lock_guard lock(mutex_);
@@ -52,13 +52,16 @@ class Arrivals {
   /// For the creation of the reader, which must not outlive this object.
   [[nodiscard]] dds_rhc* cache() { return &cache_; }
 
-  /// All that came since the last call, oldest first. `dropped` grows by what broke a limit.
-  [[nodiscard]] std::deque<Arrival> take(std::uint64_t& dropped) {
+  /// Puts all that came since the last call into `out`, oldest first, in place of what was there. `dropped`
+  /// grows by what broke a limit.
+  void take(std::deque<Arrival>& out, std::uint64_t& dropped) {
+    out.clear();
     const std::lock_guard lock(mutex_);
     dropped += std::exchange(dropped_, 0);
+    if (arrivals_.empty()) return;
+    out.swap(arrivals_);
     held_.clear();
     bytes_ = 0;
-    return std::exchange(arrivals_, {});
   }
 
  private:
@@ -72,7 +75,7 @@ class Arrivals {
   static void on_sample(void* self, dds_instance_handle_t writer, ddsi_serdata& sample) {
     auto& arrivals = *static_cast<Arrivals*>(self);
     arrivals.accept(writer, sample);
-    if (arrivals.guard_ != 0) (void)dds_set_guardcondition(arrivals.guard_, true);
+    if (arrivals.bell_ != nullptr) arrivals.bell_->ring();
   }
 
   void accept(dds_instance_handle_t writer, ddsi_serdata& sample) {
@@ -113,7 +116,7 @@ class Arrivals {
 
   HistoryCache cache_{&on_sample, this};
   const std::size_t of_writer_;
-  const dds_entity_t guard_;
+  Doorbell* const bell_;
   std::mutex mutex_;
   Limits limits_;
   std::deque<Arrival> arrivals_;

@@ -15,7 +15,7 @@ struct EndpointDeleter {
 
 }  // namespace
 
-LiveWriters::LiveWriters() : listener_(dds_create_listener(this)) {
+LiveWriters::LiveWriters(Doorbell* bell) : bell_(bell), listener_(dds_create_listener(this)) {
   dds_lset_liveliness_changed(
       listener_.get(), [](dds_entity_t /*reader*/, const dds_liveliness_changed_status_t status, void* self) {
         static_cast<LiveWriters*>(self)->note(status);
@@ -23,15 +23,18 @@ LiveWriters::LiveWriters() : listener_(dds_create_listener(this)) {
 }
 
 void LiveWriters::note(const dds_liveliness_changed_status_t& status) {
-  const std::lock_guard lock(mutex_);
-  const dds_instance_handle_t writer = status.last_publication_handle;
-  if (status.alive_count_change > 0) {
-    live_[writer] = true;
-  } else if (status.not_alive_count_change > 0) {
-    live_[writer] = false;
-  } else {
-    live_.erase(writer);
+  {
+    const std::lock_guard lock(mutex_);
+    const dds_instance_handle_t writer = status.last_publication_handle;
+    if (status.alive_count_change > 0) {
+      live_[writer] = true;
+    } else if (status.not_alive_count_change > 0) {
+      live_[writer] = false;
+    } else {
+      live_.erase(writer);
+    }
   }
+  if (bell_ != nullptr) bell_->ring();
 }
 
 WriterState LiveWriters::state(dds_instance_handle_t writer) const {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "sdk/transport/dds/doorbell.hpp"
 #include "sdk/transport/dds/entity.hpp"
 #include "sdk/transport/session_book.hpp"
 
@@ -19,7 +20,8 @@ namespace tandem::transport::dds {
 /// note.
 class LiveWriters {
  public:
-  LiveWriters();
+  /// `bell`: rung by each change; may be null.
+  explicit LiveWriters(Doorbell* bell);
   LiveWriters(const LiveWriters&) = delete;
   LiveWriters& operator=(const LiveWriters&) = delete;
   LiveWriters(LiveWriters&&) = delete;
@@ -38,6 +40,7 @@ class LiveWriters {
   };
   void note(const dds_liveliness_changed_status_t& status);
 
+  Doorbell* const bell_;
   mutable std::mutex mutex_;
   std::map<dds_instance_handle_t, bool> live_;
   std::unique_ptr<dds_listener_t, ListenerDeleter> listener_;

@@ -1,7 +1,5 @@
 #include "sdk/transport/dds/node.hpp"
 
-#include <algorithm>
-
 namespace tandem::transport::dds {
 namespace {
 
@@ -66,23 +64,12 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
   }
   node.self_ = to_participant_id(guid);
 
-  const dds_entity_t parent = node.participant_.get();
   auto publisher = node.make_publisher({partition});
   if (!publisher) return tl::unexpected(publisher.error());
   node.publisher_ = std::move(*publisher);
   auto subscriber = node.make_subscriber({partition});
   if (!subscriber) return tl::unexpected(subscriber.error());
   node.subscriber_ = std::move(*subscriber);
-  auto waitset = own(dds_create_waitset(parent), "the waitset");
-  if (!waitset) return tl::unexpected(waitset.error());
-  node.waitset_ = std::move(*waitset);
-  auto guard = own(dds_create_guardcondition(parent), "the guard condition");
-  if (!guard) return tl::unexpected(guard.error());
-  node.guard_ = std::move(*guard);
-  if (const auto code = dds_waitset_attach(node.waitset_.get(), node.guard_.get(), 0);
-      code != DDS_RETCODE_OK) {
-    return dds_failure("attaching the guard condition", code);
-  }
   return node;
 }
 
@@ -100,15 +87,5 @@ Result<Entity> Node::make_topic(const dds_topic_descriptor_t& descriptor, const 
   return own(dds_create_topic(participant_.get(), &descriptor, name, nullptr, nullptr),
              std::string("the topic ") + name);
 }
-
-void Node::wait(std::chrono::nanoseconds timeout) {
-  const dds_duration_t duration = std::max<dds_duration_t>(0, timeout.count());
-  if (dds_waitset_wait(waitset_.get(), nullptr, 0, duration) > 0) {
-    bool triggered = false;
-    (void)dds_take_guardcondition(guard_.get(), &triggered);
-  }
-}
-
-void Node::wake() { (void)dds_set_guardcondition(guard_.get(), true); }
 
 }  // namespace tandem::transport::dds

@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -72,11 +74,13 @@ class Reader {
   template <class Sink>
   void take(std::atomic<std::uint64_t>& dropped, Sink&& sink) {
     std::uint64_t broke_limits = 0;
-    for (auto& arrival : arrivals_->take(broke_limits)) {
+    arrivals_->take(taken_, broke_limits);
+    for (auto& arrival : taken_) {
       const auto from = participants_.of_writer(entity_.get(), arrival.writer);
       if (from) sink(arrival.writer, Received<M>{std::move(arrival.message), *from});
     }
-    dropped += broke_limits;
+    if (broke_limits != 0) dropped += broke_limits;
+    taken_.clear();
   }
   void take(std::atomic<std::uint64_t>& dropped, std::vector<Received<M>>& out) {
     take(dropped, [&out](dds_instance_handle_t, Received<M>&& r) { out.push_back(std::move(r)); });
@@ -105,6 +109,7 @@ class Reader {
   Entity subscriber_;
   Entity entity_;
   Participants participants_;
+  std::deque<typename Arrivals<M>::Arrival> taken_;  // kept to reuse its memory
 };
 
 /// How a reader differs from its topic's.
@@ -130,8 +135,8 @@ class Node {
     auto publisher = partition.empty() ? Result<Entity>() : make_publisher({partition});
     if (!publisher) return tl::unexpected(publisher.error());
     const Entity& parent = *publisher ? *publisher : publisher_;
-    // The status writer's short lease only paces the liveliness messages of its participant, at 0.8 of it: one
-    // of them may be lost before the other writers' lease runs out.
+    // The status writer's short lease only paces the liveliness messages of its participant, at 0.8 of it:
+    // one of them may be lost before the other writers' lease runs out.
     const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ / 2;
     const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
     dds_qset_entity_name(qos.get(), name.c_str());
@@ -153,8 +158,9 @@ class Node {
     dds_qset_entity_name(qos.get(), name.c_str());
     if (options.ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
     const auto kept = static_cast<std::size_t>(options.depth.value_or(Topic<M>::kQos.kept));
-    auto arrivals = std::make_unique<Arrivals<M>>(kept, options.watched ? guard_.get() : 0);
-    auto writers = std::make_unique<LiveWriters>();
+    Doorbell* const bell = options.watched ? bell_.get() : nullptr;
+    auto arrivals = std::make_unique<Arrivals<M>>(kept, bell);
+    auto writers = std::make_unique<LiveWriters>(bell);
     auto entity = own(
         dds_create_reader_rhc(parent.get(), topic->get(), qos.get(), writers->listener(), arrivals->cache()),
         std::string("the reader of ") + M::kTopic);
@@ -164,9 +170,10 @@ class Node {
   }
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
-  /// Until something arrived at a watched reader created here, wake() was called, or the timeout.
-  void wait(std::chrono::nanoseconds timeout);
-  void wake();
+  /// Until something arrived at a watched reader created here, or a writer of it came to life or died; wake()
+  /// was called; or the timeout.
+  void wait(std::chrono::nanoseconds timeout) { bell_->wait(timeout); }
+  void wake() { bell_->ring(); }
 
  private:
   Node(DomainUse domain, const DdsOptions& options);
@@ -175,14 +182,13 @@ class Node {
   Result<Entity> make_topic(const dds_topic_descriptor_t& descriptor, const char* name);
 
   // Destroyed in reverse: children before the participant, the participant before the domain.
+  std::unique_ptr<Doorbell> bell_ = std::make_unique<Doorbell>();  // what arrives rings it, and wake()
   DomainUse domain_;
   DdsOptions options_;
   dds_duration_t lease_;
   Entity participant_;
   Entity publisher_;
   Entity subscriber_;
-  Entity waitset_;
-  Entity guard_;  // what arrives triggers it, and wake()
   ParticipantId self_;
 };
 
