@@ -15,8 +15,11 @@ namespace {
 // An acknowledgement is repeated after this, so that the server hears from a client even when no frame comes.
 constexpr std::int64_t kJoiningRepeatNs = 250 * kMillisecond;
 constexpr std::int64_t kPlayingRepeatNs = kSecond;
-// Longest that poll() asks to sleep.
+constexpr std::int64_t kDeafRepeatNs = 4 * kSecond;  // nobody hears it: DDS repeats each many times by itself
+// Longest that poll() asks to sleep; and while it plays and misses nothing, when all that may happen wakes
+// it.
 constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
+constexpr std::int64_t kMaxPlayingSleepNs = 500 * kMillisecond;
 // A server from which nothing comes for so long while it is joined makes room for another, if there is one.
 constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
 
@@ -82,7 +85,10 @@ std::int64_t ClientCore::poll(Now now) {
 }
 
 std::int64_t ClientCore::next_due_ns(Now now) const {
-  std::int64_t due = std::min(now.steady_ns + kMaxSleepNs, status_report_.due_ns());
+  const bool calm =
+      epoch_ != nullptr && !epoch_->next && !epoch_->played.joining && !epoch_->played.input_missing_ns;
+  std::int64_t due =
+      std::min(now.steady_ns + (calm ? kMaxPlayingSleepNs : kMaxSleepNs), status_report_.due_ns());
   if (epoch_ != nullptr) {
     due = std::min(due, next_ack_ns());
     if (epoch_->next && epoch_->next->joining) due = std::min(due, epoch_->next->joiner.next_due_ns());
@@ -110,7 +116,8 @@ std::int64_t ClientCore::next_ack_ns() const {
   const std::int64_t changing_ns = e.next ? repeat_joining_ns(*e.next) : INT64_MAX;
   if (options_.role == transport::Role::kObserver)
     return std::min(changing_ns, last_ack_ns_ + 2 * kPlayingRepeatNs);
-  const std::int64_t repeat_ns = std::min(changing_ns, last_ack_ns_ + kPlayingRepeatNs);
+  const std::int64_t repeat_ns =
+      std::min(changing_ns, last_ack_ns_ + (server_alive_ ? kPlayingRepeatNs : kDeafRepeatNs));
   if (e.played.timeline.applied() == acknowledged_) return repeat_ns;
   const double period_ns = 1e9 / e.session.frame_rate_hz;
   if (e.played.timeline.applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))

@@ -9,7 +9,7 @@ namespace tandem::api {
 namespace {
 
 constexpr double kLongestWaitS = 1e6;
-constexpr std::int64_t kThreadWaitNs = 100'000'000;
+constexpr std::int64_t kThreadWaitNs = 500'000'000;
 
 std::int64_t wait_ns(double seconds) {
   return static_cast<std::int64_t>(std::clamp(seconds, 0.0, kLongestWaitS) * 1e9);

@@ -219,7 +219,7 @@ TEST_F(HostileTest, StrangeClocksDoNoHarm) {
     poll(kFrameNs);
     const std::int64_t due = core->poll({now_ns, wall_ns()});
     EXPECT_GT(due, now_ns);
-    EXPECT_LE(due, now_ns + 50 * kMs);
+    EXPECT_LE(due, now_ns + 500 * kMs);
     Sample sample;
     core->start_sampling();
     EXPECT_TRUE(core->sample(sample, SampleMode::kExtrapolate, {now_ns, wall_ns()}));

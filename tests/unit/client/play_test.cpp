@@ -190,6 +190,27 @@ TEST_F(PlayTest, TheAcknowledgementIsRepeatedWhenNoFrameComes) {
   EXPECT_LE(port.acks.size(), 5U);
 }
 
+TEST_F(PlayTest, ToAServerThatShowsNoSignOfLifeItIsRepeatedSeldom) {
+  join();
+  poll(1000 * kMs);
+  port.alive = false;
+  port.acks.clear();
+  for (int i = 0; i < 160; ++i) poll(50 * kMs);
+  EXPECT_GE(port.acks.size(), 1U);
+  EXPECT_LE(port.acks.size(), 3U);
+}
+
+TEST_F(PlayTest, WhileNothingComesItWakesTwiceASecondAtMostAndForItsStatus) {
+  join();
+  for (int i = 0; i < 40; ++i) frame();
+  port.alive = false;
+  poll(2000 * kMs);
+  const std::int64_t began_ns = now_ns;
+  int polls = 0;
+  for (; now_ns < began_ns + 8000 * kMs; ++polls) poll(core->poll({now_ns, wall_ns()}) - now_ns);
+  EXPECT_LE(polls, 8 * 3 + 2);
+}
+
 TEST_F(PlayTest, LatencyIsMeasuredFromPublicationToApplication) {
   join();
   for (int i = 0; i < 100; ++i) {
