@@ -30,8 +30,11 @@ static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler
 struct FramerateOptions {
   std::vector<std::string> scenes{"half_pipe"};
   std::vector<std::uint32_t> bodies{10000};
-  std::vector<std::string> methods{std::string(kClientOnly), "none", "entropy", "limited", "tracker"};
-  std::string device = "thin";
+  std::vector<std::string> methods{
+      std::string(kClientOnly), "none", "entropy", "limited", std::string(kBallistic), std::string(kField),
+      std::string(kAsItComes)};
+  std::vector<std::string> devices{"thin", "thesis"};
+  double step_us = 0.8;
   std::string tandemd;
   std::uint32_t users = 0;
   FramerateSetup setup;
@@ -66,26 +69,23 @@ void tell(const std::string& line) {
   if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K{}", line);
 }
 
-int run_framerate(FramerateOptions options) {
-  const auto scenes = load_scenes(options.scenes);
-  if (!scenes) return report(kCommand, scenes.error());
-  if (const auto ready = prepare(options); !ready) return report(kCommand, ready.error());
-  // Everything made here ends with the objects that hold it.
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
-  options.setup.stop = &stopped;
-  std::unique_ptr<ThinDevice> device;
-  std::optional<Calibration> calibration;
-  if (options.device == "thin") {
-    device = ThinDevice::create();
-    const auto found = calibrate(options.setup, *device, kPhoneUpdatesPerS, tell);
-    if (!found) return report(kCommand, found.error());
-    calibration = *found;
-    options.setup.slowdown = found->slowdown;
-  }
+/// Nothing for this machine as it is.
+Result<std::optional<Calibration>> set_up(FramerateOptions& options, const std::string& name,
+                                          ThinDevice* processor) {
+  options.setup.slowdown = 1;
+  if (name == "native") return std::nullopt;
+  auto found = name == "thesis" ? calibrate_by_step(*processor, kPhoneUpdatesPerS, options.step_us)
+                                : calibrate(options.setup, *processor, kPhoneUpdatesPerS, tell);
+  if (!found) return tl::unexpected(found.error());
+  options.setup.slowdown = found->slowdown;
+  return *found;
+}
+
+void measure_rows(const FramerateOptions& options, const std::vector<scenes::Scene>& scenes,
+                  ThinDevice* processor, const std::optional<Calibration>& calibration,
+                  std::vector<FramerateRow>& rows) {
   const bool only_papers = options.scenes == std::vector<std::string>{"all"};
-  std::vector<FramerateRow> rows;
-  for (const scenes::Scene& scene : *scenes) {
+  for (const scenes::Scene& scene : scenes) {
     for (const std::uint32_t bodies : options.bodies) {
       if (only_papers && !paper_updates_per_s(static_cast<int>(scene.number), bodies, "entropy")) continue;
       for (const std::string& method : options.methods) {
@@ -97,19 +97,42 @@ int run_framerate(FramerateOptions options) {
         row.bodies = bodies;
         row.method = method;
         tell(fmt::format("{} with {} bodies, {}", row.scene, row.bodies, row.method));
-        measure_row(options.setup, device.get(), row);
-        if (stopped) return report(kCommand, Error{ErrorCode::kIo, "stopped"});
+        measure_row(options.setup, processor, calibration, row);
+        if (stopped) return;
       }
     }
   }
+}
+
+int run_framerate(FramerateOptions options) {
+  const auto scenes = load_scenes(options.scenes);
+  if (!scenes) return report(kCommand, scenes.error());
+  if (const auto ready = prepare(options); !ready) return report(kCommand, ready.error());
+  // Everything made here ends with the objects that hold it.
+  std::signal(SIGINT, [](int) { stopped = true; });
+  std::signal(SIGTERM, [](int) { stopped = true; });
+  options.setup.stop = &stopped;
+  const bool slow = std::any_of(options.devices.begin(), options.devices.end(),
+                                [](const std::string& name) { return name != "native"; });
+  const std::unique_ptr<ThinDevice> processor = slow ? ThinDevice::create() : nullptr;
+  std::vector<Calibration> calibrations;
+  std::vector<FramerateRow> rows;
+  for (const std::string& name : options.devices) {
+    const auto device = set_up(options, name, processor.get());
+    if (!device) return report(kCommand, device.error());
+    if (*device) calibrations.push_back(**device);
+    measure_rows(options, *scenes, *device ? processor.get() : nullptr, *device, rows);
+    if (stopped) return report(kCommand, Error{ErrorCode::kIo, "stopped"});
+  }
   tell("");
   if (options.json) {
-    fmt::print("{}\n", to_json(rows, device ? device->name() : std::string(), calibration));
+    fmt::print("{}\n", to_json(rows, processor ? processor->name() : std::string(), calibrations));
   } else {
-    if (calibration) {
+    for (const Calibration& device : calibrations) {
       fmt::print(
-          "thin device: {:.1f} % of a processor by {}; client-only there: {:.1f} updates/s (paper: {})\n",
-          100 * calibration->share, device->name(), calibration->updates_per_s, kPhoneUpdatesPerS);
+          "{} device: {:.2f} % of a processor by {}; client-only there: {:.1f} updates/s (paper: {}){}\n",
+          device.device, 100 * device.share, processor->name(), device.updates_per_s, kPhoneUpdatesPerS,
+          device.step_us > 0 ? fmt::format(", with a step of {} us a body", device.step_us) : "");
     }
     fmt::print("{}", to_table(rows));
   }
@@ -133,12 +156,26 @@ void add_framerate(CLI::App& bench, Run& run) {
   add_bodies_option(*command, options->bodies);
   std::vector<std::string> methods{std::string(kClientOnly)};
   for (const std::string_view name : codec_names()) methods.emplace_back(name);
-  command->add_option("--method", options->methods, "client-only or codecs, separated by commas")
+  for (const std::string_view name : {kBallistic, kField, kAsItComes}) methods.emplace_back(name);
+  std::erase(methods, "tracker");  // by its predicted step, or as it comes
+  command
+      ->add_option(
+          "--method", options->methods,
+          "client-only, codecs, tracker's predicted steps, or auto (as it comes), separated by commas")
       ->delimiter(',')
       ->check(CLI::IsMember(methods))
       ->capture_default_str();
-  command->add_option("--device", options->device, "Of the measured user: this machine, or a slow processor")
-      ->check(CLI::IsMember({"native", "thin"}))
+  command
+      ->add_option(
+          "--device", options->devices,
+          "Of the measured user, separated by commas: native (this machine), or a slow processor: thin or "
+          "thesis")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"native", "thin", "thesis"}))
+      ->capture_default_str();
+  command
+      ->add_option("--step-us", options->step_us, "Of a body, microseconds: what the thesis device is set by")
+      ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
   command
       ->add_option("--users", options->users,
@@ -165,10 +202,12 @@ void add_framerate(CLI::App& bench, Run& run) {
       ->capture_default_str();
   command->add_option("--server", options->tandemd,
                       "The program tandemd (default: beside this one, or in PATH)");
-  command->add_flag("--json", options->json, "One JSON object: device, rows[...]");
+  command->add_flag("--json", options->json, "One JSON object: devices[...], rows[...]");
   command->footer(
       "Needs root unless with --link memory: server and users run in network namespaces joined by one link.\n"
-      "The thin device gets the share of a processor at which client-only makes the thesis's 4.4 updates/s.");
+      "The thin device gets the share of a processor at which client-only, the engine as it is here, makes the "
+      "thesis's 4.4 updates/s\n"
+      "with 10,000 bodies; the thesis device that at which a plain grid, one body after another, does.");
   command->callback([options, &run] { run = [options] { return run_framerate(*options); }; });
 }
 

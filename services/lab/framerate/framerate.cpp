@@ -10,6 +10,7 @@
 #include "services/lab/framerate/child.hpp"
 #include "services/lab/framerate/enclave.hpp"
 #include "services/lab/paper_numbers.hpp"
+#include "services/lab/process_counters.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -20,6 +21,7 @@ constexpr const char* kServerAddress = "10.77.0.1";
 constexpr const char* kUsersAddress = "10.77.0.2";
 // A thin device takes long to start a program and to read its first snapshot.
 constexpr std::chrono::seconds kStart{60};
+constexpr std::uint32_t kCalibratedBodies = 10000;
 
 /// Unicast only; datagrams that need no fragments, as a home router's link loses fragments dearly.
 std::string dds_config(const char* peer) {
@@ -61,35 +63,40 @@ Result<double> client_only(const FramerateSetup& setup, ThinDevice* device, cons
 }
 
 std::vector<std::string> server_command(const FramerateSetup& setup, const FramerateRow& row) {
-  return {setup.tandemd,
-          "--scene",
-          row.scene,
-          "--bodies",
-          std::to_string(row.bodies),
-          "--codec",
-          row.method,
-          "--rate",
-          "max",
-          "--stall-timeout",
-          "off",
-          "--window",
-          "2",
-          "--lead",
-          "1",
-          "--scripted",
-          "--users",
-          std::to_string(row.users),
-          "--wait-for",
-          std::to_string(row.users),
-          "--seed",
-          std::to_string(setup.seed)};
+  std::vector<std::string> command{setup.tandemd,
+                                   "--scene",
+                                   row.scene,
+                                   "--bodies",
+                                   std::to_string(row.bodies),
+                                   "--rate",
+                                   "max",
+                                   "--stall-timeout",
+                                   "off",
+                                   "--window",
+                                   "2",
+                                   "--lead",
+                                   "1",
+                                   "--scripted",
+                                   "--users",
+                                   std::to_string(row.users),
+                                   "--wait-for",
+                                   std::to_string(row.users),
+                                   "--seed",
+                                   std::to_string(setup.seed)};
+  if (row.method == kBallistic || row.method == kField) {
+    command.insert(command.end(), {"--codec", "tracker", "--predictor", row.method});
+  } else if (row.method != kAsItComes) {
+    command.insert(command.end(), {"--codec", row.method});
+  }
+  return command;
 }
 
 std::vector<std::string> user_command(const FramerateSetup& setup, double seconds) {
   return {setup.tandem, "join", "--lead", "1", "--seconds", fmt::format("{}", seconds), "--json"};
 }
 
-Result<void> stream(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row) {
+Result<void> stream(const FramerateSetup& setup, ThinDevice* device,
+                    const std::optional<Calibration>& calibration, FramerateRow& row) {
   auto server_side = make_enclave(kServerAddress);
   if (!server_side) return tl::unexpected(server_side.error());
   auto users_side = make_enclave(kUsersAddress);
@@ -106,8 +113,12 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device, FramerateRo
     if (!other) return tl::unexpected(other.error());
     others.push_back(std::move(*other));
   }
+  const auto before = read_process(server->pid());
   const auto json = run(setup, user_command(setup, setup.seconds), at_users, device);
   const LinkCounts carried = link.finish(setup.seconds);
+  const auto after = read_process(server->pid());
+  const double server_busy = before && after ? between(*before, *after).cpu_ms / (1e3 * setup.seconds)
+                                             : 0;  // it waits for who joins
   if (!json) return tl::unexpected(json.error());
   row.updates_per_s = (*json)["frames_applied"].get<double>() / setup.seconds;
   row.client_ms_p50 = (*json)["client_ms"]["p50"].get<double>();
@@ -116,6 +127,8 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device, FramerateRo
   row.resyncs = (*json)["resyncs"].get<std::uint64_t>();
   row.link_mbit_per_s = static_cast<double>(carried.bytes_there) * 8 / kBitsPerMbit / setup.seconds;
   row.dropped = carried.dropped;
+  row.stream = (*json)["stream"].get<std::string>();
+  row.bound = find_bound(row, setup.link.bits_per_s, calibration ? calibration->share : 1, server_busy);
   return {};
 }
 
@@ -125,12 +138,25 @@ std::optional<double> in_paper(const FramerateRow& row) {
 
 }  // namespace
 
-void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row) {
-  row.device = device == nullptr ? "native" : "thin";
+std::string find_bound(const FramerateRow& row, double link_bits_per_s, double share, double server_busy) {
+  if (row.link_mbit_per_s.value_or(0) * kBitsPerMbit >= 0.9 * link_bits_per_s || row.dropped.value_or(0) > 0)
+    return "link";
+  if (row.client_cpu_ms.value_or(0) * row.updates_per_s / 1e3 >= 0.8 * share) return "processor";
+  return server_busy >= 0.9 ? "server" : "round trip";
+}
+
+void measure_row(const FramerateSetup& setup, ThinDevice* device,
+                 const std::optional<Calibration>& calibration, FramerateRow& row) {
+  row.device = calibration ? calibration->device : "native";
   row.seconds = setup.seconds;
   if (row.method == kClientOnly) {
+    row.bound = "processor";
     if (row.users > 1) {
       row.missing = "without a server there is one user";
+      return;
+    }
+    if (calibration && calibration->step_us > 0) {
+      row.updates_per_s = 1e6 * calibration->share / (calibration->step_us * row.bodies);
       return;
     }
     const auto rate = client_only(setup, device, row.scene, row.bodies, setup.seconds);
@@ -139,24 +165,23 @@ void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& 
     return;
   }
   const auto streamed =
-      setup.kind == LinkKind::kMemory ? play_in_memory(setup, row) : stream(setup, device, row);
+      setup.kind == LinkKind::kMemory ? play_in_memory(setup, row) : stream(setup, device, calibration, row);
   if (!streamed) row.missing = streamed.error().message;
 }
 
 Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, double updates_per_s,
                               const std::function<void(const std::string&)>& progress) {
   constexpr const char* kScene = "half_pipe";
-  constexpr std::uint32_t kBodies = 10000;
   constexpr int kMostTries = 6;
   progress("thin device: client-only at full speed");
-  const auto native = client_only(setup, nullptr, kScene, kBodies, 3);
+  const auto native = client_only(setup, nullptr, kScene, kCalibratedBodies, 3);
   if (!native) return tl::unexpected(native.error());
-  Calibration found{.share = updates_per_s / *native};
+  Calibration found{.device = "thin", .share = updates_per_s / *native};
   for (int i = 0; i < kMostTries; ++i) {
     if (auto set = device.set_share(found.share); !set) return tl::unexpected(set.error());
     progress(fmt::format("thin device: client-only with {:.1f} % of a processor", 100 * found.share));
     // As long as a row is measured: bodies that fall cost less than bodies that lie.
-    const auto rate = client_only(setup, &device, kScene, kBodies, setup.seconds);
+    const auto rate = client_only(setup, &device, kScene, kCalibratedBodies, setup.seconds);
     if (!rate) return tl::unexpected(rate.error());
     found.updates_per_s = *rate;
     found.slowdown = *native / *rate;
@@ -167,8 +192,17 @@ Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, d
   return found;
 }
 
-std::string to_json(std::span<const FramerateRow> rows, const std::string& device_name,
-                    const std::optional<Calibration>& calibration) {
+Result<Calibration> calibrate_by_step(ThinDevice& device, double updates_per_s, double step_us) {
+  Calibration found{.device = "thesis",
+                    .share = updates_per_s * step_us * 1e-6 * kCalibratedBodies,
+                    .updates_per_s = updates_per_s,
+                    .step_us = step_us};
+  found.slowdown = 1 / found.share;
+  return device.set_share(found.share).map([&] { return found; });
+}
+
+std::string to_json(std::span<const FramerateRow> rows, const std::string& limited_by,
+                    std::span<const Calibration> calibrations) {
   Json list = Json::array();
   for (const FramerateRow& row : rows) {
     list.push_back({{"scene", row.scene},
@@ -186,22 +220,26 @@ std::string to_json(std::span<const FramerateRow> rows, const std::string& devic
                     {"link_mbit_per_s", json_of(row.link_mbit_per_s)},
                     {"dropped", json_of(row.dropped)},
                     {"resyncs", json_of(row.resyncs)},
+                    {"stream", row.stream.empty() ? Json(nullptr) : Json(row.stream)},
+                    {"bound", row.bound.empty() ? Json(nullptr) : Json(row.bound)},
                     {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});
   }
-  Json device(nullptr);
-  if (calibration) {
-    device = {{"by", device_name},
-              {"processor_share", calibration->share},
-              {"client_only_updates_per_s", calibration->updates_per_s}};
+  Json devices = Json::array();
+  for (const Calibration& calibration : calibrations) {
+    devices.push_back({{"device", calibration.device},
+                       {"by", limited_by},
+                       {"processor_share", calibration.share},
+                       {"client_only_updates_per_s", calibration.updates_per_s},
+                       {"step_us", calibration.step_us > 0 ? Json(calibration.step_us) : Json(nullptr)}});
   }
-  return Json{{"device", device}, {"rows", list}}.dump();
+  return Json{{"devices", devices}, {"rows", list}}.dump();
 }
 
 std::string to_table(std::span<const FramerateRow> rows) {
   std::string text =
-      fmt::format("{:<12} {:>5} {:>7} {:<12} {:<7} {:>9} {:>7} {:>10} {:>10} {:>11} {:>8} {:>7}\n", "scene",
-                  "users", "bodies", "method", "device", "updates/s", "paper", "client ms", "latency ms",
-                  "link Mbit/s", "dropped", "rejoins");
+      fmt::format("{:<12} {:>5} {:>7} {:<12} {:<7} {:>9} {:>7} {:>10} {:>10} {:>11} {:>8} {:>7} {:<6} {}\n",
+                  "scene", "users", "bodies", "method", "device", "updates/s", "paper", "client ms",
+                  "latency ms", "link Mbit/s", "dropped", "rejoins", "stream", "bound by");
   for (const FramerateRow& row : rows) {
     text += fmt::format("{:<12} {:>5} {:>7} {:<12} {:<7} ", row.scene, row.users, row.bodies, row.method,
                         row.device);
@@ -210,10 +248,10 @@ std::string to_table(std::span<const FramerateRow> rows) {
       continue;
     }
     text +=
-        fmt::format("{:>9.1f} {:>7} {:>10} {:>10} {:>11} {:>8} {:>7}\n", row.updates_per_s,
+        fmt::format("{:>9.1f} {:>7} {:>10} {:>10} {:>11} {:>8} {:>7} {:<6} {}\n", row.updates_per_s,
                     rounded(in_paper(row), 1), rounded(row.client_ms_p50, 2), rounded(row.latency_ms_p50, 1),
                     rounded(row.link_mbit_per_s, 2), row.dropped ? fmt::format("{}", *row.dropped) : "-",
-                    row.resyncs ? fmt::format("{}", *row.resyncs) : "-");
+                    row.resyncs ? fmt::format("{}", *row.resyncs) : "-", row.stream, row.bound);
   }
   return text;
 }

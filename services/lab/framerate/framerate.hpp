@@ -19,13 +19,18 @@ namespace tandem::lab {
 /// The thesis's "client only": the full simulation on the client, no server and no network.
 inline constexpr std::string_view kClientOnly = "client-only";
 
+/// `tracker` with this predicted step.
+inline constexpr std::string_view kBallistic = "ballistic", kField = "field";
+/// Whatever server and user take when nobody says anything: the streams of the one, the choice of the other.
+inline constexpr std::string_view kAsItComes = "auto";
+
 /// One row of the result.
 struct FramerateRow {
   std::string scene;
   std::optional<int> number;  ///< of the paper's scene, 1..5
   std::uint32_t users = 1, bodies = 0;
-  std::string method;  ///< client-only, or a codec
-  std::string device;  ///< native or thin
+  std::string method;  ///< client-only, a codec, a predicted step, or auto
+  std::string device;  ///< native, thin or thesis
   double seconds = 0;  ///< that were measured
   double updates_per_s = 0;
   // With a server:
@@ -33,7 +38,18 @@ struct FramerateRow {
   std::optional<double> client_cpu_ms;            ///< an update; DDS, start and snapshot included
   std::optional<double> link_mbit_per_s;          ///< to all users together, 2^20 bits, with all protocol
   std::optional<std::uint64_t> dropped, resyncs;  ///< packets the link's queue had no room for; rejoins
+  std::string stream;                             ///< that the user played in the end
+  std::string bound;                              ///< what kept it from more; see find_bound()
   std::string missing;                            ///< not empty: why nothing was measured
+};
+
+/// A thin device as it was set.
+struct Calibration {
+  std::string device;  ///< thin or thesis
+  double share = 1, updates_per_s = 0;
+  double slowdown = 1;  ///< against this machine's whole processor
+  double step_us =
+      0;  ///< thesis: of a body in the step that it was calibrated by; 0: measured, today's engine
 };
 
 /// Where server and users meet.
@@ -53,20 +69,21 @@ struct FramerateSetup {
   const std::atomic<bool>* stop = nullptr;  ///< ends a row early; must outlive the measurement
 };
 
-/// Fills a row's measured fields: runs the programs, on `device` for the first of its users where that is not
-/// null. `row` says scene, users, bodies, method. Errors end up in `missing`.
-void measure_row(const FramerateSetup& setup, ThinDevice* device, FramerateRow& row);
+/// Fills a row's measured fields: runs the programs, on `device` as it was calibrated for the first of its
+/// users where that is not null. `row` says scene, users, bodies, method. Errors end up in `missing`.
+void measure_row(const FramerateSetup& setup, ThinDevice* device,
+                 const std::optional<Calibration>& calibration, FramerateRow& row);
+
+/// Of a row that was measured with a server: "link" (carries 0.9 of its rate, or drops), "processor" (takes
+/// 0.8 of its share), "server" (0.9 of a processor there), or "round trip": the window of frames on their
+/// way.
+[[nodiscard]] std::string find_bound(const FramerateRow& row, double link_bits_per_s, double share,
+                                     double server_busy);
 
 /// The server's and the users' programs in one thread, on a simulated network with the setup's link. Time is
 /// simulated: what a program computes takes as long as it takes here, times the slowdown for the first user.
 /// Fills the row as measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
 [[nodiscard]] Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row);
-
-/// A thin device as it was set.
-struct Calibration {
-  double share = 1, updates_per_s = 0;
-  double slowdown = 1;  ///< against this machine's whole processor
-};
 
 /// Sets the device's share of a processor so that client-only makes `updates_per_s` of the paper's first
 /// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
@@ -75,9 +92,13 @@ struct Calibration {
                                             double updates_per_s,
                                             const std::function<void(const std::string&)>& progress);
 
-/// {"device": {...} or null, "rows": [...]}, one line.
-[[nodiscard]] std::string to_json(std::span<const FramerateRow> rows, const std::string& device_name,
-                                  const std::optional<Calibration>& calibration);
+/// Sets the share at which a step of `step_us` a body makes `updates_per_s` with 10,000 bodies: a plain grid,
+/// one body after another, as the thesis's, whatever engine is here. Errors: kIo.
+[[nodiscard]] Result<Calibration> calibrate_by_step(ThinDevice& device, double updates_per_s, double step_us);
+
+/// {"devices": [...], "rows": [...]}, one line. `limited_by`: what limits the processor.
+[[nodiscard]] std::string to_json(std::span<const FramerateRow> rows, const std::string& limited_by,
+                                  std::span<const Calibration> calibrations);
 /// A table for people, with the paper's numbers beside ours.
 [[nodiscard]] std::string to_table(std::span<const FramerateRow> rows);
 

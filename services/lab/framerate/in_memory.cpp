@@ -50,7 +50,11 @@ struct User {
 Result<host::HostConfig> plan(const scenes::Scene& scene, const FramerateRow& row) {
   sessions::SessionChoice choice;
   choice.bodies = row.bodies;
-  choice.codec = row.method;
+  if (row.method == kBallistic || row.method == kField) {
+    choice.predictor = row.method;
+  } else if (row.method != kAsItComes) {
+    choice.codec = row.method;
+  }
   return sessions::plan_session(scene, choice).map([&](host::HostConfig&& config) {
     config.streams[0].layout.lead = 1;
     config.window = 2;
@@ -134,6 +138,7 @@ Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row) {
   row.resyncs = seen.resyncs;
   row.link_mbit_per_s = static_cast<double>(down->bytes()) * 8 / kBitsPerMbit / setup.seconds;
   row.dropped = down->dropped() + up->dropped();
+  row.stream = users[0].core->status().stream;
   return {};
 }
 
