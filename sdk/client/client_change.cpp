@@ -34,6 +34,11 @@ Result<FollowedStream> ClientCore::follow(const transport::SessionMessage& sessi
   });
 }
 
+void ClientCore::prefer(std::string_view preference) {
+  preference_ = read_preference(preference);
+  if (chooser_) chooser_->prefer(preference_);
+}
+
 void ClientCore::tell_stream() {
   const StreamOffer& chosen = chooser_->chosen();
   const Layout& layout = epoch_->played.stream.layout;

@@ -135,9 +135,10 @@ void ClientCore::take_sessions(Now now) {
       const auto& message = announcement.message;
       if (!options_.session.empty() && message.session != options_.session) continue;
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
-      if (!same) {
+      const bool other_streams = same && message.streams != session_->streams;
+      if (!same || (other_streams && !epoch_)) {
         adopt(announcement, now);
-      } else if (epoch_ && message.streams != session_->streams) {
+      } else if (other_streams) {
         adopt_streams(message, now);
       }
       if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);

@@ -82,6 +82,9 @@ class ClientCore {
   Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
                              Now now);
 
+  /// Of streams, from the next poll() on: see CoreOptions::prefer.
+  void prefer(std::string_view preference);
+
   [[nodiscard]] ClientPhase phase() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   /// Last announcement that was accepted or refused; null before the first.

@@ -247,8 +247,23 @@ bool StreamChooser::starved(const Seen& seen) const {
   return late && seen.round_trip_ns > 2 * best_round_trip_ns_ + kQueuedNs;
 }
 
+void StreamChooser::prefer(StreamPreference preference) {
+  preference_ = std::move(preference);
+  is_new_preference_ = true;
+}
+
 bool StreamChooser::reconsider(const Seen& seen) {
   if (looked_ns_ == INT64_MIN) looked_ns_ = changed_ns_ = seen.now_ns;
+  if (std::exchange(is_new_preference_, false)) {
+    const std::size_t before = chosen_;
+    std::string why = choose_first();
+    const std::size_t wanted = std::exchange(chosen_, before);
+    if (wanted != before) {
+      change(wanted, std::move(why), seen.now_ns);
+      return true;
+    }
+    reason_ = std::move(why);
+  }
   if (offers_.size() == 1 || preference_.kind == StreamPreference::Kind::kNamed ||
       seen.now_ns - looked_ns_ < kLookNs)
     return false;

@@ -90,6 +90,8 @@ class StreamChooser {
     std::optional<std::int64_t> joining_since_ns = {};  ///< nothing while playing
     std::int64_t round_trip_ns = 0;                     ///< 0: unknown
   };
+  /// The application wants something else: the next reconsider() chooses as at first.
+  void prefer(StreamPreference preference);
   /// True when another stream is to be played from now on: chosen() and reason() then say which and why.
   [[nodiscard]] bool reconsider(const Seen& seen);
   /// That one is played, and stays chosen, where it can be.
@@ -131,6 +133,7 @@ class StreamChooser {
 
   std::vector<Candidate> offers_;
   StreamPreference preference_;
+  bool is_new_preference_ = false;
   double period_ns_;
   double slowness_ = 1;  // of this machine against the server's
   std::size_t chosen_ = 0, before_ = 0;

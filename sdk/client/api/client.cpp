@@ -151,6 +151,14 @@ tandem_result tandem_wait_until_playing(tandem_client client, double timeout_s) 
   });
 }
 
+tandem_result tandem_prefer(tandem_client client, const char* prefer) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (prefer == nullptr) return null_pointer("`prefer` is null");
+    const auto preferred = running.prefer(prefer);
+    return preferred ? kOk : refuse(preferred.error());
+  });
+}
+
 tandem_result tandem_get_status(tandem_client client, tandem_status* status) noexcept {
   return with_client(client, [&](RunningClient& running) {
     if (const auto checked = check_struct(status); checked != TANDEM_OK) return checked;

@@ -130,6 +130,13 @@ Result<std::uint64_t> RunningClient::send(transport::InputKind kind, std::vector
   return sent;
 }
 
+Result<void> RunningClient::prefer(std::string_view preference) {
+  const std::lock_guard lock(mutex_);
+  if (auto can = usable(); !can) return can;
+  core_.prefer(preference);
+  return {};
+}
+
 std::optional<Event> RunningClient::next_event() {
   const std::lock_guard lock(mutex_);
   return events_.take();

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -46,6 +47,8 @@ class RunningClient {
   Result<void> wait_until_playing(double timeout_s);
   /// Errors: kNotReady, kOutOfOrder, kInvalidArgument, kTransport.
   Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes);
+  /// Errors: kInternal, kOutOfMemory.
+  Result<void> prefer(std::string_view preference);
   [[nodiscard]] std::optional<Event> next_event();
   [[nodiscard]] Result<ClientStatus> status() const;
   [[nodiscard]] std::uint64_t events_dropped() const;

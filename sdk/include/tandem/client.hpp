@@ -182,6 +182,10 @@ class Client {
   Result<void> wait_until_playing(double timeout_s) {
     return checked(tandem_wait_until_playing(handle_, timeout_s));
   }
+  /// Of streams, as ClientOptions::prefer, from now on.
+  [[nodiscard]] Result<void> prefer(const std::string& preference) {
+    return checked(tandem_prefer(handle_, preference.c_str()));
+  }
   [[nodiscard]] Result<ClientStatus> status() const;
   /// The oldest event that was not taken yet; empty: there is none.
   [[nodiscard]] std::optional<tandem_event> next_event() {

@@ -188,6 +188,10 @@ TANDEM_API tandem_result tandem_update(tandem_client client, double wait_s) TAND
  * @return also TANDEM_TIMEOUT, and as tandem_update() where the client has no thread */
 TANDEM_API tandem_result tandem_wait_until_playing(tandem_client client, double timeout_s) TANDEM_NOEXCEPT;
 
+/** Another preference of streams than the one joined with, as tandem_options::prefer: a device that saves its
+ * battery, a link that is metered. The stream changes, if it has to, while the client plays. */
+TANDEM_API tandem_result tandem_prefer(tandem_client client, const char* prefer) TANDEM_NOEXCEPT;
+
 /** Figures since tandem_join(). Times in milliseconds, percentiles over all frames. */
 typedef struct tandem_status {
   uint32_t size;

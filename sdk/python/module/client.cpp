@@ -82,6 +82,9 @@ class Connection {
   void update(double wait_s) {
     check(unlocked([&] { return tandem_update(client_, wait_s); }));
   }
+  void prefer(const std::string& preference) {
+    check(unlocked([&] { return tandem_prefer(client_, preference.c_str()); }));
+  }
   // In slices, so that Ctrl-C ends the wait.
   void wait_until_playing(double timeout_s) {
     constexpr double kSliceS = 0.1;
@@ -297,6 +300,7 @@ PYBIND11_MODULE(_client, m) {
                     const std::string&, const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
+      .def("prefer", &Connection::prefer)
       .def("wait_until_playing", &Connection::wait_until_playing)
       .def("status", &Connection::status)
       .def("sample", &Connection::sample)

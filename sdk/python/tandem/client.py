@@ -145,6 +145,10 @@ class Client:
         raises TIMEOUT, and what update() raises where the client has no thread."""
         self._connection.wait_until_playing(timeout)
 
+    def prefer(self, preference: str) -> None:
+        """Of streams, as the argument of that name, from now on."""
+        self._connection.prefer(preference)
+
     def status(self) -> Status:
         """How the client stands."""
         return Status._of(self._connection.status())

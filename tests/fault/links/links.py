@@ -117,6 +117,27 @@ def lost(stage, seconds, limit, *more):
         raise Failed("not caught up in time")
 
 
+def choice(stage, kbit, expected):
+    """A fast machine behind a thin link, with no flag anywhere: it takes the stream that fits, and plays at the full rate."""
+    server = stage.server(10_000)
+    time.sleep(20)
+    link(kbit)
+    client = stage.client()
+    took = client.wait_for("playing from frame", 120) - client.started
+    time.sleep(25)
+    rates = [line["frames_per_s"] for _, line in client.live() if line["phase"] == "playing"][3:]
+    report, served = client.stop(), server.stop()
+    print(f"  {kbit} kbit/s: playing after {took:.1f} s, stream {report['stream']} ({report['stream_reason']}), "
+          f"{report['mbit_per_s'] * 1048.576:.0f} kbit/s of payload, {sum(rates) / len(rates):.1f} frames/s, {report['resyncs']} rejoins, "
+          f"{report['stream_changes']} changes; server: {served['stalls']} stalls")  # fmt: skip
+    if report["hash_mismatches"] or report["resyncs"]:
+        raise Failed(f"{report['hash_mismatches']} mismatches, {report['resyncs']} rejoins")
+    if report["stream"] != expected:
+        raise Failed(f"stream {report['stream']}")
+    if sum(rates) / len(rates) < 29:
+        raise Failed(f"{sum(rates) / len(rates):.1f} frames/s")
+
+
 class Sniffer:
     """Bytes on loopback since it was made, headers and all: of datagrams with a delta, and of all others."""
 
@@ -234,6 +255,7 @@ CASES = {
     "join_10000_at_256": lambda stage: join(stage, 10_000, 256, settle=20),
     "join_20000_at_1000": lambda stage: join(stage, 20_000, 1000, settle=20),
     "join_65536_at_4000": lambda stage: join(stage, 65_536, 4000, "--predictor", "field", settle=20),
+    "choice_at_100": lambda stage: choice(stage, 100, "rich"),
     "stopped_25_s": stopped,
     "lost_0.5_s": lambda stage: lost(stage, 0.5, 1),
     "lost_5_s": lambda stage: lost(stage, 5, 2),

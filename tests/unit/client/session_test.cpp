@@ -157,6 +157,96 @@ TEST_F(SessionTest, RadiiArePartOfTheLayoutHash) {
   EXPECT_EQ(chosen.error().code, ErrorCode::kMismatch);
 }
 
+/// The session with that stream's twin behind it, of id 1.
+transport::SessionMessage with_second(transport::SessionMessage session) {
+  session.streams.push_back(session.streams[0]);
+  session.streams[1].id.id = 1;
+  rehash(session);
+  return session;
+}
+
+TEST_F(SessionTest, AStreamGoesOnWhenAnotherIsAnnouncedBesideIt) {
+  start();
+  join();
+  frame();
+  port.sessions.push_back(from_server(with_second(server.session)));
+  poll();
+  frame();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(core->stream()->id.id, 0U);
+  EXPECT_EQ(figures().resyncs, 0U);
+  EXPECT_EQ(figures().epochs, 1U);
+  expect_agreed();
+}
+
+TEST_F(SessionTest, AStreamThatVanishesIsLeftForWhatIsThere) {
+  start();
+  join();
+  frame();
+  auto other = with_second(server.session);
+  other.streams.erase(other.streams.begin());
+  port.sessions.push_back(from_server(other));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{1}));
+  poll(200 * kMs);
+  EXPECT_EQ(port.acks.back().stream.id, 1U);
+  EXPECT_EQ(port.acks.back().phase, transport::Phase::kJoining);
+}
+
+TEST_F(SessionTest, AStreamThatVanishesWithoutAnotherIsARefusalUntilItIsBack) {
+  start();
+  join();
+  auto none = server.session;
+  none.streams[0].id.id = 1;
+  none.streams[0].layout.codec = "of the future";
+  rehash(none);
+  port.sessions.push_back(from_server(none));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+  EXPECT_TRUE(port.streams_open.empty());
+  port.sessions.push_back(from_server(server.session));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kJoining);
+}
+
+TEST_F(SessionTest, AStreamThatVanishesWhileItIsJoinedIsGivenUp) {
+  start();
+  const auto one = server.session;
+  server.session = with_second(one);
+  join();
+  frame();
+  core->prefer("1");
+  poll();
+  poll(200 * kMs);
+  EXPECT_EQ(port.acks.back().stream.id, 1U);
+  EXPECT_EQ(port.acks.back().phase, transport::Phase::kJoining);
+  EXPECT_EQ(port.acks.back().applied, server.frame()) << "it goes on playing meanwhile";
+  port.sessions.push_back(from_server(one));
+  poll();
+  poll(200 * kMs);
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0}));
+  EXPECT_EQ(port.acks.back().stream.id, 0U);
+  EXPECT_EQ(port.acks.back().phase, transport::Phase::kPlaying);
+}
+
+TEST_F(SessionTest, AChangeThatNobodyAnswersIsGivenUp) {
+  start();
+  server.session = with_second(server.session);
+  join();
+  core->prefer("1");
+  poll();
+  poll();
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0, 1}));
+  for (int i = 0; i < 11 * 30; ++i) frame();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(core->stream()->id.id, 0U);
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0}));
+  EXPECT_EQ(figures().resyncs, 0U);
+  expect_agreed();
+}
+
 TEST_F(SessionTest, ANewEpochEmptiesEverything) {
   join();
   for (int i = 0; i < 5; ++i) frame();
