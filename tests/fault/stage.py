@@ -19,7 +19,7 @@ QUEUE_MS = 400  # what a router keeps before it drops
 SEED = 1
 URI = (
     '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
-    "</General></Domain></CycloneDDS>"
+    "</General><Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
 CLONE_NEWNET = 0x40000000
 
