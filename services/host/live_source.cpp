@@ -64,7 +64,8 @@ Result<Stream> LiveSource::begin(std::uint32_t id) const {
                                                    .frame = frame_,
                                                    .frame_rate_hz = frame_rate_hz_,
                                                    .last_input = last_input_,
-                                                   .pending = pending});
+                                                   .pending = pending,
+                                                   .under_way = under_way_});
   if (stream) stream->set_clock(clock_ns_);
   return stream;
 }
@@ -95,6 +96,7 @@ std::optional<FrameSource::Made> LiveSource::next(StreamSet snapshots_follow, Ou
   const std::int64_t start_ns = clock();
   apply(next_frame());
   simulation_->step();
+  under_way_ = true;
   const std::int64_t stepped_ns = clock();
   const engine::Bodies bodies = simulation_->bodies();
   if (auto good = mirror_.check(bodies); !good) {

@@ -77,6 +77,7 @@ class LiveSource final : public FrameSource {
   double frame_rate_hz_;
   std::int64_t (*clock_ns_)();
   Frame frame_;
+  bool under_way_ = false;                // the simulation was stepped
   Drive drive_;                           // in force at frame_
   std::uint64_t last_input_ = 0;          // number
   std::vector<MadeDelta> deltas_;         // of the frame at hand

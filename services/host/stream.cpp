@@ -41,6 +41,27 @@ State told(const State& shown, const Groups& groups) {
   return state;
 }
 
+// So a snapshot cut soon after has little to say of a heap that lies there. One at the top of its throw is
+// slow as well: it is corrected once more.
+void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) {
+  // Further than the threshold after so many frames, in 1/64 lattice unit a frame.
+  constexpr std::int64_t kFrames = 30;
+  const auto slow = [&](Slot slot) {
+    for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+      if (std::abs(std::int64_t{state.v(axis)[slot]}) * kFrames > std::int64_t{threshold} * 64) return false;
+    }
+    return state.groups() == Groups{} || state.body(slot).w == Spin{};
+  };
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.alive()[slot] == 0 || !slow(slot)) continue;
+    state.rest()[slot] = 1;
+    for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+      state.v(axis)[slot] = 0;
+      state.c(axis)[slot] = -drive.gravity[axis];
+    }
+  }
+}
+
 }  // namespace
 
 struct Stream::Impl final : EncodeObserver {
@@ -49,7 +70,9 @@ struct Stream::Impl final : EncodeObserver {
         timeline(std::move(server)),
         parameters(config.layout.parameters),
         drive(start.drive) {
-    const State state = told(start.mirror.target(), groups_of(config.layout));
+    State state = told(start.mirror.target(), groups_of(config.layout));
+    if (start.under_way && codec_traits(config.layout.codec)->reads_gains)
+      put_slow_to_rest(state, start.drive, parameters.codec.threshold);
     timeline.start(start.frame, state, start.drive, start.last_input, start.pending);
     bodies = state.alive_count();
     if (config.quality) {

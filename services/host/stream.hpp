@@ -57,6 +57,8 @@ struct StreamStart {
   double frame_rate_hz = 30;                     ///< nominal; automatic quality counts in it
   std::uint64_t last_input = 0;                  ///< number of the last scheduled input before it begins
   std::span<const ScheduledDrive> pending = {};  ///< of those up to it, still to act; ascending
+  /// The bodies have been moving for a while: those that hardly do begin at rest, where the codec knows that.
+  bool under_way = false;
 };
 
 /// Predicts, encodes and applies, one frame at a time, and chooses the parameters

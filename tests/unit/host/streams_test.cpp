@@ -164,6 +164,18 @@ TEST_F(StreamsTest, WhoJoinsAnIdleOneWhileInputsWaitToActFollowsItForHundredsOfF
   EXPECT_EQ(bench.host->first_made(), kThin);
 }
 
+TEST_F(StreamsTest, OneThatBeginsInAWorldUnderWayHasSlowBodiesAtRest) {
+  bench.simulation.on_step = [](std::uint64_t /*step*/) {};  // they stand, whatever gravity says
+  bench.run_to(20);
+  joining(7, kRich);
+  bench.run_to(30);
+  ASSERT_EQ(snapshots_of(kRich), 1U);
+  const ClientTimeline client = follow(kRich);
+  const State& state = client.state(client.applied());
+  EXPECT_GT(state.alive_count(), 0U);
+  EXPECT_EQ(state.rest_count(), state.alive_count());
+}
+
 TEST_F(StreamsTest, OneEndsFiveSecondsAfterItsLastPlayerAndComesBack) {
   joining(1, kRich);
   bench.run_ms(200);
