@@ -37,9 +37,9 @@ TEST(TrackerFilter, SplitsACorrectionAmongPositionVelocityAndAcceleration) {
   EXPECT_NEAR(state.c(0)[0], 64 * 0.8 * 0.15 * d / 100, 2);
   EXPECT_EQ(state.p(1)[0], 0);
   EXPECT_EQ(state.v(1)[0], 0);
-  EXPECT_EQ(body.age, 0);
-  EXPECT_EQ(body.interval, 10);
-  EXPECT_EQ(body.steps, (std::array<std::int8_t, 3>{2, 0, 0}));
+  EXPECT_EQ(body.age, 0U);
+  EXPECT_EQ(body.interval, 10U);
+  EXPECT_EQ(body.steps, (TrackerSteps{2, 0, 0}));
 }
 
 TEST(TrackerFilter, OfABodyCorrectedTwiceRunningMoreIsBelievedToBeVelocity) {
@@ -106,8 +106,7 @@ TEST(TrackerFilter, EvidenceIsTheCosineOfCorrections) {
   const auto near = [](std::int64_t sum, double cosine) {
     return std::abs(static_cast<double>(sum) / GainEvidence::kCosineOne - cosine) < 1e-6;
   };
-  const auto evidence_of = [](const std::array<std::int8_t, 3>& last, const TrackerSteps& steps,
-                              const Vec3i& c) {
+  const auto evidence_of = [](const TrackerSteps& last, const TrackerSteps& steps, const Vec3i& c) {
     GainEvidence evidence;
     add_evidence({9, 5, last}, steps, c, evidence);
     return evidence;

@@ -201,7 +201,8 @@ struct IdealCoder {
 };
 
 TrackerContext context_of(const TrackerBody& body) {
-  const std::array<std::uint8_t, 5> columns{body.age, body.interval, 0, 0, 0};
+  const std::array<std::uint8_t, 5> columns{static_cast<std::uint8_t>(body.age),
+                                            static_cast<std::uint8_t>(body.interval), 0, 0, 0};
   TrackerContexts contexts(1);
   contexts.fill({0, 0, 1}, State(1), {&columns[0], &columns[1], &columns[2], &columns[3], &columns[4]}, 100);
   return contexts.of(0);
@@ -214,7 +215,7 @@ void code_block(Coder& coder, std::uint64_t seed, std::uint64_t corrected_one_in
   std::vector<TrackerBody> corrected;
   for (std::uint32_t i = 0; i < 2000; ++i) {
     const TrackerBody body{
-        static_cast<std::uint8_t>(random() % 20U), static_cast<std::uint8_t>(random() % 20U), {}};
+        static_cast<std::uint32_t>(random() % 20U), static_cast<std::uint32_t>(random() % 20U), {}};
     const bool is_corrected = random() % corrected_one_in == 0;
     coder.code(is_corrected, flag_model(body.age, flag_history(body), false));
     if (is_corrected) corrected.push_back(body);

@@ -5,13 +5,6 @@
 #include "sdk/core/lattice/fixed_point.hpp"
 
 namespace tandem {
-namespace {
-
-// Of v and c by one step, in 1/64 units; twice the largest velocity there is.
-constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
-
-}  // namespace
-
 // What follows from the errors that a predicted step leaves.
 //
 // A position error d that grew over k frames is explained by a velocity error d / k, or by an acceleration
@@ -48,12 +41,6 @@ const TrackerKind& kind_of(std::string_view predictor) {
 Vec3i relative(const TrackerSteps& steps) {
   return TrackerSteppings::relative(
       {std::clamp(steps[0], -127, 127), std::clamp(steps[1], -127, 127), std::clamp(steps[2], -127, 127)});
-}
-
-std::int64_t dot(const Vec3i& a, const Vec3i& b) {
-  std::int64_t sum = 0;
-  for (std::size_t i = 0; i < 3; ++i) sum += std::int64_t{a[i]} * b[i];
-  return sum;
 }
 
 // One over a vector's length, as `root` / (2^30 * 2^halvings).
@@ -109,48 +96,21 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
 void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3i& c,
                   GainEvidence& evidence) {
   if (body.age == 0) return;  // hit: its last correction says nothing of this one
-  const auto squared = [](const Vec3i& vector) { return static_cast<std::uint64_t>(dot(vector, vector)); };
+  const auto squared = [](const Vec3i& vector) {
+    return static_cast<std::uint64_t>(tracker_detail::dot(vector, vector));
+  };
   const Vec3i now = relative(steps);
   const InverseLength inverse = inverse_length(squared(now));
-  const Vec3i before = relative({body.steps[0], body.steps[1], body.steps[2]});
+  const Vec3i before = relative(body.steps);
   if (const std::uint64_t length = squared(before); length > 0) {
-    evidence.agreement += cosine(dot(now, before), inverse, inverse_length(length));
+    evidence.agreement += cosine(tracker_detail::dot(now, before), inverse, inverse_length(length));
     ++evidence.repeated;
   }
   if (const std::uint64_t length = squared(c); length > 0) {
-    evidence.forwardness += cosine(dot(now, c), inverse, inverse_length(length));
+    evidence.forwardness += cosine(tracker_detail::dot(now, c), inverse, inverse_length(length));
     ++evidence.driven;
   }
 }
-
-namespace {
-
-// What a correction means for the velocity and the acceleration behind it, and for what is remembered.
-struct Meaning {
-  Meaning(const TrackerSteps& steps, const TrackerBody& body) : k(std::min(body.age + 1U, kMostAge)) {
-    for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
-    const std::int64_t product =
-        dot(TrackerSteppings::relative({body.steps[0], body.steps[1], body.steps[2]}),
-            TrackerSteppings::relative(now));
-    // Corrections that keep pointing the same way are believed more, in 1/256: 128 .. 384.
-    belief = 256 + (std::clamp<std::int64_t>(product >> 8, -256, 256) >> 1);
-  }
-  /// Of v, c or w, by one step that is worth `one`, in 1/64 of its unit.
-  [[nodiscard]] std::int64_t growth(std::int64_t one, std::int64_t gain) const {
-    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
-  }
-  void remember(TrackerBody& body) const {
-    for (std::size_t i = 0; i < 3; ++i) body.steps[i] = static_cast<std::int8_t>(now[i]);
-    body.interval = static_cast<std::uint8_t>(k);
-    body.age = 0;
-  }
-
-  std::uint32_t k;
-  std::int64_t belief = 0;
-  TrackerSteps now{};
-};
-
-}  // namespace
 
 TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gravity, unsigned position_bits,
                              const TrackerGains& gains, std::span<const std::int32_t> radii)
@@ -168,40 +128,11 @@ TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gra
   most_c_ = std::min<std::int64_t>(kVelocityLimit, most_c_);
 }
 
-// One step along an axis is worth `one` lattice units, n of them n * one. It changes
-//   p by n one,   v by n G(k) one (1 + u/2),   c by n H(k) one (1 + u/2),
-// with v and c in 1/64 units, so that G = 64 beta / k and H = 64 beta gamma / k^2 (in 1/65536: TrackerGains).
-// u in -1 .. 1 is the product with the last correction in squares of the threshold: two in the same direction
-// mean that too little was believed, two in opposite ones that too much was.
-//
-// Ranges: one <= 2^30 and G, H <= 64, so that one G (1 + u/2) fits 64 bits in 2^-24; what one step may change
-// is cut at 2^29, so that n of them fit, n < 2^31.
-void TrackerFilter::move(State& state, Slot slot, const TrackerCorrection& correction,
-                         TrackerBody& body) const {
-  const TrackerSteps& steps = correction.steps;
-  const Meaning meaning(steps, body);
-  const std::int64_t one = steppings(correction).unit_for(steps);
-  const std::int64_t v_of_one = meaning.growth(one, gains_.velocity(meaning.k));
-  const std::int64_t c_of_one = meaning.growth(one, gains_.acceleration(meaning.k));
-  for (std::size_t i = 0; i < 3; ++i) {
-    // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of
-    // their own where the sum has a smaller one.
-    const std::int64_t n = steps[i];
-    std::int32_t& p = state.p(i)[slot];
-    std::int32_t& v = state.v(i)[slot];
-    std::int32_t& c = state.c(i)[slot];
-    p = limited(p + n * one, kPositionLimit);
-    v = limited(v + n * v_of_one, kVelocityLimit);
-    c = limited(c + n * c_of_one, most_c_);
-  }
-  meaning.remember(body);
-}
-
 // The same with an angle for `one`; w has the unit of angles, not 1/64 of it.
 void TrackerFilter::turn(State& state, Slot slot, const TrackerCorrection& correction,
                          TrackerBody& body) const {
   const TrackerSteps& steps = correction.turn;
-  const Meaning meaning(steps, body);
+  const tracker_detail::Meaning meaning(steps, body);
   const std::int64_t one = steppings(correction).angle_for(steps, radii_[state.type()[slot]]);
   const std::int64_t w_of_one = meaning.growth(one, gains_.velocity(meaning.k)) >> 6;
   std::array<std::int64_t, 3> by{}, w{};

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem {
@@ -31,11 +32,13 @@ struct TrackerCorrection {
 inline constexpr std::uint32_t kMostAge = 255;
 
 /// What the codec remembers of a body's position besides p, v and c, or of its orientation besides q and w.
-/// All zero for a new body and for a dead slot.
+/// All zero for a new body and for a dead slot. TrackerMemory keeps bytes; here they are words, because
+/// compilers pack a struct of five bytes into one register, byte by byte, which takes as long as the filter
+/// itself.
 struct TrackerBody {
-  std::uint8_t age = 0;                ///< frames since its last correction, 0 .. kMostAge - 1
-  std::uint8_t interval = 0;           ///< k of the last correction, 0: none yet
-  std::array<std::int8_t, 3> steps{};  ///< of the last correction, saturated at +-127
+  std::uint32_t age = 0;       ///< frames since its last correction, 0 .. kMostAge - 1
+  std::uint32_t interval = 0;  ///< k of the last correction, 0: none yet
+  TrackerSteps steps{};        ///< of the last correction, saturated at +-127
 };
 
 struct TrackerKind;
@@ -123,6 +126,38 @@ class TrackerSteppings {
   std::array<std::int32_t, 4> units_{1, 1, 1, 1};
 };
 
+namespace tracker_detail {
+
+// Of v and c by one step, in 1/64 units; twice the largest velocity there is.
+inline constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
+
+inline std::int64_t dot(const Vec3i& a, const Vec3i& b) {
+  std::int64_t sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) sum += std::int64_t{a[i]} * b[i];
+  return sum;
+}
+
+// What a correction means for the velocity and the acceleration behind it, and for what is remembered.
+struct Meaning {
+  Meaning(const TrackerSteps& steps, const TrackerBody& body) : k(std::min(body.age + 1U, kMostAge)) {
+    for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
+    const std::int64_t product = dot(TrackerSteppings::relative(body.steps), TrackerSteppings::relative(now));
+    // Corrections that keep pointing the same way are believed more, in 1/256: 128 .. 384.
+    belief = 256 + (std::clamp<std::int64_t>(product >> 8, -256, 256) >> 1);
+  }
+  /// Of v, c or w, by one step that is worth `one`, in 1/64 of its unit.
+  [[nodiscard]] std::int64_t growth(std::int64_t one, std::int64_t gain) const {
+    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
+  }
+  void remember(TrackerBody& body) const { body = {0, k, now}; }
+
+  std::uint32_t k;
+  std::int64_t belief = 0;
+  TrackerSteps now{};
+};
+
+}  // namespace tracker_detail
+
 /// Corrects bodies in one delta. With k = min(age + 1, 255), u = clamp(d . d_last / e^2, -1, 1):
 ///   position:     d = steps * unit;   p += d;  v += G(k) d (1 + u/2);  c += H(k) d (1 + u/2)
 ///   orientation:  d = steps * angle;  q turned by d;  w += G(k) d (1 + u/2)
@@ -154,5 +189,34 @@ class TrackerFilter {
 
 /// What the correction of a body by `steps` says of the gains; before it is corrected. `c`: the body's.
 void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3i& c, GainEvidence& evidence);
+
+// One step along an axis is worth `one` lattice units, n of them n * one. It changes
+//   p by n one,   v by n G(k) one (1 + u/2),   c by n H(k) one (1 + u/2),
+// with v and c in 1/64 units, so that G = 64 beta / k and H = 64 beta gamma / k^2 (in 1/65536: TrackerGains).
+// u in -1 .. 1 is the product with the last correction in squares of the threshold: two in the same direction
+// mean that too little was believed, two in opposite ones that too much was.
+//
+// Ranges: one <= 2^30 and G, H <= 64, so that one G (1 + u/2) fits 64 bits in 2^-24; what one step may change
+// is cut at 2^29, so that n of them fit, n < 2^31.
+inline void TrackerFilter::move(State& state, Slot slot, const TrackerCorrection& correction,
+                                TrackerBody& body) const {
+  const TrackerSteps& steps = correction.steps;
+  const tracker_detail::Meaning meaning(steps, body);
+  const std::int64_t one = steppings(correction).unit_for(steps);
+  const std::int64_t v_of_one = meaning.growth(one, gains_.velocity(meaning.k));
+  const std::int64_t c_of_one = meaning.growth(one, gains_.acceleration(meaning.k));
+  for (std::size_t i = 0; i < 3; ++i) {
+    // |steps| < 2^31 and what one of them is worth is at most 2^30, so products fit; they need no limits of
+    // their own where the sum has a smaller one.
+    const std::int64_t n = steps[i];
+    std::int32_t& p = state.p(i)[slot];
+    std::int32_t& v = state.v(i)[slot];
+    std::int32_t& c = state.c(i)[slot];
+    p = limited(p + n * one, kPositionLimit);
+    v = limited(v + n * v_of_one, kVelocityLimit);
+    c = limited(c + n * c_of_one, most_c_);
+  }
+  meaning.remember(body);
+}
 
 }  // namespace tandem

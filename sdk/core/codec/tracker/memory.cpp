@@ -67,13 +67,13 @@ void TrackerMemory::write(std::size_t column, Slot slot, const TrackerBody& body
   std::byte* at = columns_.data() + column * capacity_ + slot;
   *at = static_cast<std::byte>(body.age);
   *(at += capacity_) = static_cast<std::byte>(body.interval);
-  for (const std::int8_t step : body.steps) *(at += capacity_) = static_cast<std::byte>(step);
+  for (const std::int32_t step : body.steps) *(at += capacity_) = static_cast<std::byte>(step);
 }
 
 void TrackerMemory::derive(Slot slot) {
   const TrackerBody body = turns() ? merged(this->body(slot), turn(slot)) : this->body(slot);
   history_[slot] = flag_history(body);
-  if (turns()) youngest_[slot] = body.age;
+  if (turns()) youngest_[slot] = static_cast<std::uint8_t>(body.age);
 }
 
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections,
@@ -89,8 +89,18 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   if (delta.seen != nullptr) models_.learn(*delta.seen, models_in_use());
 }
 
-void TrackerMemory::correct(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
-                            State& state) {
+void TrackerMemory::correct_position(const TrackerFilter& filter, const TrackerCorrection& correction,
+                                     Slot slot, State& state) {
+  TrackerBody body = this->body(slot);
+  filter.move(state, slot, correction, body);
+  filter.settle(state, slot, correction.rest);
+  history_[slot] = flag_history(body);
+  write(0, slot, body);
+  columns_[slot] = std::byte{kYoungest};
+}
+
+void TrackerMemory::correct_position_and_turn(const TrackerFilter& filter,
+                                              const TrackerCorrection& correction, Slot slot, State& state) {
   if (is_some(correction.steps)) {
     TrackerBody body = this->body(slot);
     filter.move(state, slot, correction, body);
@@ -112,8 +122,13 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.position_bits, gains_,
                              radii_);
   const TrackerDelta::Part& part = delta.blocks[block.index];
-  for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i)
-    correct(filter, delta.corrections[i], delta.slots[i], state);
+  for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
+    if (turns()) {
+      correct_position_and_turn(filter, delta.corrections[i], delta.slots[i], state);
+    } else {
+      correct_position(filter, delta.corrections[i], delta.slots[i], state);
+    }
+  }
   const std::span<const Slot> renewed = within(corrections.renewed, block);
   grow_older(0, block, renewed, state);
   if (!turns()) return;

@@ -94,7 +94,12 @@ class TrackerMemory {
  private:
   [[nodiscard]] TrackerBody read(std::size_t column, Slot slot) const;
   void write(std::size_t column, Slot slot, const TrackerBody& body);
-  void correct(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot, State& state);
+  // In a stream without orientations.
+  void correct_position(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
+                        State& state);
+  // In one with them.
+  void correct_position_and_turn(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
+                                 State& state);
   void grow_older(std::size_t column, const Block& block, std::span<const Slot> renewed, const State& state);
   // Works out again what follows from the columns of a slot.
   void derive(Slot slot);
@@ -112,9 +117,9 @@ class TrackerMemory {
 inline TrackerBody TrackerMemory::read(std::size_t column, Slot slot) const {
   const std::byte* at = columns_.data() + column * capacity_ + slot;
   TrackerBody body;
-  body.age = std::to_integer<std::uint8_t>(*at);
-  body.interval = std::to_integer<std::uint8_t>(*(at += capacity_));
-  for (std::int8_t& step : body.steps) step = static_cast<std::int8_t>(*(at += capacity_));
+  body.age = std::to_integer<std::uint32_t>(*at);
+  body.interval = std::to_integer<std::uint32_t>(*(at += capacity_));
+  for (std::int32_t& step : body.steps) step = static_cast<std::int8_t>(*(at += capacity_));
   return body;
 }
 

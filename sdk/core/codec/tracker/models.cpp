@@ -139,11 +139,18 @@ TrackerBody merged(const TrackerBody& position, const TrackerBody& turn) {
 TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& turn, const Spin& w) {
   TrackerTurnContext context;
   const std::uint32_t last = position.age == turn.age ? 0 : position.age < turn.age ? 1 : 2;
-  const auto age = [](const TrackerBody& body) { return std::uint32_t{above(body.age, 1, 3, 7, 19)}; };
+  const auto age = [](const TrackerBody& body) {
+    return std::uint32_t{above(static_cast<std::uint8_t>(body.age), 1, 3, 7, 19)};
+  };
   context.choice =
       (last * TrackerModelIndex::kShortAges + age(position)) * TrackerModelIndex::kShortAges + age(turn);
   std::uint8_t zero = 0, magnitude = 0;
-  list_ages(&turn.age, &turn.interval, &turn.steps[0], &turn.steps[1], &turn.steps[2], 1, &zero, &magnitude);
+  // As columns of one slot.
+  const auto turn_age = static_cast<std::uint8_t>(turn.age);
+  const auto interval = static_cast<std::uint8_t>(turn.interval);
+  std::array<std::int8_t, 3> last_steps{};
+  for (std::size_t i = 0; i < 3; ++i) last_steps[i] = static_cast<std::int8_t>(turn.steps[i]);
+  list_ages(&turn_age, &interval, &last_steps[0], &last_steps[1], &last_steps[2], 1, &zero, &magnitude);
   TrackerContext& steps = context.turn;
   steps.steps = TrackerModelIndex::kTurnSteps;
   steps.zero = zero & 31U;
@@ -151,7 +158,7 @@ TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& 
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     constexpr std::int32_t kNone = 0;
     std::uint8_t sign = 0;
-    list_signs(&turn.steps[axis], &kNone, &w[axis], 0, kSlowTurn, 1, &sign);
+    list_signs(&last_steps[axis], &kNone, &w[axis], 0, kSlowTurn, 1, &sign);
     steps.moved_last[axis] = (zero >> (5U + axis)) & 1U;
     steps.sign[axis] = steps.steps + TrackerModelIndex::kSign +
                        (axis * 27 + sign) * TrackerModelIndex::kIntervals + (magnitude >> 4U);

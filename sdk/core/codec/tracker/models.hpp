@@ -89,9 +89,9 @@ extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 namespace tracker_detail {
 
 // Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
-inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
-  int longest = 0;
-  for (const std::int8_t step : steps) longest = std::max({longest, int{step}, -int{step}});
+inline std::uint32_t length_class(const TrackerSteps& steps) {
+  std::int32_t longest = 0;
+  for (const std::int32_t step : steps) longest = std::max({longest, step, -step});
   return static_cast<std::uint32_t>(longest > 1) + static_cast<std::uint32_t>(longest > 2);
 }
 
@@ -107,7 +107,7 @@ inline std::uint32_t length_class(const std::array<std::int8_t, 3>& steps) {
                                    tracker_detail::length_class(body.steps));
 }
 /// The flag's index.
-[[nodiscard]] inline std::uint32_t flag_model(std::uint8_t age, std::uint8_t history, bool rest) {
+[[nodiscard]] inline std::uint32_t flag_model(std::uint32_t age, std::uint32_t history, bool rest) {
   if (rest) return TrackerModelIndex::kFlagAtRest + tracker_age_buckets[age + 1U];
   return TrackerModelIndex::kFlag +
          tracker_age_buckets[age + 1U] * (TrackerModelIndex::kAges * TrackerModelIndex::kLengths) + history;
