@@ -69,6 +69,7 @@ void ClientCore::consider_streams(Now now) {
 
 void ClientCore::change_stream(Now now) {
   EpochState& e = *epoch_;
+  if (chooser_->chosen().id == e.played.stream.id) return;
   auto chosen = follow(e.session);
   if (!chosen) {
     chooser_->gave_up(now.steady_ns);
@@ -92,6 +93,8 @@ void ClientCore::follow_next(Now now) {
   EpochState& e = *epoch_;
   if (e.next->joining) {
     if (!join(*e.next, now)) {
+      // A server that is silent altogether says nothing about this stream.
+      if (now.steady_ns - statistics_.last_applied_ns > kSecond) e.next->heard_ns = now.steady_ns;
       if (now.steady_ns - e.next->heard_ns > kChangePatienceNs) give_up_change("nothing came", now);
       return;
     }
@@ -166,8 +169,10 @@ void ClientCore::adopt_streams(const transport::SessionMessage& session, Now now
     refuse(chosen.error());
     return;
   }
+  if (e.next) chooser_->keep(e.next->stream.id, e.played.stream.id);
   if (goes_on) {
-    chooser_->keep(e.played.stream.id);
+    if (!e.next) chooser_->keep(e.played.stream.id, e.played.stream.id);
+    listener_.on_stream(e.played.stream);
     return;
   }
   log(LogLevel::kWarning, "the stream that was played is not there any more");

@@ -96,7 +96,9 @@ void ClientCore::lose(FollowedStream& from, ResyncReason reason, const std::stri
   }
   ++statistics_.resyncs;
   ++statistics_.resyncs_by_reason[static_cast<std::size_t>(reason)];
-  if (chooser_) chooser_->on_loss(now.steady_ns);
+  const bool lost_on_the_way = reason == ResyncReason::kGap || reason == ResyncReason::kLostPart ||
+                               reason == ResyncReason::kMissingInput;
+  if (lost_on_the_way) chooser_->on_loss(now.steady_ns);
   if (reason != ResyncReason::kLag || !std::exchange(e.told_lag, true)) {
     log(LogLevel::kWarning, "joining again: " + why);
   }

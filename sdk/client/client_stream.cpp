@@ -171,7 +171,7 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
     }
     if (statistics_.first_applied_ns == 0) statistics_.first_applied_ns = now.steady_ns;
     statistics_.last_applied_ns = now.steady_ns;
-    if (chooser_) chooser_->on_frame(cost_ns);
+    if (!e.next) chooser_->on_frame(cost_ns);
     sent_.on_applied(delta.frame, now.steady_ns, outcomes_);
     listener_.on_applied(e.session.epoch, delta);
     played.assembly.pop();

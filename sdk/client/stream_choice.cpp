@@ -64,7 +64,7 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                       .id = stream.id,
                       .name = names[index],
                       .is_ballistic = stream.layout.predictor == kBallistic,
-                      .threshold = static_cast<double>(stream.layout.parameters.codec.threshold),
+                      .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .per_body_ns = double{1} * stream.client_cost_ns,
                       .announced_ns = double{1} * stream.client_cost_ns * session.capacity});
   }
@@ -115,16 +115,14 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
 std::string StreamChooser::choose_first() {
   std::string but;
   if (preference_.kind == StreamPreference::Kind::kNamed) {
-    const auto named = std::find_if(offers_.begin(), offers_.end(),
-                                    [this](const Candidate& c) { return c.offer.name == preference_.name; });
-    if (named != offers_.end()) {
-      chosen_ = static_cast<std::size_t>(named - offers_.begin());
+    if (const auto named = find_named()) {
+      chosen_ = *named;
       return "asked for by name";
     }
     but = ", as there is no stream '" + preference_.name + "'";
     preference_ = {};
   }
-  const Best first = best(INT64_MIN);
+  const Best first = best(INT64_MAX);
   chosen_ = first.index;
   return (offers_.size() == 1 ? "the only one" : first.why) + but;
 }
@@ -157,7 +155,7 @@ template <class Admits, class Less>
 std::optional<std::size_t> StreamChooser::best_of(std::int64_t now_ns, Admits&& admits, Less&& less) const {
   std::optional<std::size_t> best;
   for (std::size_t i = 0; i < offers_.size(); ++i) {
-    if (now_ns < offers_[i].barred_until_ns || !admits(offers_[i])) continue;
+    if (now_ns < offers_[i].barred_until_ns || offers_[i].is_unreachable || !admits(offers_[i])) continue;
     if (!best || less(offers_[i], offers_[*best])) best = i;
   }
   return best;
@@ -211,8 +209,10 @@ bool StreamChooser::worthwhile(const Candidate& other, const Candidate& present)
 
 void StreamChooser::on_status(const transport::ServerStatusMessage& status) {
   for (Candidate& candidate : offers_) {
-    if (candidate.offer.id.id != status.stream || !(status.mbit_per_s > 0)) continue;
-    candidate.bits_per_s = status.mbit_per_s * kBitsPerMbit;
+    if (candidate.offer.id.id != status.stream) continue;
+    if (status.threshold > 0) candidate.offer.threshold = status.threshold;
+    if (status.mbit_per_s > 0) candidate.bits_per_s = status.mbit_per_s * kBitsPerMbit;
+    candidate.is_played = candidate.is_played || status.participants + status.observers > 0;
   }
 }
 
@@ -236,6 +236,36 @@ void StreamChooser::look_at_last_second(const Seen& seen) {
   starved_seconds_ = starved(seen) ? starved_seconds_ + 1 : 0;
   costs_.clear();
   frames_ = 0;
+}
+
+// Of streams that are not played here: a processor that was hot, or a scene that was wild, may have calmed
+// down.
+void StreamChooser::forget_old_figures(std::int64_t now_ns) {
+  for (Candidate& candidate : offers_) {
+    if (std::exchange(candidate.is_played, false) || &candidate == &offers_[chosen_])
+      candidate.played_ns = now_ns;
+    if (candidate.played_ns != INT64_MIN && now_ns - candidate.played_ns >= kKnownNs)
+      candidate.bits_per_s = 0;
+    if (candidate.barred_until_ns == INT64_MIN || now_ns < candidate.barred_until_ns) continue;
+    candidate.barred_until_ns = INT64_MIN;
+    candidate.is_unreachable = false;
+    candidate.measured_ns = 0;
+  }
+}
+
+std::optional<std::size_t> StreamChooser::find(const StreamId& stream) const {
+  const auto found =
+      std::find_if(offers_.begin(), offers_.end(), [&](const Candidate& c) { return c.offer.id == stream; });
+  if (found == offers_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - offers_.begin());
+}
+
+std::optional<std::size_t> StreamChooser::find_named() const {
+  if (preference_.kind != StreamPreference::Kind::kNamed) return std::nullopt;
+  const auto found = std::find_if(offers_.begin(), offers_.end(),
+                                  [this](const Candidate& c) { return c.offer.name == preference_.name; });
+  if (found == offers_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - offers_.begin());
 }
 
 // Fewer frames than the session has, while what is sent waits in a queue on the way. A server that waits for
@@ -264,13 +294,17 @@ bool StreamChooser::reconsider(const Seen& seen) {
     }
     reason_ = std::move(why);
   }
-  if (offers_.size() == 1 || preference_.kind == StreamPreference::Kind::kNamed ||
-      seen.now_ns - looked_ns_ < kLookNs)
-    return false;
+  if (offers_.size() == 1 || seen.now_ns - looked_ns_ < kLookNs) return false;
   if (seen.round_trip_ns > 0 && (best_round_trip_ns_ == 0 || seen.round_trip_ns < best_round_trip_ns_))
     best_round_trip_ns_ = seen.round_trip_ns;
   look_at_last_second(seen);
   looked_ns_ = seen.now_ns;
+  forget_old_figures(seen.now_ns);
+  if (const auto named = find_named()) {  // elsewhere only after a change that was given up
+    if (*named == chosen_ || seen.now_ns < offers_[*named].barred_until_ns) return false;
+    change(*named, "asked for by name", seen.now_ns);
+    return true;
+  }
   const std::string name = offers_[chosen_].offer.name;
   if (slow_seconds_ >= kSlowSeconds && leave_slow(seen.now_ns)) return true;
   if (losses_ns_.size() >= kManyLosses && seen.now_ns - losses_ns_.front() <= kLossSpanNs &&
@@ -294,7 +328,7 @@ bool StreamChooser::reconsider(const Seen& seen) {
 
 bool StreamChooser::leave_slow(std::int64_t now_ns) {
   const Candidate& present = offers_[chosen_];
-  const std::size_t other = cheapest(now_ns);
+  const std::size_t other = cheapest(INT64_MAX);  // also one that the link was left for
   if (relative_cost(offers_[other], present) >= kWorthwhile) return false;
   return leave_for(other,
                    "a frame of " + present.offer.name + " takes " + milliseconds(cost_ns(present)) + " of " +
@@ -304,10 +338,12 @@ bool StreamChooser::leave_slow(std::int64_t now_ns) {
 
 bool StreamChooser::leave_link(const std::string& what, std::int64_t now_ns) {
   const Candidate& present = offers_[chosen_];
-  return leave_for(best_of(
-                       now_ns, [&](const Candidate& c) { return &c != &present && fewer_bits(c, present); },
-                       [this](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); }),
-                   what, now_ns);
+  return leave_for(
+      best_of(
+          now_ns,
+          [&](const Candidate& c) { return &c != &present && fewer_bits(c, present) && fits(c, kMostShare); },
+          [this](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); }),
+      what, now_ns);
 }
 
 bool StreamChooser::leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns) {
@@ -325,19 +361,21 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
   changed_ns_ = now_ns;
   slow_seconds_ = starved_seconds_ = better_seconds_ = 0;
   losses_ns_.clear();
+  costs_.clear();
+  frames_ = 0;
 }
 
-void StreamChooser::keep(const StreamId& stream) {
-  if (preference_.kind == StreamPreference::Kind::kNamed) return;
-  const auto kept =
-      std::find_if(offers_.begin(), offers_.end(), [&](const Candidate& c) { return c.offer.id == stream; });
-  if (kept != offers_.end()) chosen_ = before_ = static_cast<std::size_t>(kept - offers_.begin());
+void StreamChooser::keep(const StreamId& chosen, const StreamId& before) {
+  const auto kept = find(chosen);
+  if (kept) chosen_ = *kept;
+  before_ = find(before).value_or(chosen_);
 }
 
 void StreamChooser::gave_up(std::int64_t now_ns) {
   Candidate& other = offers_[chosen_];
   other.barred_until_ns = now_ns + other.barred_ns;
   other.barred_ns = std::min(2 * other.barred_ns, kMostBarredNs);
+  other.is_unreachable = true;
   change(before_, reason_before_, now_ns);
 }
 

@@ -36,7 +36,7 @@ struct StreamOffer {
   StreamId id;
   std::string name;
   bool is_ballistic = false;
-  double threshold = 0;     ///< lattice units, as announced
+  double threshold = 0;     ///< scene units
   double per_body_ns = 0;   ///< of a client's predicted step and hash, on the server's machine
   double announced_ns = 0;  ///< the same of all slots
 };
@@ -67,6 +67,8 @@ class StreamChooser {
   /// A stream that was left for trouble is not taken again for so long; doubled each time, up to
   /// kMostBarredNs.
   static constexpr std::int64_t kBarredNs = 60 * kSecond, kMostBarredNs = 960 * kSecond;
+  /// What a stream costs the link is forgotten so long after somebody played it.
+  static constexpr std::int64_t kKnownNs = 60 * kSecond;
   /// A join that takes longer makes a stream of fewer bits worth a try.
   static constexpr std::int64_t kLongJoinNs = 10 * kSecond;
 
@@ -94,8 +96,9 @@ class StreamChooser {
   void prefer(StreamPreference preference);
   /// True when another stream is to be played from now on: chosen() and reason() then say which and why.
   [[nodiscard]] bool reconsider(const Seen& seen);
-  /// That one is played, and stays chosen, where it can be.
-  void keep(const StreamId& stream);
+  /// What a client follows when a session is announced anew: `chosen` is played, or on its way while `before`
+  /// is.
+  void keep(const StreamId& chosen, const StreamId& before);
   /// The change did not come about: the stream of before is chosen again.
   void gave_up(std::int64_t now_ns);
 
@@ -104,8 +107,11 @@ class StreamChooser {
     StreamOffer offer;
     double bits_per_s = 0;   // payload, as the server or this client saw it last; 0: unknown
     double measured_ns = 0;  // a frame here, when it was played last; 0: unknown
+    bool is_played = false;  // by anybody, since the last look
+    std::int64_t played_ns = INT64_MIN;
     std::int64_t barred_until_ns = INT64_MIN;
     std::int64_t barred_ns = kBarredNs;  // the next time
+    bool is_unreachable = false;  // could not be joined: barred even where trouble elsewhere would not count
   };
   struct Best {
     std::size_t index = 0;
@@ -125,6 +131,9 @@ class StreamChooser {
   [[nodiscard]] Best best(std::int64_t now_ns) const;
   [[nodiscard]] bool worthwhile(const Candidate& other, const Candidate& present) const;
   void look_at_last_second(const Seen& seen);
+  void forget_old_figures(std::int64_t now_ns);
+  [[nodiscard]] std::optional<std::size_t> find(const StreamId& stream) const;
+  [[nodiscard]] std::optional<std::size_t> find_named() const;
   [[nodiscard]] bool starved(const Seen& seen) const;
   bool leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns);
   bool leave_slow(std::int64_t now_ns);

@@ -20,19 +20,30 @@ void Gateway::announce(OutgoingPtr announcement) {
   ++announcement_number_;
 }
 
+// The same epoch with another stream: inputs go on, and so does what becomes of them.
 void Gateway::on_session(const transport::SessionMessage& session) {
+  const bool same_epoch = session_ && session_->epoch == session.epoch;
   session_ = session;
   alive_ = true;
   announce(make_outgoing(session));
   log_.clear();
   newest_delta_.reset();
   frame_ = 0;
-  coming_inputs_.clear();
   collecting_since_ns_.reset();
   snapshot_bytes_ = 0;
   status_.reset();
+  for (auto& [id, viewer] : viewers_) {
+    if (same_epoch) {
+      viewer.now.flow = Viewer::Flow::kSilent;
+      viewer.now.served_attempt.reset();
+      viewer.now.passage = {};
+    } else {
+      viewer.now = {};
+    }
+  }
+  if (same_epoch) return;
+  coming_inputs_.clear();
   merger_.clear();
-  for (auto& [id, viewer] : viewers_) viewer.now = {};
 }
 
 void Gateway::on_server_alive(bool alive) {

@@ -231,6 +231,35 @@ TEST_F(SessionTest, AStreamThatVanishesWhileItIsJoinedIsGivenUp) {
   EXPECT_EQ(port.acks.back().phase, transport::Phase::kPlaying);
 }
 
+TEST_F(SessionTest, AnotherAnnouncementInTheMiddleOfAChangeLetsItGoOn) {
+  start();
+  server.session = with_second(server.session);
+  join();
+  core->prefer("1");
+  poll();
+  poll();
+  auto third = server.session;
+  third.streams.push_back(third.streams[0]);
+  third.streams[2].id.id = 2;
+  rehash(third);
+  port.sessions.push_back(from_server(third));
+  for (int i = 0; i < 30; ++i) frame();
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0, 1}));
+  EXPECT_EQ(core->status().stream, "1") << "on its way";
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  expect_agreed();
+}
+
+TEST_F(SessionTest, ASilentServerEndsNoChange) {
+  start();
+  server.session = with_second(server.session);
+  join();
+  frame();
+  core->prefer("1");
+  for (int i = 0; i < 60; ++i) poll(500 * kMs);
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0, 1}));
+}
+
 TEST_F(SessionTest, AChangeThatNobodyAnswersIsGivenUp) {
   start();
   server.session = with_second(server.session);

@@ -171,6 +171,18 @@ TEST_F(GatewayTest, ANewEpochStartsOver) {
   EXPECT_EQ(world.cuts, 1);
 }
 
+TEST_F(GatewayTest, AnotherStreamOfTheEpochLosesNoInput) {
+  gateway.on_session(fake_session());
+  frame();
+  const ViewerId id = *gateway.admit();
+  plays(id, 7);
+  frame();
+  EXPECT_FALSE(say(id, input(7, 1)));
+  gateway.on_session(fake_session());
+  later(kSecond);
+  EXPECT_EQ(world.sent.size(), 1U);
+}
+
 TEST_F(GatewayTest, AViewerThatPlayedElsewhereFollowsFromTheNewest) {
   gateway.on_session(fake_session());
   frame();
