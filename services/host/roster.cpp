@@ -68,10 +68,11 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
   if (!lists(ack.stream)) return Reason::kNoStream;
   // It goes on with the stream that it plays until it has the other's snapshot. Its `playing` may have been
-  // overwritten by what it says now.
-  const bool changes = account != nullptr && ack.phase == Phase::kJoining && ack.applied > 0 &&
-                       ack.stream.id != account->stream &&
-                       (account->phase == Phase::kPlaying || was_served(*account));
+  // overwritten by what it says now, also that of `next_stream` where it is on its way back.
+  const bool changes =
+      account != nullptr && ack.phase == Phase::kJoining && ack.applied > 0 &&
+      (ack.stream.id == account->stream ? account->next_stream && was_served(*account)
+                                        : account->phase == Phase::kPlaying || was_served(*account));
   const bool plays = ack.phase == Phase::kPlaying || changes;
   const bool readable = ack.client != 0 && (plays || ack.phase == Phase::kJoining) &&
                         (ack.role_wanted == Role::kParticipant || ack.role_wanted == Role::kObserver);
@@ -116,6 +117,7 @@ bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, b
   account.phase = changes ? Phase::kPlaying : ack.phase;
   account.next_stream = changes ? std::optional(ack.stream.id) : std::nullopt;
   if (!changes) account.stream = ack.stream.id;
+  if (changes && ack.stream.id == account.stream) account.stream = *before.next_stream;
   if (account.phase != before.phase || account.stream != before.stream ||
       account.next_stream != before.next_stream)
     account.reply.schedule.on_change();

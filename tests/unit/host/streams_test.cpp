@@ -242,6 +242,25 @@ TEST_F(StreamsTest, WhoGivesUpAChangeIsWhereItWas) {
   EXPECT_FALSE(totals(kRich).made);
 }
 
+// Its `playing` of the other stream was overwritten by the question for its way back.
+TEST_F(StreamsTest, WhoChangesBackBeforeItWasHeardToPlayTheOtherKeepsItsSeat) {
+  bench.enter(1);
+  bench.on_ms = [this] { changing(1, kRich, 2); };
+  bench.run_ms(500);
+  const std::size_t before = snapshots_of(kThin);
+  bench.on_ms = [this] { changing(1, kThin, 3); };
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.last_reply(1)->phase, Phase::kPlaying);
+  EXPECT_EQ(bench.last_reply(1)->role, Role::kParticipant);
+  EXPECT_EQ(totals(kRich).participants, 1U);
+  EXPECT_EQ(totals(kThin).participants, 0U);
+  EXPECT_GT(snapshots_of(kThin), before);
+  bench.on_ms = [this] { playing(1, kThin, 3); };
+  bench.run_ms(500);
+  EXPECT_EQ(totals(kThin).participants, 1U);
+  EXPECT_EQ(totals(kRich).participants, 0U);
+}
+
 TEST_F(StreamsTest, AChangeWithANonsensicalAppliedIsRefusedAndChangesNothing) {
   bench.enter(1);
   bench.send(ack_of(1, kRich, Phase::kJoining, bench.host->frame() + 1000, 2));
