@@ -62,6 +62,20 @@ void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) 
   }
 }
 
+// A session may begin without a body: a measure of what bodies cost then takes these, far from each other.
+State spread_bodies(const Layout& layout) {
+  constexpr Slot kMost = 4096, kSide = 16;
+  constexpr std::int32_t kApart = 4096;
+  State state(std::min(layout.capacity, kMost), groups_of(layout));
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    const Vec3i place{static_cast<std::int32_t>(slot % kSide) * kApart,
+                      static_cast<std::int32_t>(slot / kSide % kSide) * kApart,
+                      static_cast<std::int32_t>(slot / (kSide * kSide)) * kApart};
+    state.spawn(slot, 0, 0, {.p = place});
+  }
+  return state;
+}
+
 }  // namespace
 
 struct Stream::Impl final : EncodeObserver {
@@ -236,12 +250,12 @@ void Stream::set_clock(std::int64_t (*now_ns)()) {
 
 std::uint32_t Stream::measure_client_cost() const {
   const Impl& m = *impl_;
-  const State& from = agreed();
   const Layout& layout = m.config.layout;
-  const auto predictor = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
-  if (m.clock == nullptr || m.bodies == 0 || !predictor) return 0;
+  const State from = m.bodies == 0 ? spread_bodies(layout) : agreed();
+  const auto predictor = make_predictor(layout.predictor, from.capacity(), layout.predictor_constants);
+  if (m.clock == nullptr || !predictor) return 0;
   const StepInput input{.drive = m.drive, .parameters = m.parameters.step};
-  State to(layout.capacity, groups_of(layout));
+  State to(from.capacity(), from.groups());
   StateHasher hasher;
   std::array<std::int64_t, 9> took_ns{};
   for (std::int64_t& took : took_ns) {
@@ -251,7 +265,9 @@ std::uint32_t Stream::measure_client_cost() const {
     took = m.clock() - began_ns;
   }
   std::ranges::nth_element(took_ns, took_ns.begin() + took_ns.size() / 2);
-  return static_cast<std::uint32_t>(took_ns[took_ns.size() / 2] / m.bodies);
+  const std::int64_t bodies = from.alive_count();
+  return static_cast<std::uint32_t>(
+      std::max<std::int64_t>((took_ns[took_ns.size() / 2] + bodies - 1) / bodies, 1));
 }
 
 Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timeline.schedule(input); }

@@ -101,8 +101,9 @@ class Stream {
 
   /// For measurement only: a monotonic clock in nanoseconds.
   void set_clock(std::int64_t (*now_ns)());
-  /// What a client spends on predicted step and hash of agreed(), ns per body: the median of nine on this
-  /// machine, on one thread. 0 without a clock or a body. Changes nothing.
+  /// What a client spends on predicted step and hash of agreed(), or of up to 4,096 made-up bodies while it
+  /// has none, ns per body: the median of nine on this machine, on one thread, rounded up. At least 1; 0
+  /// without a clock. Changes nothing.
   [[nodiscard]] std::uint32_t measure_client_cost() const;
 
   [[nodiscard]] const StreamConfig& config() const;

@@ -228,5 +228,25 @@ TEST(Announcement, TheCostOfAClientIsMeasured) {
   EXPECT_EQ(Bench(config).host->session().streams[0].client_cost_ns, 0U) << "not measured";
 }
 
+// Each measurement takes a microsecond.
+std::int64_t even_clock() {
+  static std::int64_t now_ns = 0;
+  return now_ns += 1'000;
+}
+
+TEST(Announcement, TheCostOfAClientIsMeasuredBeforeThereIsABody) {
+  HostConfig config = test_config();
+  config.clock_ns = even_clock;
+  for (const std::uint32_t capacity : {4U, 4096U, 10'000U}) {
+    config.streams[0].layout.capacity = capacity;
+    FakeSimulation simulation(capacity);
+    std::ranges::fill(simulation.alive, 0);
+    FakePort port(participant(0xAA));
+    const auto host = Host::create(config, simulation, port);
+    ASSERT_TRUE(host) << host.error().message;
+    EXPECT_EQ((*host)->session().streams[0].client_cost_ns, capacity == 4 ? 250U : 1U) << "rounded up";
+  }
+}
+
 }  // namespace
 }  // namespace tandem::host
