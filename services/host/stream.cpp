@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -134,6 +135,7 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
         fmt::format("a session has 1 to {} streams, not {}", transport::kMaxStreams, streams.size()));
   if (streams.size() == 1 && streams.front().name.empty()) return {};
   constexpr std::size_t kMostCharacters = 32;
+  constexpr std::array<std::string_view, 4> kPreferences{"auto", "bandwidth", "computing", "error"};
   const auto allowed = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   };
@@ -143,6 +145,9 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
       return refuse(
           fmt::format("a stream's name has 1 to {} characters of a-z, 0-9, '_' and '-', unlike '{}'",
                       kMostCharacters, name));
+    }
+    if (std::ranges::find(kPreferences, name) != kPreferences.end()) {
+      return refuse(fmt::format("a stream cannot be called '{}': to a client that is a preference", name));
     }
     if (std::ranges::find(streams.begin(), stream, name, &StreamConfig::name) != stream)
       return refuse(fmt::format("two streams are called '{}': give each a name of its own", name));

@@ -30,8 +30,9 @@ struct StreamConfig {
   LocalOptions local;                  ///< streams share no threads: they are made side by side
 };
 
-/// Checks the names of a session's streams: each its own, of 1 to 32 characters of [a-z0-9_-]; a single one
-/// needs none. Errors: kInvalidArgument; also for none and for more than 8.
+/// Checks the names of a session's streams: each its own, of 1 to 32 characters of [a-z0-9_-], none of auto,
+/// bandwidth, computing and error, which clients prefer; a single one needs none. Errors: kInvalidArgument;
+/// also for none and for more than 8.
 [[nodiscard]] Result<void> check_stream_names(std::span<const StreamConfig> streams);
 
 /// Sets the decay and gains of the first frame, and what the later ones aim at, for a codec that reads them.

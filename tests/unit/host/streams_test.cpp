@@ -356,6 +356,8 @@ TEST_F(StreamsTest, ThatTheConfigurationGetsWrongAreRefusedByName) {
   for (const char* name : {"", "Rich", "a b", "a/1", "012345678901234567890123456789012"})
     EXPECT_NE(refusal([name](Streams& s) { s[1].name = name; }).find("a stream's name has"),
               std::string::npos);
+  for (const char* name : {"auto", "bandwidth", "computing", "error"})
+    EXPECT_NE(refusal([name](Streams& s) { s[1].name = name; }).find("cannot be called"), std::string::npos);
   EXPECT_NE(refusal([](Streams& s) {
               for (int i = 2; i < 9; ++i) {
                 s.push_back(s[0]);
