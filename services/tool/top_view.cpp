@@ -152,6 +152,12 @@ bool TopView::several(const std::string& session) const {
          std::next(first)->first.first == session;
 }
 
+std::string TopView::stream_of(const transport::ClientStatusMessage& client) const {
+  const auto heard = streams_.find({client.session, client.stream.id});
+  if (heard == streams_.end()) return fmt::format("{}", client.stream.id);
+  return fmt::format("{} {}", client.stream.id, printable(heard->second.status.predictor));
+}
+
 std::string TopView::to_json() const {
   Json sessions = Json::array();
   for (auto first = streams_.begin(); first != streams_.end();) {
@@ -184,14 +190,14 @@ std::string TopView::to_table() const {
                     short_bytes(s.input_bytes), short_bytes(s.snapshot_bytes)),
         printable(s.codec), printable(s.predictor), s.threshold);
   }
-  text +=
-      fmt::format("\n{:<16} {:<20} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}\n", "CLIENT", "SESSION",
-                  "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS", "MBIT/S", "REJOINS", "WRONG");
+  text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}\n", "CLIENT",
+                      "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS", "MBIT/S",
+                      "REJOINS", "WRONG");
   for (const auto& [id, heard] : clients_) {
     const transport::ClientStatusMessage& c = heard.status;
-    text += fmt::format("{:016x} {:<20} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}{}\n",
-                        c.client, printable(c.session), role_word(c.role), phase_word(c.phase), c.applied,
-                        c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
+    text += fmt::format("{:016x} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}{}\n",
+                        c.client, printable(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
+                        c.applied, c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
                         c.too_slow != 0 ? "  too slow" : "");
   }
   return text;

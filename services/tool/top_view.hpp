@@ -40,6 +40,8 @@ class TopView {
   /// Name of the session, number of the stream.
   using StreamKey = std::pair<std::string, std::uint32_t>;
   [[nodiscard]] bool several(const std::string& session) const;
+  /// Its number, and its predictor if its status was heard.
+  [[nodiscard]] std::string stream_of(const transport::ClientStatusMessage& client) const;
 
   std::map<StreamKey, Heard<transport::ServerStatusMessage>> streams_;
   std::map<transport::ClientId, Heard<transport::ClientStatusMessage>> clients_;

@@ -77,6 +77,24 @@ TEST(TopView, tells_bytes_by_kind_bodies_at_rest_and_who_is_too_slow) {
   EXPECT_EQ(json["clients"][0]["too_slow"], true);
 }
 
+TEST(TopView, tells_which_stream_a_client_plays_and_its_predictor_once_heard) {
+  TopView view;
+  auto rich = client(0xabc, "a");
+  rich.stream.id = 1;
+  view.update(rich, 0);
+  EXPECT_THAT(view.to_table(), HasSubstr("SESSION              STREAM      ROLE "));
+  EXPECT_THAT(view.to_table(), HasSubstr("a                    1           participant"));
+  auto status = server("a");
+  status.predictor = "ballistic";
+  view.update(status, 0);
+  EXPECT_THAT(view.to_table(), HasSubstr("a                    1           participant"))
+      << "not of stream 0";
+  status.stream = 1;
+  status.predictor = "field";
+  view.update(status, 0);
+  EXPECT_THAT(view.to_table(), HasSubstr("a                    1 field     participant"));
+}
+
 TEST(TopView, forgets_who_is_silent_for_more_than_three_seconds) {
   TopView view;
   view.update(server("a"), 0);
