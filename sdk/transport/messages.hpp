@@ -80,7 +80,7 @@ struct SessionMessage {
   std::string scene;              ///< name
   std::string scene_description;  ///< the geometry as protobuf text (idl/scene.proto), for drawing
   std::vector<BodyType> types;
-  std::vector<StreamMessage> streams;  ///< at least one; a client plays the first that it can
+  std::vector<StreamMessage> streams;  ///< at least one; a client chooses of those that it can play
   bool operator==(const SessionMessage&) const = default;
 };
 

@@ -44,7 +44,8 @@ struct ServiceConfig {
 struct HostConfig : ServiceConfig {
   Frame start_frame = 0;
   /// 1 to 8 ways of telling all bodies, of one lattice and one lead, 0 or 1; layout.capacity is the
-  /// simulation's. Several have names, each its own; clients of no preference play the first.
+  /// simulation's. Several have names, each its own. Clients choose (sdk/client/stream_choice.hpp); one that
+  /// chooses nothing plays the first.
   std::vector<StreamConfig> streams;
 
   std::string scene;

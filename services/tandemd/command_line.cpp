@@ -81,8 +81,8 @@ void add_flags(CLI::App& app, idl::ServerConfig& config) {
          "--stream", [&config](const std::vector<std::string>& texts) { add_streams(config, texts); },
          "One of up to 8 ways of telling the world, each for clients of other means; made while somebody plays "
          "it. NAME:PREDICTOR, or NAME:key=value,... with codec, predictor, threshold, target-bandwidth, "
-         "max-error, budget; the rest as the flags of these names say. Clients of no preference play the first "
-         "[thin:ballistic and rich:field where --predictor auto is field]")
+         "max-error, budget; the rest as the flags of these names say. Clients choose by themselves; one that "
+         "chooses nothing plays the first [thin:ballistic and rich:field where --predictor auto is field]")
       ->type_name("NAME:SPEC")
       ->allow_extra_args(false);
   app.add_option_function<std::string>(
