@@ -99,6 +99,11 @@ class Process:
         tail = "\n".join(line for _, line in self.lines[-8:])
         raise Failed(f"waited {seconds:.0f} s for '{text}'; it said last:\n{tail}")
 
+    def cpu_seconds(self):
+        """Processor time of all its threads, which what else runs here hardly changes."""
+        fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def resident_kb(self):
         """Of its memory, what is in RAM."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()

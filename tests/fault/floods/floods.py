@@ -136,7 +136,7 @@ def months(stage, frames):
         stage.options.tandemd, "--scene", "half_pipe", "--bodies", 64, "--scripted", "--rate", "max",
         "--hash-log", hashes,
     )  # fmt: skip
-    marks = []  # frames, seconds, kB at each tenth
+    marks = []  # frames, seconds of processor time, kB at each tenth
     done, began = 0, time.monotonic()
     with open(hashes, "rb", buffering=0) as lines:
         while done < frames:
@@ -145,12 +145,13 @@ def months(stage, frames):
                 raise Failed(f"it ended: {server.lines[-4:]}")
             done += chunk.count(b"\n")
             if done >= frames * (len(marks) + 1) / 10:
-                marks.append((done, time.monotonic() - began, server.resident_kb()))
+                marks.append((done, server.cpu_seconds(), server.resident_kb()))
         server.process.kill()
-    spans = [(b[0] - a[0]) / (b[1] - a[1]) for a, b in zip(marks, marks[1:])]
+    took = time.monotonic() - began
+    spans = [(b[0] - a[0]) / max(b[1] - a[1], 0.01) for a, b in zip(marks, marks[1:])]
     sizes = [size for _, _, size in marks]
-    print(f"  {done} frames ({done / FRAMES_PER_S / 3600:.1f} h at 30 Hz) in {marks[-1][1]:.0f} s; by tenths "
-          f"{', '.join(f'{rate:.0f}' for rate in spans)} frames/s, {', '.join(str(size) for size in sizes)} kB")  # fmt: skip
+    print(f"  {done} frames ({done / FRAMES_PER_S / 3600:.1f} h at 30 Hz) in {took:.0f} s; by tenths "
+          f"{', '.join(f'{rate:.0f}' for rate in spans)} frames per s of processor time, {', '.join(str(size) for size in sizes)} kB")  # fmt: skip
     if sizes[-1] - sizes[0] > 512:
         raise Failed("memory grows")
     if sum(spans[-3:]) < 0.7 * sum(spans[:3]):
