@@ -20,8 +20,8 @@ Result<FollowedStream> ClientCore::choose_stream(const transport::SessionMessage
   const auto playable = playable_streams(session);
   if (!playable) return tl::unexpected<Error>(playable.error());
   const bool choice = playable->size() > 1 && preference_.kind != StreamPreference::Kind::kNamed;
-  chooser_.emplace(list_offers(session, *playable), preference_, 1e9 / session.frame_rate_hz,
-                   choice ? measure_own_step(options_.measure_ns) : std::nullopt);
+  if (choice && !own_step_ns_) own_step_ns_ = measure_own_step(options_.measure_ns);
+  chooser_.emplace(list_offers(session, *playable), preference_, 1e9 / session.frame_rate_hz, own_step_ns_);
   return follow(session);
 }
 
@@ -81,8 +81,13 @@ void ClientCore::change_stream(Now now) {
     start_join(e.next.emplace(std::move(*chosen)), now);
     return;
   }
+  join_instead(std::move(*chosen), now);
+}
+
+void ClientCore::join_instead(FollowedStream other, Now now) {
+  EpochState& e = *epoch_;
   port_.close_stream(e.played.stream.id.id);
-  e.played = std::move(*chosen);
+  e.played = std::move(other);
   e.join_began_ns = now.steady_ns;
   start_join(e.played, now);
   tell_stream();
@@ -129,10 +134,9 @@ void ClientCore::move_over(Now now) {
 
 void ClientCore::show_other(Frame left_at, Now now) {
   EpochState& e = *epoch_;
-  ClientTimeline& timeline = e.played.timeline;
+  const ClientTimeline& timeline = e.played.timeline;
   follow_uncorrected();
-  while (e.pacer.known() && e.pacer.due_ns(timeline.now() + 1) <= now.steady_ns && timeline.step(e.lead)) {
-  }
+  simulate_ahead(now);
   if (timeline.applied() == left_at) {
     e.pictures.on_changed(timeline, e.pacer, now.steady_ns);
   } else if (pictures_.wanted()) {
@@ -180,11 +184,7 @@ void ClientCore::adopt_streams(const transport::SessionMessage& session, Now now
     move_over(now);
     return;
   }
-  port_.close_stream(e.played.stream.id.id);
-  e.played = std::move(*chosen);
-  e.join_began_ns = now.steady_ns;
-  start_join(e.played, now);
-  tell_stream();
+  join_instead(std::move(*chosen), now);
 }
 
 }  // namespace tandem::client

@@ -153,6 +153,7 @@ class ClientCore {
   /// False when there is nothing to apply, or not yet, or it was lost. The delta stays at the front.
   bool apply_front(FollowedStream& to, Now now, std::int64_t since_last_poll_ns);
   void play(Now now, std::int64_t since_last_poll_ns);
+  void simulate_ahead(Now now);
   void play_ahead(Now now);
 
   // client_join.cpp: join, join again
@@ -172,6 +173,8 @@ class ClientCore {
   void tell_stream();
   void consider_streams(Now now);
   void change_stream(Now now);
+  /// In the place of the one that is played or joined.
+  void join_instead(FollowedStream other, Now now);
   void follow_next(Now now);
   void move_over(Now now);
   void show_other(Frame left_at, Now now);
@@ -219,6 +222,7 @@ class ClientCore {
   std::string refusal_;                   ///< why it is not
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
   std::optional<StreamChooser> chooser_;  ///< of that session
+  std::optional<double> own_step_ns_;     ///< once it was measured
   std::uint32_t join_attempts_ = 0;       ///< of the epochs before it
 
   bool server_alive_ = false;

@@ -179,14 +179,19 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
   }
 }
 
-// Simulates the frames that the server simulates by now, as far as the lead allows.
-void ClientCore::play_ahead(Now now) {
+// The frames that the server simulates by now, as far as the lead allows.
+void ClientCore::simulate_ahead(Now now) {
   EpochState& e = *epoch_;
   if (!e.pacer.known()) return;
-  const std::int64_t began_ns = measure();
-  const Frame simulated = e.played.timeline.now();
   while (e.pacer.due_ns(e.played.timeline.now() + 1) <= now.steady_ns && e.played.timeline.step(e.lead)) {
   }
+}
+
+void ClientCore::play_ahead(Now now) {
+  EpochState& e = *epoch_;
+  const std::int64_t began_ns = measure();
+  const Frame simulated = e.played.timeline.now();
+  simulate_ahead(now);
   e.frame_cost_ns += measure() - began_ns;
   if (e.played.timeline.now() != simulated) e.pictures.on_simulated(e.played.timeline, e.pacer);
 }

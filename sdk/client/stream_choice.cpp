@@ -104,9 +104,8 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
     const auto ballistic = std::find_if(offers_.begin(), offers_.end(), [](const Candidate& c) {
       return c.offer.is_ballistic && c.offer.announced_ns > 0;
     });
-    // Announced in whole nanoseconds a body: half of one is the least that it can stand for.
     if (ballistic != offers_.end())
-      slowness_ = std::clamp(*own_step_ns / std::max(0.5, ballistic->offer.per_body_ns), 0.1, 1000.0);
+      slowness_ = std::clamp(*own_step_ns / ballistic->offer.per_body_ns, 0.1, 1000.0);
   }
   reason_ = choose_first();
   before_ = chosen_;
