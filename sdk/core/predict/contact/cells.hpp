@@ -1,90 +1,74 @@
 #pragma once
 // The walk over the grid's bodies, for each way to look at a run of them.
 
+#include <array>
 #include <cstdint>
 
 #include "sdk/core/predict/contact/pairs.hpp"
 
 namespace tandem {
 
-/// Runs of bodies that follow each other, to look at one after another.
-/// `Build` is a type of an unnamed namespace: code for AVX2 must not become everybody's.
-template <class Build>
-class ContactRuns {
+/// The 13 cells ahead of one and itself, as runs of bodies that follow each other: three cells of a row are
+/// one run. No run is listed first or passed over when empty: whether it is is as good as random, and most
+/// are not.
+template <class Search>
+class ContactWalk {
  public:
-  static constexpr std::uint32_t kBodies = 32;  ///< whose runs fit
+  explicit ContactWalk(const ContactGrid& grid)
+      : begin_(grid.begin),
+        row_(1U << grid.side_bits),
+        layer_(row_ << grid.side_bits),
+        last_((layer_ << grid.side_bits) - 1) {}
 
-  /// Bodies near `self` may be among 1 to 48. In 64 bits, for they are many: 32 bits of the place of the
-  /// first, 6 bits how many, and the one.
-  class Run {
-   public:
-    Run() = default;
-    Run(std::uint32_t self, std::uint32_t from, std::uint32_t count)
-        : bits_(std::uint64_t{self} << 38U | std::uint64_t{count} << 32U | from) {}
-    [[nodiscard]] std::uint32_t self() const { return static_cast<std::uint32_t>(bits_ >> 38U); }
-    [[nodiscard]] std::uint32_t from() const { return static_cast<std::uint32_t>(bits_); }
-    [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(bits_ >> 32U) & 63U; }
-
-   private:
-    std::uint64_t bits_ = 0;
-  };
-
-  void clear() { count_ = 0; }
-  [[nodiscard]] std::uint32_t size() const { return count_; }
-  [[nodiscard]] const Run& operator[](std::uint32_t i) const { return runs_[i]; }
-
-  /// Of one body: its own cell and the 13 ahead.
-  void add_body(const ContactGrid& grid, std::uint32_t place) {
-    const std::uint32_t* const begin = grid.begin;
-    const std::uint32_t side = grid.side_bits;
-    const std::uint32_t last = (1U << (3 * side)) - 1;
-    const std::uint32_t cell = grid.cell[place];
-    const std::uint32_t row = 1U << side;
-    const std::uint32_t layer = row << side;
-    if (cell != last) {
-      add(place, place + 1, begin[cell + 2]);
-    } else {
-      add(place, place + 1, begin[cell + 1]);
-      add(place, 0, begin[1]);
+  /// Of the body at `place`, in `cell`.
+  void around(std::uint32_t place, std::uint32_t cell, Search& search) const {
+    const std::array<std::uint32_t, 4> middles = middles_of(cell);
+    bool inside = cell != last_;
+    for (const std::uint32_t middle : middles) inside &= middle - 1 < last_ - 1;
+    if (!inside) {
+      search = around_the_ends(place, cell, search);
+      return;
     }
-    add_three(begin, last, place, (cell + row) & last);
-    add_three(begin, last, place, (cell + layer - row) & last);
-    add_three(begin, last, place, (cell + layer) & last);
-    add_three(begin, last, place, (cell + layer + row) & last);
+    search.among(place + 1, begin_[cell + 2]);
+    for (const std::uint32_t middle : middles) search.among(begin_[middle - 1], begin_[middle + 2]);
   }
 
  private:
-  // No branch: whether there are any is as good as random.
-  void add(std::uint32_t self, std::uint32_t from, std::uint32_t to) {
-    runs_[count_] = Run(self, from, to - from);
-    count_ += static_cast<std::uint32_t>(from != to);
+  [[nodiscard]] std::array<std::uint32_t, 4> middles_of(std::uint32_t cell) const {
+    return {(cell + row_) & last_, (cell + layer_ - row_) & last_, (cell + layer_) & last_,
+            (cell + layer_ + row_) & last_};
   }
-  // A cell and those before and behind it.
-  void add_three(const std::uint32_t* begin, std::uint32_t last, std::uint32_t self, std::uint32_t cell) {
-    if (cell - 1 < last - 1) return add(self, begin[cell - 1], begin[cell + 2]);
-    add(self, begin[cell == 0 ? 0 : last - 1], begin[cell == 0 ? 2 : last + 1]);
-    add(self, begin[cell == 0 ? last : 0], begin[cell == 0 ? last + 1 : 1]);
+  // Where the list of cells closes to a ring, so that any run may be two. A copy, so that the other stays in
+  // registers.
+  [[gnu::noinline]] Search around_the_ends(std::uint32_t place, std::uint32_t cell, Search search) const {
+    search.among(place + 1, begin_[cell + 1]);
+    const auto among = [&](std::uint32_t of) { search.among(begin_[of & last_], begin_[(of & last_) + 1]); };
+    among(cell + 1);
+    for (const std::uint32_t middle : middles_of(cell)) {
+      for (const std::uint32_t of : {middle - 1, middle, middle + 1}) among(of);
+    }
+    return search;
   }
 
-  std::uint32_t count_ = 0;
-  Run runs_[kBodies * 10 + 1] = {};
+  const std::uint32_t* begin_;
+  std::uint32_t row_, layer_, last_;
 };
 
-/// ContactKernels::find. `Build::collect(grid, runs, pairs)` adds the pairs of all runs.
-template <class Build>
+/// ContactKernels::find. `Search`, of an unnamed namespace (code for AVX2 must not become everybody's), has
+/// start(place), whose neighbours are looked for; among(from, to), which adds those of a run of at most 48;
+/// and count(), how many pairs there are.
+template <class Search>
 std::uint32_t find_pairs(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                          ContactPairs& pairs) {
-  using Runs = ContactRuns<Build>;
-  static_assert(Runs::kBodies * 14 * ContactGrid::kMostInCell + 16 <= ContactPairs::kMostAtOnce);
+  static_assert(14 * ContactGrid::kMostInCell + 16 <= ContactPairs::kMostAtOnce);
   const std::uint32_t end = grid.begin[std::uint32_t{1} << (3 * grid.side_bits)];
-  Runs runs;
-  pairs.count = 0;
-  while (place < end && pairs.count < enough) {
-    const std::uint32_t stop = end - place < Runs::kBodies ? end : place + Runs::kBodies;
-    runs.clear();
-    for (; place < stop; ++place) runs.add_body(grid, place);
-    Build::collect(grid, runs, pairs);
+  Search search(grid, pairs);
+  const ContactWalk<Search> walk(grid);
+  for (; place < end && search.count() < enough; ++place) {
+    search.start(place);
+    walk.around(place, grid.cell[place], search);
   }
+  pairs.count = search.count();
   for (; pairs.count % 8 != 0; ++pairs.count) pairs.first[pairs.count] = pairs.second[pairs.count] = 0;
   return place;
 }

@@ -33,35 +33,46 @@ inline Four apart(Four a, Four b) {
   return reinterpret_cast<Four>(reinterpret_cast<Eight>(a) - reinterpret_cast<Eight>(b));
 }
 
-struct Portable {
-  static void collect(const ContactGrid& grid, const ContactRuns<Portable>& runs, ContactPairs& pairs);
-};
+// Who is near one body.
+class Search {
+ public:
+  Search(const ContactGrid& grid, const ContactPairs& pairs) : grid_(grid), pairs_(pairs) {
+    pairs_.count = 0;
+  }
 
-void Portable::collect(const ContactGrid& grid, const ContactRuns<Portable>& runs, ContactPairs& pairs) {
-  std::uint32_t count = pairs.count;
-  for (std::uint32_t r = 0; r < runs.size(); ++r) {
-    const std::uint32_t self = runs[r].self();
-    const std::uint32_t end = runs[r].from() + runs[r].count();
-    for (std::uint32_t from = runs[r].from(); from < end; from += 4) {
-      const Four xy = apart(load(grid.xy + from), same(grid.xy[self]));
-      const Four z = apart(load(grid.z + from), same(grid.z[self]));
+  [[nodiscard]] std::uint32_t count() const { return pairs_.count; }
+  void start(std::uint32_t place) {
+    self_ = place;
+    self_xy_ = same(grid_.xy[place]);
+    self_z_ = same(grid_.z[place]);
+    if (grid_.later_xy != nullptr) self_later_xy_ = same(grid_.later_xy[place]);
+  }
+  void among(std::uint32_t from, std::uint32_t to) {
+    for (; from < to; from += 4) {
+      const Four xy = apart(load(grid_.xy + from), self_xy_);
+      const Four z = apart(load(grid_.z + from), self_z_);
       Four near =
-          reinterpret_cast<Four>(squared_low(xy) + squared_high(xy) + squared_low(z) < grid.near_squared);
-      if (grid.later_xy != nullptr) {
-        const Four later = apart(load(grid.later_xy + from), same(grid.later_xy[self]));
+          reinterpret_cast<Four>(squared_low(xy) + squared_high(xy) + squared_low(z) < grid_.near_squared);
+      if (grid_.later_xy != nullptr) {
+        const Four later = apart(load(grid_.later_xy + from), self_later_xy_);
         near |= reinterpret_cast<Four>(squared_low(later) + squared_high(later) + squared_high(z) <
-                                       grid.near_squared);
+                                       grid_.near_squared);
       }
-      near &= reinterpret_cast<Four>(Four{0, 1, 2, 3} < end - from);
+      near &= reinterpret_cast<Four>(Four{0, 1, 2, 3} < to - from);
       for (std::uint32_t i = 0; i < 4; ++i) {
-        pairs.first[count] = self;
-        pairs.second[count] = from + i;
-        count += near[i] & 1U;
+        pairs_.first[pairs_.count] = self_;
+        pairs_.second[pairs_.count] = from + i;
+        pairs_.count += near[i] & 1U;
       }
     }
   }
-  pairs.count = count;
-}
+
+ private:
+  ContactGrid grid_;
+  ContactPairs pairs_;
+  std::uint32_t self_ = 0;
+  Four self_xy_{}, self_z_{}, self_later_xy_{};
+};
 
 std::int32_t difference(std::int16_t b, std::int16_t a) { return static_cast<std::int16_t>(b - a); }
 
@@ -98,7 +109,7 @@ void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const 
 
 }  // namespace
 
-ContactKernels portable_contact_kernels() { return {find_pairs<Portable>, add_forces}; }
+ContactKernels portable_contact_kernels() { return {find_pairs<Search>, add_forces}; }
 
 ContactKernels fastest_contact_kernels() {
 #ifdef TANDEM_CONTACT_AVX2

@@ -56,7 +56,7 @@ struct ContactPairs {
   std::uint32_t count;  ///< a multiple of 8: filled up with pairs of a body and itself, which add nothing
 
   /// How many more than enough may be found, and what a vector writes beyond.
-  static constexpr std::uint32_t kMostAtOnce = 32 * 14 * ContactGrid::kMostInCell + 16;
+  static constexpr std::uint32_t kMostAtOnce = 14 * ContactGrid::kMostInCell + 16;
 };
 
 /// What a contact does, besides where it is. Gains as in ContactMaterial.

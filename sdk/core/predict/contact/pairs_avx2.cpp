@@ -49,57 +49,68 @@ inline void store(std::uint32_t* to, Wide x) { _mm256_storeu_si256(reinterpret_c
 
 inline Wide squared(Wide words) { return _mm256_madd_epi16(words, words); }
 
-// Also where bodies are later.
+// Who is near one body; `kLater`: also where bodies are later. How many are is as good as random: no branch
+// depends on it.
 template <bool kLater>
-struct Avx2 {
-  static void collect(const ContactGrid& grid, const ContactRuns<Avx2>& runs, ContactPairs& pairs);
+class Search {
+ public:
+  Search(const ContactGrid& grid, const ContactPairs& pairs)
+      : xy_(grid.xy),
+        later_xy_(grid.later_xy),
+        z_(grid.z),
+        most_(same(grid.near_squared - 1)),
+        first_(pairs.first),
+        second_(pairs.second) {}
+
+  [[nodiscard]] std::uint32_t count() const { return count_; }
+  void start(std::uint32_t place) {
+    self_ = same(place);
+    self_xy_ = same(xy_[place]);
+    self_z_ = same(z_[place]);
+    if constexpr (kLater) self_later_xy_ = same(later_xy_[place]);
+  }
+  void among(std::uint32_t from, std::uint32_t to) {
+    const std::uint32_t left = to - from;
+    among_eight(from, left);
+    if (left > 8) *this = more(*this, from + 8, left - 8);
+  }
+
+ private:
+  // Seldom: not as often in the code as there are runs. A copy, so that the other stays in registers.
+  [[gnu::noinline]] static Search more(Search search, std::uint32_t from, std::uint32_t left) {
+    for (; left > 8; from += 8, left -= 8) search.among_eight(from, left);
+    search.among_eight(from, left);
+    return search;
+  }
+  void among_eight(std::uint32_t from, std::uint32_t left) {
+    const Wide apart_xy = _mm256_sub_epi16(load(xy_ + from), self_xy_);
+    const Wide apart_z = _mm256_sub_epi16(load(z_ + from), self_z_);
+    Wide apart = _mm256_add_epi32(squared(apart_xy), squared(_mm256_and_si256(apart_z, same(0xFFFF))));
+    if constexpr (kLater) {
+      const Wide later = _mm256_sub_epi16(load(later_xy_ + from), self_later_xy_);
+      const Wide later_apart = _mm256_add_epi32(squared(later), squared(_mm256_srli_epi32(apart_z, 16)));
+      apart = _mm256_min_epu32(apart, later_apart);
+    }
+    const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(apart, most_), apart);
+    const std::uint32_t bits =
+        static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) & kFirsts.of[left];
+    const Wide places =
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
+    store(first_ + count_, self_);
+    store(second_ + count_, _mm256_add_epi32(places, same(from)));
+    count_ += static_cast<std::uint32_t>(_mm_popcnt_u32(bits));
+  }
+
+  const std::uint32_t *xy_, *later_xy_, *z_;
+  Wide most_;
+  std::uint32_t *first_, *second_;
+  std::uint32_t count_ = 0;
+  Wide self_{}, self_xy_{}, self_z_{}, self_later_xy_{};
 };
 
-// How many are near is as good as random: no branch depends on it.
-template <bool kLater>
-void Avx2<kLater>::collect(const ContactGrid& grid, const ContactRuns<Avx2>& runs, ContactPairs& pairs) {
-  const std::uint32_t* const xy = grid.xy;
-  const std::uint32_t* const later_xy = grid.later_xy;
-  const std::uint32_t* const z = grid.z;
-  std::uint32_t* const first = pairs.first;
-  std::uint32_t* const second = pairs.second;
-  std::uint32_t count = pairs.count;
-  const Wide most = same(grid.near_squared - 1);
-  const std::uint32_t size = runs.size();
-  for (std::uint32_t r = 0; r < size; ++r) {
-    const std::uint32_t self = runs[r].self();
-    std::uint32_t from = runs[r].from();
-    std::uint32_t left = runs[r].count();
-    const Wide self_xy = same(xy[self]);
-    const Wide self_z = same(z[self]);
-    while (true) {
-      const Wide apart_xy = _mm256_sub_epi16(load(xy + from), self_xy);
-      const Wide apart_z = _mm256_sub_epi16(load(z + from), self_z);
-      Wide apart = _mm256_add_epi32(squared(apart_xy), squared(_mm256_and_si256(apart_z, same(0xFFFF))));
-      if constexpr (kLater) {
-        const Wide later = _mm256_sub_epi16(load(later_xy + from), same(later_xy[self]));
-        const Wide later_apart = _mm256_add_epi32(squared(later), squared(_mm256_srli_epi32(apart_z, 16)));
-        apart = _mm256_min_epu32(apart, later_apart);
-      }
-      const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(apart, most), apart);
-      const std::uint32_t bits =
-          static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(near))) & kFirsts.of[left];
-      const Wide places =
-          _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
-      store(first + count, same(self));
-      store(second + count, _mm256_add_epi32(places, same(from)));
-      count += static_cast<std::uint32_t>(_mm_popcnt_u32(bits));
-      if (left <= 8) break;
-      from += 8;
-      left -= 8;
-    }
-  }
-  pairs.count = count;
-}
-
 std::uint32_t find(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough, ContactPairs& pairs) {
-  return grid.later_xy != nullptr ? find_pairs<Avx2<true>>(grid, place, enough, pairs)
-                                  : find_pairs<Avx2<false>>(grid, place, enough, pairs);
+  return grid.later_xy != nullptr ? find_pairs<Search<true>>(grid, place, enough, pairs)
+                                  : find_pairs<Search<false>>(grid, place, enough, pairs);
 }
 
 // Four rows of four, twice side by side, turned over.
