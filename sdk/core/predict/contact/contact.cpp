@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <utility>
 
 #include "sdk/core/lattice/vector_clones.hpp"
@@ -79,6 +80,37 @@ TANDEM_VECTOR_CLONES void decay(std::int32_t* c, const std::uint8_t* rest, std::
   }
 }
 
+// The rank of each body among those of its cell, by slot, from kMostInCell on the same.
+void rank_in_cells(std::span<const std::uint32_t> cells, std::span<const std::uint8_t> alive,
+                   std::span<std::uint8_t> in_cell, std::span<std::uint32_t> ranks) {
+  for (std::size_t s = 0; s < cells.size(); ++s) {
+    std::uint8_t& count = in_cell[cells[s]];
+    ranks[s] = count;
+    count = static_cast<std::uint8_t>(count +
+                                      (alive[s] & static_cast<unsigned>(count < ContactGrid::kMostInCell)));
+  }
+}
+
+// The places of the cells' first bodies, and how many there are, eight cells at a time: the product has in
+// each byte the sum of the bytes up to it.
+TANDEM_VECTOR_CLONES std::uint32_t begin_cells(std::span<const std::uint8_t> in_cell,
+                                               std::span<std::uint32_t> begin) {
+  static_assert(8 * ContactGrid::kMostInCell < 256);
+  std::uint32_t sum = 0;
+  for (std::size_t cell = 0; cell < in_cell.size(); cell += 8) {
+    std::uint64_t counts = 0;
+    std::memcpy(&counts, &in_cell[cell], sizeof counts);
+    const std::uint64_t sums = counts * 0x0101010101010101U;
+    std::array<std::uint8_t, 8> before{};
+    const std::uint64_t shifted = sums << 8U;
+    std::memcpy(before.data(), &shifted, sizeof shifted);
+    for (std::size_t i = 0; i < 8; ++i) begin[cell + i] = sum + before[i];
+    sum += static_cast<std::uint32_t>(sums >> 56U);
+  }
+  begin[in_cell.size()] = sum;
+  return sum;
+}
+
 }  // namespace
 
 Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
@@ -92,17 +124,17 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
       side_bits_(side_bits_for(capacity)),
       cell_(capacity),
       place_(capacity),
-      begin_((std::size_t{1} << (3 * side_bits_)) + 1),
+      in_cell_(std::size_t{1} << (3 * side_bits_)),
+      begin_(in_cell_.size() + 1),
       bodies_(capacity),
       views_(capacity),
       forces_(capacity),
-      accelerations_(capacity),
-      at_rest_(capacity),
       place_cell_(capacity),
       near_xy_(capacity + kBeyond),
-      later_xy_(near_xy_.size()),
+      later_xy_(constants_.substeps > 1 ? near_xy_.size() : 0),
       near_z_(near_xy_.size()),
-      first_(kPairsPerBody * capacity + kPairsAtOnce + ContactPairs::kMostAtOnce),
+      first_((constants_.substeps > 1 ? kPairsPerBody * capacity : 0) + kPairsAtOnce +
+             ContactPairs::kMostAtOnce),
       second_(first_.size()),
       inverse_root_(kRoots) {
   const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
@@ -118,35 +150,46 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
   }
 }
 
-void Contact::sort(const State& state, std::span<const std::uint8_t> rest) {
+void Contact::sort(const State& state) {
   const std::uint32_t capacity = state.capacity();
   number_cells({shift_, side_bits_, cells_per_}, state.p(0).data(), state.p(1).data(), state.p(2).data(),
                cell_.data(), capacity);
   accelerated_ = any_of(state.c(0).data(), capacity) || any_of(state.c(1).data(), capacity) ||
                  any_of(state.c(2).data(), capacity);
-  std::fill(begin_.begin(), begin_.end(), 0U);
-  const std::span<const std::uint8_t> alive = state.alive();
-  for (Slot s = 0; s < capacity; ++s) place_[s] = (begin_[cell_[s]] += alive[s]) - 1;
-  std::uint32_t sum = 0;
-  for (std::uint32_t& begin : begin_) {
-    const std::uint32_t in_cell = std::min(begin, ContactGrid::kMostInCell);
-    begin = sum;
-    sum += in_cell;
+  std::fill(in_cell_.begin(), in_cell_.end(), std::uint8_t{0});
+  rank_in_cells(cell_, state.alive(), in_cell_, place_);
+  count_ = begin_cells(in_cell_, begin_);
+  scatter(state);
+}
+
+// Nothing of this object is read in the loop: the compiler would read it again after every write.
+void Contact::scatter(const State& state) {
+  const std::array<const std::int32_t*, 3> p{state.p(0).data(), state.p(1).data(), state.p(2).data()};
+  const std::array<const std::int32_t*, 3> v{state.v(0).data(), state.v(1).data(), state.v(2).data()};
+  const std::uint8_t* const alive = state.alive().data();
+  const TypeId* const type = state.type().data();
+  const std::uint32_t* const begin = begin_.data();
+  const std::uint32_t* const cells = cell_.data();
+  std::uint32_t* const places = place_.data();
+  std::uint32_t* const place_cell = place_cell_.data();
+  ContactBody* const bodies = bodies_.data();
+  ContactForce* const forces = forces_.data();
+  const bool one_mobility = one_mobility_;
+  std::uint32_t count = count_;
+  for (Slot s = 0, end = state.capacity(); s < end; ++s) {
+    if (alive[s] == 0) {
+      places[s] = 0;
+      continue;
+    }
+    const std::uint32_t cell = cells[s];
+    const std::uint32_t place = places[s] < ContactGrid::kMostInCell ? begin[cell] + places[s] : count++;
+    const ContactConstants::Type& its = constants_.type_of(type[s]);
+    places[s] = place;
+    place_cell[place] = cell;
+    bodies[place] = {{p[0][s], p[1][s], p[2][s]}, its.radius, {v[0][s], v[1][s], v[2][s]}, s};
+    if (!one_mobility) forces[place].mobility = its.mobility;
   }
-  count_ = sum;
-  for (Slot s = 0; s < capacity; ++s) {
-    if (alive[s] == 0) continue;
-    const std::uint32_t place =
-        place_[s] < ContactGrid::kMostInCell ? begin_[cell_[s]] + place_[s] : count_++;
-    place_[s] = place;
-    const Vec3i p{state.p(0)[s], state.p(1)[s], state.p(2)[s]};
-    const ContactConstants::Type& type = constants_.type_of(state.type()[s]);
-    bodies_[place] = {p, type.radius, {state.v(0)[s], state.v(1)[s], state.v(2)[s]}, s};
-    if (!one_mobility_) forces_[place].mobility = type.mobility;
-    if (some_rest_) at_rest_[place] = rest[s];
-    if (accelerated_) accelerations_[place] = {{state.c(0)[s], state.c(1)[s], state.c(2)[s]}, 0};
-  }
-  for (std::uint32_t place = 0; place < count_; ++place) place_cell_[place] = cell_[bodies_[place].slot];
+  count_ = count;
 }
 
 // Those found are worked on while they are in the cache. They are kept for the later sub-steps as long as
@@ -161,7 +204,7 @@ void Contact::add_pairs(bool first) {
                          begin_.data(),
                          place_cell_.data(),
                          near_xy_.data(),
-                         constants_.substeps > 1 ? later_xy_.data() : nullptr,
+                         later_xy_.empty() ? nullptr : later_xy_.data(),
                          near_z_.data(),
                          near_ * near_};
   const auto room = static_cast<std::uint32_t>(first_.size());
@@ -179,56 +222,52 @@ void Contact::add_pairs(bool first) {
   }
 }
 
-void Contact::write(const State& from, const StepInput& input, State& to) const {
-  if (&from != &to) {
-    const auto copy = [](const auto& column, const auto& column_to) {
-      std::copy(column.begin(), column.end(), column_to.begin());
-    };
-    copy(from.alive(), to.alive());
-    copy(from.reuse(), to.reuse());
-    copy(from.type(), to.type());
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (accelerated_) {
-        copy(from.c(i), to.c(i));
-      } else {
-        std::fill(to.c(i).begin(), to.c(i).end(), 0);
-      }
+// All but what moves.
+void Contact::copy(const State& from, State& to) const {
+  if (&from == &to) return;
+  const auto copy = [](const auto& column, const auto& column_to) {
+    std::copy(column.begin(), column.end(), column_to.begin());
+  };
+  copy(from.alive(), to.alive());
+  copy(from.reuse(), to.reuse());
+  copy(from.type(), to.type());
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (accelerated_) {
+      copy(from.c(i), to.c(i));
+    } else {
+      std::fill(to.c(i).begin(), to.c(i).end(), 0);
     }
   }
-  static constexpr ContactBody kDead{};
-  for (Slot s = 0; s < to.capacity(); ++s) {
-    const ContactBody& body = to.alive()[s] != 0 ? bodies_[place_[s]] : kDead;
-    for (std::size_t i = 0; i < 3; ++i) {
-      to.p(i)[s] = body.p[i];
-      to.v(i)[s] = body.v[i];
+}
+
+void Contact::step(const State& from, State& to, const StepInput& input) {
+  const bool some_rest = keep_at_rest(from, to, input.drive);
+  sort(from);
+  const auto bodies = std::span(bodies_).first(count_);
+  place_bodies(bodies, {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_,
+               forces_);
+  copy(from, to);
+  ContactMove move{shift_,
+                   one_mobility_,
+                   constants_.substeps,
+                   input.drive.gravity,
+                   input.drive.damping,
+                   some_rest ? std::span<const std::uint8_t>(to.rest()) : std::span<const std::uint8_t>(),
+                   accelerated_ ? &to : nullptr};
+  for (std::int32_t i = 0; i < constants_.substeps; ++i) {
+    walls_.add_forces(bodies, forces_);
+    add_pairs(i == 0);
+    if (i + 1 < constants_.substeps) {
+      move_bodies(move, bodies, forces_, views_);
+      move.gravity = {};
+      move.damping = 0;
+      move.accelerated = nullptr;
+    } else {
+      move_bodies(move, bodies, forces_, place_, to);
     }
   }
   for (std::size_t i = 0; accelerated_ && i < 3; ++i)
     decay(to.c(i).data(), to.rest().data(), to.c(i).size(), input.parameters.decay);
-}
-
-void Contact::step(const State& from, State& to, const StepInput& input) {
-  some_rest_ = keep_at_rest(from, to, input.drive);
-  sort(from, to.rest());
-  place_bodies(std::span(bodies_).first(count_),
-               {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_);
-  for (std::int32_t i = 0; i < constants_.substeps; ++i) {
-    walls_.add_forces(std::span(bodies_).first(count_), forces_);
-    add_pairs(i == 0);
-    const bool first = i == 0;
-    const ContactMove move{
-        shift_,
-        one_mobility_,
-        constants_.substeps,
-        first ? input.drive.gravity : Vec3i{},
-        first ? input.drive.damping : 0U,
-        some_rest_ ? std::span<const std::uint8_t>(at_rest_) : std::span<const std::uint8_t>()};
-    const bool pushed = first && accelerated_;
-    move_bodies(move, std::span(bodies_).first(count_), forces_,
-                pushed ? std::span<const ContactForce>(accelerations_) : std::span<const ContactForce>(),
-                views_);
-  }
-  write(from, input, to);
   turn_bodies(from, to);
 }
 

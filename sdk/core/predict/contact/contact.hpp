@@ -33,9 +33,10 @@ class Contact final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
 
  private:
-  void sort(const State& state, std::span<const std::uint8_t> rest);
+  void sort(const State& state);
+  void scatter(const State& state);
   void add_pairs(bool first);
-  void write(const State& from, const StepInput& input, State& to) const;
+  void copy(const State& from, State& to) const;
 
   bool coarse_;  // one step stands for several
   ContactConstants constants_;
@@ -50,16 +51,14 @@ class Contact final : public Predictor {
   std::int32_t later_share_ = 0;  // of v, in 1/32768: what the sub-steps before the last move a body by
   bool one_mobility_ = false;     // all bodies have that of type 0
   std::vector<std::uint32_t> cell_, place_;  // by slot; first the rank in the cell, then the place
+  std::vector<std::uint8_t> in_cell_;        // by cell, how many
   std::vector<std::uint32_t> begin_;         // by cell, and one more
   // By place: bodies that take part in pairs by cell, then the rest.
   std::uint32_t count_ = 0;
   std::vector<ContactBody> bodies_;
   std::vector<ContactView> views_;
   std::vector<ContactForce> forces_;
-  std::vector<ContactForce> accelerations_;  // c, where any is not zero
-  bool accelerated_ = false;
-  std::vector<std::uint8_t> at_rest_;  // where some_rest_
-  bool some_rest_ = false;
+  bool accelerated_ = false;  // some c is not zero
   std::vector<std::uint32_t> place_cell_, near_xy_, later_xy_, near_z_;
   std::vector<std::uint32_t> first_, second_;
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
