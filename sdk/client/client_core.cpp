@@ -78,6 +78,7 @@ std::int64_t ClientCore::poll(Now now) {
     consider_streams(now);
     show_clock();
     if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
+    prepare_next();
   }
   report_outcomes();
   if (now.steady_ns >= status_report_.due_ns()) send_status(now);
@@ -96,7 +97,7 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
       due = std::min(due, epoch_->played.joiner.next_due_ns());
     } else if (epoch_->played.assembly.front() != nullptr && !epoch_->played.input_missing_ns) {
       due = now.steady_ns;  // more than one poll applies
-    } else if (epoch_->pacer.known() &&
+    } else if (pictures_.wanted() && epoch_->pacer.known() &&
                epoch_->played.timeline.now() < epoch_->played.timeline.applied() + epoch_->lead) {
       due = std::min(due, epoch_->pacer.due_ns(epoch_->played.timeline.now() + 1));
     }

@@ -155,6 +155,7 @@ class ClientCore {
   void play(Now now, std::int64_t since_last_poll_ns);
   void simulate_ahead(Now now);
   void play_ahead(Now now);
+  void prepare_next();
 
   // client_join.cpp: join, join again
   /// The one that a snapshot is wanted of; null: none.

@@ -196,4 +196,13 @@ void ClientCore::play_ahead(Now now) {
   if (e.played.timeline.now() != simulated) e.pictures.on_simulated(e.played.timeline, e.pacer);
 }
 
+// Once all that others wait for is done: the picture and the acknowledgement of the last frame.
+void ClientCore::prepare_next() {
+  EpochState& e = *epoch_;
+  if (e.played.joining) return;
+  const std::int64_t began_ns = measure();
+  e.played.timeline.prepare();
+  e.frame_cost_ns += measure() - began_ns;
+}
+
 }  // namespace tandem::client

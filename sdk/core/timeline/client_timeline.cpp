@@ -38,7 +38,7 @@ struct ClientTimeline::Impl {
   void resimulate() {
     const std::span<const Slot> touched = parts.delta.touched();
     const StepParameters& parameters = parts.delta.parameters().step;
-    for (Frame frame = applied + 1; frame <= now; ++frame) {
+    for (Frame frame = applied + 1; frame <= simulated; ++frame) {
       Held& next = at(frame);
       const bool stepped_otherwise = next.input.parameters != parameters;
       next.input.parameters = parameters;
@@ -54,11 +54,12 @@ struct ClientTimeline::Impl {
   TimelineParts parts;
   TypeId type_count;
   std::uint32_t max_lead;
-  std::vector<Held> ring;  // frames applied .. now, by frame modulo size
+  std::vector<Held> ring;  // frames applied .. simulated, by frame modulo size
   Epoch epoch = 0;
   StreamId stream;
   Frame applied = 0;
   Frame now = 0;
+  Frame simulated = 0;  // now, or what is prepared beyond it
   bool playing = false;
   InputSchedule inputs;
   std::uint64_t hash = 0;
@@ -88,7 +89,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   Impl& m = *impl_;
   m.playing = false;
   // Beside the state that is drawn meanwhile; what was simulated beyond that goes.
-  m.now = m.applied;
+  m.now = m.simulated = m.applied;
   Impl::Held& place = m.at(m.applied + 1);
   State& state = place.state;
   const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
@@ -108,7 +109,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   m.inputs.reset(read->last_input, read->pending);
   m.epoch = read->epoch;
   m.stream = read->stream;
-  m.applied = m.now = read->frame;
+  m.applied = m.now = m.simulated = read->frame;
   m.hash = hash;
   m.playing = true;
   return {};
@@ -122,7 +123,7 @@ Result<void> ClientTimeline::schedule(const ScheduledDrive& input) {
   const auto added = m.inputs.add(input, m.applied);
   if (!added) return tl::unexpected<Error>(added.error());
   if (*added) {
-    for (Frame frame = input.frame; frame <= m.now; ++frame) m.simulate(frame);
+    for (Frame frame = input.frame; frame <= m.simulated; ++frame) m.simulate(frame);
   }
   return {};
 }
@@ -142,8 +143,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
                 "scheduled inputs up to " + std::to_string(last_input) + " are not all here");
   }
   Stopwatch watch(m.clock);
-  const bool ahead = m.now > m.applied;
-  if (!ahead) m.simulate(frame);
+  if (m.simulated == m.applied) m.simulate(m.simulated = frame);
   m.timings.predict_ns = watch.lap_ns();
   State& state = m.at(frame).state;
   m.parts.delta.set_gravity(m.at(frame).input.drive.gravity);
@@ -192,8 +192,13 @@ void ClientTimeline::rename(Epoch epoch, StreamId stream) {
 bool ClientTimeline::step(std::uint32_t lead) {
   Impl& m = *impl_;
   if (!m.playing || m.now >= m.applied + std::min(lead, m.max_lead)) return false;
-  m.simulate(++m.now);
+  if (++m.now > m.simulated) m.simulate(m.simulated = m.now);
   return true;
+}
+
+void ClientTimeline::prepare() {
+  Impl& m = *impl_;
+  if (m.playing && m.simulated == m.applied) m.simulate(++m.simulated);
 }
 
 Frame ClientTimeline::applied() const { return impl_->applied; }

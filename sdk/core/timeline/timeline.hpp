@@ -134,6 +134,9 @@ class ClientTimeline {
   void rename(Epoch epoch, StreamId stream);
   /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead); returns whether it did.
   bool step(std::uint32_t lead);
+  /// Simulates the frame after applied() unless that is done, while its state is still in the caches; now()
+  /// stays. The next apply() or step() finds it ready.
+  void prepare();
 
   [[nodiscard]] Frame applied() const;  ///< last frame whose delta is in
   [[nodiscard]] Frame now() const;      ///< last frame simulated, applied() .. applied() + max_lead

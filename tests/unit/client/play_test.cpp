@@ -173,13 +173,23 @@ TEST_F(PlayTest, WithLeadZeroItNeverSimulatesAhead) {
   EXPECT_EQ(core->timeline()->now(), core->timeline()->applied());
 }
 
-TEST_F(PlayTest, PollAsksToBeCalledWhenTheNextFrameIsDue) {
+TEST_F(PlayTest, PollAsksToBeCalledWhenTheNextFrameIsDueToBeDrawn) {
   join();
+  core->start_sampling();
   for (int i = 0; i < 40; ++i) frame();
   const std::int64_t due = core->poll({now_ns, wall_ns()});
   EXPECT_GT(due, now_ns);
   EXPECT_LE(due, now_ns + 50 * kMs);
   EXPECT_NEAR(static_cast<double>(due - now_ns), static_cast<double>(kFrameNs), 2e6);
+}
+
+TEST_F(PlayTest, WhereNobodyDrawsNoFrameIsDueBeforeItsDelta) {
+  join();
+  for (int i = 0; i < 40; ++i) frame();
+  const std::int64_t due = core->poll({now_ns, wall_ns()});
+  EXPECT_GT(due, now_ns + kFrameNs * 11 / 10) << "the next delta comes before that";
+  poll(kFrameNs);
+  EXPECT_EQ(core->timeline()->now(), core->timeline()->applied() + 1) << "simulated ahead all the same";
 }
 
 TEST_F(PlayTest, TheAcknowledgementIsRepeatedWhenNoFrameComes) {

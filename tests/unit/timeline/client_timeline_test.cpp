@@ -37,6 +37,39 @@ TEST(ClientTimeline, FollowsTheServerWithEveryCodec) {
   }
 }
 
+TEST(ClientTimeline, WhatIsPreparedIsSeenOnceItIsSteppedAndFollowsInputsThatComeLater) {
+  for (const std::string_view codec : codec_names()) {
+    SCOPED_TRACE(codec);
+    Pair pair(1, codec);
+    for (int i = 0; i < 10; ++i) {
+      pair.client.prepare();
+      EXPECT_EQ(pair.client.now(), pair.client.applied());
+      const Drive drive{{0, -100 * i, 0}, 10};
+      const std::uint64_t number = pair.server.last_input() + 1;
+      ASSERT_TRUE(pair.server.schedule({number, pair.server.frame() + 1, drive}));
+      ASSERT_TRUE(pair.client.schedule({number, pair.server.frame() + 1, drive}));
+      if (i % 2 == 0) {
+        EXPECT_TRUE(pair.client.step(1));
+        pair.client.prepare();  // nothing is left to prepare
+        EXPECT_EQ(pair.client.now(), pair.client.applied() + 1);
+      }
+      const auto applied = apply(pair.client, pair.frame());
+      ASSERT_TRUE(applied) << applied.error().message;
+      ASSERT_EQ(pair.client.state(pair.client.applied()), pair.server.state());
+    }
+  }
+}
+
+TEST(ClientTimeline, ASnapshotIsLoadedOverWhatIsPrepared) {
+  Pair pair;
+  pair.client.prepare();
+  static_cast<void>(pair.frame());
+  ASSERT_TRUE(pair.client.load(snapshot_of(pair.server), kEpoch));
+  pair.client.prepare();
+  ASSERT_TRUE(apply(pair.client, pair.frame()));
+  EXPECT_EQ(pair.client.state(pair.client.applied()), pair.server.state());
+}
+
 TEST(ClientTimeline, ItsSnapshotIsTheServersToTheByte) {
   for (const std::string_view codec : codec_names()) {
     SCOPED_TRACE(codec);
