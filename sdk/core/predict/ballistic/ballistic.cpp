@@ -13,11 +13,12 @@
 namespace tandem {
 namespace {
 
-// (x*k + 2^15) >> 16 exactly, by one unsigned product, which is what plain SSE2 has: with u = x + 2^31 the
-// result is ((u*k + 2^15) >> 16) - k*2^15. Needs k < 2^16.
+// (x*k + 2^15) >> 16 exactly, by two products of 32 bits, which every vector unit has: the upper half of x
+// gives whole numbers, the lower one alone is rounded. Needs k < 2^16.
 inline std::int32_t share_of(std::int32_t x, std::uint32_t k) {
-  const std::uint64_t u = static_cast<std::uint32_t>(x) ^ 0x80000000U;
-  return static_cast<std::int32_t>(static_cast<std::uint32_t>((u * k + 0x8000U) >> 16U) - (k << 15U));
+  const auto whole = static_cast<std::uint32_t>(x >> 16) * k;
+  const std::uint32_t rest = (static_cast<std::uint32_t>(x) & 0xFFFFU) * k + 0x8000U;
+  return static_cast<std::int32_t>(whole + (rest >> 16U));
 }
 
 inline std::int32_t clamp_velocity(std::int32_t x) { return std::clamp(x, -kVelocityLimit, kVelocityLimit); }
