@@ -181,7 +181,7 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   for (std::uint32_t place = 0; place < count; ++place) {
     xy[place] = static_cast<std::uint32_t>(random());
     later[place] = static_cast<std::uint32_t>(random());
-    z[place] = static_cast<std::uint32_t>(random());
+    z[place] = static_cast<std::uint32_t>(random()) & (later_too ? ~0U : 0xFFFFU);
     ContactView& view = views[place];
     for (std::size_t i = 0; i < 3; ++i) {
       view.q[i] = static_cast<std::int16_t>(vector_within(random, spread)[i]);
@@ -195,17 +195,21 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
 
   const ContactGrid grid{kSideBits, begin.data(), cells.data(), xy.data(), later_too ? later.data() : nullptr,
                          z.data(),  1U << 29U};
-  constexpr std::uint32_t kEnough = 500, kRoom = kEnough + ContactPairs::kMostAtOnce;
+  constexpr std::uint32_t kEnough = 500;
+  constexpr std::uint32_t kRoom = kEnough + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
   std::vector<std::uint32_t> first(kRoom), second(kRoom);
   std::vector<ContactForce> forces(count);
   KernelResult result;
   ContactPairs pairs{first.data(), second.data(), 0};
   for (std::uint32_t place = 0; place < count;) {
+    pairs.count = 0;
     place = kernels.find(grid, place, kEnough, pairs);
     for (std::uint32_t k = 0; k < pairs.count; ++k) {
       result.first.push_back(first[k]);
       result.second.push_back(second[k]);
     }
+    for (; pairs.count % ContactPairs::kBatch != 0; ++pairs.count)
+      first[pairs.count] = second[pairs.count] = 0;
     kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), views.data(), pairs, forces.data());
   }
   for (const ContactForce& force : forces)

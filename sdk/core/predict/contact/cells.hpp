@@ -69,7 +69,6 @@ std::uint32_t find_pairs(const ContactGrid& grid, std::uint32_t place, std::uint
     walk.around(place, grid.cell[place], search);
   }
   pairs.count = search.count();
-  for (; pairs.count % 8 != 0; ++pairs.count) pairs.first[pairs.count] = pairs.second[pairs.count] = 0;
   return place;
 }
 

@@ -23,6 +23,7 @@ constexpr std::uint32_t kNearShift = 5;
 constexpr std::uint32_t kBeyond = 8;  // places a vector may read behind the last body
 constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
+constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
 
 // Every grid needs four cells a side, or the cells before and behind one would be the same.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
@@ -71,13 +72,10 @@ TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
   return all != 0;
 }
 
-// c -= (c*E + 2^15) >> 16, which is never larger than c; not of bodies at rest.
-TANDEM_VECTOR_CLONES void decay(std::int32_t* c, const std::uint8_t* rest, std::size_t count,
-                                std::int64_t share) {
-  for (std::size_t s = 0; s < count; ++s) {
-    const std::int32_t moving = static_cast<std::int32_t>(rest[s]) - 1;
-    c[s] -= static_cast<std::int32_t>((c[s] * share + 32768) >> 16) & moving;
-  }
+bool accelerated(const State& state) {
+  const std::size_t count = state.capacity();
+  return any_of(state.c(0).data(), count) || any_of(state.c(1).data(), count) ||
+         any_of(state.c(2).data(), count);
 }
 
 // The rank of each body among those of its cell, by slot, from kMostInCell on the same.
@@ -123,18 +121,17 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
       walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
       side_bits_(side_bits_for(capacity)),
       cell_(capacity),
-      place_(capacity),
+      place_(capacity + kBeyond),
       in_cell_(std::size_t{1} << (3 * side_bits_)),
       begin_(in_cell_.size() + 1),
       bodies_(capacity),
       views_(capacity),
-      forces_(capacity),
+      forces_(capacity, ContactForce{{}, 65536}),
       place_cell_(capacity),
       near_xy_(capacity + kBeyond),
       later_xy_(constants_.substeps > 1 ? near_xy_.size() : 0),
       near_z_(near_xy_.size()),
-      first_((constants_.substeps > 1 ? kPairsPerBody * capacity : 0) + kPairsAtOnce +
-             ContactPairs::kMostAtOnce),
+      first_((constants_.substeps > 1 ? kPairsPerBody * capacity : 0) + kRoomForPairs),
       second_(first_.size()),
       inverse_root_(kRoots) {
   const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
@@ -154,8 +151,6 @@ void Contact::sort(const State& state) {
   const std::uint32_t capacity = state.capacity();
   number_cells({shift_, side_bits_, cells_per_}, state.p(0).data(), state.p(1).data(), state.p(2).data(),
                cell_.data(), capacity);
-  accelerated_ = any_of(state.c(0).data(), capacity) || any_of(state.c(1).data(), capacity) ||
-                 any_of(state.c(2).data(), capacity);
   std::fill(in_cell_.begin(), in_cell_.end(), std::uint8_t{0});
   rank_in_cells(cell_, state.alive(), in_cell_, place_);
   count_ = begin_cells(in_cell_, begin_);
@@ -192,9 +187,10 @@ void Contact::scatter(const State& state) {
   count_ = count;
 }
 
-// Those found are worked on while they are in the cache. They are kept for the later sub-steps as long as
-// there is room; else they are found again.
+// Those found are worked on while they are in the cache, the odd ones of a batch with the next. They are kept
+// for the later sub-steps as long as there is room; else they are found again.
 void Contact::add_pairs(bool first) {
+  constexpr std::uint32_t kBatch = ContactPairs::kBatch;
   const auto add_forces = [this](std::uint32_t begin, std::uint32_t end) {
     kernels_.add_forces(pair_law_, inverse_root_.data(), views_.data(),
                         {first_.data() + begin, second_.data() + begin, end - begin}, forces_.data());
@@ -208,18 +204,24 @@ void Contact::add_pairs(bool first) {
                          near_z_.data(),
                          near_ * near_};
   const auto room = static_cast<std::uint32_t>(first_.size());
+  ContactPairs pairs{first_.data(), second_.data(), 0};
+  std::uint32_t done = 0;
   all_kept_ = true;
-  kept_ = 0;
   for (std::uint32_t place = 0; place < begin_.back();) {
-    if (constants_.substeps == 1 || room - kept_ < kPairsAtOnce + ContactPairs::kMostAtOnce) {
-      all_kept_ = kept_ == 0 && place == 0;
-      kept_ = 0;
-    }
-    ContactPairs pairs{first_.data() + kept_, second_.data() + kept_, 0};
-    place = kernels_.find(grid, place, kPairsAtOnce, pairs);
-    add_forces(kept_, kept_ + pairs.count);
-    kept_ += pairs.count;
+    place = kernels_.find(grid, place, done + kPairsAtOnce, pairs);
+    const std::uint32_t whole = pairs.count - pairs.count % kBatch;
+    add_forces(done, whole);
+    done = whole;
+    if (constants_.substeps > 1 && room - done >= kRoomForPairs) continue;
+    std::copy(&first_[done], &first_[pairs.count], &first_[0]);
+    std::copy(&second_[done], &second_[pairs.count], &second_[0]);
+    pairs.count -= done;
+    done = 0;
+    all_kept_ = false;
   }
+  for (; pairs.count % kBatch != 0; ++pairs.count) first_[pairs.count] = second_[pairs.count] = 0;
+  add_forces(done, pairs.count);
+  kept_ = pairs.count;
 }
 
 // All but what moves.
@@ -231,13 +233,6 @@ void Contact::copy(const State& from, State& to) const {
   copy(from.alive(), to.alive());
   copy(from.reuse(), to.reuse());
   copy(from.type(), to.type());
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (accelerated_) {
-      copy(from.c(i), to.c(i));
-    } else {
-      std::fill(to.c(i).begin(), to.c(i).end(), 0);
-    }
-  }
 }
 
 void Contact::step(const State& from, State& to, const StepInput& input) {
@@ -253,7 +248,8 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
                    input.drive.gravity,
                    input.drive.damping,
                    some_rest ? std::span<const std::uint8_t>(to.rest()) : std::span<const std::uint8_t>(),
-                   accelerated_ ? &to : nullptr};
+                   constants_.substeps > 1 && accelerated(from) ? &from : nullptr,
+                   input.parameters.decay};
   for (std::int32_t i = 0; i < constants_.substeps; ++i) {
     walls_.add_forces(bodies, forces_);
     add_pairs(i == 0);
@@ -263,11 +259,9 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
       move.damping = 0;
       move.accelerated = nullptr;
     } else {
-      move_bodies(move, bodies, forces_, place_, to);
+      move_bodies(move, bodies, forces_, place_, from, to);
     }
   }
-  for (std::size_t i = 0; accelerated_ && i < 3; ++i)
-    decay(to.c(i).data(), to.rest().data(), to.c(i).size(), input.parameters.decay);
   turn_bodies(from, to);
 }
 

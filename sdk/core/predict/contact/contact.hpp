@@ -58,7 +58,6 @@ class Contact final : public Predictor {
   std::vector<ContactBody> bodies_;
   std::vector<ContactView> views_;
   std::vector<ContactForce> forces_;
-  bool accelerated_ = false;  // some c is not zero
   std::vector<std::uint32_t> place_cell_, near_xy_, later_xy_, near_z_;
   std::vector<std::uint32_t> first_, second_;
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16

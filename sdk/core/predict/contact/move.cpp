@@ -1,6 +1,7 @@
 #include "sdk/core/predict/contact/move.hpp"
 
-#include <bit>
+#include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "sdk/core/lattice/vector_clones.hpp"
@@ -25,7 +26,8 @@ inline std::int32_t here(std::int32_t count) {
   return count;
 }
 inline Four same(std::int32_t x) { return Four{x, x, x, x}; }
-inline Four clamped(Four x, Four limit) {
+template <class X>
+inline X clamped(X x, X limit) {
   x = x < -limit ? -limit : x;
   return x > limit ? limit : x;
 }
@@ -36,14 +38,67 @@ inline Four load(const T& from) {
   return x;
 }
 
+inline FourBits bits_of(Four x) { return reinterpret_cast<FourBits>(x); }
+inline std::uint32_t bits_of(std::int32_t x) { return static_cast<std::uint32_t>(x); }
+inline Four value_of(FourBits bits) { return reinterpret_cast<Four>(bits); }
+inline std::int32_t value_of(std::uint32_t bits) { return static_cast<std::int32_t>(bits); }
+
 // (x * share + half) >> (16 + bits) in 32 bits, for share < 2^16: the halves of x one by one.
-inline Four share_of(Four x, Four share, std::uint32_t bits, std::uint32_t half) {
-  const auto low = reinterpret_cast<FourBits>(x) & 0xFFFFU;
-  const FourBits carry = (low * reinterpret_cast<FourBits>(share) + half) >> 16U;
-  return ((x >> 16) * share + reinterpret_cast<Four>(carry)) >> static_cast<std::int32_t>(bits);
+template <class X>
+inline X share_of(X x, X share, std::int32_t bits, std::uint32_t half) {
+  const auto carry = ((bits_of(x) & 0xFFFFU) * bits_of(share) + half) >> 16U;
+  return ((x >> 16) * share + value_of(carry)) >> bits;
 }
 
-inline Four either(Four mask, Four x, Four y) { return (x & mask) | (y & ~mask); }
+template <class X>
+inline X either(X mask, X x, X y) {
+  return (x & mask) | (y & ~mask);
+}
+
+inline std::int32_t same_as(std::int32_t x, std::int32_t /*like*/) { return x; }
+inline Four same_as(std::int32_t x, Four /*like*/) { return same(x); }
+
+// How an axis of a body moves, or of several bodies, or all axes of one.
+struct Motion {
+  explicit Motion(const ContactMove& move)
+      : force_scale(4 << move.shift),
+        damping(static_cast<std::int32_t>(move.damping)),
+        share((32768 + move.substeps / 2) / move.substeps) {}
+
+  /// A change of v.
+  template <class X>
+  [[nodiscard]] X push(X force) const {
+    return clamped(force, same_as(kForceLimit / force_scale, force)) * force_scale;
+  }
+  template <class X>
+  [[nodiscard]] X push(X force, X mobility) const {
+    const X f = push(force);
+    return f * (mobility >> 16) + share_of(f, mobility & 0xFFFF, 0, 1U << 15U);
+  }
+  /// `v` with all that pushes it.
+  template <class X>
+  [[nodiscard]] X slowed(X v) const {
+    return clamped(v - share_of(v, same_as(damping, v), 0, 1U << 15U), same_as(kVelocityLimit, v));
+  }
+  /// `p` after the step; a share of 1 needs no product.
+  template <class X>
+  [[nodiscard]] X moved(X p, X v, bool whole) const {
+    const X way = whole ? (v + 32) >> 6 : share_of(v, same_as(share, v), 5, 1U << 20U);
+    return clamped(p + way, same_as(kPositionLimit, p));
+  }
+
+  std::int32_t force_scale, damping, share;
+};
+
+inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
+  const FourWords places = __builtin_convertvector(p_and_radius >> here(shift), FourWords);
+  const FourWords speeds =
+      __builtin_convertvector(clamped(v >> here(shift + 6), same(kMostSpeed)), FourWords);
+  ContactView view{};
+  std::memcpy(&view.q, &places, sizeof places);
+  std::memcpy(&view.v, &speeds, sizeof speeds);
+  return view;
+}
 
 // Four rows of four, turned over.
 inline void transpose(std::array<Four, 4>& row) {
@@ -57,86 +112,68 @@ inline void transpose(std::array<Four, 4>& row) {
   row[3] = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
-// Each element by itself: three axes of a body, or an axis of four bodies.
-class Motion {
- public:
-  explicit Motion(const ContactMove& move)
-      : force_shift_(static_cast<std::int32_t>(move.shift) + 2),
-        most_force_(same(kForceLimit >> force_shift_)),
-        damped_(move.damping != 0),
-        damping_(same(static_cast<std::int32_t>(move.damping))),
-        one_mobility_(move.one_mobility),
-        halved_(std::has_single_bit(static_cast<std::uint32_t>(move.substeps))),
-        half_(32 * move.substeps),
-        halvings_(6 + std::countr_zero(static_cast<std::uint32_t>(move.substeps))),
-        share_(same((32768 + move.substeps / 2) / move.substeps)) {}
+// Slots that follow each other, in the last sub-step.
+struct Slots {
+  static constexpr std::size_t kMost = 64;
+  using Column = std::array<std::int32_t, kMost>;
 
-  void operator()(Four& p, Four& v, Four force, Four mobility, Four gravity, Four c) const {
-    const Four f = clamped(force, most_force_) << here(force_shift_);
-    v += gravity;
-    if (one_mobility_) {
-      v += f;
-    } else {
-      v += f * (mobility >> 16) + share_of(f, mobility & 0xFFFF, 0, 1U << 15U);
-    }
-    v += c;
-    if (damped_) v -= share_of(v, damping_, 0, 1U << 15U);
-    v = clamped(v, same(kVelocityLimit));
-    // The same where N is a power of two.
-    const Four way = halved_ ? (v + half_) >> here(halvings_) : share_of(v, share_, 5, 1U << 20U);
-    p = clamped(p + way, same(kPositionLimit));
-  }
-
- private:
-  std::int32_t force_shift_;
-  Four most_force_;
-  bool damped_;
-  Four damping_;
-  bool one_mobility_, halved_;
-  std::int32_t half_, halvings_;
-  Four share_;
+  Slot first = 0;
+  std::size_t count = 0;
+  std::array<Column, 3> f, p, v;    // p and v: where a sub-step was before
+  Column mobility, living, moving;  // the last two: all bits or none
 };
 
-inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
-  const FourWords places = __builtin_convertvector(p_and_radius >> here(shift), FourWords);
-  const FourWords speeds =
-      __builtin_convertvector(clamped(v >> here(shift + 6), same(kMostSpeed)), FourWords);
-  ContactView view{};
-  std::memcpy(&view.q, &places, sizeof places);
-  std::memcpy(&view.v, &speeds, sizeof speeds);
-  return view;
+// Inlined, as move_slots(), for each copy for a processor has its own.
+[[gnu::always_inline]] inline void gather(const ContactMove& move, std::span<const ContactBody> bodies,
+                                          std::span<const ContactForce> forces,
+                                          std::span<const std::uint32_t> place, const State& to,
+                                          Slots& slots) {
+  const std::uint32_t* const at = &place[slots.first];
+  for (std::size_t k = 0; k < slots.count; k += 4) {
+    std::array<Four, 4> f{load(forces[at[k]].f), load(forces[at[k + 1]].f), load(forces[at[k + 2]].f),
+                          load(forces[at[k + 3]].f)};
+    transpose(f);
+    for (std::size_t i = 0; i < 3; ++i) std::memcpy(&slots.f[i][k], &f[i], sizeof f[i]);
+    std::memcpy(&slots.mobility[k], &f[3], sizeof f[3]);
+  }
+  for (std::size_t k = 0; move.substeps > 1 && k < slots.count; ++k) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      slots.p[i][k] = bodies[at[k]].p[i];
+      slots.v[i][k] = bodies[at[k]].v[i];
+    }
+  }
+  const std::uint8_t* const alive = &to.alive()[slots.first];
+  const std::uint8_t* const rest = &to.rest()[slots.first];
+  for (std::size_t k = 0; k < slots.count; ++k) {
+    slots.living[k] = -std::int32_t{alive[k]};
+    slots.moving[k] = std::int32_t{rest[k]} - 1;
+  }
 }
 
-// Some slots that follow each other, in the last sub-step. Inlined, as each copy for a processor has its own.
-template <std::size_t kCount>
-[[gnu::always_inline]] inline void move_slots(const Motion& motion, const ContactMove& move,
-                                              std::span<const ContactBody> bodies,
-                                              std::span<const ContactForce> forces,
-                                              std::span<const std::uint32_t> place, Slot first, State& to) {
-  std::array<Four, 4> p{}, v{}, f{};
-  Four living{}, still{};
-  for (std::size_t k = 0; k < kCount; ++k) {
-    const std::uint32_t at = place[first + k];
-    p[k] = load(bodies[at].p);
-    v[k] = load(bodies[at].v);
-    f[k] = load(forces[at].f);
-    living[k] = -std::int32_t{to.alive()[first + k]};
-    if (!move.at_rest.empty()) still[k] = -std::int32_t{move.at_rest[first + k]};
-  }
-  transpose(p);
-  transpose(v);
-  transpose(f);
+// `kOnly`: the frame is one step.
+template <bool kOnly, bool kOneMobility>
+[[gnu::always_inline]] inline void move_slots(const ContactMove& move, const Slots& slots, const State& from,
+                                              State& to) {
+  const Motion motion(move);
   for (std::size_t i = 0; i < 3; ++i) {
-    Four c{};
-    if (move.accelerated != nullptr)
-      std::memcpy(&c, move.accelerated->c(i).data() + first, kCount * sizeof c[0]);
-    Four new_p = p[i];
-    Four new_v = v[i];
-    motion(new_p, new_v, f[i], f[3], same(move.gravity[i]), c);
-    new_p = either(still, p[i], new_p) & living;
-    new_v = either(still, v[i], new_v) & living;
-    std::memcpy(to.p(i).data() + first, &new_p, kCount * sizeof new_p[0]);
-    std::memcpy(to.v(i).data() + first, &new_v, kCount * sizeof new_v[0]);
+    const std::int32_t* const p = kOnly ? &from.p(i)[slots.first] : slots.p[i].data();
+    const std::int32_t* const v = kOnly ? &from.v(i)[slots.first] : slots.v[i].data();
+    const std::int32_t* const c = &from.c(i)[slots.first];
+    const std::int32_t gravity = move.gravity[i];
+    const std::int32_t decay = move.decay;
+    Slots::Column next_p, next_v, next_c;  // `to` may be `from`
+    for (std::size_t k = 0; k < slots.count; ++k) {
+      const std::int32_t force = slots.f[i][k];
+      const std::int32_t push = kOneMobility ? motion.push(force) : motion.push(force, slots.mobility[k]);
+      const std::int32_t new_v = motion.slowed(v[k] + gravity + push + (kOnly ? c[k] : 0));
+      const std::int32_t new_p = motion.moved(p[k], new_v, kOnly);
+      next_p[k] = either(slots.moving[k], new_p, p[k]) & slots.living[k];
+      next_v[k] = either(slots.moving[k], new_v, v[k]) & slots.living[k];
+      next_c[k] = c[k] - (share_of(c[k], decay, 0, 1U << 15U) & slots.moving[k]);
+    }
+    std::copy_n(next_p.data(), slots.count, &to.p(i)[slots.first]);
+    std::copy_n(next_v.data(), slots.count, &to.v(i)[slots.first]);
+    std::copy_n(next_c.data(), slots.count, &to.c(i)[slots.first]);
   }
 }
 
@@ -182,11 +219,11 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
       c = Four{s->c(0)[slot], s->c(1)[slot], s->c(2)[slot], 0};
     const Four p_and_radius = load(body.p);
     const Four v_and_slot = load(body.v);
-    Four p = p_and_radius;
-    Four v = v_and_slot & axes;
-    motion(p, v, load(force.f), same(force.mobility), gravity, c);
+    const Four f = load(force.f);
+    const Four push = move.one_mobility ? motion.push(f) : motion.push(f, same(force.mobility));
+    const Four v = motion.slowed((v_and_slot & axes) + gravity + push + c);
     const Four new_v = either(axes, v, v_and_slot);
-    const Four new_p = either(axes, p, p_and_radius);
+    const Four new_p = either(axes, motion.moved(p_and_radius, v, false), p_and_radius);
     std::memcpy(&body.v, &new_v, sizeof new_v);
     std::memcpy(&body.p, &new_p, sizeof new_p);
     force.f = {};
@@ -196,12 +233,20 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
 
 TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<const ContactBody> bodies,
                                       std::span<const ContactForce> forces,
-                                      std::span<const std::uint32_t> place, State& to) {
-  const Motion motion(move);
-  const std::uint32_t capacity = to.capacity();
-  Slot slot = 0;
-  for (; slot + 4 <= capacity; slot += 4) move_slots<4>(motion, move, bodies, forces, place, slot, to);
-  for (; slot < capacity; ++slot) move_slots<1>(motion, move, bodies, forces, place, slot, to);
+                                      std::span<const std::uint32_t> place, const State& from, State& to) {
+  Slots slots;
+  for (Slot first = 0; first < to.capacity(); first += Slots::kMost) {
+    slots.first = first;
+    slots.count = std::min<std::size_t>(Slots::kMost, to.capacity() - first);
+    gather(move, bodies, forces, place, to, slots);
+    if (move.substeps == 1 && move.one_mobility) {
+      move_slots<true, true>(move, slots, from, to);
+    } else if (move.substeps == 1) {
+      move_slots<true, false>(move, slots, from, to);
+    } else {
+      move_slots<false, false>(move, slots, from, to);
+    }
+  }
 }
 
 }  // namespace tandem

@@ -16,6 +16,7 @@ struct ContactMove {
   std::uint32_t damping;
   std::span<const std::uint8_t> at_rest;  ///< by slot, bodies that do not move; empty: none
   const State* accelerated;               ///< whose c is added to v; null: none
+  std::uint16_t decay;                    ///< of c, in 1/65536
 };
 
 /// Where bodies are when a frame starts, for the search of pairs: columns of ContactGrid, by place.
@@ -34,9 +35,10 @@ void place_bodies(std::span<const ContactBody> bodies, const ContactPlaces& plac
 void move_bodies(const ContactMove& move, std::span<ContactBody> bodies, std::span<ContactForce> forces,
                  std::span<ContactView> views);
 
-/// The last sub-step: likewise, into p and v of `to`, whose `alive` holds already. `place`: by slot, of dead
-/// ones any.
+/// The last sub-step: moves bodies into p and v of `to`, whose `alive` holds already, and lets c decay into
+/// its c, `from` and `to` may be the same. `place`: by slot, of dead ones any.
 void move_bodies(const ContactMove& move, std::span<const ContactBody> bodies,
-                 std::span<const ContactForce> forces, std::span<const std::uint32_t> place, State& to);
+                 std::span<const ContactForce> forces, std::span<const std::uint32_t> place,
+                 const State& from, State& to);
 
 }  // namespace tandem

@@ -45,7 +45,7 @@ struct ContactGrid {
   const std::uint32_t* xy;  ///< x below, y above
   /// Where the last sub-step finds it if nothing pushes it; none for one sub-step.
   const std::uint32_t* later_xy;
-  const std::uint32_t* z;      ///< now below, later above
+  const std::uint32_t* z;      ///< now below, later or 0 above
   std::uint32_t near_squared;  ///< bodies nearer than this, now or later, are a pair
 };
 
@@ -53,8 +53,10 @@ struct ContactGrid {
 struct ContactPairs {
   std::uint32_t* first;
   std::uint32_t* second;
-  std::uint32_t count;  ///< a multiple of 8: filled up with pairs of a body and itself, which add nothing
+  std::uint32_t count;
 
+  /// Forces are added to so many at a time. A body and itself are a pair that adds nothing.
+  static constexpr std::uint32_t kBatch = 512;
   /// How many more than enough may be found, and what a vector writes beyond.
   static constexpr std::uint32_t kMostAtOnce = 14 * ContactGrid::kMostInCell + 16;
 };
@@ -66,11 +68,11 @@ struct ContactLaw {
 };
 
 struct ContactKernels {
-  /// Writes the pairs of the bodies from `place` on until they are `enough`; there is room for kMostAtOnce
+  /// Appends the pairs of the bodies from `place` on until they are `enough`; there is room for kMostAtOnce
   /// more. Returns the place of the first body not looked at.
   std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                         ContactPairs& pairs);
-  /// Adds the forces of all pairs. `inverse_root`: 2^30 / r by r^2 >> 16.
+  /// Adds the forces of all pairs, whole batches. `inverse_root`: 2^30 / r by r^2 >> 16.
   void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                      const ContactPairs& pairs, ContactForce* forces);
 };

@@ -60,9 +60,10 @@ class Search {
         z_(grid.z),
         most_(same(grid.near_squared - 1)),
         first_(pairs.first),
-        second_(pairs.second) {}
+        second_(pairs.second),
+        count_(pairs.count) {}
 
-  [[nodiscard]] std::uint32_t count() const { return count_; }
+  [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(count_); }
   void start(std::uint32_t place) {
     self_ = same(place);
     self_xy_ = same(xy_[place]);
@@ -85,11 +86,14 @@ class Search {
   void among_eight(std::uint32_t from, std::uint32_t left) {
     const Wide apart_xy = _mm256_sub_epi16(load(xy_ + from), self_xy_);
     const Wide apart_z = _mm256_sub_epi16(load(z_ + from), self_z_);
-    Wide apart = _mm256_add_epi32(squared(apart_xy), squared(_mm256_and_si256(apart_z, same(0xFFFF))));
-    if constexpr (kLater) {
+    Wide apart{};
+    if constexpr (!kLater) {
+      apart = _mm256_add_epi32(squared(apart_xy), squared(apart_z));
+    } else {
+      const Wide now = _mm256_add_epi32(squared(apart_xy), squared(_mm256_and_si256(apart_z, same(0xFFFF))));
       const Wide later = _mm256_sub_epi16(load(later_xy_ + from), self_later_xy_);
       const Wide later_apart = _mm256_add_epi32(squared(later), squared(_mm256_srli_epi32(apart_z, 16)));
-      apart = _mm256_min_epu32(apart, later_apart);
+      apart = _mm256_min_epu32(now, later_apart);
     }
     const Wide near = _mm256_cmpeq_epi32(_mm256_min_epu32(apart, most_), apart);
     const std::uint32_t bits =
@@ -98,13 +102,13 @@ class Search {
         _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kCompressions.of[bits])));
     store(first_ + count_, self_);
     store(second_ + count_, _mm256_add_epi32(places, same(from)));
-    count_ += static_cast<std::uint32_t>(_mm_popcnt_u32(bits));
+    count_ += static_cast<std::size_t>(_mm_popcnt_u32(bits));
   }
 
   const std::uint32_t *xy_, *later_xy_, *z_;
   Wide most_;
   std::uint32_t *first_, *second_;
-  std::uint32_t count_ = 0;
+  std::size_t count_;
   Wide self_{}, self_xy_{}, self_z_{}, self_later_xy_{};
 };
 
@@ -156,19 +160,23 @@ inline Wide looked_up(const std::uint32_t* table, Wide index) {
   return _mm256_inserti128_si256(_mm256_castsi128_si256(four(0)), four(4), 1);
 }
 
+// A body's pairs follow each other. Those worked on at once are from eight places far apart, or each would
+// wait for the sum that the one before it stores.
+constexpr std::size_t kStride = ContactPairs::kBatch / 8;
+
 // The forces of eight pairs on the first of each, as in pairs.cpp.
 struct Forces {
   Wide row[4];  // pair k in the lower half of row k, pair k + 4 in the upper half
 };
 
 inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
-                        const std::uint32_t* first, const std::uint32_t* second, std::size_t stride) {
+                        const std::uint32_t* first, const std::uint32_t* second) {
   // The radius of the first is negated, so that the difference of the radii is their sum.
   const Wide signs = _mm256_set_epi16(1, 1, 1, 1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, 1, 1);
   Wide rows[4];
   for (unsigned k = 0; k < 4; ++k) {
-    const Wide a = both(views[first[k * stride]], views[first[(k + 4) * stride]]);
-    const Wide b = both(views[second[k * stride]], views[second[(k + 4) * stride]]);
+    const Wide a = both(views[first[k * kStride]], views[first[(k + 4) * kStride]]);
+    const Wide b = both(views[second[k * kStride]], views[second[(k + 4) * kStride]]);
     rows[k] = _mm256_sub_epi16(b, _mm256_sign_epi16(a, signs));
   }
   const Wide places01 = _mm256_unpacklo_epi16(rows[0], rows[1]);
@@ -217,23 +225,18 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
 
 void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                 const ContactPairs& pairs, ContactForce* forces) {
-  // A body's pairs follow each other. Those worked on at once are from eight places far apart, or each would
-  // wait for the sum that the one before it stores.
-  constexpr std::uint32_t kAtOnce = 1024;
-  for (std::uint32_t begin = 0; begin < pairs.count; begin += kAtOnce) {
-    const std::uint32_t left = pairs.count - begin;
-    const std::size_t stride = (left < kAtOnce ? left : kAtOnce) / 8;
-    for (std::size_t k = 0; k < stride; ++k) {
+  for (std::uint32_t begin = 0; begin < pairs.count; begin += ContactPairs::kBatch) {
+    for (std::size_t k = 0; k < kStride; ++k) {
       const std::uint32_t* const first = pairs.first + begin + k;
       const std::uint32_t* const second = pairs.second + begin + k;
-      const Forces f = forces_of(law, inverse_root, views, first, second, stride);
+      const Forces f = forces_of(law, inverse_root, views, first, second);
       for (unsigned i = 0; i < 4; ++i) {
         const __m128i low = _mm256_castsi256_si128(f.row[i]);
         const __m128i high = _mm256_extracti128_si256(f.row[i], 1);
-        add(forces[first[i * stride]], low);
-        subtract(forces[second[i * stride]], low);
-        add(forces[first[(i + 4) * stride]], high);
-        subtract(forces[second[(i + 4) * stride]], high);
+        add(forces[first[i * kStride]], low);
+        subtract(forces[second[i * kStride]], low);
+        add(forces[first[(i + 4) * kStride]], high);
+        subtract(forces[second[(i + 4) * kStride]], high);
       }
     }
   }
