@@ -195,23 +195,18 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
 
   const ContactGrid grid{kSideBits, begin.data(), cells.data(), xy.data(), later_too ? later.data() : nullptr,
                          z.data(),  1U << 29U};
-  constexpr std::uint32_t kEnough = 500;
-  constexpr std::uint32_t kRoom = kEnough + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
+  constexpr std::uint32_t kAtOnce = 500, kRoom = 1U << 16U;
   std::vector<std::uint32_t> first(kRoom), second(kRoom);
   std::vector<ContactForce> forces(count);
-  KernelResult result;
   ContactPairs pairs{first.data(), second.data(), 0};
-  for (std::uint32_t place = 0; place < count;) {
-    pairs.count = 0;
-    place = kernels.find(grid, place, kEnough, pairs);
-    for (std::uint32_t k = 0; k < pairs.count; ++k) {
-      result.first.push_back(first[k]);
-      result.second.push_back(second[k]);
-    }
-    for (; pairs.count % ContactPairs::kBatch != 0; ++pairs.count)
-      first[pairs.count] = second[pairs.count] = 0;
-    kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), views.data(), pairs, forces.data());
-  }
+  for (std::uint32_t place = 0; place < count;)
+    place = kernels.find(grid, place, pairs.count + kAtOnce, pairs);
+  EXPECT_LT(pairs.count + ContactPairs::kMostAtOnce + ContactPairs::kBatch, kRoom);
+  KernelResult result;
+  result.first.assign(first.begin(), first.begin() + pairs.count);
+  result.second.assign(second.begin(), second.begin() + pairs.count);
+  for (; pairs.count % ContactPairs::kBatch != 0; ++pairs.count) first[pairs.count] = second[pairs.count] = 0;
+  kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), views.data(), pairs, forces.data());
   for (const ContactForce& force : forces)
     result.forces.insert(result.forces.end(), force.f.begin(), force.f.end());
   return result;

@@ -36,9 +36,7 @@ inline Four apart(Four a, Four b) {
 // Who is near one body.
 class Search {
  public:
-  Search(const ContactGrid& grid, const ContactPairs& pairs) : grid_(grid), pairs_(pairs) {
-    pairs_.count = 0;
-  }
+  Search(const ContactGrid& grid, const ContactPairs& pairs) : grid_(grid), pairs_(pairs) {}
 
   [[nodiscard]] std::uint32_t count() const { return pairs_.count; }
   void start(std::uint32_t place) {
