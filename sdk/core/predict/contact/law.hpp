@@ -2,6 +2,7 @@
 // The force of one contact, as idl/PROTOCOL.md has it.
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 
 #include "sdk/core/predict/contact/pairs.hpp"
@@ -31,12 +32,15 @@ inline constexpr std::int32_t kMostOverlap = 1 << 14;      ///< grid units
 // each other.
 /// With `n` in 2^-12 towards the other, `u` the other's velocity less the own. |u| < 2^15 on each axis,
 /// |n| < 2^12.5, spring <= 2^16, shear <= 2^13, drag <= 2^14: all of it fits 32 bits.
-[[nodiscard]] inline Vec3i contact_force(const ContactLaw& law, std::int32_t overlap, const Vec3i& n,
-                                         const Vec3i& u) {
-  const std::int32_t along = (u[0] * n[0] + u[1] * n[1] + u[2] * n[2]) >> 11;
-  const std::int32_t push =
-      std::clamp((law.spring * overlap >> 11) + (law.shear * along >> 11), -kMostPush, kMostPush);
-  Vec3i force{};
+/// Of one contact, or of several in vectors.
+template <class X>
+[[nodiscard]] inline std::array<X, 3> contact_force(const ContactLaw& law, X overlap,
+                                                    const std::array<X, 3>& n, const std::array<X, 3>& u) {
+  const X along = (u[0] * n[0] + u[1] * n[1] + u[2] * n[2]) >> 11;
+  X push = (law.spring * overlap >> 11) + (law.shear * along >> 11);
+  push = push < -kMostPush ? X{} - kMostPush : push;
+  push = push > kMostPush ? X{} + kMostPush : push;
+  std::array<X, 3> force{};
   for (std::size_t i = 0; i < 3; ++i) force[i] = (law.drag * u[i] >> 9) - (push * n[i] >> 11);
   return force;
 }

@@ -5,15 +5,11 @@
 #include <cstring>
 
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/law.hpp"
 
 namespace tandem {
 namespace {
-
-// Three axes at once, and what follows them in memory.
-using Four = std::int32_t __attribute__((vector_size(16)));
-using FourWords = std::int16_t __attribute__((vector_size(8)));
-using FourBits = std::uint32_t __attribute__((vector_size(16)));
 
 constexpr std::int32_t kForceLimit = 1 << 26;  // times a mobility of 16 a velocity stays below 2^31
 
@@ -25,23 +21,6 @@ inline std::int32_t here(std::int32_t count) {
 #endif
   return count;
 }
-inline Four same(std::int32_t x) { return Four{x, x, x, x}; }
-template <class X>
-inline X clamped(X x, X limit) {
-  x = x < -limit ? -limit : x;
-  return x > limit ? limit : x;
-}
-template <class T>
-inline Four load(const T& from) {
-  Four x;
-  std::memcpy(&x, &from, sizeof x);
-  return x;
-}
-
-inline FourBits bits_of(Four x) { return reinterpret_cast<FourBits>(x); }
-inline std::uint32_t bits_of(std::int32_t x) { return static_cast<std::uint32_t>(x); }
-inline Four value_of(FourBits bits) { return reinterpret_cast<Four>(bits); }
-inline std::int32_t value_of(std::uint32_t bits) { return static_cast<std::int32_t>(bits); }
 
 // (x * share + half) >> (16 + bits) in 32 bits, for share < 2^16: the halves of x one by one.
 template <class X>
@@ -100,18 +79,6 @@ inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
   return view;
 }
 
-// Four rows of four, turned over.
-inline void transpose(std::array<Four, 4>& row) {
-  const Four ab_low = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
-  const Four ab_high = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
-  const Four cd_low = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
-  const Four cd_high = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
-  row[0] = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
-  row[1] = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
-  row[2] = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
-  row[3] = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
-}
-
 // Slots that follow each other, in the last sub-step.
 struct Slots {
   static constexpr std::size_t kMost = 64;
@@ -130,8 +97,8 @@ struct Slots {
                                           Slots& slots) {
   const std::uint32_t* const at = &place[slots.first];
   for (std::size_t k = 0; k < slots.count; k += 4) {
-    std::array<Four, 4> f{load(forces[at[k]].f), load(forces[at[k + 1]].f), load(forces[at[k + 2]].f),
-                          load(forces[at[k + 3]].f)};
+    std::array<Four, 4> f{load<Four>(forces[at[k]].f), load<Four>(forces[at[k + 1]].f),
+                          load<Four>(forces[at[k + 2]].f), load<Four>(forces[at[k + 3]].f)};
     transpose(f);
     for (std::size_t i = 0; i < 3; ++i) std::memcpy(&slots.f[i][k], &f[i], sizeof f[i]);
     std::memcpy(&slots.mobility[k], &f[3], sizeof f[3]);
@@ -185,8 +152,8 @@ TANDEM_VECTOR_CLONES void place_bodies(std::span<const ContactBody> bodies, cons
   const auto near_shift = static_cast<std::int32_t>(places.near_shift);
   const Four share = same(places.later_share);
   for (std::size_t k = 0; k < bodies.size(); ++k) {
-    const Four p = load(bodies[k].p);
-    const Four v = load(bodies[k].v) & Four{-1, -1, -1, 0};
+    const Four p = load<Four>(bodies[k].p);
+    const Four v = load<Four>(bodies[k].v) & Four{-1, -1, -1, 0};
     views[k] = view(p, v, shift);
     forces[k].f = {};
     const FourWords now = __builtin_convertvector(p >> here(near_shift), FourWords);
@@ -217,9 +184,9 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
     Four c{};
     if (const State* const s = move.accelerated; s != nullptr)
       c = Four{s->c(0)[slot], s->c(1)[slot], s->c(2)[slot], 0};
-    const Four p_and_radius = load(body.p);
-    const Four v_and_slot = load(body.v);
-    const Four f = load(force.f);
+    const Four p_and_radius = load<Four>(body.p);
+    const Four v_and_slot = load<Four>(body.v);
+    const Four f = load<Four>(force.f);
     const Four push = move.one_mobility ? motion.push(f) : motion.push(f, same(force.mobility));
     const Four v = motion.slowed((v_and_slot & axes) + gravity + push + c);
     const Four new_v = either(axes, v, v_and_slot);

@@ -2,112 +2,208 @@
 
 #include <cstring>
 
+#if defined(__wasm_simd128__)
+#include <wasm_simd128.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 #include "sdk/core/predict/contact/cells.hpp"
+#include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/law.hpp"
 
 namespace tandem {
 namespace {
 
-// Four bodies at once, in what compilers make of it on any processor.
-using Four = std::uint32_t __attribute__((vector_size(16)));
-using FourSigned = std::int32_t __attribute__((vector_size(16)));
-using Eight = std::uint16_t __attribute__((vector_size(16)));
-
-inline Four load(const std::uint32_t* from) {
-  Four x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
-inline Four same(std::uint32_t x) { return Four{x, x, x, x}; }
-
-// The squares of the lower and of the upper 16 bits, both signed.
-inline Four squared_low(Four words) {
-  const FourSigned low = reinterpret_cast<FourSigned>(words << 16U) >> 16;
-  return reinterpret_cast<Four>(low * low);
-}
-inline Four squared_high(Four words) {
-  const FourSigned high = reinterpret_cast<FourSigned>(words) >> 16;
-  return reinterpret_cast<Four>(high * high);
-}
-inline Four apart(Four a, Four b) {
-  return reinterpret_cast<Four>(reinterpret_cast<Eight>(a) - reinterpret_cast<Eight>(b));
+inline FourBits load_at(const std::uint32_t* from) { return load<FourBits>(*from); }
+inline void store(std::uint32_t* to, FourBits x) { std::memcpy(to, &x, sizeof x); }
+inline FourBits apart(FourBits a, FourBits b) {
+  return reinterpret_cast<FourBits>(reinterpret_cast<EightHalves>(a) - reinterpret_cast<EightHalves>(b));
 }
 
-// Who is near one body.
+// The square of the lower plus that of the upper 16 bits, both signed. One instruction where there is one.
+inline FourBits squared(FourBits words) {
+#if defined(__wasm_simd128__)
+  return reinterpret_cast<FourBits>(wasm_i32x4_dot_i16x8(words, words));
+#elif defined(__aarch64__)
+  const auto w = reinterpret_cast<int16x8_t>(words);
+  return reinterpret_cast<FourBits>(
+      vpaddq_s32(vmull_s16(vget_low_s16(w), vget_low_s16(w)), vmull_high_s16(w, w)));
+#elif defined(__SSE2__)
+  const auto w = reinterpret_cast<__m128i>(words);
+  return reinterpret_cast<FourBits>(_mm_madd_epi16(w, w));
+#else
+  const Four low = reinterpret_cast<Four>(words << 16U) >> 16;
+  const Four high = reinterpret_cast<Four>(words) >> 16;
+  return reinterpret_cast<FourBits>(low * low) + reinterpret_cast<FourBits>(high * high);
+#endif
+}
+
+// A bit for each element, which is all ones or none.
+inline std::uint32_t bits_set(FourBits mask) {
+#if defined(__wasm_simd128__)
+  return static_cast<std::uint32_t>(wasm_i32x4_bitmask(mask));
+#elif defined(__aarch64__)
+  return vaddvq_u32(reinterpret_cast<uint32x4_t>(mask & FourBits{1, 2, 4, 8}));
+#elif defined(__SSE2__)
+  return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(mask)));
+#else
+  return (mask[0] & 1U) | (mask[1] & 2U) | (mask[2] & 4U) | (mask[3] & 8U);
+#endif
+}
+
+// By four bits: the positions of those set, and how many they are.
+struct Compression {
+  FourBits positions;
+  std::uint32_t count;
+};
+constexpr Compression kCompressions[16] = {
+    {{0, 0, 0, 0}, 0}, {{0, 0, 0, 0}, 1}, {{1, 0, 0, 0}, 1}, {{0, 1, 0, 0}, 2},
+    {{2, 0, 0, 0}, 1}, {{0, 2, 0, 0}, 2}, {{1, 2, 0, 0}, 2}, {{0, 1, 2, 0}, 3},
+    {{3, 0, 0, 0}, 1}, {{0, 3, 0, 0}, 2}, {{1, 3, 0, 0}, 2}, {{0, 1, 3, 0}, 3},
+    {{2, 3, 0, 0}, 2}, {{0, 2, 3, 0}, 3}, {{1, 2, 3, 0}, 3}, {{0, 1, 2, 3}, 4}};
+
+// Who is near one body; `kLater`: also where bodies are later. How many are is as good as random: no branch
+// depends on it.
+template <bool kLater>
 class Search {
  public:
-  Search(const ContactGrid& grid, const ContactPairs& pairs) : grid_(grid), pairs_(pairs) {}
+  Search(const ContactGrid& grid, const ContactPairs& pairs)
+      : xy_(grid.xy),
+        later_xy_(grid.later_xy),
+        z_(grid.z),
+        near_squared_(same(grid.near_squared)),
+        first_(pairs.first),
+        second_(pairs.second),
+        count_(pairs.count) {}
 
-  [[nodiscard]] std::uint32_t count() const { return pairs_.count; }
+  [[nodiscard]] std::uint32_t count() const { return count_; }
   void start(std::uint32_t place) {
-    self_ = place;
-    self_xy_ = same(grid_.xy[place]);
-    self_z_ = same(grid_.z[place]);
-    if (grid_.later_xy != nullptr) self_later_xy_ = same(grid_.later_xy[place]);
+    self_ = same(place);
+    self_xy_ = same(xy_[place]);
+    self_z_ = same(z_[place]);
+    if constexpr (kLater) self_later_xy_ = same(later_xy_[place]);
   }
   void among(std::uint32_t from, std::uint32_t to) {
     for (; from < to; from += 4) {
-      const Four xy = apart(load(grid_.xy + from), self_xy_);
-      const Four z = apart(load(grid_.z + from), self_z_);
-      Four near =
-          reinterpret_cast<Four>(squared_low(xy) + squared_high(xy) + squared_low(z) < grid_.near_squared);
-      if (grid_.later_xy != nullptr) {
-        const Four later = apart(load(grid_.later_xy + from), self_later_xy_);
-        near |= reinterpret_cast<Four>(squared_low(later) + squared_high(later) + squared_high(z) <
-                                       grid_.near_squared);
+      const FourBits xy = apart(load_at(xy_ + from), self_xy_);
+      const FourBits z = apart(load_at(z_ + from), self_z_);
+      auto near = squared(xy) + squared(kLater ? z & 0xFFFFU : z) < near_squared_;
+      if constexpr (kLater) {
+        const FourBits later = apart(load_at(later_xy_ + from), self_later_xy_);
+        near |= squared(later) + squared(z >> 16U) < near_squared_;
       }
-      near &= reinterpret_cast<Four>(Four{0, 1, 2, 3} < to - from);
-      for (std::uint32_t i = 0; i < 4; ++i) {
-        pairs_.first[pairs_.count] = self_;
-        pairs_.second[pairs_.count] = from + i;
-        pairs_.count += near[i] & 1U;
-      }
+      near &= FourBits{0, 1, 2, 3} < same(to - from);
+      const Compression& compression = kCompressions[bits_set(reinterpret_cast<FourBits>(near))];
+      store(first_ + count_, self_);
+      store(second_ + count_, compression.positions + same(from));
+      count_ += compression.count;
     }
   }
 
  private:
-  ContactGrid grid_;
-  ContactPairs pairs_;
-  std::uint32_t self_ = 0;
-  Four self_xy_{}, self_z_{}, self_later_xy_{};
+  const std::uint32_t *xy_, *later_xy_, *z_;
+  FourBits near_squared_;
+  std::uint32_t *first_, *second_;
+  std::uint32_t count_;
+  FourBits self_{}, self_xy_{}, self_z_{}, self_later_xy_{};
 };
 
-std::int32_t difference(std::int16_t b, std::int16_t a) { return static_cast<std::int16_t>(b - a); }
+std::uint32_t find(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough, ContactPairs& pairs) {
+  return grid.later_xy != nullptr ? find_pairs<Search<true>>(grid, place, enough, pairs)
+                                  : find_pairs<Search<false>>(grid, place, enough, pairs);
+}
+
+inline Four low_words(EightWords words) {
+  return __builtin_convertvector(__builtin_shufflevector(words, words, 0, 1, 2, 3), Four);
+}
+inline Four high_words(EightWords words) {
+  return __builtin_convertvector(__builtin_shufflevector(words, words, 4, 5, 6, 7), Four);
+}
+
+inline void add(ContactForce& force, Four change) {
+  const Four sum = load<Four>(force) + change;
+  std::memcpy(&force, &sum, sizeof sum);
+}
+
+// A body's pairs follow each other. Those worked on at once are from four places far apart, or each would
+// wait for the sum that the one before it stores.
+constexpr std::size_t kStride = ContactPairs::kBatch / 4;
+
+// The forces of four pairs on the first of each, a row for a pair.
+inline std::array<Four, 4> forces_of(const ContactLaw& law, const std::uint32_t* inverse_root,
+                                     const ContactView* views, const std::uint32_t* first,
+                                     const std::uint32_t* second) {
+  // The radius of the first is negated, so that the difference of the radii is their sum.
+  constexpr EightHalves kSigns{1, 1, 1, 0xFFFF, 1, 1, 1, 1};
+  std::array<EightHalves, 4> row;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto a = load<EightHalves>(views[first[k * kStride]]);
+    const auto b = load<EightHalves>(views[second[k * kStride]]);
+    row[k] = b - a * kSigns;
+  }
+  const auto places = [](EightHalves a, EightHalves b) {
+    return reinterpret_cast<Four>(__builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11));
+  };
+  const auto speeds = [](EightHalves a, EightHalves b) {
+    return reinterpret_cast<Four>(__builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15));
+  };
+  const auto front = [](Four a, Four b) {
+    return reinterpret_cast<EightWords>(__builtin_shufflevector(a, b, 0, 4, 1, 5));
+  };
+  const auto back = [](Four a, Four b) {
+    return reinterpret_cast<EightWords>(__builtin_shufflevector(a, b, 2, 6, 3, 7));
+  };
+  const Four places01 = places(row[0], row[1]), places23 = places(row[2], row[3]);
+  const Four speeds01 = speeds(row[0], row[1]), speeds23 = speeds(row[2], row[3]);
+  const EightWords d_xy = front(places01, places23), d_z_reach = back(places01, places23);
+  const EightWords u_xy = front(speeds01, speeds23), u_z = back(speeds01, speeds23);
+  const std::array<Four, 3> d{low_words(d_xy), high_words(d_xy), low_words(d_z_reach)};
+  const std::array<Four, 3> u{low_words(u_xy), high_words(u_xy), low_words(u_z)};
+  const Four reach = high_words(d_z_reach);
+
+  FourBits squared = bits_of(d[0] * d[0]) + bits_of(d[1] * d[1]) + bits_of(d[2] * d[2]);
+  const auto touches = reinterpret_cast<FourBits>(squared < bits_of(reach * reach));
+  squared &= touches;
+  const FourBits inverse = FourBits{inverse_root[squared[0] >> 16U], inverse_root[squared[1] >> 16U],
+                                    inverse_root[squared[2] >> 16U], inverse_root[squared[3] >> 16U]} &
+                           touches;
+  // Half way to the middle of the table's entry: its slope is twice the root's.
+  const FourBits middle = (squared + ((squared & 0xFFFF0000U) | 0x8000U)) >> 1U;
+  const Four distance = value_of((middle >> 12U) * inverse >> 18U);
+  Four overlap = reach - distance;
+  overlap &= overlap > 0;
+  std::array<Four, 3> n;
+  for (std::size_t i = 0; i < 3; ++i) n[i] = d[i] * value_of(inverse) >> 18;
+  n[1] += (squared == 0U) & (1 << 12);
+
+  const std::array<Four, 3> f = contact_force(law, overlap, n, u);
+  std::array<Four, 4> force{};
+  for (std::size_t i = 0; i < 3; ++i) force[i] = f[i] & value_of(touches);
+  transpose(force);
+  return force;
+}
 
 void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                 const ContactPairs& pairs, ContactForce* forces) {
-  for (std::uint32_t k = 0; k < pairs.count; ++k) {
-    const ContactView& a = views[pairs.first[k]];
-    const ContactView& b = views[pairs.second[k]];
-    Vec3i d{};
-    std::uint32_t squared = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      d[i] = difference(b.q[i], a.q[i]);
-      squared += static_cast<std::uint32_t>(d[i] * d[i]);
-    }
-    const std::int32_t reach = a.radius + b.radius;
-    if (squared >= static_cast<std::uint32_t>(reach * reach)) continue;
-    const std::uint32_t inverse = inverse_root[squared >> 16];
-    // Half way to the middle of the table's entry: its slope is twice the root's.
-    const std::uint32_t middle = (squared + ((squared & 0xFFFF0000U) | 0x8000U)) >> 1;
-    const auto distance = static_cast<std::int32_t>((middle >> 12) * inverse >> 18);
-    Vec3i n{0, squared == 0 ? 1 << 12 : 0, 0};
-    Vec3i u{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      n[i] += d[i] * static_cast<std::int32_t>(inverse) >> 18;
-      u[i] = b.v[i] - a.v[i];
-    }
-    const Vec3i f = contact_force(law, std::max(0, reach - distance), n, u);
-    for (std::size_t i = 0; i < 3; ++i) {
-      forces[pairs.first[k]].f[i] += f[i];
-      forces[pairs.second[k]].f[i] -= f[i];
+  for (std::uint32_t begin = 0; begin < pairs.count; begin += ContactPairs::kBatch) {
+    for (std::size_t k = 0; k < kStride; ++k) {
+      const std::uint32_t* const first = pairs.first + begin + k;
+      const std::uint32_t* const second = pairs.second + begin + k;
+      const std::array<Four, 4> f = forces_of(law, inverse_root, views, first, second);
+      for (std::size_t i = 0; i < 4; ++i) {
+        add(forces[first[i * kStride]], f[i]);
+        add(forces[second[i * kStride]], -f[i]);
+      }
     }
   }
 }
 
 }  // namespace
 
-ContactKernels portable_contact_kernels() { return {find_pairs<Search>, add_forces}; }
+ContactKernels portable_contact_kernels() { return {find, add_forces}; }
 
 ContactKernels fastest_contact_kernels() {
 #ifdef TANDEM_CONTACT_AVX2

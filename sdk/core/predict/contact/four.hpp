@@ -1,0 +1,50 @@
+#pragma once
+// Four 32-bit integers at once, in what compilers make of them on any processor.
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+
+namespace tandem {
+
+using Four = std::int32_t __attribute__((vector_size(16)));
+using FourBits = std::uint32_t __attribute__((vector_size(16)));
+using FourWords = std::int16_t __attribute__((vector_size(8)));
+using EightWords = std::int16_t __attribute__((vector_size(16)));
+using EightHalves = std::uint16_t __attribute__((vector_size(16)));  ///< differences of these wrap
+
+inline Four same(std::int32_t x) { return Four{x, x, x, x}; }
+inline FourBits same(std::uint32_t x) { return FourBits{x, x, x, x}; }
+inline std::uint32_t bits_of(std::int32_t x) { return static_cast<std::uint32_t>(x); }
+inline std::int32_t value_of(std::uint32_t bits) { return static_cast<std::int32_t>(bits); }
+inline FourBits bits_of(Four x) { return reinterpret_cast<FourBits>(x); }
+inline Four value_of(FourBits bits) { return reinterpret_cast<Four>(bits); }
+
+/// 16 bytes of anything.
+template <class Vector, class T>
+inline Vector load(const T& from) {
+  Vector x;
+  std::memcpy(&x, &from, sizeof x);
+  return x;
+}
+
+/// Also of single integers.
+template <class X>
+inline X clamped(X x, X limit) {
+  x = x < -limit ? -limit : x;
+  return x > limit ? limit : x;
+}
+
+/// Four rows of four, turned over.
+inline void transpose(std::array<Four, 4>& row) {
+  const Four ab_low = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
+  const Four ab_high = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
+  const Four cd_low = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
+  const Four cd_high = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
+  row[0] = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+  row[1] = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+  row[2] = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  row[3] = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
+}
+
+}  // namespace tandem
