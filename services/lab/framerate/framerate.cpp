@@ -139,9 +139,10 @@ std::optional<double> in_paper(const FramerateRow& row) {
 }  // namespace
 
 std::string find_bound(const FramerateRow& row, double link_bits_per_s, double share, double server_busy) {
-  if (row.link_mbit_per_s.value_or(0) * kBitsPerMbit >= 0.9 * link_bits_per_s || row.dropped.value_or(0) > 0)
-    return "link";
+  if (row.link_mbit_per_s.value_or(0) * kBitsPerMbit >= 0.9 * link_bits_per_s) return "link";
   if (row.client_cpu_ms.value_or(0) * row.updates_per_s / 1e3 >= 0.8 * share) return "processor";
+  // Only then: a packet lost in a burst does not slow down whom the processor does.
+  if (row.dropped.value_or(0) > 0) return "link";
   return server_busy >= 0.9 ? "server" : "round trip";
 }
 

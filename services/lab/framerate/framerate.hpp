@@ -74,9 +74,9 @@ struct FramerateSetup {
 void measure_row(const FramerateSetup& setup, ThinDevice* device,
                  const std::optional<Calibration>& calibration, FramerateRow& row);
 
-/// Of a row that was measured with a server: "link" (carries 0.9 of its rate, or drops), "processor" (takes
-/// 0.8 of its share), "server" (0.9 of a processor there), or "round trip": the window of frames on their
-/// way.
+/// Of a row that was measured with a server: "link" (carries 0.9 of its rate), "processor" (takes 0.8 of its
+/// share), "link" too where it drops anything, "server" (0.9 of a processor there), or "round trip": the
+/// window of frames on their way.
 [[nodiscard]] std::string find_bound(const FramerateRow& row, double link_bits_per_s, double share,
                                      double server_busy);
 

@@ -62,6 +62,7 @@ TEST(Framerate, SaysWhatBoundsARow) {
   EXPECT_EQ(find_bound(row, 1.1e6, 0.035, 0.95), "link");
   row.dropped = 3;
   EXPECT_EQ(find_bound(row, 15e6, 0.035, 0.1), "link");
+  EXPECT_EQ(find_bound(row, 15e6, 0.006, 0.1), "processor") << "whatever was dropped besides";
 }
 
 TEST(Framerate, TheThesissDeviceIsSetByItsStep) {
