@@ -42,12 +42,14 @@ class ContactWalk {
   // registers.
   [[gnu::noinline]] Search around_the_ends(std::uint32_t place, std::uint32_t cell, Search search) const {
     search.among(place + 1, begin_[cell + 1]);
-    const auto among = [&](std::uint32_t of) { search.among(begin_[of & last_], begin_[(of & last_) + 1]); };
-    among(cell + 1);
+    among_cell(cell + 1, search);
     for (const std::uint32_t middle : middles_of(cell)) {
-      for (const std::uint32_t of : {middle - 1, middle, middle + 1}) among(of);
+      for (const std::uint32_t of : {middle - 1, middle, middle + 1}) among_cell(of, search);
     }
     return search;
+  }
+  [[gnu::noinline]] void among_cell(std::uint32_t cell, Search& search) const {
+    search.among(begin_[cell & last_], begin_[(cell & last_) + 1]);
   }
 
   const std::uint32_t* begin_;

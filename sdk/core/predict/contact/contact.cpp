@@ -243,7 +243,6 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
                forces_);
   copy(from, to);
   ContactMove move{shift_,
-                   one_mobility_,
                    constants_.substeps,
                    input.drive.gravity,
                    input.drive.damping,

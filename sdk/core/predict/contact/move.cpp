@@ -46,12 +46,8 @@ struct Motion {
 
   /// A change of v.
   template <class X>
-  [[nodiscard]] X push(X force) const {
-    return clamped(force, same_as(kForceLimit / force_scale, force)) * force_scale;
-  }
-  template <class X>
   [[nodiscard]] X push(X force, X mobility) const {
-    const X f = push(force);
+    const X f = clamped(force, same_as(kForceLimit / force_scale, force)) * force_scale;
     return f * (mobility >> 16) + share_of(f, mobility & 0xFFFF, 0, 1U << 15U);
   }
   /// `v` with all that pushes it.
@@ -118,7 +114,7 @@ struct Slots {
 }
 
 // `kOnly`: the frame is one step.
-template <bool kOnly, bool kOneMobility>
+template <bool kOnly>
 [[gnu::always_inline]] inline void move_slots(const ContactMove& move, const Slots& slots, const State& from,
                                               State& to) {
   const Motion motion(move);
@@ -130,8 +126,7 @@ template <bool kOnly, bool kOneMobility>
     const std::int32_t decay = move.decay;
     Slots::Column next_p, next_v, next_c;  // `to` may be `from`
     for (std::size_t k = 0; k < slots.count; ++k) {
-      const std::int32_t force = slots.f[i][k];
-      const std::int32_t push = kOneMobility ? motion.push(force) : motion.push(force, slots.mobility[k]);
+      const std::int32_t push = motion.push(slots.f[i][k], slots.mobility[k]);
       const std::int32_t new_v = motion.slowed(v[k] + gravity + push + (kOnly ? c[k] : 0));
       const std::int32_t new_p = motion.moved(p[k], new_v, kOnly);
       next_p[k] = either(slots.moving[k], new_p, p[k]) & slots.living[k];
@@ -187,7 +182,7 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
     const Four p_and_radius = load<Four>(body.p);
     const Four v_and_slot = load<Four>(body.v);
     const Four f = load<Four>(force.f);
-    const Four push = move.one_mobility ? motion.push(f) : motion.push(f, same(force.mobility));
+    const Four push = motion.push(f, same(force.mobility));
     const Four v = motion.slowed((v_and_slot & axes) + gravity + push + c);
     const Four new_v = either(axes, v, v_and_slot);
     const Four new_p = either(axes, motion.moved(p_and_radius, v, false), p_and_radius);
@@ -206,12 +201,10 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<const C
     slots.first = first;
     slots.count = std::min<std::size_t>(Slots::kMost, to.capacity() - first);
     gather(move, bodies, forces, place, to, slots);
-    if (move.substeps == 1 && move.one_mobility) {
-      move_slots<true, true>(move, slots, from, to);
-    } else if (move.substeps == 1) {
-      move_slots<true, false>(move, slots, from, to);
+    if (move.substeps == 1) {
+      move_slots<true>(move, slots, from, to);
     } else {
-      move_slots<false, false>(move, slots, from, to);
+      move_slots<false>(move, slots, from, to);
     }
   }
 }

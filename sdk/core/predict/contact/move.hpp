@@ -10,7 +10,6 @@ namespace tandem {
 
 struct ContactMove {
   std::uint32_t shift;  ///< a grid unit is 2^shift lattice units
-  bool one_mobility;    ///< the mobility of all bodies is 65536
   std::int32_t substeps;
   Vec3i gravity;
   std::uint32_t damping;
