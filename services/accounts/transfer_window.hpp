@@ -10,12 +10,13 @@
 namespace tandem::accounts {
 
 /// Bytes in flight that fill a link of unknown rate without filling the queues in front of it, where deltas
-/// wait too. Follows the delay, as FAST TCP does (Jin, Wei, Low 2004), because DDS repairs what is lost
-/// before anybody here can see it: where a link is full, the delay settles at kQueueNs above the least. Not
+/// wait too. Follows the delay, as FAST TCP does (Jin, Wei, Low 2004), because a queue that drops parts has
+/// long made deltas late: where a link is full, the delay settles at kQueueNs above the least. Not
 /// thread-safe.
 class TransferWindow {
  public:
-  static constexpr std::size_t kLeast = 2'600;     ///< also what goes out before anything is known
+  static constexpr std::size_t kLeast = 1'300;
+  static constexpr std::size_t kFirst = 2'600;     ///< goes out before anything is known
   static constexpr std::size_t kMost = 4U << 20U;  ///< 1 Gbit/s at 30 ms from sending to acknowledgement
   static constexpr std::int64_t kQueueNs = 100 * kMillisecond;
 
@@ -42,13 +43,13 @@ class TransferWindow {
  private:
   void resize(double factor, std::int64_t now_ns) {
     const auto wanted = static_cast<std::size_t>(static_cast<double>(bytes_) * std::max(factor, 0.5));
-    // Half of the least on top, so that delays that have other reasons do not hold it there.
+    // A little on top, so that delays that have other reasons do not hold it there.
     bytes_ = std::clamp(wanted + kLeast / 2, kLeast, kMost);
     round_ns_ = now_ns;
     sum_ns_ = arrivals_ = 0;
   }
 
-  std::size_t bytes_ = kLeast;
+  std::size_t bytes_ = kFirst;
   std::int64_t least_ns_ = INT64_MAX;       // mean of a round
   std::int64_t delay_ns_ = 0;               // mean of this round so far, or of the last; 0: none yet
   std::int64_t round_ns_ = 0;               // when this round began

@@ -4,8 +4,15 @@
 #include <utility>
 
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/units.hpp"
 
 namespace tandem::host {
+namespace {
+
+// A part that arrives so much later than one sent after it was not overtaken but lost.
+constexpr std::int64_t kReorderNs = 20 * kMillisecond;
+
+}  // namespace
 
 void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
                              std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
@@ -23,6 +30,7 @@ void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::spa
   for (const transport::ClientId client : receivers) admit(client, now_ns);
   window_ = {};
   started_ns_ = now_ns;
+  overtaken_ns_ = INT64_MIN;
 }
 
 void SnapshotTransfer::end() {
@@ -81,7 +89,9 @@ void SnapshotTransfer::acknowledged(const transport::AckMessage& ack, std::int64
 
 void SnapshotTransfer::received(std::size_t part, std::int64_t now_ns) {
   Part& p = parts_[part];
-  if (--p.lacking == 0 && p.sent_ns && !p.again) window_.arrived(now_ns - *p.sent_ns, now_ns);
+  if (--p.lacking != 0 || !p.sent_ns || p.again) return;
+  window_.arrived(now_ns - *p.sent_ns, now_ns);
+  overtaken_ns_ = std::max(overtaken_ns_, *p.sent_ns - kReorderNs);
 }
 
 void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns) {
@@ -104,7 +114,7 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
 }
 
 bool SnapshotTransfer::on_its_way(const Part& part, std::int64_t now_ns) const {
-  return part.sent_ns && now_ns - *part.sent_ns < window_.patience_ns();
+  return part.sent_ns && *part.sent_ns >= overtaken_ns_ && now_ns - *part.sent_ns < window_.patience_ns();
 }
 
 std::size_t SnapshotTransfer::in_flight(std::int64_t now_ns, std::size_t& parts) const {

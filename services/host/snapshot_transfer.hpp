@@ -65,7 +65,7 @@ class SnapshotTransfer {
   void admit(transport::ClientId client, std::int64_t now_ns);
   void dismiss(transport::ClientId client);
   void received(std::size_t part, std::int64_t now_ns);
-  // Sent, and not yet late; whether it has arrived is another question.
+  // Sent, and neither late nor overtaken; whether it has arrived is another question.
   [[nodiscard]] bool on_its_way(const Part& part, std::int64_t now_ns) const;
   [[nodiscard]] std::size_t in_flight(std::int64_t now_ns, std::size_t& parts) const;
   [[nodiscard]] bool queue(std::size_t part, std::int64_t now_ns);
@@ -78,6 +78,7 @@ class SnapshotTransfer {
   std::map<transport::ClientId, Receiver> receivers_;
   accounts::TransferWindow window_;
   std::int64_t started_ns_ = 0;
+  std::int64_t overtaken_ns_ = INT64_MIN;  // what was sent before this and has not arrived is lost
   std::uint64_t bytes_ = 0;
 };
 

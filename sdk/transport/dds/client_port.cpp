@@ -67,7 +67,7 @@ class DdsClientPort final : public ClientPort {
     // only while the application does not take it.
     const auto depth = static_cast<std::int32_t>(
         delta_depth(session.frame_rate_hz, session.window_ceiling, stream.max_delta_bytes));
-    auto delta = reader<DeltaMessage>("deltas", stream.id.id, depth);
+    auto delta = reader<DeltaMessage>("deltas", stream.id.id, {.depth = depth});
     if (!delta) return tl::unexpected(delta.error());
     streams_.emplace(stream.id.id, Stream{std::move(*delta), std::nullopt, {}})
         .first->second.set_limits(limits);
@@ -83,7 +83,10 @@ class DdsClientPort final : public ClientPort {
     const auto open = streams_.find(stream);
     if (open == streams_.end()) return fail(ErrorCode::kOutOfOrder, "that stream is not open");
     if (open->second.snapshots) return {};
-    auto snapshots = reader<SnapshotMessage>("snapshots", stream, Topic<SnapshotMessage>::kQos.reader_depth);
+    // The server repeats what acknowledgements say is missing, at the pace of the link; DDS would repeat it
+    // besides, at its own.
+    auto snapshots = reader<SnapshotMessage>(
+        "snapshots", stream, {.depth = Topic<SnapshotMessage>::kQos.reader_depth, .best_effort = true});
     if (!snapshots) return tl::unexpected(snapshots.error());
     open->second.snapshots.emplace(std::move(*snapshots));
     open->second.set_limits(open->second.limits);
@@ -140,8 +143,7 @@ class DdsClientPort final : public ClientPort {
   };
 
   template <class M>
-  Result<Reader<M>> reader(const std::string& name, std::uint32_t stream, std::int32_t depth) {
-    dds::ReaderOptions options{.depth = depth};
+  Result<Reader<M>> reader(const std::string& name, std::uint32_t stream, dds::ReaderOptions options) {
     if (stream != 0) options.partitions = {stream_partition(options_.session, stream)};
     return endpoints_.node.reader<M>(name, options);
   }

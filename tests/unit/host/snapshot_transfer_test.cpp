@@ -120,7 +120,7 @@ TEST_F(SnapshotTransferTest, PartsAreConsecutiveCutsThatTellWhatTheyBelongTo) {
 
 TEST_F(SnapshotTransferTest, NoMoreIsOnItsWayThanTheWindowUntilSomethingArrived) {
   start(7, 100 * kPart, {1});
-  EXPECT_EQ(send().size() * kPart, TransferWindow::kLeast);
+  EXPECT_EQ(send().size() * kPart, TransferWindow::kFirst);
   EXPECT_TRUE(send().empty());
 }
 
@@ -149,7 +149,7 @@ TEST_F(SnapshotTransferTest, TheSlowestReceiverSetsThePace) {
     }
     now_ns += 10 * kMillisecond;
   }
-  EXPECT_EQ(transfer.bytes(), TransferWindow::kLeast) << "2 got nothing yet";
+  EXPECT_EQ(transfer.bytes(), TransferWindow::kFirst) << "2 got nothing yet";
 }
 
 TEST_F(SnapshotTransferTest, WhatDoesNotArriveIsSentAgainAndOnlyThat) {
@@ -167,6 +167,26 @@ TEST_F(SnapshotTransferTest, WhatDoesNotArriveIsSentAgainAndOnlyThat) {
   }
   EXPECT_EQ(parts, (std::vector<std::uint32_t>{2, 3, 0}));
   EXPECT_TRUE(assemblies.at(1).take());
+}
+
+TEST_F(SnapshotTransferTest, WhatLaterPartsOvertookIsSentAgainAtOnce) {
+  start(7, 100 * kPart, {1});
+  for (int i = 0; i < 2; ++i, now_ns += 30 * kMillisecond) {
+    for (const auto& part : send()) deliver(part);
+  }
+  const auto sent = send();
+  ASSERT_GT(sent.size(), 1U);
+  const std::uint32_t lost = sent[0].part;
+  now_ns += 30 * kMillisecond;
+  for (std::size_t i = 1; i < sent.size(); ++i) deliver(sent[i]);
+  const auto later = send();
+  ASSERT_FALSE(later.empty());
+  EXPECT_NE(later[0].part, lost) << "of those sent together one may come after another";
+  now_ns += 30 * kMillisecond;
+  for (const auto& part : later) deliver(part);
+  const auto again = send();
+  ASSERT_FALSE(again.empty());
+  EXPECT_EQ(again[0].part, lost);
 }
 
 TEST_F(SnapshotTransferTest, AReceiverThatHoldsPartsIsServedAfterAPauseToo) {
