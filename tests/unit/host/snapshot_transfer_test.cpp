@@ -60,7 +60,8 @@ class SnapshotTransferTest : public ::testing::Test {
     }
   }
   /// Milliseconds until `client` has all of it, at most `most_ms`; `rate` in bytes a second, one way 10 ms.
-  int run_until_whole(ClientId client, double rate, int most_ms) {
+  /// What would wait for longer than `queue_ns` is dropped.
+  int run_until_whole(ClientId client, double rate, int most_ms, std::int64_t queue_ns = INT64_MAX) {
     struct Flying {
       std::int64_t at_ns;
       transport::SnapshotMessage part;
@@ -69,10 +70,11 @@ class SnapshotTransferTest : public ::testing::Test {
     std::int64_t free_ns = now_ns;  // when the link has sent what it was given
     for (int ms = 0; ms < most_ms; ++ms) {
       for (auto& part : send()) {
+        sent_bytes += part.bytes.size();
+        if (free_ns - now_ns > queue_ns) continue;
         free_ns = std::max(free_ns, now_ns) +
                   static_cast<std::int64_t>(static_cast<double>(part.bytes.size()) / rate * 1e9);
         longest_queue_ns = std::max(longest_queue_ns, free_ns - now_ns);
-        sent_bytes += part.bytes.size();
         link.push_back({free_ns + 10 * kMillisecond, std::move(part)});
       }
       while (!link.empty() && link.front().at_ns <= now_ns) {
@@ -187,6 +189,13 @@ TEST_F(SnapshotTransferTest, WhatLaterPartsOvertookIsSentAgainAtOnce) {
   const auto again = send();
   ASSERT_FALSE(again.empty());
   EXPECT_EQ(again[0].part, lost);
+}
+
+TEST_F(SnapshotTransferTest, AQueueThatDropsBeforeItDelaysIsNotFlooded) {
+  start(7, 150 * kPart, {1});
+  constexpr double kRate = 125'000;  // 1 Mbit/s: 1.6 s for all
+  EXPECT_LT(run_until_whole(1, kRate, 10'000, 50 * kMillisecond), 4'000);
+  EXPECT_LT(sent_bytes, 2 * bytes.size());
 }
 
 TEST_F(SnapshotTransferTest, AReceiverThatHoldsPartsIsServedAfterAPauseToo) {
