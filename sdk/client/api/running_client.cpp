@@ -191,6 +191,7 @@ Result<void> RunningClient::sample(const tandem_sample_options& options, const t
     if (auto can = usable(); !can) return can;
     core_.start_sampling();
     sampling_ = true;
+    port_->wake();  // from now on it wakes for each frame that is due
   }
   const auto sampled = core_.sample({.mode = static_cast<SampleMode>(options.mode),
                                      .at_ns = options.at_ns,

@@ -139,7 +139,7 @@ class ClientTimeline {
   void prepare();
 
   [[nodiscard]] Frame applied() const;  ///< last frame whose delta is in
-  [[nodiscard]] Frame now() const;      ///< last frame simulated, applied() .. applied() + max_lead
+  [[nodiscard]] Frame now() const;      ///< last frame stepped to, applied() .. applied() + max_lead
   /// State of a frame from applied() to now(); valid until the next call that is not const.
   [[nodiscard]] const State& state(Frame frame) const;
   [[nodiscard]] std::uint64_t hash() const;                          ///< of state(applied()), as last checked

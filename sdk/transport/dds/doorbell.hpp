@@ -26,8 +26,9 @@ class Doorbell {
   }
   /// Until it rings, at once if it has rung since the last wait; or for so long.
   void wait(std::chrono::nanoseconds timeout) {
-    // Before whoever waited looks at what came: a ring from here on counts for the next wait.
-    if (rang_within(timeout)) rung_ = false;
+    // Before whoever waited looks at what came: a ring from here on counts for the next wait. An exchange, so
+    // that what a ring without a post announced is seen.
+    if (rang_within(timeout)) rung_.exchange(false);
   }
 
  private:

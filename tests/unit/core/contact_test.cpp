@@ -47,6 +47,19 @@ TEST_P(ContactTiers, InPlaceEqualsApartForAnyState) {
   }
 }
 
+TEST_P(ContactTiers, AWorldWithoutBodiesStaysEmpty) {
+  for (const std::uint32_t capacity : {1U, 3U, 65U}) {
+    for (const std::int32_t substeps : {1, 2}) {
+      const auto predictor = predictor_of(GetParam(), capacity, constants_of(substeps));
+      const State from(capacity);
+      State to = from;
+      predictor->step(from, to, kFalling);
+      predictor->step(to, to, kFalling);
+      EXPECT_EQ(to, from);
+    }
+  }
+}
+
 TEST_P(ContactTiers, ExtremeConstantsMeetExtremeStates) {
   constexpr std::uint64_t kSeed = 52;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);

@@ -60,6 +60,23 @@ TEST(ClientTimeline, WhatIsPreparedIsSeenOnceItIsSteppedAndFollowsInputsThatCome
   }
 }
 
+TEST(ClientTimeline, ARefusedDeltaLeavesWhatIsPrepared) {
+  for (const std::uint32_t lead : {0U, 1U, 2U}) {
+    Pair pair(lead, "tracker");
+    for (int i = 0; i < 10; ++i) {
+      pair.client.prepare();
+      pair.client.step(lead);
+      pair.client.step(lead);
+      const std::array<std::byte, 3> nonsense{std::byte{0xFF}, std::byte{0xFF}, std::byte{0xFF}};
+      EXPECT_EQ(pair.client.apply(pair.client.applied() + 1, 0, 0, nonsense).error().code,
+                ErrorCode::kMalformed);
+      const auto applied = apply(pair.client, pair.frame());
+      ASSERT_TRUE(applied) << applied.error().message;
+      ASSERT_EQ(pair.client.state(pair.client.applied()), pair.server.state());
+    }
+  }
+}
+
 TEST(ClientTimeline, ASnapshotIsLoadedOverWhatIsPrepared) {
   Pair pair;
   pair.client.prepare();

@@ -213,10 +213,12 @@ void Contact::add_pairs(bool first) {
     add_forces(done, whole);
     done = whole;
     if (constants_.substeps > 1 && room - done >= kRoomForPairs) continue;
-    std::copy(&first_[done], &first_[pairs.count], &first_[0]);
-    std::copy(&second_[done], &second_[pairs.count], &second_[0]);
-    pairs.count -= done;
-    done = 0;
+    if (done > 0) {
+      std::copy(&first_[done], &first_[pairs.count], &first_[0]);
+      std::copy(&second_[done], &second_[pairs.count], &second_[0]);
+      pairs.count -= done;
+      done = 0;
+    }
     all_kept_ = false;
   }
   for (; pairs.count % kBatch != 0; ++pairs.count) first_[pairs.count] = second_[pairs.count] = 0;
@@ -258,7 +260,7 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
       move.damping = 0;
       move.accelerated = nullptr;
     } else {
-      move_bodies(move, bodies, forces_, place_, from, to);
+      move_bodies(move, bodies_, forces_, place_, from, to);
     }
   }
   turn_bodies(from, to);
