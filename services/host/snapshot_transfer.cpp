@@ -9,7 +9,7 @@
 namespace tandem::host {
 namespace {
 
-// A part that arrives so much later than one sent after it was not overtaken but lost.
+// A part that has not arrived while one sent more than this after it has is lost.
 constexpr std::int64_t kReorderNs = 20 * kMillisecond;
 
 }  // namespace
