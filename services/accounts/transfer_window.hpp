@@ -30,7 +30,7 @@ class TransferWindow {
     least_ns_ = std::min(least_ns_, delay_ns_);
     const double wanted = static_cast<double>(least_ns_ + kQueueNs) / static_cast<double>(delay_ns_ + 1);
     // A queue may drop before it delays: who lost something in a round does not grow in it.
-    resize(lost_ ? std::min(wanted, kAfterLoss) : std::min(wanted, 2.0), now_ns);
+    resize(std::min(wanted, lost_ ? kAfterLoss : 2.0), now_ns);
   }
   /// Something did not arrive within patience_ns(), or was overtaken.
   void lost(std::int64_t now_ns) {
