@@ -62,7 +62,7 @@ void ClientCore::consider_streams(Now now) {
   }
   const bool other = chooser_->reconsider(
       {.now_ns = now.steady_ns,
-       .joining_since_ns = e.played.joining ? std::optional(e.join_began_ns) : std::nullopt,
+       .idle_since_ns = e.played.joining ? std::optional(e.played.heard_ns) : std::nullopt,
        .round_trip_ns = e.pacer.clock().round_trip_ns()});
   if (other) change_stream(now);
 }

@@ -13,7 +13,6 @@ namespace tandem::client {
 namespace {
 
 // An acknowledgement is repeated after this, so that the server hears from a client even when no frame comes.
-constexpr std::int64_t kJoiningRepeatNs = 250 * kMillisecond;
 constexpr std::int64_t kPlayingRepeatNs = kSecond;
 constexpr std::int64_t kDeafRepeatNs = 4 * kSecond;  // nobody hears it: DDS repeats each many times by itself
 // Longest that poll() asks to sleep; and while it plays and misses nothing, when all that may happen wakes
@@ -111,7 +110,7 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
 std::int64_t ClientCore::next_ack_ns() const {
   const EpochState& e = *epoch_;
   const auto repeat_joining_ns = [this](const FollowedStream& joined) {
-    return last_ack_ns_ + (joined.part_unacknowledged ? EpochState::kPartAckNs : kJoiningRepeatNs);
+    return last_ack_ns_ + (joined.part_unacknowledged ? EpochState::kPartAckNs : joined.repeat_ns);
   };
   if (e.played.joining) return repeat_joining_ns(e.played);
   const std::int64_t changing_ns = e.next ? repeat_joining_ns(*e.next) : INT64_MAX;
@@ -238,6 +237,7 @@ void ClientCore::send_ack(Now now) {
   ack.phase = joins ? transport::Phase::kJoining : transport::Phase::kPlaying;
   if (joins) {
     joined.part_unacknowledged = false;
+    joined.repeat_ns = std::min(2 * joined.repeat_ns, FollowedStream::kMostRepeatNs);
     ack.snapshot_frame = joined.snapshot.frame();
     ack.snapshot_parts = joined.snapshot.parts();
     ack.missing = joined.snapshot.missing();

@@ -21,6 +21,7 @@ std::optional<transport::SnapshotMessage> ClientCore::join(FollowedStream& to, N
   if (to.joiner.poll(now.steady_ns)) {
     if (auto opened = port_.open_snapshots(to.stream.id.id); !opened)
       log(LogLevel::kError, opened.error().message);
+    to.repeat_ns = FollowedStream::kLeastRepeatNs;
     ack_due_ = true;
   }
   // The deltas in between were lost meanwhile, or sent before this client read them.

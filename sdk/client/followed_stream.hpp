@@ -35,7 +35,11 @@ struct FollowedStream {
   bool is_open = false;  ///< in the port
   bool joining = true;
   bool part_unacknowledged = false;  ///< of the snapshot that is coming in
-  std::int64_t heard_ns = 0;         ///< a part of the snapshot came, or the join began
+  /// Until `joining` is said again: soon after a question, as it may have been lost, then more and more
+  /// seldom.
+  static constexpr std::int64_t kLeastRepeatNs = 50'000'000, kMostRepeatNs = 250'000'000;
+  std::int64_t repeat_ns = kLeastRepeatNs;
+  std::int64_t heard_ns = 0;  ///< a part of the snapshot came, or the join began
   /// How long the front delta has waited for a scheduled input.
   std::optional<std::int64_t> input_missing_ns;
 };

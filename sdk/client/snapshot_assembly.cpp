@@ -8,9 +8,10 @@
 namespace tandem::client {
 
 SnapshotAssembly::Outcome SnapshotAssembly::add(transport::SnapshotMessage&& part) {
-  const bool malformed = part.parts == 0 || part.parts > transport::kMaxParts || part.part >= part.parts ||
-                         part.bytes.empty() || part.bytes.size() > part.total_bytes ||
-                         part.total_bytes > most_bytes_;
+  if (part.parts == 0) return Outcome::kIgnored;  // a greeting
+  const bool malformed = part.parts > transport::kMaxSnapshotParts || part.parts > part.total_bytes ||
+                         part.part >= part.parts || part.bytes.empty() ||
+                         part.bytes.size() > part.total_bytes || part.total_bytes > most_bytes_;
   if (malformed) {
     clear();
     return Outcome::kRefused;

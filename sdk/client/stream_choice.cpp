@@ -227,7 +227,7 @@ void StreamChooser::on_loss(std::int64_t now_ns) {
 
 void StreamChooser::look_at_last_second(const Seen& seen) {
   Candidate& present = offers_[chosen_];
-  if (frames_ > 0 && !seen.joining_since_ns) {
+  if (frames_ > 0 && !seen.idle_since_ns) {
     const double median_ns = 1e6 * costs_.quantile_ms(0.5);
     if (median_ns > 0) present.measured_ns = median_ns;
   }
@@ -270,7 +270,7 @@ std::optional<std::size_t> StreamChooser::find_named() const {
 // Fewer frames than the session has, while what is sent waits in a queue on the way. A server that waits for
 // another client, or is slow itself, leaves the round trip as it is.
 bool StreamChooser::starved(const Seen& seen) const {
-  if (seen.joining_since_ns || seen.round_trip_ns == 0 || best_round_trip_ns_ == 0) return false;
+  if (seen.idle_since_ns || seen.round_trip_ns == 0 || best_round_trip_ns_ == 0) return false;
   const auto elapsed_ns = static_cast<double>(seen.now_ns - looked_ns_);
   const bool late = static_cast<double>(frames_) * period_ns_ < kFullRate * elapsed_ns;
   return late && seen.round_trip_ns > 2 * best_round_trip_ns_ + kQueuedNs;
@@ -299,6 +299,11 @@ bool StreamChooser::reconsider(const Seen& seen) {
   look_at_last_second(seen);
   looked_ns_ = seen.now_ns;
   forget_old_figures(seen.now_ns);
+  if (seen.idle_since_ns) {  // a join that gets on is not given up for another
+    return seen.now_ns - std::max(*seen.idle_since_ns, changed_ns_) >= kLongJoinNs &&
+           leave_link("nothing of " + offers_[chosen_].offer.name + " came for 10 s while joining",
+                      seen.now_ns);
+  }
   if (const auto named = find_named()) {  // elsewhere only after a change that was given up
     if (*named == chosen_ || seen.now_ns < offers_[*named].barred_until_ns) return false;
     change(*named, "asked for by name", seen.now_ns);
@@ -311,10 +316,6 @@ bool StreamChooser::reconsider(const Seen& seen) {
     return true;
   if (starved_seconds_ >= kStarvedSeconds && leave_link("the link is too thin for " + name, seen.now_ns))
     return true;
-  if (seen.joining_since_ns) {
-    return seen.now_ns - std::max(*seen.joining_since_ns, changed_ns_) >= kLongJoinNs &&
-           leave_link("joining " + name + " takes too long", seen.now_ns);
-  }
   const Best wanted = best(seen.now_ns);
   const bool better = wanted.index != chosen_ && worthwhile(offers_[wanted.index], offers_[chosen_]);
   better_seconds_ = better && wanted.index == better_ ? better_seconds_ + 1 : (better ? 1 : 0);

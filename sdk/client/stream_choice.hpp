@@ -89,8 +89,9 @@ class StreamChooser {
 
   struct Seen {
     std::int64_t now_ns = 0;
-    std::optional<std::int64_t> joining_since_ns = {};  ///< nothing while playing
-    std::int64_t round_trip_ns = 0;                     ///< 0: unknown
+    /// While joining: since when nothing of a snapshot has come. Nothing while playing.
+    std::optional<std::int64_t> idle_since_ns = {};
+    std::int64_t round_trip_ns = 0;  ///< 0: unknown
   };
   /// The application wants something else: the next reconsider() chooses as at first.
   void prefer(StreamPreference preference);

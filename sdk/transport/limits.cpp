@@ -102,9 +102,10 @@ bool within_limits(const ScheduledInputMessage& message, const Limits& /*limits*
 }
 
 bool within_limits(const SnapshotMessage& message, const Limits& limits) {
-  return message.parts >= 1 && message.parts <= kMaxParts && message.part < message.parts &&
-         message.total_bytes <= limits.max_snapshot_bytes && !message.bytes.empty() &&
-         message.bytes.size() <= message.total_bytes;
+  if (message.parts == 0) return message.bytes.empty();  // a greeting
+  return message.parts <= kMaxSnapshotParts && message.parts <= message.total_bytes &&
+         message.part < message.parts && message.total_bytes <= limits.max_snapshot_bytes &&
+         !message.bytes.empty() && message.bytes.size() <= message.total_bytes;
 }
 
 bool within_limits(const ReplyMessage& message, const Limits& /*limits*/) {

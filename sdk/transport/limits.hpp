@@ -13,7 +13,8 @@ namespace tandem::transport {
 /// No sample is larger, whatever a session declares; transports refuse it on the wire where they can.
 inline constexpr std::uint32_t kMaxSampleBytes = 64U << 20U;
 inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
-inline constexpr std::uint32_t kMaxParts = 4096;  ///< of one delta or snapshot
+inline constexpr std::uint32_t kMaxParts = 4096;           ///< of one delta
+inline constexpr std::uint32_t kMaxSnapshotParts = 65536;  ///< of one snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
 inline constexpr std::size_t kMaxHullValues = 768;

@@ -118,8 +118,8 @@ struct SnapshotMessage {
   Epoch epoch = 0;
   StreamId stream;
   Frame frame = 0;
-  std::uint32_t part = 0, parts = 1;
-  std::uint32_t total_bytes = 0;  ///< of all parts together
+  std::uint32_t part = 0, parts = 1;  ///< parts 0: a greeting, which carries nothing
+  std::uint32_t total_bytes = 0;      ///< of all parts together
   Bytes bytes;
   bool operator==(const SnapshotMessage&) const = default;
 };

@@ -32,30 +32,32 @@ class ServerPort {
   /// Session announcements of other live servers in the same partition, newest of each.
   virtual void take_sessions(std::vector<Received<SessionMessage>>& out) = 0;
 
-  /// Writers of deltas and snapshots for streams 0 .. count - 1, each in its stream_partition(); before the
+  /// Writers of deltas for streams 0 .. count - 1, each in its stream_partition(); before the
   /// session is announced, and while nobody else calls the port. Those of stream 0 are there from the start.
   /// `count`: 1 .. kMaxStreams; those that are there stay. Errors: kInvalidArgument, kTransport.
   virtual Result<void> open_streams(std::uint32_t count) = 0;
 
   virtual Result<void> write(const SessionMessage&) = 0;
-  /// By message.stream.id, as snapshots. Errors: also kInvalidArgument, for a stream that is not open.
+  /// By message.stream.id. Errors: also kInvalidArgument, for a stream that is not open.
   virtual Result<void> write(const DeltaMessage&) = 0;
   virtual Result<void> write(const ScheduledInputMessage&) = 0;
-  virtual Result<void> write(const SnapshotMessage&) = 0;
-  /// Reaches the client alone where open_replies() was called for it; otherwise every client of the session.
+  /// Reaches that client alone. Errors: also kInvalidArgument, where open_client() was not called for it.
+  virtual Result<void> write(ClientId to, const SnapshotMessage&) = 0;
+  /// Reaches the client alone where open_client() was called for it; otherwise every client of the session.
   virtual Result<void> write(const ReplyMessage&) = 0;
   virtual Result<void> write(const ServerStatusMessage&) = 0;
-  /// A reply writer of the client's own, in reply_partition(). No effect while there is one. Part of the
-  /// writes, as is close_replies().
-  virtual Result<void> open_replies(ClientId client) = 0;
-  /// Its account is gone: ends its writer, and with it what late readers are handed.
-  virtual void close_replies(ClientId client) = 0;
+  /// Writers of replies and snapshots of the client's own, in client_partition(). No effect while there are
+  /// some. Part of the writes, as is close_client().
+  virtual Result<void> open_client(ClientId client) = 0;
+  /// Its account is gone: ends its writers, and with them what late readers are handed.
+  virtual void close_client(ClientId client) = 0;
 
   virtual void take(std::vector<Received<InputMessage>>& out) = 0;
   virtual void take(std::vector<Received<AckMessage>>& out) = 0;
-  /// The scheduled-input writer and the stream's delta and snapshot writers all have a matched reader in that
-  /// participant. False for a stream that is not open.
-  [[nodiscard]] virtual bool joined(const ParticipantId& participant, std::uint32_t stream) = 0;
+  /// The scheduled-input writer, the stream's delta writer and the client's snapshot writer all have a
+  /// matched reader in that participant. False for a stream or a client that is not open.
+  [[nodiscard]] virtual bool joined(const ParticipantId& participant, ClientId client,
+                                    std::uint32_t stream) = 0;
   /// The participant still has a live acknowledgement writer.
   [[nodiscard]] virtual bool alive(const ParticipantId& participant) = 0;
   /// Nothing is left of the participant: it said so itself, or was silent for longer than its lease.
@@ -96,8 +98,8 @@ class ClientPort {
   virtual void close_stream(std::uint32_t stream) = 0;
   /// Ends all subscriptions that open_stream() and open_snapshots() made.
   virtual void close_streams() = 0;
-  /// Subscribes to the snapshots of a stream that is open; close when one was taken. No effect while they
-  /// are.
+  /// Subscribes to the snapshots for this client, with the limits of a stream that is open; close when one
+  /// was taken. No effect while they are.
   virtual Result<void> open_snapshots(std::uint32_t stream) = 0;
   virtual void close_snapshots(std::uint32_t stream) = 0;
 
@@ -120,11 +122,11 @@ class ClientPort {
 /// Checks a session name: 1..64 characters of [A-Za-z0-9._-]; so no wildcard ever reaches a partition name.
 [[nodiscard]] Result<void> check_session_name(const std::string& name);
 
-/// Where the deltas and snapshots of a stream are: SESSION for stream 0, SESSION/k for stream k > 0.
+/// Where the deltas of a stream are: SESSION for stream 0, SESSION/k for stream k > 0.
 [[nodiscard]] std::string stream_partition(const std::string& session, std::uint32_t stream);
 
-/// Where the replies to a client with an account are: SESSION/ID, the id as 16 hex digits.
-[[nodiscard]] std::string reply_partition(const std::string& session, ClientId client);
+/// Where the snapshots for a client and the replies to it are: SESSION/ID, the id as 16 hex digits.
+[[nodiscard]] std::string client_partition(const std::string& session, ClientId client);
 
 /// Over everything that decides how the bytes of a stream are read, stepped and scaled: its layout and the
 /// session's protocol version and lattice unit. A client that computes another value refuses the stream.

@@ -40,7 +40,7 @@ std::string stream_partition(const std::string& session, std::uint32_t stream) {
   return partition;
 }
 
-std::string reply_partition(const std::string& session, ClientId client) {
+std::string client_partition(const std::string& session, ClientId client) {
   return session + '/' + to_hex(client);
 }
 

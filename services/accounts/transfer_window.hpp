@@ -1,7 +1,8 @@
 #pragma once
-// How much of a snapshot may be on its way at once.
+// How much of a snapshot may be on its way to one receiver, and how fast it leaves.
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -9,57 +10,132 @@
 
 namespace tandem::accounts {
 
-/// Bytes in flight that fill a link of unknown rate without filling the queues in front of it, where deltas
-/// wait too. Follows the delay, as FAST TCP does (Jin, Wei, Low 2004), because a queue that drops parts has
-/// long made deltas late: where a link is full, the delay settles at kQueueNs above the least. Not
+/// Bytes in flight that fill a link of unknown rate, delay, jitter and loss, and leave the queues in front of
+/// it to the deltas.
+///
+/// The window follows the rate at which parts arrive, as in BBR (Cardwell et al. 2016), not their delay and
+/// not their loss: DDS delivers in order, so that one lost packet holds up all behind it for a round trip,
+/// and jitter moves every delay. A rate is the most that was seen lately, which such pauses do not lower. Not
 /// thread-safe.
 class TransferWindow {
  public:
-  static constexpr std::size_t kLeast = 1'300;
-  static constexpr std::size_t kFirst = 2'600;     ///< goes out before anything is known
+  /// Goes out before anything is known: a quarter of a second on a link of 256 kbit/s.
+  static constexpr std::size_t kFirst = 7'800;
+  static constexpr std::size_t kLeast = 2'600;
   static constexpr std::size_t kMost = 4U << 20U;  ///< 1 Gbit/s at 30 ms from sending to acknowledgement
+  /// What a full link may have queued.
   static constexpr std::int64_t kQueueNs = 100 * kMillisecond;
 
+  /// What is remembered of each part that is sent, to be handed back when it arrived.
+  struct Sent {
+    std::int64_t at_ns = 0;
+    std::size_t bytes = 0;
+    std::uint64_t arrived = 0;            // bytes, by then
+    std::int64_t arrived_ns = 0;          // when the last of them was acknowledged
+    std::int64_t last_arrived_at_ns = 0;  // when the last of them had been sent
+  };
+
+  /// A part of so many bytes may leave beside those in flight.
+  [[nodiscard]] bool admits(std::size_t bytes, std::int64_t now_ns) const {
+    return flying_ == 0 || (flying_ + bytes <= bytes_ && now_ns >= next_ns_);
+  }
+  /// When the pace admits the next part; in the past, or of no matter, while the window is full.
+  [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
+  [[nodiscard]] bool is_full(std::size_t bytes) const { return flying_ > 0 && flying_ + bytes > bytes_; }
+
+  [[nodiscard]] Sent sent(std::size_t bytes, std::int64_t now_ns) {
+    if (flying_ == 0) {  // nothing was there to arrive: the time until now says nothing
+      arrived_ns_ = now_ns;
+      last_arrived_at_ns_ = now_ns;
+    }
+    flying_ += bytes;
+    if (pace_ > 0) {
+      // Behind its pace by a few milliseconds, as who polls is, it catches up; not after a pause.
+      const std::int64_t from_ns = std::max(next_ns_, now_ns - kBurstNs);
+      next_ns_ = from_ns + static_cast<std::int64_t>(static_cast<double>(bytes) / pace_ * 1e9);
+    }
+    return {now_ns, bytes, arrived_, arrived_ns_, last_arrived_at_ns_};
+  }
+  /// Is not waited for any more.
+  void lost(const Sent& part) { flying_ -= std::min(flying_, part.bytes); }
+  /// Parts of so many bytes were acknowledged together; `last` is the one that was sent last.
+  void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
+    flying_ -= std::min(flying_, bytes);
+    // Those that were on their way at the last acknowledgement came one after another since.
+    if (last.at_ns <= arrived_ns_ && arrived_ > 0)
+      saw_rate(bytes, std::max(now_ns - arrived_ns_, last.at_ns - last_arrived_at_ns_), now_ns);
+    arrived_ += bytes;
+    arrived_ns_ = now_ns;
+    last_arrived_at_ns_ = std::max(last_arrived_at_ns_, last.at_ns);
+    least_ns_ = std::min(least_ns_, std::max<std::int64_t>(now_ns - last.at_ns, 1));
+    saw_rate(static_cast<std::size_t>(arrived_ - last.arrived),
+             std::max(now_ns - last.arrived_ns, last.at_ns - last.last_arrived_at_ns), now_ns);
+    if (last.at_ns >= round_ns_) end_round(now_ns);
+    resize();
+  }
+  /// Nothing has arrived for long: what the link carries now is unknown.
+  void start_over() {
+    rates_ = {};
+    rate_at_round_ = 0;
+    flat_rounds_ = 0;
+    bytes_ = kLeast;
+    pace_ = 0;
+    least_ns_ = INT64_MAX;
+  }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
-  /// Something arrived everywhere, `delay_ns` after it was sent for the first and only time.
-  void arrived(std::int64_t delay_ns, std::int64_t now_ns) {
-    sum_ns_ += delay_ns;
-    ++arrivals_;
-    delay_ns_ = sum_ns_ / arrivals_;
-    if (now_ns - round_ns_ < delay_ns_) return;  // once a round trip
-    least_ns_ = std::min(least_ns_, delay_ns_);
-    const double wanted = static_cast<double>(least_ns_ + kQueueNs) / static_cast<double>(delay_ns_ + 1);
-    // A queue may drop before it delays: who lost something in a round does not grow in it.
-    resize(std::min(wanted, lost_ ? kAfterLoss : 2.0), now_ns);
-  }
-  /// Something did not arrive within patience_ns(), or was overtaken.
-  void lost(std::int64_t now_ns) {
-    lost_ = true;
-    if (now_ns - round_ns_ >= kSecond) resize(0.5, now_ns);
-  }
-  /// How long a part may take until it is sent again.
-  [[nodiscard]] std::int64_t patience_ns() const {
-    return delay_ns_ > 0 ? std::max(kSecond / 2, 4 * delay_ns_) : 2 * kSecond;
-  }
+  [[nodiscard]] std::size_t flying() const { return flying_; }
+  /// From sending to acknowledgement at best; 0: nothing arrived yet.
+  [[nodiscard]] std::int64_t least_ns() const { return least_ns_ == INT64_MAX ? 0 : least_ns_; }
 
  private:
-  static constexpr double kAfterLoss = 0.7;
+  static constexpr double kStartGain = 2.9;  // BBR's 2/ln 2: twice the rate each round trip
+  static constexpr int kFlatRounds = 2;      // in which the rate did not grow: the link is full
+  static constexpr std::int64_t kBurstNs = 5 * kMillisecond;
+  // Acknowledgements come 20 ms apart; two that jitter moved together must not pass for a fast link.
+  static constexpr std::int64_t kLeastGapNs = 10 * kMillisecond;
+  static constexpr std::int64_t kRateLastsNs = 2 * kSecond;
 
-  void resize(double factor, std::int64_t now_ns) {
-    const auto wanted = static_cast<std::size_t>(static_cast<double>(bytes_) * std::max(factor, 0.5));
-    // A little on top, so that delays that have other reasons do not hold it there.
-    bytes_ = std::clamp(wanted + kLeast / 2, kLeast, kMost);
+  void saw_rate(std::size_t bytes, std::int64_t within_ns, std::int64_t now_ns) {
+    const double rate =
+        static_cast<double>(bytes) * 1e9 / static_cast<double>(std::max(within_ns, kLeastGapNs));
+    // The most of this span and the last one.
+    if (now_ns - span_ns_ >= kRateLastsNs) {
+      rates_ = {now_ns - span_ns_ < 2 * kRateLastsNs ? rates_[1] : 0, 0};
+      span_ns_ = now_ns;
+    }
+    rates_[1] = std::max(rates_[1], rate);
+  }
+  [[nodiscard]] double rate() const { return std::max(rates_[0], rates_[1]); }
+
+  void end_round(std::int64_t now_ns) {
     round_ns_ = now_ns;
-    sum_ns_ = arrivals_ = 0;
-    lost_ = false;
+    flat_rounds_ = rate() < 1.25 * rate_at_round_ ? flat_rounds_ + 1 : 0;
+    rate_at_round_ = std::max(rate(), rate_at_round_);
   }
 
+  void resize() {
+    const auto least_s = static_cast<double>(least_ns_) * 1e-9;
+    const double full = rate() * (least_s + static_cast<double>(kQueueNs) * 1e-9);
+    const double wanted = starting() ? std::max(full, kStartGain * rate() * least_s) : full;
+    bytes_ =
+        static_cast<std::size_t>(std::clamp(wanted, static_cast<double>(kLeast), static_cast<double>(kMost)));
+    pace_ = static_cast<double>(bytes_) / least_s;
+  }
+  [[nodiscard]] bool starting() const { return flat_rounds_ < kFlatRounds; }
+
   std::size_t bytes_ = kFirst;
-  std::int64_t least_ns_ = INT64_MAX;       // mean of a round
-  std::int64_t delay_ns_ = 0;               // mean of this round so far, or of the last; 0: none yet
-  std::int64_t round_ns_ = 0;               // when this round began
-  std::int64_t sum_ns_ = 0, arrivals_ = 0;  // of this round
-  bool lost_ = false;                       // in this round
+  std::size_t flying_ = 0;
+  double pace_ = 0;  // bytes a second; 0: none
+  std::int64_t next_ns_ = INT64_MIN;
+  std::uint64_t arrived_ = 0;
+  std::int64_t arrived_ns_ = 0;
+  std::int64_t last_arrived_at_ns_ = 0;
+  std::int64_t least_ns_ = INT64_MAX;
+  std::array<double, 2> rates_{};  // bytes a second
+  std::int64_t span_ns_ = 0;
+  std::int64_t round_ns_ = 0;
+  double rate_at_round_ = 0;
+  int flat_rounds_ = 0;
 };
 
 }  // namespace tandem::accounts

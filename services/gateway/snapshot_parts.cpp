@@ -29,24 +29,25 @@ SnapshotParts::SnapshotParts(const World::Cut& cut, Epoch epoch, std::vector<Out
 bool SnapshotPassage::has_next() const {
   if (!snapshot_) return false;
   if (inputs_sent_ < snapshot_->inputs.size()) return true;
-  const std::size_t flying = (sent_ns_.size() - arrived_) * snapshot_->part_bytes;
-  return flying == 0 || flying + snapshot_->part_bytes <= window_.bytes();
+  return !window_.is_full(snapshot_->part_bytes);
 }
 
 OutgoingPtr SnapshotPassage::next(std::int64_t now_ns) {
   if (inputs_sent_ < snapshot_->inputs.size()) return snapshot_->inputs[inputs_sent_++];
-  OutgoingPtr part = snapshot_->parts[sent_ns_.size()];
-  sent_ns_.push_back(now_ns);
-  if (sent_ns_.size() == snapshot_->parts.size()) snapshot_.reset();
+  OutgoingPtr part = snapshot_->parts[sent_.size()];
+  sent_.push_back(window_.sent(snapshot_->part_bytes, now_ns));
+  if (sent_.size() == snapshot_->parts.size()) snapshot_.reset();
   return part;
 }
 
 void SnapshotPassage::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns) {
   if (!snapshot_ || ack.snapshot_frame != snapshot_->frame || ack.snapshot_parts != snapshot_->parts.size())
     return;
-  const std::size_t held = ack.missing.empty() ? sent_ns_.size() : ack.missing.front();
-  for (; arrived_ < std::min(held, sent_ns_.size()); ++arrived_)
-    window_.arrived(now_ns - sent_ns_[arrived_], now_ns);
+  const std::size_t held =
+      std::min<std::size_t>(ack.missing.empty() ? sent_.size() : ack.missing.front(), sent_.size());
+  if (held <= arrived_) return;
+  window_.arrived((held - arrived_) * snapshot_->part_bytes, sent_[held - 1], now_ns);
+  arrived_ = held;
 }
 
 }  // namespace tandem::gateway

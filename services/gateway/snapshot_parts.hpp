@@ -29,7 +29,7 @@ struct SnapshotParts {
   std::vector<OutgoingPtr> parts;
 };
 
-/// Paces the parts for one viewer: no more is on its way than the window that follows the delay of its link.
+/// Paces the parts for one viewer: no more is on its way than the window that follows the rate of its link.
 /// A WebSocket keeps order and loses nothing, so what arrived is a number of parts. Not thread-safe.
 class SnapshotPassage {
  public:
@@ -51,8 +51,8 @@ class SnapshotPassage {
   std::shared_ptr<const SnapshotParts> snapshot_;  // null once all is handed out
   std::int64_t began_ns_ = 0;
   std::size_t inputs_sent_ = 0;
-  std::size_t arrived_ = 0;            // parts
-  std::vector<std::int64_t> sent_ns_;  // by part, of those sent
+  std::size_t arrived_ = 0;                           // parts
+  std::vector<accounts::TransferWindow::Sent> sent_;  // by part
   accounts::TransferWindow window_;
 };
 

@@ -144,6 +144,7 @@ struct Host::Impl {
   bool advance_if_due(StreamSet snapshots_due);
   void choose_streams(StreamSet joined);
   void make_snapshots(StreamSet due);
+  void greet_joiners();
   void publish_status();
   void plan_wake();
 
@@ -220,6 +221,7 @@ bool Host::Impl::poll() {
     const StreamSet due = snapshots_due();
     produced = advance_if_due(due);
     if (due.any() && (produced || now_ns >= frame_awaited_until_ns())) make_snapshots(due);
+    greet_joiners();
     for (Lane& lane : lanes) lane.transfer.send(roster.accounts(), now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
@@ -434,6 +436,24 @@ void Host::Impl::make_snapshots(StreamSet due) {
   }
 }
 
+// Until their snapshot is made. A reader of Cyclone DDS drops what comes from a writer that is new to it
+// before the first heartbeat; one travels with each greeting.
+void Host::Impl::greet_joiners() {
+  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
+    transport::SnapshotMessage greeting;
+    greeting.epoch = config.epoch;
+    greeting.stream = {.id = id, .generation = 0};
+    greeting.parts = 0;
+    for (const transport::ClientId client : lanes[id].joins.ready()) {
+      const auto account = roster.accounts().find(client);
+      if (account == roster.accounts().end() || was_served(account->second)) continue;
+      std::int64_t& greeted_ns = account->second.join.greeted_ns;
+      if (greeted_ns != INT64_MIN && now_ns - greeted_ns < kShortWakeNs) continue;
+      if (outbox.push(SnapshotPart{client, greeting})) greeted_ns = now_ns;
+    }
+  }
+}
+
 HostTotals Host::Impl::totals_now() const {
   HostTotals now = totals;
   const StreamSet active = source->active();
@@ -494,6 +514,7 @@ void Host::Impl::plan_wake() {
     }
   }
   for (const Lane& lane : lanes) {
+    at(lane.transfer.next_ns());
     if (const auto due = lane.joins.due_ns(lane.transfer, now_ns))
       at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
   }

@@ -10,7 +10,7 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTr
   for (const auto& [id, account] : roster.accounts()) {
     if (joined_stream(account) != stream_ || was_served(account) || transfer.serves(id, now_ns)) continue;
     if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
-    if (port.joined(account.from, stream_)) ready_.push_back(id);
+    if (account.open && port.joined(account.from, id, stream_)) ready_.push_back(id);
   }
   if (ready_.empty()) {
     collecting_since_ns_.reset();
@@ -18,7 +18,7 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTr
   }
   if (!collecting_since_ns_) collecting_since_ns_ = now_ns;
   const bool spaced = !served_at_ns_ || now_ns - *served_at_ns_ >= kSpacingNs;
-  return spaced && now_ns - *collecting_since_ns_ >= kCollectNs && !transfer.busy(now_ns);
+  return spaced && now_ns - *collecting_since_ns_ >= kCollectNs && !transfer.full(now_ns);
 }
 
 void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
@@ -33,7 +33,7 @@ void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
 }
 
 std::optional<std::int64_t> JoinDesk::due_ns(const SnapshotTransfer& transfer, std::int64_t now_ns) const {
-  if (!collecting_since_ns_ || transfer.busy(now_ns)) return std::nullopt;
+  if (!collecting_since_ns_ || transfer.full(now_ns)) return std::nullopt;
   const std::int64_t spaced_ns = served_at_ns_ ? *served_at_ns_ + kSpacingNs : INT64_MIN;
   return std::max(*collecting_since_ns_ + kCollectNs, spaced_ns);
 }

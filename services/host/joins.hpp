@@ -18,13 +18,13 @@ class JoinDesk {
  public:
   explicit JoinDesk(std::uint32_t stream) : stream_(stream) {}
 
-  static constexpr std::int64_t kCollectNs = 100 * kMillisecond;  ///< joiners of one snapshot
+  static constexpr std::int64_t kCollectNs = 20 * kMillisecond;   ///< joiners of one snapshot
   static constexpr std::int64_t kSpacingNs = 250 * kMillisecond;  ///< between two snapshots at least
 
   /// True when the time has come to make one snapshot for all who are ready: they say `joining` and
-  /// name the stream, all three writers have matched their participant, they are not being sent one, they
-  /// were not served for this attempt, and where they were served before, their participant has not asked too
-  /// often. While `transfer` serves somebody there is no other snapshot.
+  /// name the stream, all writers that they need have matched their participant, they are not being sent one,
+  /// they were not served for this attempt, and where they were served before, their participant has not
+  /// asked too often. While `transfer` has no memory for another there is none.
   [[nodiscard]] bool due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
                          std::int64_t now_ns);
   /// Who was ready at the last due().

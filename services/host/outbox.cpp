@@ -14,7 +14,7 @@ std::uint32_t* Outbox::count_of(const Outgoing& message, std::uint32_t& limit) {
     limit = limits_.frames;
     return &frames_;
   }
-  if (std::holds_alternative<transport::SnapshotMessage>(message)) {
+  if (std::holds_alternative<SnapshotPart>(message)) {
     limit = limits_.snapshots;
     return &snapshots_;
   }
@@ -30,6 +30,11 @@ bool Outbox::has_frame_room() const {
 bool Outbox::has_control_room() const {
   const std::scoped_lock lock(mutex_);
   return control_ < limits_.control;
+}
+
+bool Outbox::has_snapshot_room() const {
+  const std::scoped_lock lock(mutex_);
+  return snapshots_ < limits_.snapshots;
 }
 
 void Outbox::weigh(const Outgoing& message) {
@@ -97,10 +102,13 @@ struct Write {
   transport::ServerPort& port;
 
   Result<void> operator()(const EndOfFrame& /*end*/) const { return {}; }
-  Result<void> operator()(const OpenReplies& open) const { return port.open_replies(open.client); }
-  Result<void> operator()(const CloseReplies& close) const {
-    port.close_replies(close.client);
+  Result<void> operator()(const OpenClient& open) const { return port.open_client(open.client); }
+  Result<void> operator()(const CloseClient& close) const {
+    port.close_client(close.client);
     return {};
+  }
+  Result<void> operator()(const SnapshotPart& snapshot) const {
+    return port.write(snapshot.client, snapshot.part);
   }
   template <class M>
   Result<void> operator()(const M& sample) const {

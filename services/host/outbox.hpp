@@ -14,22 +14,26 @@
 
 namespace tandem::host {
 
-/// Asks the publisher for a client's own reply writer.
-struct OpenReplies {
+/// Asks the publisher for a client's own writers.
+struct OpenClient {
   transport::ClientId client = 0;
 };
-/// Asks the publisher to end it.
-struct CloseReplies {
+/// Asks the publisher to end them.
+struct CloseClient {
   transport::ClientId client = 0;
+};
+/// Part of a snapshot for one client.
+struct SnapshotPart {
+  transport::ClientId client = 0;
+  transport::SnapshotMessage part;
 };
 
 /// All deltas of a frame, one a stream that is made, are in front of this.
 struct EndOfFrame {};
 
-using Outgoing =
-    std::variant<transport::SessionMessage, transport::DeltaMessage, transport::ScheduledInputMessage,
-                 transport::SnapshotMessage, transport::ReplyMessage, transport::ServerStatusMessage,
-                 OpenReplies, CloseReplies, EndOfFrame>;
+using Outgoing = std::variant<transport::SessionMessage, transport::DeltaMessage,
+                              transport::ScheduledInputMessage, SnapshotPart, transport::ReplyMessage,
+                              transport::ServerStatusMessage, OpenClient, CloseClient, EndOfFrame>;
 
 /// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
 /// for one producer and one consumer.
@@ -45,6 +49,7 @@ class Outbox {
   /// Room for the deltas of one more frame; stays true until the producer pushes its end.
   [[nodiscard]] bool has_frame_room() const;
   [[nodiscard]] bool has_control_room() const;
+  [[nodiscard]] bool has_snapshot_room() const;
   /// False, and nothing queued, when the message's kind is at its limit. The deltas of a frame count once,
   /// with its end; check has_frame_room() before the first.
   [[nodiscard]] bool push(Outgoing message);

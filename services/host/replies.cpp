@@ -18,7 +18,7 @@ Reason standing_reason(const Account& account) {
 bool ReplyDesk::close_forgotten(Roster& roster) {
   auto& forgotten = roster.forgotten();
   while (!forgotten.empty()) {
-    if (!outbox_->push(CloseReplies{forgotten.back()})) return false;
+    if (!outbox_->push(CloseClient{forgotten.back()})) return false;
     forgotten.pop_back();
   }
   return true;
@@ -29,8 +29,8 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
   for (auto& [id, account] : roster.accounts()) {
     ReplyAccount& reply = account.reply;
     if (!account.present || !reply.schedule.due(account.role(), now_ns)) continue;
-    if (!reply.open && !outbox_->push(OpenReplies{id})) return;
-    reply.open = true;
+    if (!account.open && !outbox_->push(OpenClient{id})) return;
+    account.open = true;
     const bool queued =
         outbox_->push(transport::ReplyMessage{.client = id,
                                               .epoch = epoch_,

@@ -14,7 +14,7 @@
 namespace tandem::host {
 
 /// Queues replies when they are due (accounts::ReplySchedule). A reply that finds no room is tried again.
-/// A client with an account is answered through a writer of its own, opened with its first reply.
+/// A client with an account has writers of its own, opened with its first reply.
 class ReplyDesk {
  public:
   static constexpr std::int64_t kStrangerNs = kSecond;  ///< between two answers to the same one

@@ -29,7 +29,7 @@ void Roster::note(Account& account, std::string_view what, std::int64_t now_ns) 
 }
 
 Roster::Accounts::iterator Roster::forget(Accounts::iterator account) {
-  if (account->second.reply.open) forgotten_.push_back(account->first);
+  if (account->second.open) forgotten_.push_back(account->first);
   const transport::ParticipantId from = account->second.from;
   const auto next = accounts_.erase(account);
   if (std::ranges::none_of(accounts_, [&from](const auto& entry) { return entry.second.from == from; }))

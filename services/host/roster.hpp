@@ -34,10 +34,10 @@ struct JoinAccount {
   bool served = false;
   std::uint32_t served_attempt = 0;
   std::uint32_t served_stream = 0;
+  std::int64_t greeted_ns = INT64_MIN;
 };
 
 struct ReplyAccount {
-  bool open = false;  ///< the client has a reply writer of its own
   accounts::ReplySchedule schedule;
   transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
 };
@@ -51,6 +51,7 @@ struct Account {
   transport::Role wanted = transport::Role::kObserver;
   std::uint32_t stream = 0;                  ///< that it plays, or joins
   std::optional<std::uint32_t> next_stream;  ///< that it joins while it goes on playing `stream`
+  bool open = false;                         ///< the client has writers of its own
   bool present = true;                       ///< its participant lives and it was heard of lately
   bool counted = false;  ///< a participant that plays and has caught up: the server waits for it
   bool demoted = false;
@@ -154,7 +155,8 @@ class Roster {
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
   [[nodiscard]] Notices& notices() { return notices_; }
-  /// Accounts with a reply writer that were forgotten, for whoever ends their writers and removes them here.
+  /// Accounts with writers of their own that were forgotten, for whoever ends their writers and removes them
+  /// here.
   [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
 
  private:

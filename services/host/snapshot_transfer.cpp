@@ -1,157 +1,236 @@
 #include "services/host/snapshot_transfer.hpp"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "sdk/transport/limits.hpp"
-#include "sdk/transport/units.hpp"
 
 namespace tandem::host {
 namespace {
 
-// A part that has not arrived while one sent more than this after it has is lost.
-constexpr std::int64_t kReorderNs = 20 * kMillisecond;
+// DDS repairs what it loses; a part that nothing is heard of after this is sent once more, so that a link
+// that was gone is found again soon.
+constexpr std::int64_t kProbeNs = kSecond / 2;
+constexpr std::int64_t kMostProbeNs = 2 * kSecond;
+// After so long without an arrival the rate of the link is measured anew.
+constexpr std::int64_t kForgetRateNs = kSecond;
+// No receiver is sent more than so many times what there is.
+constexpr std::size_t kMostTimes = 4;
+constexpr std::size_t kSlackBytes = 64U << 10U;
+// Parts of one receiver queued in one go, so that many receivers take turns.
+constexpr int kTurn = 16;
+
+// Of each part, whether the acknowledgement says that it is held. Where all runs that there is room for are
+// used, nothing is said of what lies behind them.
+std::vector<bool> held_parts(const transport::AckMessage& ack, std::size_t parts) {
+  std::vector<bool> held(parts, true);
+  std::size_t told = 0;
+  for (std::size_t i = 0; i + 1 < ack.missing.size(); i += 2) {
+    const std::size_t first = std::min<std::size_t>(ack.missing[i], parts);
+    const std::size_t end = first + std::min<std::size_t>(ack.missing[i + 1], parts - first);
+    std::fill(held.begin() + static_cast<std::ptrdiff_t>(first),
+              held.begin() + static_cast<std::ptrdiff_t>(end), false);
+    told = std::max(told, end);
+  }
+  if (ack.missing.size() >= 2 * transport::kMaxMissingRuns)
+    std::fill(held.begin() + static_cast<std::ptrdiff_t>(told), held.end(), false);
+  return held;
+}
 
 }  // namespace
 
-void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
-                             std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
-  snapshot_.assign(bytes.begin(), bytes.end());
-  part_bytes_ =
-      std::clamp((bytes.size() + kMostParts - 1) / kMostParts, kLeastPartBytes, transport::kPartBytes);
-  head_ = {};
-  head_.epoch = epoch;
-  head_.stream = stream;
-  head_.frame = frame;
-  head_.parts = static_cast<std::uint32_t>((bytes.size() + part_bytes_ - 1) / part_bytes_);
-  head_.total_bytes = static_cast<std::uint32_t>(bytes.size());
-  parts_.assign(head_.parts, {});
-  receivers_.clear();
-  for (const transport::ClientId client : receivers) admit(client, now_ns);
-  window_ = {};
-  started_ns_ = now_ns;
-  overtaken_ns_ = INT64_MIN;
+std::size_t Snapshot::size_of(std::size_t part) const {
+  return std::min(SnapshotTransfer::kPartBytes, bytes.size() - part * SnapshotTransfer::kPartBytes);
 }
 
-void SnapshotTransfer::end() {
-  parts_.clear();
-  receivers_.clear();
-}
-
-void SnapshotTransfer::admit(transport::ClientId client, std::int64_t now_ns) {
-  receivers_[client] = {.holds = std::vector<bool>(parts_.size()), .heard_ns = now_ns, .progress_ns = now_ns};
-  for (Part& part : parts_) ++part.lacking;
-}
-
-void SnapshotTransfer::dismiss(transport::ClientId client) {
-  const auto receiver = receivers_.find(client);
-  if (receiver == receivers_.end()) return;
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    if (!receiver->second.holds[i]) --parts_[i].lacking;
-  }
-  receivers_.erase(receiver);
-}
-
-void SnapshotTransfer::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns) {
-  const bool of_this = !parts_.empty() && ack.phase == transport::Phase::kJoining &&
-                       ack.stream == head_.stream && ack.snapshot_frame == head_.frame &&
-                       ack.snapshot_parts == parts_.size();
-  auto receiver = receivers_.find(ack.client);
-  if (!of_this) {
-    // Held parts of it and holds them no more: it cannot use this snapshot.
-    const bool gave_up = receiver != receivers_.end() && std::ranges::count(receiver->second.holds, true) > 0;
-    if (gave_up) dismiss(ack.client);
-    return;
-  }
-  if (receiver == receivers_.end()) {
-    admit(ack.client, now_ns);
-    receiver = receivers_.find(ack.client);
-  }
-  receiver->second.heard_ns = now_ns;
-  // Where all runs there is room for are used, nothing is said of what lies behind them.
-  const bool cut_short = ack.missing.size() >= 2 * transport::kMaxMissingRuns;
-  std::size_t told = cut_short ? 0 : parts_.size();
-  std::vector<bool> lacks(parts_.size());
-  for (std::size_t i = 0; i + 1 < ack.missing.size(); i += 2) {
-    const std::size_t first = std::min<std::size_t>(ack.missing[i], parts_.size());
-    const std::size_t end = first + std::min<std::size_t>(ack.missing[i + 1], parts_.size() - first);
-    std::fill(lacks.begin() + static_cast<std::ptrdiff_t>(first),
-              lacks.begin() + static_cast<std::ptrdiff_t>(end), true);
-    told = std::max(told, end);
-  }
-  for (std::size_t part = 0; part < told; ++part) {
-    if (lacks[part] || receiver->second.holds[part]) continue;
-    receiver->second.holds[part] = true;
-    receiver->second.progress_ns = now_ns;
-    received(part, now_ns);
-  }
-}
-
-void SnapshotTransfer::received(std::size_t part, std::int64_t now_ns) {
-  Part& p = parts_[part];
-  if (--p.lacking != 0 || !p.sent_ns || p.again) return;
-  window_.arrived(now_ns - *p.sent_ns, now_ns);
-  overtaken_ns_ = std::max(overtaken_ns_, *p.sent_ns - kReorderNs);
-}
-
-void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns) {
-  for (auto it = receivers_.begin(); it != receivers_.end();) {
-    const transport::ClientId client = (it++)->first;
-    const auto account = accounts.find(client);
-    if (account == accounts.end() || joined_stream(account->second) != head_.stream.id) dismiss(client);
-  }
-  if (receivers_.empty()) return;
-  std::size_t flying = 0;
-  std::size_t bytes = in_flight(now_ns, flying);
-  for (std::size_t i = 0; i < parts_.size() && flying < kMostInFlight; ++i) {
-    if (parts_[i].lacking == 0 || on_its_way(parts_[i], now_ns)) continue;
-    if (bytes > 0 && bytes + size_of(i) > window_.bytes()) return;
-    if (parts_[i].sent_ns) window_.lost(now_ns);
-    if (!queue(i, now_ns)) return;
-    bytes += size_of(i);
-    ++flying;
-  }
-}
-
-bool SnapshotTransfer::on_its_way(const Part& part, std::int64_t now_ns) const {
-  return part.sent_ns && *part.sent_ns >= overtaken_ns_ && now_ns - *part.sent_ns < window_.patience_ns();
-}
-
-std::size_t SnapshotTransfer::in_flight(std::int64_t now_ns, std::size_t& parts) const {
-  std::size_t bytes = 0;
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    if (parts_[i].lacking == 0 || !on_its_way(parts_[i], now_ns)) continue;
-    bytes += size_of(i);
-    ++parts;
-  }
-  return bytes;
-}
-
-bool SnapshotTransfer::queue(std::size_t part, std::int64_t now_ns) {
-  const auto cut = std::span(snapshot_).subspan(part * part_bytes_, size_of(part));
-  transport::SnapshotMessage message = head_;
+transport::SnapshotMessage Snapshot::cut(std::size_t part) const {
+  const auto piece = std::span(bytes).subspan(part * SnapshotTransfer::kPartBytes, size_of(part));
+  transport::SnapshotMessage message = head;
   message.part = static_cast<std::uint32_t>(part);
-  message.bytes.assign(cut.begin(), cut.end());
-  if (!outbox_->push(std::move(message))) return false;
-  bytes_ += cut.size();
-  parts_[part].again = parts_[part].sent_ns.has_value();
-  parts_[part].sent_ns = now_ns;
+  message.bytes.assign(piece.begin(), piece.end());
+  return message;
+}
+
+Passage::Passage(std::shared_ptr<const Snapshot> snapshot, std::int64_t now_ns)
+    : snapshot_(std::move(snapshot)),
+      holds_(snapshot_->head.parts),
+      began_ns_(now_ns),
+      heard_ns_(now_ns),
+      progress_ns_(now_ns),
+      probed_ns_(now_ns) {}
+
+bool Passage::names(const transport::AckMessage& ack) const {
+  return ack.phase == transport::Phase::kJoining && ack.stream == snapshot_->head.stream &&
+         ack.snapshot_frame == snapshot_->head.frame && ack.snapshot_parts == holds_.size();
+}
+
+bool Passage::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns) {
+  if (!names(ack)) {
+    // Whoever held parts of it and names it no more cannot use it.
+    return progress_ns_ == began_ns_;
+  }
+  heard_ns_ = now_ns;
+  arrived(held_parts(ack, holds_.size()), now_ns);
   return true;
 }
 
-std::size_t SnapshotTransfer::size_of(std::size_t part) const {
-  return std::min(part_bytes_, snapshot_.size() - part * part_bytes_);
+// DDS delivers in the order of sending: what left before a part that arrived, and has not arrived, is lost.
+void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
+  std::size_t bytes = 0;
+  std::size_t settled = 0;  // entries up to the last one that arrived
+  for (std::size_t i = 0; i < flying_.size(); ++i) {
+    const Flying& entry = flying_[i];
+    if (!held[entry.part] || holds_[entry.part]) continue;
+    holds_[entry.part] = true;
+    bytes += entry.sent.bytes;
+    settled = i + 1;
+  }
+  if (settled == 0) return;
+  progress_ns_ = probed_ns_ = now_ns;
+  probes_ = 0;
+  window_.arrived(bytes, flying_[settled - 1].sent, now_ns);
+  for (std::size_t i = 0; i < settled; ++i) {
+    if (holds_[flying_[i].part]) continue;
+    window_.lost(flying_[i].sent);
+    again_.push_back(flying_[i].part);
+  }
+  flying_.erase(flying_.begin(), flying_.begin() + static_cast<std::ptrdiff_t>(settled));
+  std::erase_if(flying_, [this](const Flying& entry) {  // sent twice
+    if (holds_[entry.part]) window_.lost(entry.sent);
+    return holds_[entry.part];
+  });
+}
+
+std::optional<std::size_t> Passage::wanted() {
+  while (!again_.empty() && holds_[again_.front()]) again_.pop_front();
+  if (!again_.empty()) return again_.front();
+  if (unsent_ < holds_.size()) return unsent_;
+  return std::nullopt;
+}
+
+std::optional<std::size_t> Passage::next(std::int64_t now_ns) {
+  if (const auto part = wanted()) {
+    if (window_.admits(snapshot_->size_of(*part), now_ns)) {
+      if (*part == unsent_) {
+        ++unsent_;
+      } else {
+        again_.pop_front();
+      }
+      return send(*part, now_ns);
+    }
+  }
+  if (flying_.empty() || now_ns < probe_ns()) return std::nullopt;
+  probed_ns_ = now_ns;
+  ++probes_;
+  if (now_ns - progress_ns_ >= kForgetRateNs) window_.start_over();
+  return send(flying_.front().part, now_ns);
+}
+
+std::size_t Passage::send(std::size_t part, std::int64_t now_ns) {
+  const std::size_t size = snapshot_->size_of(part);
+  flying_.push_back({part, window_.sent(size, now_ns)});
+  sent_bytes_ += size;
+  return part;
+}
+
+std::int64_t Passage::probe_ns() const {
+  const std::int64_t patience_ns = std::max(kProbeNs, 4 * window_.least_ns()) << std::min(probes_, 2);
+  return probed_ns_ + std::clamp(patience_ns, kProbeNs, kMostProbeNs);
+}
+
+std::int64_t Passage::next_ns() const {
+  const bool waits = !again_.empty() || unsent_ < holds_.size();
+  const std::int64_t probe = flying_.empty() ? INT64_MAX : probe_ns();
+  if (!waits || window_.is_full(SnapshotTransfer::kPartBytes)) return probe;
+  return std::min(probe, window_.next_ns());
+}
+
+bool Passage::exhausted() const { return sent_bytes_ > kMostTimes * snapshot_->bytes.size() + kSlackBytes; }
+
+void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
+                             std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->bytes.assign(bytes.begin(), bytes.end());
+  snapshot->head.epoch = epoch;
+  snapshot->head.stream = stream;
+  snapshot->head.frame = frame;
+  snapshot->head.parts = static_cast<std::uint32_t>((bytes.size() + kPartBytes - 1) / kPartBytes);
+  snapshot->head.total_bytes = static_cast<std::uint32_t>(bytes.size());
+  largest_ = std::max(largest_, bytes.size());
+  if (held_count_and_bytes(true, now_ns).second + bytes.size() > kMostHeldBytes)
+    std::erase_if(passages_, [&](const auto& entry) { return stalled(entry.second, now_ns); });
+  for (const transport::ClientId client : receivers)
+    passages_.insert_or_assign(client, Passage(snapshot, now_ns));
+  next_ns_ = now_ns;
+}
+
+void SnapshotTransfer::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns) {
+  const auto passage = passages_.find(ack.client);
+  if (passage == passages_.end()) return;
+  if (!passage->second.acknowledged(ack, now_ns)) {
+    passages_.erase(passage);
+    return;
+  }
+  next_ns_ = now_ns;
+}
+
+void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns) {
+  std::erase_if(passages_, [&](const auto& entry) {
+    const auto account = accounts.find(entry.first);
+    const bool joins = account != accounts.end() &&
+                       joined_stream(account->second) == entry.second.snapshot()->head.stream.id;
+    return !joins || entry.second.exhausted();
+  });
+  next_ns_ = INT64_MAX;
+  if (passages_.empty()) return;
+  // In turns: whoever follows the one that was served last comes first.
+  auto next = passages_.upper_bound(last_served_);
+  for (std::size_t i = 0; i < passages_.size(); ++i, ++next) {
+    if (next == passages_.end()) next = passages_.begin();
+    if (!serve(next->first, next->second, now_ns)) return;
+    last_served_ = next->first;
+  }
+}
+
+bool SnapshotTransfer::serve(transport::ClientId client, Passage& passage, std::int64_t now_ns) {
+  for (int i = 0; i < kTurn; ++i) {
+    if (!outbox_->has_snapshot_room()) {
+      next_ns_ = now_ns + kMillisecond;
+      return false;
+    }
+    const auto part = passage.next(now_ns);
+    if (!part) break;
+    static_cast<void>(outbox_->push(SnapshotPart{client, passage.snapshot()->cut(*part)}));
+    bytes_ += passage.snapshot()->size_of(*part);
+  }
+  next_ns_ = std::min(next_ns_, passage.next_ns());
+  return true;
 }
 
 bool SnapshotTransfer::serves(transport::ClientId client, std::int64_t now_ns) const {
-  const auto receiver = receivers_.find(client);
-  return receiver != receivers_.end() && now_ns - receiver->second.heard_ns < kStalledNs;
+  const auto passage = passages_.find(client);
+  return passage != passages_.end() && now_ns - passage->second.heard_ns() < kStalledNs;
 }
 
-bool SnapshotTransfer::busy(std::int64_t now_ns) const {
-  if (now_ns - started_ns_ >= kLongestNs) return false;
-  return std::ranges::any_of(
-      receivers_, [&](const auto& entry) { return now_ns - entry.second.progress_ns < kStalledNs; });
+bool SnapshotTransfer::stalled(const Passage& passage, std::int64_t now_ns) {
+  return now_ns - passage.progress_ns() >= kStalledNs || now_ns - passage.began_ns() >= kLongestNs;
+}
+
+std::pair<std::size_t, std::size_t> SnapshotTransfer::held_count_and_bytes(bool all,
+                                                                           std::int64_t now_ns) const {
+  std::set<const Snapshot*> held;
+  std::size_t bytes = 0;
+  for (const auto& [client, passage] : passages_) {
+    if ((all || !stalled(passage, now_ns)) && held.insert(passage.snapshot().get()).second)
+      bytes += passage.snapshot()->bytes.size();
+  }
+  return {held.size(), bytes};
+}
+
+bool SnapshotTransfer::full(std::int64_t now_ns) const {
+  const auto [count, bytes] = held_count_and_bytes(false, now_ns);
+  return count >= 2 && bytes + largest_ > kMostHeldBytes;
 }
 
 }  // namespace tandem::host

@@ -1,84 +1,123 @@
 #pragma once
-// A snapshot on its way to those who join.
+// Snapshots on their way to those who join.
 
 #include <cstdint>
+#include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/accounts/transfer_window.hpp"
 #include "services/host/outbox.hpp"
 #include "services/host/roster.hpp"
 
 namespace tandem::host {
 
-/// Cuts a snapshot into parts and queues them at the pace of the slowest of its receivers, each until all of
-/// them have it. What receivers lack they say in their acknowledgements. Holds one snapshot at a time. Not
-/// thread-safe.
+/// One cut, shared by all who are sent it.
+struct Snapshot {
+  transport::SnapshotMessage head;  ///< what all parts have in common
+  std::vector<std::byte> bytes;
+
+  [[nodiscard]] std::size_t size_of(std::size_t part) const;
+  [[nodiscard]] transport::SnapshotMessage cut(std::size_t part) const;
+};
+
+/// One snapshot's way to one receiver, at the pace of that receiver's link. Not thread-safe.
+class Passage {
+ public:
+  Passage(std::shared_ptr<const Snapshot> snapshot, std::int64_t now_ns);
+
+  /// What the receiver holds by now. False: it cannot use this snapshot any more. Untrusted: parts that were
+  /// never sent, or runs that make no sense, change nothing.
+  [[nodiscard]] bool acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
+  /// The part to send now, if one may leave; it counts as sent.
+  [[nodiscard]] std::optional<std::size_t> next(std::int64_t now_ns);
+  /// When next() may have something that it has not now, if no acknowledgement comes.
+  [[nodiscard]] std::int64_t next_ns() const;
+
+  [[nodiscard]] const std::shared_ptr<const Snapshot>& snapshot() const { return snapshot_; }
+  [[nodiscard]] std::int64_t began_ns() const { return began_ns_; }
+  [[nodiscard]] std::int64_t heard_ns() const { return heard_ns_; }        ///< it named this snapshot
+  [[nodiscard]] std::int64_t progress_ns() const { return progress_ns_; }  ///< something arrived
+  /// It was sent several times what there is: whoever acknowledges like that is not served further.
+  [[nodiscard]] bool exhausted() const;
+
+ private:
+  struct Flying {
+    std::size_t part;
+    accounts::TransferWindow::Sent sent;
+  };
+
+  [[nodiscard]] std::optional<std::size_t> wanted();
+  [[nodiscard]] bool names(const transport::AckMessage& ack) const;
+  void arrived(const std::vector<bool>& held, std::int64_t now_ns);
+  std::size_t send(std::size_t part, std::int64_t now_ns);
+  [[nodiscard]] std::int64_t probe_ns() const;
+
+  std::shared_ptr<const Snapshot> snapshot_;
+  std::vector<bool> holds_;        // by part
+  std::size_t unsent_ = 0;         // the first part that was never sent
+  std::deque<std::size_t> again_;  // parts that DDS lost, to be sent again
+  std::deque<Flying> flying_;      // in the order of sending
+  accounts::TransferWindow window_;
+  std::int64_t began_ns_, heard_ns_, progress_ns_;
+  std::int64_t probed_ns_;
+  int probes_ = 0;  // since something arrived
+  std::size_t sent_bytes_ = 0;
+};
+
+/// Snapshots of one stream, each receiver's at its own pace. Parts go out through the writer that each client
+/// has of its own, so a slow or silent receiver costs the others nothing. Not thread-safe.
 class SnapshotTransfer {
  public:
-  /// Of a part, unless there would be more than kMostParts.
-  static constexpr std::size_t kLeastPartBytes = 1'300;
-  static constexpr std::size_t kMostParts = 1'024;
-  /// The writer keeps 64 samples for repairs.
-  static constexpr std::size_t kMostInFlight = 48;
-  /// Others that want a snapshot do not wait for a receiver that got nothing for so long.
+  static constexpr std::size_t kPartBytes = 1'300;
+  /// Whoever got nothing for so long holds no memory that somebody else needs.
   static constexpr std::int64_t kStalledNs = 3 * kSecond;
-  /// Nor for anybody when one snapshot has taken so long.
+  /// Nor does anybody who was served for so long.
   static constexpr std::int64_t kLongestNs = 60 * kSecond;
+  /// Of all snapshots held; two of any size have room.
+  static constexpr std::size_t kMostHeldBytes = std::size_t{128} << 20U;
 
   explicit SnapshotTransfer(Outbox& outbox) : outbox_(&outbox) {}
 
-  /// A new snapshot for `receivers`, in the place of the one before. `bytes` is not empty.
+  /// A new snapshot for `receivers`, each in the place of the one it was sent before. `bytes` is not empty.
   void start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
              std::span<const transport::ClientId> receivers, std::int64_t now_ns);
-  /// The snapshot is of no use any more.
-  void end();
-  /// What a client that joins holds by now. Untrusted; runs that make no sense count for what they cover.
+  /// The stream ends: snapshots of it are of no use any more.
+  void end() { passages_.clear(); }
+  /// What a client that joins holds by now. Untrusted.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
-  /// Forgets receivers that do not join its stream any more, and queues what the window and the outbox have
-  /// room for.
+  /// Forgets receivers that do not join the stream any more, and queues what their windows and the outbox
+  /// have room for.
   void send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
 
-  /// This client is being sent the snapshot and, lately, said so: it needs no other.
+  /// This client is being sent a snapshot and, lately, said so: it needs no other.
   [[nodiscard]] bool serves(transport::ClientId client, std::int64_t now_ns) const;
-  /// Somebody is, and the parts arrive: another snapshot has to wait.
-  [[nodiscard]] bool busy(std::int64_t now_ns) const;
+  /// There is no memory for one snapshot more.
+  [[nodiscard]] bool full(std::int64_t now_ns) const;
+  /// When send() may have something to do that it has not now.
+  [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
+  [[nodiscard]] bool idle() const { return passages_.empty(); }
   /// Bytes queued since the start, repetitions too.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  struct Receiver {
-    std::vector<bool> holds;       // by part
-    std::int64_t heard_ns = 0;     // it named this snapshot
-    std::int64_t progress_ns = 0;  // something arrived
-  };
-  struct Part {
-    std::uint32_t lacking = 0;  // receivers
-    std::optional<std::int64_t> sent_ns;
-    bool again = false;  // sent more than once: its delay tells nothing
-  };
-
-  [[nodiscard]] std::size_t size_of(std::size_t part) const;
-  void admit(transport::ClientId client, std::int64_t now_ns);
-  void dismiss(transport::ClientId client);
-  void received(std::size_t part, std::int64_t now_ns);
-  // Sent, and neither late nor overtaken; whether it has arrived is another question.
-  [[nodiscard]] bool on_its_way(const Part& part, std::int64_t now_ns) const;
-  [[nodiscard]] std::size_t in_flight(std::int64_t now_ns, std::size_t& parts) const;
-  [[nodiscard]] bool queue(std::size_t part, std::int64_t now_ns);
+  [[nodiscard]] static bool stalled(const Passage& passage, std::int64_t now_ns);
+  /// Of the snapshots held; `all`: also of those whose receivers are stalled.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> held_count_and_bytes(bool all, std::int64_t now_ns) const;
+  /// True when the client's turn is over; false when the outbox is full.
+  [[nodiscard]] bool serve(transport::ClientId client, Passage& passage, std::int64_t now_ns);
 
   Outbox* outbox_;
-  transport::SnapshotMessage head_;  // what all parts have in common
-  std::vector<std::byte> snapshot_;
-  std::size_t part_bytes_ = kLeastPartBytes;
-  std::vector<Part> parts_;
-  std::map<transport::ClientId, Receiver> receivers_;
-  accounts::TransferWindow window_;
-  std::int64_t started_ns_ = 0;
-  std::int64_t overtaken_ns_ = INT64_MIN;  // what was sent before this and has not arrived is lost
+  std::map<transport::ClientId, Passage> passages_;
+  transport::ClientId last_served_ = 0;
+  std::size_t largest_ = 0;  // snapshot so far
+  std::int64_t next_ns_ = INT64_MAX;
   std::uint64_t bytes_ = 0;
 };
 

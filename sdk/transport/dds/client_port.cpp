@@ -53,9 +53,9 @@ class DdsClientPort final : public ClientPort {
       auto scheduled = endpoints_.node.reader<ScheduledInputMessage>("scheduled inputs");
       if (!scheduled) return tl::unexpected(scheduled.error());
       auto reply = endpoints_.node.reader<ReplyMessage>(
-          "replies", {.partitions = {options_.session, reply_partition(options_.session, client)}});
+          "replies", {.partitions = {options_.session, client_partition(options_.session, client)}});
       if (!reply) return tl::unexpected(reply.error());
-      common_.emplace(Common{std::move(*scheduled), std::move(*reply)});
+      common_.emplace(Common{std::move(*scheduled), std::move(*reply), client});
       epoch_ = session.epoch;
     }
     const Limits limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
@@ -83,10 +83,8 @@ class DdsClientPort final : public ClientPort {
     const auto open = streams_.find(stream);
     if (open == streams_.end()) return fail(ErrorCode::kOutOfOrder, "that stream is not open");
     if (open->second.snapshots) return {};
-    // The server repeats what acknowledgements say is missing, at the pace of the link; DDS would repeat it
-    // besides, at its own.
-    auto snapshots = reader<SnapshotMessage>(
-        "snapshots", stream, {.depth = Topic<SnapshotMessage>::kQos.reader_depth, .best_effort = true});
+    auto snapshots = endpoints_.node.reader<SnapshotMessage>(
+        "snapshots", {.partitions = {client_partition(options_.session, common_->client)}});
     if (!snapshots) return tl::unexpected(snapshots.error());
     open->second.snapshots.emplace(std::move(*snapshots));
     open->second.set_limits(open->second.limits);
@@ -140,6 +138,7 @@ class DdsClientPort final : public ClientPort {
   struct Common {
     Reader<ScheduledInputMessage> scheduled;
     Reader<ReplyMessage> reply;
+    ClientId client = 0;
   };
 
   template <class M>

@@ -116,7 +116,6 @@ class Reader {
 struct ReaderOptions {
   std::optional<std::int32_t> depth = {};    ///< of its history, and what is kept of each writer
   bool ignore_own = false;                   ///< not what its own participant writes
-  bool best_effort = false;                  ///< where others see to repairs
   bool watched = true;                       ///< what comes ends Node::wait()
   std::vector<std::string> partitions = {};  ///< through a subscriber of its own; none: the node's
 };
@@ -154,9 +153,8 @@ class Node {
     auto subscriber = options.partitions.empty() ? Result<Entity>() : make_subscriber(options.partitions);
     if (!subscriber) return tl::unexpected(subscriber.error());
     const Entity& parent = *subscriber ? *subscriber : subscriber_;
-    TopicQos asked_for = Topic<M>::kQos;
-    asked_for.reliable = asked_for.reliable && !options.best_effort;
-    const Qos qos = make_qos(asked_for, options.depth.value_or(asked_for.reader_depth), DDS_INFINITY);
+    const Qos qos =
+        make_qos(Topic<M>::kQos, options.depth.value_or(Topic<M>::kQos.reader_depth), DDS_INFINITY);
     dds_qset_entity_name(qos.get(), name.c_str());
     if (options.ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
     const auto kept = static_cast<std::size_t>(options.depth.value_or(Topic<M>::kQos.kept));

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <deque>
 #include <map>
+#include <mutex>
 #include <utility>
 
 #include "sdk/transport/dds/announcements.hpp"
@@ -46,10 +47,7 @@ class DdsServerPort final : public ServerPort {
       const std::string partition = stream == 0 ? std::string() : stream_partition(session_, stream);
       auto delta = endpoints_.node.writer<DeltaMessage>("deltas", delta_depth_, partition);
       if (!delta) return tl::unexpected(delta.error());
-      auto snapshot = endpoints_.node.writer<SnapshotMessage>(
-          "snapshots", Topic<SnapshotMessage>::kQos.writer_depth, partition);
-      if (!snapshot) return tl::unexpected(snapshot.error());
-      streams_.push_back({std::move(*delta), std::move(*snapshot)});
+      streams_.push_back(std::move(*delta));
     }
     return {};
   }
@@ -57,42 +55,53 @@ class DdsServerPort final : public ServerPort {
   Result<void> write(const SessionMessage& message) override { return endpoints_.session.write(message); }
   Result<void> write(const DeltaMessage& message) override {
     if (message.stream.id >= streams_.size()) return not_open();
-    return streams_[message.stream.id].delta.write(message);
+    return streams_[message.stream.id].write(message);
   }
   Result<void> write(const ScheduledInputMessage& message) override {
     return endpoints_.scheduled.write(message);
   }
-  Result<void> write(const SnapshotMessage& message) override {
-    if (message.stream.id >= streams_.size()) return not_open();
-    return streams_[message.stream.id].snapshot.write(message);
+  Result<void> write(ClientId to, const SnapshotMessage& message) override {
+    const auto own = clients_.find(to);
+    if (own == clients_.end()) return fail(ErrorCode::kInvalidArgument, "a client that is not open");
+    return own->second.snapshot.write(message);
   }
   Result<void> write(const ReplyMessage& message) override {
-    const auto own = replies_.find(message.client);
-    if (own != replies_.end()) return own->second.write(message);
+    const auto own = clients_.find(message.client);
+    if (own != clients_.end()) return own->second.reply.write(message);
     auto written = endpoints_.reply.write(message);
     if (written) remember_stranger(message.client);
     return written;
   }
   Result<void> write(const ServerStatusMessage& message) override { return endpoints_.status.write(message); }
 
-  Result<void> open_replies(ClientId client) override {
-    if (replies_.contains(client)) return {};
-    auto writer = endpoints_.node.writer<ReplyMessage>("replies", Topic<ReplyMessage>::kQos.writer_depth,
-                                                       reply_partition(session_, client));
-    if (!writer) return tl::unexpected(writer.error());
-    replies_.emplace(client, std::move(*writer));
+  Result<void> open_client(ClientId client) override {
+    if (clients_.contains(client)) return {};
+    const std::string partition = client_partition(session_, client);
+    auto snapshot = endpoints_.node.writer<SnapshotMessage>(
+        "snapshots", Topic<SnapshotMessage>::kQos.writer_depth, partition);
+    if (!snapshot) return tl::unexpected(snapshot.error());
+    auto reply =
+        endpoints_.node.writer<ReplyMessage>("replies", Topic<ReplyMessage>::kQos.writer_depth, partition);
+    if (!reply) return tl::unexpected(reply.error());
+    {
+      const std::scoped_lock lock(clients_mutex_);
+      clients_.emplace(client, Client{std::move(*snapshot), std::move(*reply)});
+    }
     forget_stranger(client);  // or what it was told before could be taken for news
     return {};
   }
-  void close_replies(ClientId client) override { replies_.erase(client); }
+  void close_client(ClientId client) override {
+    const std::scoped_lock lock(clients_mutex_);
+    clients_.erase(client);
+  }
 
   void take(std::vector<Received<InputMessage>>& out) override { endpoints_.input.take(dropped_, out); }
   void take(std::vector<Received<AckMessage>>& out) override { endpoints_.ack.take(dropped_, out); }
 
-  [[nodiscard]] bool joined(const ParticipantId& participant, std::uint32_t stream) override {
-    return stream < streams_.size() && reads(streams_[stream].delta.get(), participant) &&
-           reads(endpoints_.scheduled.get(), participant) &&
-           reads(streams_[stream].snapshot.get(), participant);
+  [[nodiscard]] bool joined(const ParticipantId& participant, ClientId client,
+                            std::uint32_t stream) override {
+    return stream < streams_.size() && reads(streams_[stream].get(), participant) &&
+           reads(endpoints_.scheduled.get(), participant) && reads_snapshots(participant, client);
   }
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return endpoints_.ack.alive(participant) || endpoints_.input.alive(participant);
@@ -106,13 +115,19 @@ class DdsServerPort final : public ServerPort {
   void wake() override { endpoints_.node.wake(); }
 
  private:
-  struct Stream {
-    Writer<DeltaMessage> delta;
+  struct Client {
     Writer<SnapshotMessage> snapshot;
+    Writer<ReplyMessage> reply;
   };
 
   static tl::unexpected<Error> not_open() {
     return fail(ErrorCode::kInvalidArgument, "a stream that is not open");
+  }
+
+  bool reads_snapshots(const ParticipantId& participant, ClientId client) {
+    const std::scoped_lock lock(clients_mutex_);
+    const auto own = clients_.find(client);
+    return own != clients_.end() && reads(own->second.snapshot.get(), participant);
   }
 
   static bool reads(dds_entity_t writer, const ParticipantId& participant) {
@@ -154,10 +169,11 @@ class DdsServerPort final : public ServerPort {
   Endpoints endpoints_;
   std::string session_;
   std::int32_t delta_depth_;
-  std::vector<Stream> streams_;
-  // Of the writing thread.
-  std::map<ClientId, Writer<ReplyMessage>> replies_;
-  std::deque<ClientId> strangers_;
+  std::vector<Writer<DeltaMessage>> streams_;
+  // Changed by the writing thread alone, which reads without the lock.
+  std::map<ClientId, Client> clients_;
+  std::mutex clients_mutex_;
+  std::deque<ClientId> strangers_;  // of the writing thread
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 

@@ -14,8 +14,8 @@ namespace {
 constexpr std::uint32_t kSessionReaderDepth = 8;
 constexpr std::uint32_t kScheduledDepth = 4096;
 constexpr std::uint32_t kInputDepth = 64;
-constexpr std::uint32_t kSnapshotWriterDepth = 64;
-constexpr std::uint32_t kSnapshotReaderDepth = 1200;
+constexpr std::uint32_t kSnapshotWriterDepth = 4096;
+constexpr std::uint32_t kSnapshotReaderDepth = 4096;
 
 /// What both kinds of port share: a participant and its samples.
 class Member {
@@ -107,40 +107,48 @@ class SimulatedServerPort final : public ServerPort {
   }
   Result<void> write(const DeltaMessage& message) override {
     if (message.stream.id >= streams_.size()) return not_open();
-    return member_.fabric().write(streams_[message.stream.id].delta, 0, message);
+    return member_.fabric().write(streams_[message.stream.id], 0, message);
   }
   Result<void> write(const ScheduledInputMessage& message) override {
     return member_.fabric().write(scheduled_, 0, message);
   }
-  Result<void> write(const SnapshotMessage& message) override {
-    if (message.stream.id >= streams_.size()) return not_open();
-    return member_.fabric().write(streams_[message.stream.id].snapshot, 0, message);
+  Result<void> write(ClientId to, const SnapshotMessage& message) override {
+    const auto own = clients_.find(to);
+    if (own == clients_.end()) return fail(ErrorCode::kInvalidArgument, "a client that is not open");
+    return member_.fabric().write(own->second.snapshot, 0, message);
   }
   Result<void> write(const ReplyMessage& message) override {
-    const auto own = replies_.find(message.client);
-    return member_.fabric().write(own == replies_.end() ? reply_ : own->second, message.client, message);
+    const auto own = clients_.find(message.client);
+    return member_.fabric().write(own == clients_.end() ? reply_ : own->second.reply, message.client,
+                                  message);
   }
   Result<void> write(const ServerStatusMessage& message) override {
     return member_.fabric().write(status_, message.stream, message);
   }
-  Result<void> open_replies(ClientId client) override {
-    if (replies_.contains(client)) return {};
-    replies_.emplace(client, member_.writer<ReplyMessage>(1, reply_partition(member_.session(), client)));
+  Result<void> open_client(ClientId client) override {
+    if (clients_.contains(client)) return {};
+    const std::string partition = client_partition(member_.session(), client);
+    clients_.emplace(client, Client{member_.writer<SnapshotMessage>(kSnapshotWriterDepth, partition),
+                                    member_.writer<ReplyMessage>(1, partition)});
     member_.fabric().forget(reply_, client);
     return {};
   }
-  void close_replies(ClientId client) override {
-    const auto own = replies_.find(client);
-    if (own == replies_.end()) return;
-    member_.fabric().close_writer(own->second);
-    replies_.erase(own);
+  void close_client(ClientId client) override {
+    const auto own = clients_.find(client);
+    if (own == clients_.end()) return;
+    member_.fabric().close_writer(own->second.snapshot);
+    member_.fabric().close_writer(own->second.reply);
+    clients_.erase(own);
   }
   void take(std::vector<Received<InputMessage>>& out) override { member_.take(input_, Limits{}, out); }
   void take(std::vector<Received<AckMessage>>& out) override { member_.take(ack_, Limits{}, out); }
-  [[nodiscard]] bool joined(const ParticipantId& participant, std::uint32_t stream) override {
-    return stream < streams_.size() && member_.fabric().reaches(streams_[stream].delta, participant) &&
+  [[nodiscard]] bool joined(const ParticipantId& participant, ClientId client,
+                            std::uint32_t stream) override {
+    const auto own = clients_.find(client);
+    return stream < streams_.size() && own != clients_.end() &&
+           member_.fabric().reaches(streams_[stream], participant) &&
            member_.fabric().reaches(scheduled_, participant) &&
-           member_.fabric().reaches(streams_[stream].snapshot, participant);
+           member_.fabric().reaches(own->second.snapshot, participant);
   }
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return member_.fabric().hears(ack_, participant);
@@ -152,14 +160,13 @@ class SimulatedServerPort final : public ServerPort {
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
  private:
-  struct Stream {
-    Fabric::Index delta = 0, snapshot = 0;
+  struct Client {
+    Fabric::Index snapshot = 0, reply = 0;
   };
   void open_stream() {
     const auto stream = static_cast<std::uint32_t>(streams_.size());
-    const std::string partition = stream_partition(member_.session(), stream);
-    streams_.push_back({member_.writer<DeltaMessage>(delta_depth_, partition),
-                        member_.writer<SnapshotMessage>(kSnapshotWriterDepth, partition)});
+    streams_.push_back(
+        member_.writer<DeltaMessage>(delta_depth_, stream_partition(member_.session(), stream)));
   }
   static tl::unexpected<Error> not_open() {
     return fail(ErrorCode::kInvalidArgument, "a stream that is not open");
@@ -169,8 +176,8 @@ class SimulatedServerPort final : public ServerPort {
   std::uint32_t delta_depth_;
   Fabric::Index session_, scheduled_, reply_, status_;
   Fabric::Index others_, input_, ack_;
-  std::vector<Stream> streams_;
-  std::map<ClientId, Fabric::Index> replies_;
+  std::vector<Fabric::Index> streams_;  // their delta writers
+  std::map<ClientId, Client> clients_;
   SessionBook book_;
 };
 
@@ -199,8 +206,9 @@ class SimulatedClientPort final : public ClientPort {
                            ClientId client) override {
     if (common_ && common_->epoch != session.epoch) close_streams();
     if (!common_)
-      common_ = Common{session.epoch, member_.reader<ScheduledInputMessage>(kScheduledDepth),
-                       member_.reader<ReplyMessage>(1, {{}, reply_partition(member_.session(), client)})};
+      common_ =
+          Common{session.epoch, member_.reader<ScheduledInputMessage>(kScheduledDepth),
+                 member_.reader<ReplyMessage>(1, {{}, client_partition(member_.session(), client)}), client};
     const auto [open, is_new] = streams_.try_emplace(stream.id.id);
     if (is_new) open->second.deltas = member_.reader<DeltaMessage>(delta_depth_, partitions(stream.id.id));
     open->second.limits = Limits{stream.max_delta_bytes, stream.max_snapshot_bytes};
@@ -224,7 +232,8 @@ class SimulatedClientPort final : public ClientPort {
     const auto open = streams_.find(stream);
     if (open == streams_.end()) return fail(ErrorCode::kOutOfOrder, "that stream is not open");
     if (!open->second.snapshots)
-      open->second.snapshots = member_.reader<SnapshotMessage>(kSnapshotReaderDepth, partitions(stream));
+      open->second.snapshots = member_.reader<SnapshotMessage>(
+          kSnapshotReaderDepth, {client_partition(member_.session(), common_->client)});
     return {};
   }
   void close_snapshots(std::uint32_t stream) override {
@@ -272,6 +281,7 @@ class SimulatedClientPort final : public ClientPort {
   struct Common {
     Epoch epoch = 0;
     Fabric::Index scheduled = 0, reply = 0;
+    ClientId client = 0;
   };
   [[nodiscard]] std::vector<std::string> partitions(std::uint32_t stream) const {
     return {stream_partition(member_.session(), stream)};

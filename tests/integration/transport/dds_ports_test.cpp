@@ -43,7 +43,9 @@ class DdsPorts : public ::testing::Test {
     EXPECT_TRUE(server.write(session));
     EXPECT_TRUE(client.open_stream(session, session.streams[0], kClient));
     EXPECT_TRUE(client.open_snapshots(0));
-    EXPECT_TRUE(eventually([&] { return server.joined(client.self(), 0) && server.alive(client.self()); }));
+    EXPECT_TRUE(server.open_client(kClient));
+    EXPECT_TRUE(
+        eventually([&] { return server.joined(client.self(), kClient, 0) && server.alive(client.self()); }));
     return session;
   }
   /// The next `count` messages of a type.
@@ -57,6 +59,17 @@ class DdsPorts : public ::testing::Test {
     })) << "got "
         << out.size() << " of " << count;
     return out;
+  }
+  /// A reader drops what comes before the first heartbeat of a writer that is new to it.
+  void write_until_received(ServerPort& server, ClientPort& client, const SnapshotMessage& snapshot) {
+    std::vector<Received<SnapshotMessage>> got;
+    ASSERT_TRUE(eventually([&] {
+      EXPECT_TRUE(server.write(kClient, snapshot));
+      client.wait(100ms);
+      client.take(got);
+      return !got.empty();
+    }));
+    EXPECT_EQ(got[0].message, snapshot);
   }
   template <class Port>
   std::vector<Received<SessionMessage>> receive_sessions(Port& port, std::size_t count = 1) {
@@ -73,44 +86,53 @@ class DdsPorts : public ::testing::Test {
 };
 
 // The reader of stream 1 is a bare node, so that nothing is asked of the client's side.
-TEST_F(DdsPorts, DeltasAndSnapshotsOfASecondStreamAreInAPartitionOfTheirOwn) {
+TEST_F(DdsPorts, DeltasOfASecondStreamAreInAPartitionOfTheirOwnAndSnapshotsInThatOfTheirClient) {
+  constexpr ClientId kOther = kClient + 1;
   const auto server = this->server();
   const auto client = this->client();
   ASSERT_TRUE(server->open_streams(2));
   const SessionMessage session = join(*server, *client);
-  EXPECT_FALSE(server->joined(client->self(), 1)) << "it reads stream 0 alone";
-  EXPECT_FALSE(server->joined(client->self(), 2));
+  EXPECT_FALSE(server->joined(client->self(), kClient, 1)) << "it reads stream 0 alone";
+  EXPECT_FALSE(server->joined(client->self(), kClient, 2));
+  ASSERT_TRUE(server->open_client(kOther));
   auto node = dds::Node::create(options_, "reader of stream 1", stream_partition(options_.session, 1));
   ASSERT_TRUE(node);
   auto deltas = node->reader<DeltaMessage>("deltas");
-  auto snapshots = node->reader<SnapshotMessage>("snapshots");
+  auto snapshots = node->reader<SnapshotMessage>(
+      "snapshots", {.partitions = {client_partition(options_.session, kOther)}});
   auto inputs = node->reader<ScheduledInputMessage>("scheduled inputs", {.partitions = {options_.session}});
   ASSERT_TRUE(deltas && snapshots && inputs);
-  ASSERT_TRUE(eventually([&] { return server->joined(node->self(), 1); }));
-  EXPECT_FALSE(server->joined(node->self(), 0));
+  ASSERT_TRUE(eventually([&] { return server->joined(node->self(), kOther, 1); }));
+  EXPECT_FALSE(server->joined(node->self(), kOther, 0));
+  EXPECT_FALSE(server->joined(client->self(), kOther, 0)) << "the other's snapshots";
 
   DeltaMessage first = a_delta(kEpoch, 1), second = first;
-  SnapshotMessage cut = a_snapshot(kEpoch, 1);
-  second.stream.id = cut.stream.id = 1;
+  second.stream.id = 1;
   ASSERT_TRUE(server->write(first));
   ASSERT_TRUE(server->write(second));
-  ASSERT_TRUE(server->write(cut));
   std::atomic<std::uint64_t> dropped = 0;
   std::vector<Received<DeltaMessage>> got;
   std::vector<Received<SnapshotMessage>> cuts;
   ASSERT_TRUE(eventually([&] {
+    SnapshotMessage cut = a_snapshot(kEpoch, 1);
+    cut.stream.id = 1;
+    EXPECT_TRUE(server->write(kOther, cut));
     deltas->take(dropped, got);
     snapshots->take(dropped, cuts);
     return !got.empty() && !cuts.empty();
   }));
   EXPECT_EQ(got.size(), 1U);
   EXPECT_EQ(got[0].message, second);
-  EXPECT_EQ(cuts[0].message, cut);
+  EXPECT_EQ(cuts[0].message.stream.id, 1U);
   const auto of_first = receive<DeltaMessage>(*client, 1);
   EXPECT_EQ(of_first.size(), 1U);
   EXPECT_EQ(of_first[0].message, first);
+  std::vector<Received<SnapshotMessage>> none;
+  client->take(none);
+  EXPECT_TRUE(none.empty());
   second.stream.id = 2;
   EXPECT_EQ(server->write(second).error().code, ErrorCode::kInvalidArgument) << "not open";
+  EXPECT_EQ(server->write(kOther + 1, a_snapshot(kEpoch, 1)).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST_F(DdsPorts, SessionNamesWithWildcardsAreRefused) {
@@ -154,8 +176,7 @@ TEST_F(DdsPorts, EveryTopicArrivesAsItWasWritten) {
   ASSERT_TRUE(server->write(scheduled));
   EXPECT_EQ(receive<ScheduledInputMessage>(*client, 1)[0].message, scheduled);
   const SnapshotMessage snapshot = a_snapshot(kEpoch, 6);
-  ASSERT_TRUE(server->write(snapshot));
-  EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message, snapshot);
+  write_until_received(*server, *client, snapshot);
   ReplyMessage reply;
   reply.client = 77;
   reply.epoch = kEpoch;
@@ -194,15 +215,26 @@ TEST_F(DdsPorts, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
   const SessionMessage session = join(*server, *owner);
   ASSERT_TRUE(other->open_stream(session, session.streams[0], kClient + 1));
   ASSERT_TRUE(other->open_snapshots(0));
-  ASSERT_TRUE(eventually([&] { return server->joined(other->self(), 0); }));
+  server->close_client(kClient);
+  ASSERT_TRUE(eventually([&] {
+    ReplyMessage to_all;
+    to_all.client = kClient + 1;
+    EXPECT_TRUE(server->write(to_all));
+    std::vector<Received<ReplyMessage>> got;
+    other->wait(10ms);
+    other->take(got);
+    return !got.empty();
+  }));
+  std::vector<Received<ReplyMessage>> before;
+  owner->take(before);
   ReplyMessage reply;
   reply.client = kClient;
   reply.epoch = kEpoch;
   ASSERT_TRUE(server->write(reply));
   EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, reply);
   EXPECT_EQ(receive<ReplyMessage>(*other, 1).at(0).message, reply) << "a stranger's answer is for everybody";
-  ASSERT_TRUE(server->open_replies(kClient));
-  ASSERT_TRUE(server->open_replies(kClient)) << "twice is harmless";
+  ASSERT_TRUE(server->open_client(kClient));
+  ASSERT_TRUE(server->open_client(kClient)) << "twice is harmless";
   reply.highest_input = 5;
   ASSERT_TRUE(server->write(reply));
   EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, reply);
@@ -218,7 +250,7 @@ TEST_F(DdsPorts, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
   for (const auto& [message, from] : handed) {
     EXPECT_TRUE(message == reply || message == last) << "client " << message.client;
   }
-  server->close_replies(kClient);
+  server->close_client(kClient);
   const SessionMessage latest = a_session(options_.session, kEpoch + 2);
   ASSERT_TRUE(owner->open_stream(latest, latest.streams[0], kClient));
   EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, last);
@@ -271,7 +303,8 @@ TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapsh
     ASSERT_TRUE(server->write(a_scheduled_input(kEpoch, number)));
   }
   for (Frame frame = 1; frame <= 20; ++frame) ASSERT_TRUE(server->write(a_delta(kEpoch, frame)));
-  ASSERT_TRUE(server->write(a_snapshot(kEpoch, 20)));
+  ASSERT_TRUE(server->open_client(kClient));
+  ASSERT_TRUE(server->write(kClient, a_snapshot(kEpoch, 20)));
 
   const auto client = this->client();
   EXPECT_EQ(receive_sessions(*client)[0].message, session);
@@ -280,9 +313,8 @@ TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapsh
   const auto scheduled = receive<ScheduledInputMessage>(*client, 256);
   ASSERT_EQ(scheduled.size(), 256U) << "keep-last 256";
   for (std::size_t i = 0; i < 256; ++i) EXPECT_EQ(scheduled[i].message.number, 45 + i);
-  ASSERT_TRUE(eventually([&] { return server->joined(client->self(), 0); }));
-  ASSERT_TRUE(server->write(a_snapshot(kEpoch, 21)));
-  EXPECT_EQ(receive<SnapshotMessage>(*client, 1)[0].message.frame, 21U);
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self(), kClient, 0); }));
+  write_until_received(*server, *client, a_snapshot(kEpoch, 21));
   ASSERT_TRUE(server->write(a_delta(kEpoch, 21)));
   EXPECT_EQ(receive<DeltaMessage>(*client, 1)[0].message.frame, 21U);
 }
@@ -359,12 +391,13 @@ TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   const ParticipantId id = client->self();
   const SessionMessage session = a_session(options_.session, kEpoch);
   ASSERT_TRUE(eventually([&] { return server->alive(id); }));
-  EXPECT_FALSE(server->joined(id, 0));
+  EXPECT_FALSE(server->joined(id, kClient, 0));
+  ASSERT_TRUE(server->open_client(kClient));
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots(0));
-  ASSERT_TRUE(eventually([&] { return server->joined(id, 0); }));
+  ASSERT_TRUE(eventually([&] { return server->joined(id, kClient, 0); }));
   client->close_snapshots(0);
-  EXPECT_TRUE(eventually([&] { return !server->joined(id, 0); }));
+  EXPECT_TRUE(eventually([&] { return !server->joined(id, kClient, 0); }));
   client.reset();
   EXPECT_TRUE(eventually([&] { return !server->alive(id); }));
 }
@@ -441,7 +474,7 @@ TEST_F(DdsPorts, OversizeAndMisshapenSamplesAreDroppedAndCounted) {
   session.streams[0].max_snapshot_bytes = 2000;
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots(0));
-  ASSERT_TRUE(eventually([&] { return server->joined(client->self(), 0); }));
+  ASSERT_TRUE(eventually([&] { return server->joined(client->self(), kClient, 0); }));
   ASSERT_TRUE(server->write(a_delta(kEpoch, 1, 1001)));
   DeltaMessage misshapen = a_delta(kEpoch, 2);
   misshapen.part = misshapen.parts = 3;
@@ -491,8 +524,7 @@ TEST_F(DdsPorts, DeltasInPartsAndALargeSnapshotArriveWhole) {
     EXPECT_EQ(deltas.at(part).message.payload.size(), 200'000U + part);
   }
   const SnapshotMessage snapshot = a_snapshot(kEpoch, 5, 1'000'000);
-  ASSERT_TRUE(server->write(snapshot));
-  EXPECT_EQ(receive<SnapshotMessage>(*client, 1).at(0).message, snapshot);
+  write_until_received(*server, *client, snapshot);
 }
 
 TEST_F(DdsPorts, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {

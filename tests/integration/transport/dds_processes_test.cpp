@@ -50,10 +50,13 @@ class DdsProcesses : public ::testing::Test {
           std::vector<Received<AckMessage>> acks;
           server.take(acks);
           for (const auto& ack : acks) {
-            if (known_.insert(ack.from).second) ids.push_back(ack.from);
+            if (!known_.insert(ack.from).second) continue;
+            ids.push_back(ack.from);
+            clients_[ack.from] = ack.message.client;
+            EXPECT_TRUE(server.open_client(ack.message.client));
           }
           return ids.size() == count && std::all_of(ids.begin(), ids.end(), [&](const ParticipantId& id) {
-                   return server.joined(id, 0) && server.alive(id);
+                   return server.joined(id, clients_.at(id), 0) && server.alive(id);
                  });
         },
         30s))
@@ -81,6 +84,7 @@ class DdsProcesses : public ::testing::Test {
 
   DdsOptions options_;
   std::set<ParticipantId> known_;
+  std::map<ParticipantId, ClientId> clients_;
 };
 
 TEST_F(DdsProcesses, EveryDeltaAfterJoinedArrivesInTheOtherProcess) {

@@ -49,7 +49,7 @@ class StreamReader {
         deltas_(std::move(*node_.reader<DeltaMessage>(
             "deltas", {.depth = 4096, .partitions = {stream_partition(options.session, kRich)}}))),
         snapshots_(std::move(*node_.reader<SnapshotMessage>(
-            "snapshots", {.partitions = {stream_partition(options.session, kRich)}}))) {}
+            "snapshots", {.partitions = {client_partition(options.session, kClient)}}))) {}
 
   /// Takes what came, acknowledges.
   void poll() {
@@ -80,7 +80,8 @@ class StreamReader {
 
  private:
   void add(const SnapshotMessage& part) {
-    if (timeline || part.stream.id != kRich) return;
+    if (timeline || part.stream.id != kRich || part.parts == 0) return;
+    cut_ = {.epoch = part.epoch, .stream = part.stream, .frame = part.frame, .parts = part.parts};
     parts_.try_emplace(part.part, part);
     if (parts_.size() < part.parts) return;
     Bytes whole;
@@ -117,6 +118,12 @@ class StreamReader {
     ack.phase = timeline ? Phase::kPlaying : Phase::kJoining;
     ack.applied = ack.simulated = timeline ? timeline->applied() : 0;
     ack.join_attempt = 1;
+    if (!timeline && cut_.parts > 0) {
+      ack.snapshot_frame = cut_.frame;
+      ack.snapshot_parts = cut_.parts;
+      for (std::uint32_t part = 0; part < cut_.parts && ack.missing.size() < 2 * kMaxMissingRuns; ++part)
+        if (!parts_.contains(part)) ack.missing.insert(ack.missing.end(), {part, 1});
+    }
     ack.clock_ns = steady_ns();
     static_cast<void>(ack_.write(ack));
   }
@@ -129,6 +136,7 @@ class StreamReader {
   dds::Reader<SnapshotMessage> snapshots_;
   std::atomic<std::uint64_t> dropped_ = 0;
   std::map<std::uint32_t, SnapshotMessage> parts_;
+  SnapshotMessage cut_{.parts = 0};  // that these are of
   std::vector<ScheduledInputMessage> scheduled_;
   std::vector<DeltaMessage> deltas_kept_;
 };

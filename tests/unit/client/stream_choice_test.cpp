@@ -234,7 +234,7 @@ TEST(StreamChoice, AJoinThatTakesLongTriesFewerBits) {
   const auto joining = [&](int seconds) {
     for (int i = 0; i < seconds; ++i) {
       watched.now_ns += kSecond;
-      if (watched.chooser.reconsider({.now_ns = watched.now_ns, .joining_since_ns = 1000 * kSecond}))
+      if (watched.chooser.reconsider({.now_ns = watched.now_ns, .idle_since_ns = 1000 * kSecond}))
         return true;
     }
     return false;

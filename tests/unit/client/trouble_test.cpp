@@ -23,6 +23,7 @@ class TroubleTest : public ::testing::Test {
     core = std::make_unique<ClientCore>(options, *client_port);
     core->start_sampling();
     EXPECT_TRUE(server_port->write(server.session).has_value());
+    EXPECT_TRUE(server_port->open_client(kClient).has_value());
   }
 
   /// Goes on for so long; looks at the second differences of what is drawn.
@@ -36,7 +37,7 @@ class TroubleTest : public ::testing::Test {
       for (const auto& ask : asks) {
         if (ask.message.phase != transport::Phase::kJoining || core->phase() != ClientPhase::kJoining)
           continue;
-        EXPECT_TRUE(server_port->write(server.snapshot()).has_value());
+        EXPECT_TRUE(server_port->write(kClient, server.snapshot()).has_value());
       }
       if (now_ns >= next_frame_ns) {
         next_frame_ns += kFrameNs;

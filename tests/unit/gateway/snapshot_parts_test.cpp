@@ -44,11 +44,10 @@ std::uint32_t drain(SnapshotPassage& passage, std::int64_t now_ns) {
 }
 
 TEST(SnapshotPassage, NoMoreIsOnItsWayThanTheWindow) {
-  SnapshotPassage passage(snapshot_of(13'000), kStart);
-  EXPECT_EQ(drain(passage, kStart), 2U) << "2,600 bytes";
-  passage.acknowledged(holds(1, 10), kStart + 50 * kMillisecond);
-  passage.acknowledged(holds(2, 10), kStart + 50 * kMillisecond);
-  EXPECT_GE(drain(passage, kStart + 50 * kMillisecond), 4U) << "a round trip doubles it";
+  SnapshotPassage passage(snapshot_of(26'000), kStart);
+  EXPECT_EQ(drain(passage, kStart), 6U) << "7,800 bytes";
+  passage.acknowledged(holds(6, 20), kStart + 50 * kMillisecond);
+  EXPECT_GE(drain(passage, kStart + 50 * kMillisecond), 12U) << "a round trip doubles it";
   EXPECT_TRUE(passage.unfinished());
 }
 

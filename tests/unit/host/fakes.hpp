@@ -105,18 +105,27 @@ class FakePort final : public transport::ServerPort {
   Result<void> write(const transport::ScheduledInputMessage& m) override {
     return keep(scheduled, m, "scheduled");
   }
-  Result<void> write(const transport::SnapshotMessage& m) override { return keep(snapshots, m, "snapshot"); }
+  Result<void> write(transport::ClientId to, const transport::SnapshotMessage& m) override {
+    if (!client_writers.contains(to)) return fail(ErrorCode::kInvalidArgument, "not open");
+    if (m.parts == 0) {
+      ++greetings;
+      return {};
+    }
+    snapshots_to.push_back(to);
+    return keep(snapshots, m, "snapshot");
+  }
   Result<void> write(const transport::ReplyMessage& m) override { return keep(replies, m, "reply"); }
   Result<void> write(const transport::ServerStatusMessage& m) override { return keep(statuses, m, "status"); }
-  Result<void> open_replies(transport::ClientId client) override {
-    reply_writers.insert(client);
+  Result<void> open_client(transport::ClientId client) override {
+    client_writers.insert(client);
     return {};
   }
-  void close_replies(transport::ClientId client) override { reply_writers.erase(client); }
+  void close_client(transport::ClientId client) override { client_writers.erase(client); }
   void take(std::vector<transport::Received<transport::InputMessage>>& out) override { move(inputs, out); }
   void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
-  [[nodiscard]] bool joined(const transport::ParticipantId& id, std::uint32_t stream) override {
-    return stream < open_stream_count && !unmatched.contains(id);
+  [[nodiscard]] bool joined(const transport::ParticipantId& id, transport::ClientId client,
+                            std::uint32_t stream) override {
+    return stream < open_stream_count && client_writers.contains(client) && !unmatched.contains(id);
   }
   [[nodiscard]] bool alive(const transport::ParticipantId& id) override { return !dead.contains(id); }
   [[nodiscard]] bool ended(const transport::ParticipantId& id) override { return gone.contains(id); }
@@ -132,7 +141,9 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::ScheduledInputMessage> scheduled;
   std::vector<transport::SnapshotMessage> snapshots;
   std::vector<transport::ReplyMessage> replies;
-  std::set<transport::ClientId> reply_writers;
+  std::vector<transport::ClientId> snapshots_to;  // of each of these
+  std::uint64_t greetings = 0;
+  std::set<transport::ClientId> client_writers;
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written
   std::uint32_t open_stream_count = 1;

@@ -142,11 +142,11 @@ TEST(Outbox, KeepsOneOrderOverAllKinds) {
   Outbox outbox({});
   ASSERT_TRUE(outbox.push(transport::ScheduledInputMessage{}));
   ASSERT_TRUE(outbox.push(delta(1, 0, 1)));
-  ASSERT_TRUE(outbox.push(transport::SnapshotMessage{}));
+  ASSERT_TRUE(outbox.push(SnapshotPart{}));
   using std::chrono::nanoseconds;
   EXPECT_TRUE(std::holds_alternative<transport::ScheduledInputMessage>(*outbox.pop(nanoseconds{0})));
   EXPECT_TRUE(std::holds_alternative<transport::DeltaMessage>(*outbox.pop(nanoseconds{0})));
-  EXPECT_TRUE(std::holds_alternative<transport::SnapshotMessage>(*outbox.pop(nanoseconds{0})));
+  EXPECT_TRUE(std::holds_alternative<SnapshotPart>(*outbox.pop(nanoseconds{0})));
   EXPECT_FALSE(outbox.pop(nanoseconds{0}));
   EXPECT_EQ(outbox.high_water(), 3U);
 }
@@ -189,8 +189,8 @@ TEST(Outbox, EachKindIsBoundedByItself) {
   Outbox outbox({.frames = 1, .snapshots = 1, .control = 1});
   EXPECT_TRUE(outbox.push(EndOfFrame{}));
   EXPECT_FALSE(outbox.push(EndOfFrame{}));
-  EXPECT_TRUE(outbox.push(transport::SnapshotMessage{}));
-  EXPECT_FALSE(outbox.push(transport::SnapshotMessage{}));
+  EXPECT_TRUE(outbox.push(SnapshotPart{}));
+  EXPECT_FALSE(outbox.push(SnapshotPart{}));
   EXPECT_TRUE(outbox.push(transport::ReplyMessage{}));
   EXPECT_FALSE(outbox.push(transport::ServerStatusMessage{}));
   EXPECT_EQ(outbox.size(), 3U);

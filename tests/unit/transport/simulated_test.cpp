@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr Epoch kEpoch = 7;
+constexpr ClientId kClient = 77;
 
 SessionMessage session(Epoch epoch = kEpoch) {
   SessionMessage message;
@@ -25,7 +26,8 @@ SessionMessage session(Epoch epoch = kEpoch) {
   return message;
 }
 
-Result<void> open_stream(ClientPort& port, const SessionMessage& about = session(), ClientId client = 77) {
+Result<void> open_stream(ClientPort& port, const SessionMessage& about = session(),
+                         ClientId client = kClient) {
   return port.open_stream(about, about.streams[0], client);
 }
 
@@ -87,8 +89,9 @@ struct Pair {
     EXPECT_TRUE(server->write(session()));
     EXPECT_TRUE(open_stream(*client));
     EXPECT_TRUE(client->open_snapshots(0));
+    EXPECT_TRUE(server->open_client(kClient));
     run(100 * kMs);
-    EXPECT_TRUE(server->joined(client->self(), 0));
+    EXPECT_TRUE(server->joined(client->self(), kClient, 0));
   }
   void run(std::int64_t duration_ns) { network.advance_to(network.now_ns() + duration_ns); }
   Network network;
@@ -119,15 +122,18 @@ TEST(Simulated, WritersReachOnlyReadersTheyAreMatchedWith) {
   EXPECT_FALSE(server->alive(client->self()));
   network.advance_to(10 * kMs);
   EXPECT_TRUE(server->alive(client->self()));
-  EXPECT_FALSE(server->joined(client->self(), 0)) << "no snapshot reader yet";
+  ASSERT_TRUE(server->open_client(kClient));
+  network.advance_to(20 * kMs);
+  EXPECT_FALSE(server->joined(client->self(), kClient, 0)) << "no snapshot reader yet";
   ASSERT_TRUE(server->write(delta(2)));
   ASSERT_TRUE(client->open_snapshots(0));
-  network.advance_to(30 * kMs);
-  EXPECT_TRUE(server->joined(client->self(), 0));
+  network.advance_to(40 * kMs);
+  EXPECT_TRUE(server->joined(client->self(), kClient, 0));
+  EXPECT_FALSE(server->joined(client->self(), kClient + 1, 0)) << "a client that is not open";
   EXPECT_EQ(frames(*client), range(2, 2)) << "deltas are volatile";
 }
 
-TEST(Simulated, DeltasAndSnapshotsOfAStreamReachOnlyThoseWhoOpenedIt) {
+TEST(Simulated, DeltasReachOnlyThoseWhoOpenedTheStreamAndSnapshotsTheirClientAlone) {
   Network network(NetworkOptions{});
   const auto server = std::move(*network.make_server("s"));
   const auto thin = std::move(*network.make_client("s"));
@@ -138,20 +144,22 @@ TEST(Simulated, DeltasAndSnapshotsOfAStreamReachOnlyThoseWhoOpenedIt) {
   ASSERT_TRUE(server->open_streams(2));
   ASSERT_TRUE(server->open_streams(1)) << "what is open stays";
   for (const auto& [client, stream] : {std::pair{thin.get(), 0U}, std::pair{rich.get(), 1U}}) {
-    ASSERT_TRUE(client->open_stream(two, two.streams[stream], 77));
+    ASSERT_TRUE(client->open_stream(two, two.streams[stream], kClient + stream));
     ASSERT_TRUE(client->open_snapshots(stream));
+    ASSERT_TRUE(server->open_client(kClient + stream));
   }
   network.advance_to(100 * kMs);
-  EXPECT_TRUE(server->joined(rich->self(), 1));
-  EXPECT_FALSE(server->joined(rich->self(), 0));
-  EXPECT_TRUE(server->joined(thin->self(), 0));
-  EXPECT_FALSE(server->joined(thin->self(), 1));
+  EXPECT_TRUE(server->joined(rich->self(), kClient + 1, 1));
+  EXPECT_FALSE(server->joined(rich->self(), kClient + 1, 0));
+  EXPECT_FALSE(server->joined(rich->self(), kClient, 1)) << "not its own client";
+  EXPECT_TRUE(server->joined(thin->self(), kClient, 0));
+  EXPECT_FALSE(server->joined(thin->self(), kClient, 1));
   for (const std::uint32_t stream : {0U, 1U}) {
     DeltaMessage message = delta(10 + stream);
     SnapshotMessage cut = snapshot(20 + stream);
     message.stream.id = cut.stream.id = stream;
     ASSERT_TRUE(server->write(message));
-    ASSERT_TRUE(server->write(cut));
+    ASSERT_TRUE(server->write(kClient + stream, cut));
   }
   ASSERT_TRUE(server->write(scheduled(1)));
   network.advance_to(200 * kMs);
@@ -169,11 +177,10 @@ TEST(Simulated, AStreamThatIsNotOpenIsNotWritten) {
   EXPECT_FALSE(server->open_streams(0));
   EXPECT_FALSE(server->open_streams(9));
   DeltaMessage message = delta(1);
-  SnapshotMessage cut = snapshot(1);
-  message.stream.id = cut.stream.id = 1;
+  message.stream.id = 1;
   EXPECT_EQ(server->write(message).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(server->write(cut).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_FALSE(server->joined(server->self(), 1));
+  EXPECT_EQ(server->write(kClient, snapshot(1)).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_FALSE(server->joined(server->self(), kClient, 1));
 }
 
 TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
@@ -181,7 +188,8 @@ TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
   const auto server = std::move(*network.make_server("s"));
   ASSERT_TRUE(server->write(session()));
   for (std::uint64_t number = 1; number <= 300; ++number) ASSERT_TRUE(server->write(scheduled(number)));
-  ASSERT_TRUE(server->write(snapshot(1)));
+  ASSERT_TRUE(server->open_client(kClient));
+  ASSERT_TRUE(server->write(kClient, snapshot(1)));
   const auto client = std::move(*network.make_client("s"));
   ASSERT_TRUE(open_stream(*client));
   ASSERT_TRUE(client->open_snapshots(0));
@@ -344,7 +352,7 @@ TEST(Simulated, AKilledClientIsNoticedAfterTheLeaseAndAClosedOneAtOnce) {
   EXPECT_TRUE(pair.server->alive(first_id));
   pair.run(kMs);
   EXPECT_FALSE(pair.server->alive(first_id));
-  EXPECT_FALSE(pair.server->joined(first_id, 0));
+  EXPECT_FALSE(pair.server->joined(first_id, kClient, 0));
   EXPECT_FALSE(pair.client->write(ack(1, 1)));
 }
 
@@ -448,13 +456,12 @@ TEST(Simulated, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
   const auto other = std::move(*pair.network.make_client("s"));
   ASSERT_TRUE(open_stream(*other, session(), 78));
   pair.run(100 * kMs);
-  ASSERT_TRUE(pair.server->write(reply(77)));
+  ASSERT_TRUE(pair.server->write(reply(99)));
   pair.run(100 * kMs);
   EXPECT_EQ(take<ReplyMessage>(*pair.client).size(), 1U);
   EXPECT_EQ(take<ReplyMessage>(*other).size(), 1U) << "a stranger's answer is for everybody";
-  ASSERT_TRUE(pair.server->open_replies(77));
-  ASSERT_TRUE(pair.server->open_replies(77)) << "twice is harmless";
-  ASSERT_TRUE(pair.server->write(reply(77, 5)));
+  ASSERT_TRUE(pair.server->open_client(kClient)) << "twice is harmless";
+  ASSERT_TRUE(pair.server->write(reply(kClient, 5)));
   pair.run(100 * kMs);
   const auto own = take<ReplyMessage>(*pair.client);
   ASSERT_EQ(own.size(), 1U) << "also what was written before the match";
@@ -464,9 +471,10 @@ TEST(Simulated, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
 
 TEST(Simulated, AClosedReplyWriterHandsNothingToLateReaders) {
   Pair pair(NetworkOptions{});
-  ASSERT_TRUE(pair.server->write(reply(77, 1)));
-  ASSERT_TRUE(pair.server->open_replies(77));
-  ASSERT_TRUE(pair.server->write(reply(77, 2)));
+  pair.server->close_client(kClient);
+  ASSERT_TRUE(pair.server->write(reply(kClient, 1)));
+  ASSERT_TRUE(pair.server->open_client(kClient));
+  ASSERT_TRUE(pair.server->write(reply(kClient, 2)));
   pair.run(100 * kMs);
   take<ReplyMessage>(*pair.client);
   ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 1)));
@@ -474,8 +482,8 @@ TEST(Simulated, AClosedReplyWriterHandsNothingToLateReaders) {
   const auto kept = take<ReplyMessage>(*pair.client);
   ASSERT_EQ(kept.size(), 1U) << "the answer to the stranger it was is forgotten";
   EXPECT_EQ(kept[0].message.highest_input, 2U);
-  pair.server->close_replies(77);
-  pair.server->close_replies(77);
+  pair.server->close_client(kClient);
+  pair.server->close_client(kClient);
   ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 2)));
   pair.run(100 * kMs);
   EXPECT_TRUE(take<ReplyMessage>(*pair.client).empty());
