@@ -161,7 +161,7 @@ int report_error(const Error& error, int exit_code) {
 
 }  // namespace
 
-int run(const Options& options, const std::atomic<bool>& stop) {
+int run(const Options& options, SignalWatch& signals) {
   std::string token;
   if (!options.token_file.empty()) {
     auto read = read_token(options.token_file);
@@ -177,24 +177,25 @@ int run(const Options& options, const std::atomic<bool>& stop) {
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.session = options.session;
-  dds.stop = &stop;
+  dds.stop = &signals.stop();
   auto port = transport::make_dds_client_port(dds);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
 
   Service service(options, Admission(std::move(token), options.origins), **port);
   auto server = WebServer::create(options.web, site, service);
-  if (!server) return report_error(server.error(), 1);
+  if (!server) return signals.finish(report_error(server.error(), 1));
   const bool v6 = options.web.address.find(':') != std::string::npos;
   warn_of_open_doors(options);
   spdlog::info("session '{}' on domain {}: {}://{}:{}/", options.session, options.domain,
                options.web.tls_cert.empty() ? "http" : "https",
                v6 ? fmt::format("[{}]", options.web.address) : options.web.address, (*server)->port());
   std::jthread follower([&](const std::stop_token& done) { service.follow(done, **server); });
-  (*server)->run(stop);
+  (*server)->run(signals.stop());
+  const int exit_code = signals.finish(0);
   follower.request_stop();
   (*port)->wake();
   follower.join();
-  return 0;
+  return exit_code;
 }
 
 }  // namespace tandem::gateway

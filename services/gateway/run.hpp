@@ -1,12 +1,11 @@
 #pragma once
 
-#include <atomic>
-
 #include "services/gateway/options.hpp"
+#include "services/signals/signal_watch.hpp"
 
 namespace tandem::gateway {
 
-/// Serves until `stop`. Returns the exit code; says on stderr what went wrong.
-[[nodiscard]] int run(const Options& options, const std::atomic<bool>& stop);
+/// Serves until a signal. Returns the exit code; says on stderr what went wrong.
+[[nodiscard]] int run(const Options& options, SignalWatch& signals);
 
 }  // namespace tandem::gateway

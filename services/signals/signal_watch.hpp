@@ -1,35 +1,37 @@
 #pragma once
-// SIGINT and SIGTERM as a flag.
-
-#include <pthread.h>
+// SIGINT and SIGTERM as a flag, and an end in time whatever a library waits for.
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
+#include <string>
 #include <thread>
+#include <utility>
 
 namespace tandem {
 
 /// A thread waits for the signals, so that no handler and no global is needed. Make it before other threads:
 /// its mask holds for those started later.
+///
+/// The same thread is the guard of the end. Cyclone DDS, when it stops, waits for a packet to itself, which
+/// never comes once the network interface is gone. So from the first signal, or from finish() where that is
+/// earlier, the program has a limited time until this object is destroyed. After that, or at a further signal
+/// that comes a while after the first, the thread says on stderr what was left and ends the process with
+/// _exit().
 class SignalWatch {
  public:
-  SignalWatch() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // inherited by all threads started from here on
-    thread_ = std::thread([this] {
-      while (!done_) {
-        // A process that was stopped and goes on gets here without a signal.
-        if (sigwaitinfo(&signals_, nullptr) > 0 && !done_) stop_.store(true, std::memory_order_relaxed);
-      }
-    });
-  }
-  ~SignalWatch() {
-    done_ = true;
-    pthread_kill(thread_.native_handle(), SIGTERM);  // blocked in every thread: it ends the wait only
-    thread_.join();
-  }
+  struct Limits {
+    /// For an orderly end; a program that is asked to end does so within 5 s.
+    std::chrono::milliseconds end{4000};
+    /// A further signal within this time of the first is the same wish: a terminal and a parent process, or
+    /// timeout(1) alone, send two at once.
+    std::chrono::milliseconds repeat{1000};
+  };
+
+  /// `program` stands in front of what the guard says.
+  explicit SignalWatch(std::string program) : SignalWatch(std::move(program), Limits()) {}
+  SignalWatch(std::string program, Limits limits);
+  ~SignalWatch();
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
   SignalWatch(SignalWatch&&) = delete;
@@ -37,9 +39,25 @@ class SignalWatch {
 
   [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
 
+  /// All work is done, reports and files are written, and only DDS is left to end: from now on `exit_code` is
+  /// that of the process, also when the guard ends it; before it would be 1. Flushes stdout, as _exit() does
+  /// not. Returns `exit_code`, or 1 when stdout took not all.
+  [[nodiscard]] int finish(int exit_code);
+
  private:
+  static constexpr int kAtWork = -1;
+
+  void run();
+  /// The thread looks again at what it waits for.
+  void wake();
+  /// Ends the process. `when`: in words, behind "had not ended".
+  [[noreturn]] void give_up(const std::string& when) const;
+
+  const std::string program_;
+  const Limits limits_;
   sigset_t signals_{};
   std::atomic<bool> stop_{false}, done_{false};
+  std::atomic<int> exit_code_{kAtWork};
   std::thread thread_;
 };
 

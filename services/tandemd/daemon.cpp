@@ -219,9 +219,39 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   return {};
 }
 
+/// A session of one stream does not name it.
+bool is_alone(const std::vector<host::StreamConfig>& streams) {
+  return streams.size() == 1 && streams[0].name.empty();
+}
+
+/// Finishes the hash log, tells how it went, and returns the exit code.
+int tell_end(const host::Host& host, Ending ending, HashLog& hashes,
+             const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options) {
+  const auto closed = hashes.close();
+  if (!closed) spdlog::error(closed.error().message);
+  if (ending == Ending::kRefused) return report_error(*host.error(), 1);
+  for (std::uint32_t id = 0; id < streams.size(); ++id) {
+    const std::string which = is_alone(streams) ? std::string() : " of stream " + streams[id].name;
+    if (streams[id].quality) spdlog::info("threshold{} at the end: {:.4g} m", which, host.threshold_m(id));
+    if (const std::string gains = gains_text(host.parameters(id)); !gains.empty())
+      spdlog::info("at the end{}: {}", which, gains);
+  }
+  const auto printed = print_report(host.totals(), frame_rate_hz, options.json);
+  if (!printed) spdlog::error(printed.error().message);
+  if (ending == Ending::kCannotWrite) {
+    return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
+  }
+  if (ending == Ending::kNobodyCame) {
+    return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
+                                                          options.wait_for, *options.duration_s)},
+                        1);
+  }
+  return closed && printed ? 0 : 1;
+}
+
 }  // namespace
 
-int run_daemon(const Options& options, const std::atomic<bool>& stop) {
+int run_daemon(const Options& options, SignalWatch& signals) {
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return report_error(scene.error(), 2);
   auto config = configure(*scene, options);
@@ -233,13 +263,13 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
   if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
     return report_error(opened.error(), 1);
 
-  auto port = open_port(*config, options, stop);
+  auto port = open_port(*config, options, signals.stop());
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
   const std::vector<host::StreamConfig> streams = config->streams;
   auto host = host::Host::create(std::move(*config), **simulation, **port);
-  if (!host) return report_error(host.error(), 2);
-  const bool alone = streams.size() == 1 && streams[0].name.empty();
+  if (!host) return signals.finish(report_error(host.error(), 2));
+  const bool alone = is_alone(streams);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
                options.choice.bodies,
                alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
@@ -249,33 +279,15 @@ int run_daemon(const Options& options, const std::atomic<bool>& stop) {
 
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
-  const Ending ending = serve(**host, **port, script, hashes, publisher, options, stop);
+  const Ending ending = serve(**host, **port, script, hashes, publisher, options, signals.stop());
+  // Before the last writes: should DDS keep one of them, nothing else is missing.
+  const int exit_code = signals.finish(tell_end(**host, ending, hashes, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {
     spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());
   }
-  const auto closed = hashes.close();
-  if (!closed) spdlog::error(closed.error().message);
-  if (ending == Ending::kRefused) return report_error(*(*host)->error(), 1);
-  for (std::uint32_t id = 0; id < streams.size(); ++id) {
-    const std::string which = alone ? std::string() : " of stream " + streams[id].name;
-    if (streams[id].quality)
-      spdlog::info("threshold{} at the end: {:.4g} m", which, (*host)->threshold_m(id));
-    if (const std::string gains = gains_text((*host)->parameters(id)); !gains.empty())
-      spdlog::info("at the end{}: {}", which, gains);
-  }
-  const auto printed = print_report((*host)->totals(), frame_rate_hz, options.json);
-  if (!printed) spdlog::error(printed.error().message);
-  if (ending == Ending::kCannotWrite) {
-    return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
-  }
-  if (ending == Ending::kNobodyCame) {
-    return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
-                                                          options.wait_for, *options.duration_s)},
-                        1);
-  }
-  return closed && printed ? 0 : 1;
+  return exit_code;
 }
 
 }  // namespace tandem::daemon

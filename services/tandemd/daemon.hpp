@@ -1,14 +1,13 @@
 #pragma once
 // One session from start to end: what tandemd does once it knows its options.
 
-#include <atomic>
-
+#include "services/signals/signal_watch.hpp"
 #include "services/tandemd/options.hpp"
 
 namespace tandem::daemon {
 
-/// Loads the scene, joins the domain, serves until `stop`, the duration or a conflict, and prints the report.
-/// Returns the exit code: 0 done, 1 failed, 2 options that make no session.
-[[nodiscard]] int run_daemon(const Options& options, const std::atomic<bool>& stop);
+/// Loads the scene, joins the domain, serves until a signal, the duration or a conflict, prints the report,
+/// and leaves the domain. Returns the exit code: 0 done, 1 failed, 2 options that make no session.
+[[nodiscard]] int run_daemon(const Options& options, SignalWatch& signals);
 
 }  // namespace tandem::daemon

@@ -31,7 +31,7 @@ std::string with_suffix(const std::string& path, std::uint32_t index) {
 }
 
 int run_join(const JoinOptions& options) {
-  const SignalWatch signals;
+  SignalWatch signals("tandem join");
   const HeapTrimmer trimmer;
   std::vector<std::unique_ptr<HeadlessClient>> clients;
   for (std::uint32_t i = 0; i < options.count; ++i) {
@@ -45,7 +45,7 @@ int run_join(const JoinOptions& options) {
     auto client = HeadlessClient::create(one);
     if (!client) {
       print_error(fmt::format("tandem join: {}\n", client.error().message));
-      return 1;
+      return signals.finish(1);
     }
     clients.push_back(std::move(*client));
   }
@@ -68,7 +68,7 @@ int run_join(const JoinOptions& options) {
     for (const auto& client : clients) fmt::print("{}", client->summary());
   }
   const bool good = std::all_of(clients.begin(), clients.end(), [](const auto& c) { return c->succeeded(); });
-  return good ? 0 : 1;
+  return signals.finish(good ? 0 : 1);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ nlohmann::ordered_json report(const HeadlessClient& client) {
 }
 
 int run_record(RecordOptions options) {
-  const SignalWatch signals;
+  SignalWatch signals("tandem record");
   const HeapTrimmer trimmer;
   options.client.observe = true;
   options.client.lead = 0;  // nothing is drawn
@@ -56,7 +56,7 @@ int run_record(RecordOptions options) {
     fmt::print("{}: {} frames, {} bytes, {} of them deltas\n", options.client.capture, totals.frames,
                totals.file_bytes, totals.payload_bytes);
   }
-  return (*client)->succeeded() ? 0 : 1;
+  return signals.finish((*client)->succeeded() ? 0 : 1);
 }
 
 }  // namespace

@@ -52,6 +52,9 @@ struct Served {
 struct ReplayState {
   Epoch epoch = 0;      ///< the last; 0 before the first
   bool sought = false;  ///< a client did
+  /// Of the last run. It stays when all is over: whoever runs the replay has something to say before DDS
+  /// ends.
+  std::unique_ptr<transport::ServerPort> port;
   accounts::TokenBucket seeks{1, 1};
 };
 
@@ -59,6 +62,7 @@ struct ReplayState {
 Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplayState& state, bool hold,
                      const std::atomic<bool>& stop) {
   const bool first = state.epoch == 0;
+  state.port.reset();
   // An epoch of its own for each run, as frames follow one another within one.
   state.epoch = std::max<Epoch>(state.epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
   host::ServiceConfig config;
@@ -75,17 +79,18 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   dds.delta_depth =
       transport::delta_depth(config.frame_rate_hz, config.window_ceiling, playback.stream().max_delta_bytes);
   dds.stop = &stop;
-  const auto port = transport::make_dds_server_port(dds);
+  auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
+  state.port = std::move(*port);
   auto frames = std::make_unique<RecordedSource>(playback, config, state.seeks);
   const RecordedSource& source = *frames;
-  const auto host = host::Host::create(config, std::move(frames), **port);
+  const auto host = host::Host::create(config, std::move(frames), *state.port);
   if (!host) return tl::unexpected(host.error());
   print_error(
       fmt::format("tandem replay: session '{}' on domain {}, epoch {}, {} slots, {} frame {} ({:.1f} s)\n",
                   options.session, options.domain, config.epoch, playback.session().capacity,
                   hold ? "at its end," : "from", source.frame(), playback.time_s()));
-  host::Publisher publisher((*host)->outbox(), **port);
+  host::Publisher publisher((*host)->outbox(), *state.port);
   while (!stop && (*host)->state() != host::Host::State::kEnded) {
     (*host)->poll(steady_ns(), wall_ns());
     if ((*host)->error()) return tl::unexpected(*(*host)->error());
@@ -95,7 +100,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
     for (const std::string& notice : (*host)->take_notices())
       print_error(fmt::format("tandem replay: {}\n", notice));
     const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
-    if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
+    if (wait_ns > 0) state.port->wait(std::chrono::nanoseconds(wait_ns));
   }
   if (!stop) {
     publisher.flush();
@@ -126,21 +131,24 @@ Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState&
     if (at_end && (options.loop || !state.sought)) break;
     const auto served = serve(playback, options, state, at_end, stop);
     if (!served) return tl::unexpected(served.error());
-    if (served->sought_s) state.sought = true;
+    if (served->sought_s) {
+      state.sought = true;
+      state.port.reset();  // the way there may be long
+    }
     step = served->sought_s ? go_to(playback, *served->sought_s) : served->behind;
   }
   if (!step) return tl::unexpected(step.error());
   return {};
 }
 
-Result<void> replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
+Result<void> replay(const ReplayOptions& options, ReplayState& state, const std::atomic<bool>& stop) {
   auto playback = Playback::open(options.file);
   if (!playback) return tl::unexpected(playback.error());
   if (const auto torn = (*playback)->torn_at())
     print_error(fmt::format("tandem replay: {} is cut short at byte {}; replayed up to there\n", options.file,
                             *torn));
-  ReplayState state;
   do {
+    state.port.reset();
     if (auto played = play(**playback, options, state, stop); !played)
       return fail(played.error().code, options.file + ": " + played.error().message);
   } while (options.loop && !stop);
@@ -148,12 +156,12 @@ Result<void> replay(const ReplayOptions& options, const std::atomic<bool>& stop)
 }
 
 int run_replay(const ReplayOptions& options) {
-  const SignalWatch signals;
+  SignalWatch signals("tandem replay");
   const HeapTrimmer trimmer;
-  const auto done = replay(options, signals.stop());
-  if (done) return 0;
-  print_error(fmt::format("tandem replay: {}\n", done.error().message));
-  return 1;
+  ReplayState state;
+  const auto done = replay(options, state, signals.stop());
+  if (!done) print_error(fmt::format("tandem replay: {}\n", done.error().message));
+  return signals.finish(done ? 0 : 1);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/signals/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/top_view.hpp"
 
@@ -27,8 +28,6 @@ struct TopOptions {
   std::string session;
   bool once = false, json = false, stream = false;
 };
-
-volatile std::sig_atomic_t stopped = 0;
 
 void collect(transport::Monitor& monitor, TopView& view) {
   std::vector<transport::Received<transport::ServerStatusMessage>> servers;
@@ -58,6 +57,7 @@ int reader_left() {
 }
 
 int run_top(const TopOptions& options) {
+  SignalWatch signals("tandem top");
   transport::DdsOptions dds;
   dds.domain = options.domain;
   auto monitor = transport::make_dds_monitor(dds);
@@ -65,27 +65,25 @@ int run_top(const TopOptions& options) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
     return 1;
   }
-  std::signal(SIGINT, [](int) { stopped = 1; });
-  std::signal(SIGTERM, [](int) { stopped = 1; });
   std::signal(SIGPIPE, SIG_IGN);
   TopView view;
   if (!options.session.empty()) view.only(options.session);
   const std::int64_t start_ns = transport::steady_ns();
   std::int64_t shown_ns = start_ns;
-  while (stopped == 0) {
+  while (!signals.stop()) {
     (*monitor)->wait(std::chrono::milliseconds(100));
     collect(**monitor, view);
     const std::int64_t now_ns = transport::steady_ns();
     if (options.once) {
       if (now_ns - start_ns < kOnceNs) continue;
-      return show(view, options) && !view.empty() ? 0 : 1;
+      return signals.finish(show(view, options) && !view.empty() ? 0 : 1);
     }
     if (now_ns - shown_ns >= kSecond) {
       shown_ns += kSecond;
-      if (!show(view, options)) return errno == EPIPE ? reader_left() : 1;
+      if (!show(view, options)) return signals.finish(errno == EPIPE ? reader_left() : 1);
     }
   }
-  return 0;
+  return signals.finish(0);
 }
 
 }  // namespace

@@ -60,11 +60,11 @@ EDGES = {
     "services/tandemd": SIMULATION
     + LAYOUT
     + CODEC
-    + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/workers"],
+    + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/signals", "services/workers"],
     "services/tandemd/main.cpp": ["services/tandemd", "services/heap", "services/signals"],
     "services/signals": [],
     "services/gateway": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "services/accounts"],
+    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "services/accounts", "services/signals"],
     "services/gateway/main.cpp": ["services/gateway", "services/heap", "services/signals"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]

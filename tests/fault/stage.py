@@ -18,7 +18,7 @@ NOT_RUN = 77
 QUEUE_MS = 400  # what a router keeps before it drops
 SEED = 1
 URI = (
-    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
+    '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="{}" multicast="true"/></Interfaces>'
     "</General><Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
 CLONE_NEWNET = 0x40000000
@@ -71,12 +71,12 @@ def cut_link():
 class Process:
     """A program whose stderr is read line by line, with the time of each."""
 
-    def __init__(self, *command):
+    def __init__(self, *command, interface="lo"):
         self.started = time.monotonic()
         self.lines = []
         self.process = subprocess.Popen(
             [str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, env={**os.environ, "CYCLONEDDS_URI": URI},
+            text=True, env={**os.environ, "CYCLONEDDS_URI": URI.format(interface)},
         )  # fmt: skip
         threading.Thread(target=self.read, daemon=True).start()
 
@@ -137,9 +137,10 @@ class Stage:
         self.options = options
         self.running = []
         self.folder = tempfile.mkdtemp()
+        self.interface = "lo"  # of what starts from now on
 
     def start(self, *command):
-        self.running.append(Process(*command))
+        self.running.append(Process(*command, interface=self.interface))
         return self.running[-1]
 
     def server(self, bodies, *more, scene="half_pipe"):
@@ -161,12 +162,13 @@ class Stage:
         shutil.rmtree(self.folder)
 
 
-def arguments(documentation, short_help):
+def arguments(documentation, short_help=None):
     parser = argparse.ArgumentParser(description=documentation, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tandemd", type=pathlib.Path, required=True)
     parser.add_argument("--tandem", type=pathlib.Path, required=True)
     parser.add_argument("--list", action="store_true", help="the names of all cases")
-    parser.add_argument("--short", action="store_true", help=short_help)
+    if short_help:
+        parser.add_argument("--short", action="store_true", help=short_help)
     parser.add_argument("cases", nargs="*", metavar="CASE")
     return parser
 

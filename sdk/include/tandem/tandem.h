@@ -174,7 +174,12 @@ typedef struct tandem_options {
 TANDEM_API tandem_result tandem_join(const tandem_options* options, tandem_client* client) TANDEM_NOEXCEPT;
 
 /** Leaves the session and frees all that the client holds. Waits for calls of other threads with this client,
- * which end soon: tandem_update() and tandem_wait_until_playing() return TANDEM_INVALID_HANDLE. */
+ * which end soon: tandem_update() and tandem_wait_until_playing() return TANDEM_INVALID_HANDLE.
+ *
+ * For the last client of a process Cyclone DDS stops too, and 0.10 then waits for a packet to itself: where
+ * the network interface is gone, this call does not return. An application that must not wait ends its process
+ * without this call, or sets Internal/MultipleReceiveThreads to false in CYCLONEDDS_URI, with which DDS needs
+ * no packet to stop. */
 TANDEM_API tandem_result tandem_leave(tandem_client client) TANDEM_NOEXCEPT;
 
 /** For a client without a thread: takes what arrived, follows the session, and waits for the next thing to

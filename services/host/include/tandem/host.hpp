@@ -78,7 +78,8 @@ class __attribute__((visibility("default"))) Server {
   Server& operator=(Server&&) noexcept;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
-  /// Ends the session; what was queued is sent first.
+  /// Ends the session; what was queued is sent first. Where the network interface is gone, the end of DDS
+  /// does not return: tandem/tandem.h says at tandem_leave() what an application can do.
   ~Server();
 
   /// Does what is due, which may be a step of the simulation, and waits at most `wait_s`, 0..1, for the next
