@@ -1,6 +1,7 @@
-"""Real programs on a network of their own: a namespace, whose loopback can be shaped."""
+"""Real programs on networks of their own: a namespace, whose loopback can be shaped, and others beside it."""
 
 import argparse
+import contextlib
 import ctypes
 import json
 import os
@@ -22,6 +23,7 @@ URI = (
     "</General><Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
 CLONE_NEWNET = 0x40000000
+LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 class Failed(Exception):
@@ -34,7 +36,7 @@ def shell(*words):
 
 def enter_namespace():
     """A network of our own, gone with this process. As root directly, otherwise through a user namespace."""
-    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
+    if LIBC.unshare(CLONE_NEWNET) != 0:
         if os.environ.get("TANDEM_STAGE_INNER"):
             return False
         os.environ["TANDEM_STAGE_INNER"] = "1"
@@ -50,6 +52,36 @@ def enter_namespace():
     except (OSError, subprocess.CalledProcessError):
         return False
     return True
+
+
+class Namespace:
+    """A network beside the test's own, gone with the last program in it. Its interface gets a name that programs use."""
+
+    def __init__(self, interface):
+        self.interface = interface
+        self.descriptor = None
+        with self.entered():
+            shell("ip", "link", "set", "lo", "up")
+
+    @contextlib.contextmanager
+    def entered(self):
+        """What this thread opens or starts meanwhile is in there."""
+        outside = os.open("/proc/thread-self/ns/net", os.O_RDONLY)
+        try:
+            if self.descriptor is None:
+                entered = LIBC.unshare(CLONE_NEWNET)
+                self.descriptor = os.open("/proc/thread-self/ns/net", os.O_RDONLY)
+            else:
+                entered = LIBC.setns(self.descriptor, CLONE_NEWNET)
+            if entered != 0:
+                raise OSError(ctypes.get_errno(), "a network namespace was refused")
+            yield
+        finally:
+            LIBC.setns(outside, CLONE_NEWNET)
+            os.close(outside)
+
+    def end(self):
+        os.close(self.descriptor)
 
 
 def link(kbit):
@@ -139,20 +171,25 @@ class Stage:
         self.folder = tempfile.mkdtemp()
         self.interface = "lo"  # of what starts from now on
 
-    def start(self, *command):
-        self.running.append(Process(*command, interface=self.interface))
+    def start(self, *command, namespace=None):
+        if namespace is None:
+            self.running.append(Process(*command, interface=self.interface))
+        else:
+            with namespace.entered():
+                self.running.append(Process(*command, interface=namespace.interface))
         return self.running[-1]
 
-    def server(self, bodies, *more, scene="half_pipe"):
+    def server(self, bodies, *more, scene="half_pipe", namespace=None):
         server = self.start(
-            self.options.tandemd, "--scene", scene, "--bodies", bodies, "--seed", SEED, "--json", *more
+            self.options.tandemd, "--scene", scene, "--bodies", bodies, "--seed", SEED, "--json", *more,
+            namespace=namespace,
         )  # fmt: skip
         server.wait_for("session 'default'", 60)
         time.sleep(2.0)  # the claim of the name, and some frames
         return server
 
-    def client(self, *more):
-        return self.start(self.options.tandem, "join", "--json", "--live", *more)
+    def client(self, *more, namespace=None):
+        return self.start(self.options.tandem, "join", "--json", "--live", *more, namespace=namespace)
 
     def end(self):
         for each in self.running:
