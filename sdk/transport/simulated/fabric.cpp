@@ -126,7 +126,23 @@ void Fabric::add_pair(Index writer, Index reader) {
   pairs_.push_back(std::move(pair));
   writers_[writer].pairs.push_back(index);
   readers_[reader].pairs.push_back(index);
-  schedule(index, now_ns_ + random_.between(options_.match_min_ns, options_.match_max_ns));
+  schedule(index, now_ns_ + match_ns(from.participant, to.participant));
+}
+
+std::int64_t Fabric::match_ns(Index writer, Index reader) {
+  const std::int64_t own_ns = random_.between(options_.match_min_ns, options_.match_max_ns);
+  if (!options_.match_over_links) return own_ns;
+  const auto [met, is_new] = met_ns_.try_emplace(ordered(writer, reader), now_ns_);
+  if (is_new) met->second += told_ns(writer, reader) + told_ns(reader, writer);
+  return own_ns + std::max<std::int64_t>(0, met->second - now_ns_) +
+         std::max(told_ns(writer, reader), told_ns(reader, writer));
+}
+
+std::int64_t Fabric::told_ns(Index from, Index to) {
+  const LinkModel& model = link(from, to);
+  std::int64_t takes_ns = model.delay_ns + random_.between(0, model.jitter_ns);
+  while (loses(from, to) && takes_ns < options_.lease_ns) takes_ns += repair_ns(from, to);
+  return takes_ns;
 }
 
 void Fabric::close_reader(Index reader) {
@@ -172,9 +188,33 @@ Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) 
   return {};
 }
 
-std::optional<std::int64_t> Fabric::squeeze_ns(const LinkModel& model, const AnyMessage& message) const {
+bool Fabric::loses(Index from, Index to) {
+  const LinkModel& model = link(from, to);
+  bool lost = random_.chance(model.loss);
+  if (model.burst_loss > 0) {  // Gilbert and Elliott: all is lost in one state, nothing in the other
+    bool& in_burst = bursts_[{from, to}];
+    const double leave = 1 / model.burst_samples;
+    in_burst =
+        in_burst ? !random_.chance(leave) : random_.chance(leave * model.burst_loss / (1 - model.burst_loss));
+    lost = lost || in_burst;
+  }
+  return lost;
+}
+
+std::int64_t Fabric::repair_ns(Index from, Index to) {
+  const LinkModel& there = link(from, to);
+  const LinkModel& back = link(to, from);
+  if (there.repair_ns) return std::max<std::int64_t>(1, *there.repair_ns);
+  return kNackNs + back.delay_ns + random_.between(0, back.jitter_ns) + there.delay_ns +
+         random_.between(0, there.jitter_ns);
+}
+
+std::optional<std::int64_t> Fabric::squeeze_ns(const LinkModel& model, const AnyMessage& message) {
+  const bool twice = random_.chance(model.duplicates);
+  if (twice) ++counts_.duplicated;
   if (!model.bottleneck) return 0;
   const auto arrives_ns = model.bottleneck->offer(now_ns_, wire_bytes(message));
+  if (twice) static_cast<void>(model.bottleneck->offer(now_ns_, wire_bytes(message)));
   return arrives_ns ? std::optional(*arrives_ns - now_ns_) : std::nullopt;
 }
 
@@ -184,7 +224,7 @@ void Fabric::send(Index pair, const Sample& sample) {
   const Index to = readers_[way.reader].participant;
   const LinkModel& model = link(writer.participant, to);
   Travelling travelling{sample, now_ns_ + model.delay_ns + random_.between(0, model.jitter_ns), false};
-  const bool lost = is_cut(writer.participant, to) || random_.chance(model.loss);
+  const bool lost = is_cut(writer.participant, to) || loses(writer.participant, to);
   const auto squeezed_ns = lost ? std::nullopt : squeeze_ns(model, *sample.message);
   travelling.due_ns += squeezed_ns.value_or(0);
   if (!squeezed_ns) {
@@ -194,9 +234,14 @@ void Fabric::send(Index pair, const Sample& sample) {
       return;
     }
     travelling.to_repair = true;
-    travelling.due_ns += model.repair_ns;
+    travelling.due_ns += repair_ns(writer.participant, to);
   }
   schedule(pair, travelling.due_ns);
+  while (!kRules[writer.topic].reliable && !way.travelling.empty() &&
+         way.travelling.back().due_ns > travelling.due_ns) {
+    way.travelling.pop_back();
+    ++counts_.overtaken;
+  }
   way.travelling.push_back(std::move(travelling));
 }
 
@@ -260,12 +305,12 @@ bool Fabric::settle_front(Pair& pair, Index index) {
       return true;
     }
     const bool lost = participants_[writer.participant].frozen_ns != kNever ||
-                      is_cut(writer.participant, to) || random_.chance(model.loss);
+                      is_cut(writer.participant, to) || loses(writer.participant, to);
     const auto squeezed_ns = lost ? std::nullopt : squeeze_ns(model, *front.sample.message);
     if (squeezed_ns) ++counts_.repaired;
     if (!squeezed_ns || *squeezed_ns > 0) {
       front.to_repair = !squeezed_ns;
-      front.due_ns = now_ns_ + squeezed_ns.value_or(std::max<std::int64_t>(1, model.repair_ns));
+      front.due_ns = now_ns_ + (squeezed_ns ? *squeezed_ns : repair_ns(writer.participant, to));
       schedule(index, front.due_ns);
       return false;
     }
@@ -384,7 +429,7 @@ void Fabric::set_frozen(const ParticipantId& participant, bool frozen) {
       for (Travelling& travelling : pair.travelling) {
         if (travelling.due_ns > now_ns_) continue;
         travelling.to_repair = true;
-        travelling.due_ns = now_ns_ + link(writer.participant, index).repair_ns;
+        travelling.due_ns = now_ns_ + repair_ns(writer.participant, index);
         schedule(index_of_pair, travelling.due_ns);
       }
     }

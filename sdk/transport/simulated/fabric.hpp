@@ -155,6 +155,10 @@ class Fabric {
   [[nodiscard]] Index find(const ParticipantId& participant) const;
   void add_pair(Index writer, Index reader);
   void schedule(Index pair, std::int64_t at_ns);
+  /// Draws how long endpoints take to find each other.
+  [[nodiscard]] std::int64_t match_ns(Index writer, Index reader);
+  /// Draws how long a message takes that DDS repeats until it arrives.
+  [[nodiscard]] std::int64_t told_ns(Index from, Index to);
   void send(Index pair, const Sample& sample);
   void process(Index pair);
   /// False while the front of the pair has to wait.
@@ -162,9 +166,13 @@ class Fabric {
   void deliver(const Pair& pair, const Sample& sample);
   [[nodiscard]] bool keeps(const Writer& writer, const Sample& sample) const;
   [[nodiscard]] const LinkModel& link(Index from, Index to) const;
-  /// Through the path's bottleneck: how long that takes from now, or nothing when it is dropped there.
-  [[nodiscard]] std::optional<std::int64_t> squeeze_ns(const LinkModel& model,
-                                                       const AnyMessage& message) const;
+  /// Draws whether a transmission is lost.
+  [[nodiscard]] bool loses(Index from, Index to);
+  /// Draws how long it takes until a lost sample comes again.
+  [[nodiscard]] std::int64_t repair_ns(Index from, Index to);
+  /// Through the path's bottleneck, a duplicate behind it: how long that takes from now, or nothing when it
+  /// is dropped there.
+  [[nodiscard]] std::optional<std::int64_t> squeeze_ns(const LinkModel& model, const AnyMessage& message);
   [[nodiscard]] bool is_cut(Index a, Index b) const;
   [[nodiscard]] bool gone(Index participant) const;
 
@@ -177,7 +185,9 @@ class Fabric {
   std::vector<Reader> readers_;
   std::vector<Pair> pairs_;
   std::map<std::pair<Index, Index>, LinkModel> links_;
-  std::map<std::pair<Index, Index>, std::int64_t> cuts_;  // since when, lower index first
+  std::map<std::pair<Index, Index>, std::int64_t> cuts_;    // since when, lower index first
+  std::map<std::pair<Index, Index>, std::int64_t> met_ns_;  // lower index first
+  std::map<std::pair<Index, Index>, bool> bursts_;          // whether all is being lost on this way
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   NetworkCounts counts_;
 };
