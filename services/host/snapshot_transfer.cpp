@@ -9,12 +9,13 @@
 namespace tandem::host {
 namespace {
 
-// DDS repairs what it loses; a part that nothing is heard of after this is sent once more, so that a link
-// that was gone is found again soon.
-constexpr std::int64_t kProbeNs = kSecond / 2;
+// DDS repairs what it loses; where nothing is heard for two round trips and a little, a part is sent once more, so
+// that a link that was gone is found again soon.
+constexpr std::int64_t kProbeNs = kSecond / 4;
+constexpr std::int64_t kFirstProbeNs = kSecond;  // at most
 constexpr std::int64_t kMostProbeNs = 2 * kSecond;
 // After so long without an arrival the rate of the link is measured anew.
-constexpr std::int64_t kForgetRateNs = kSecond;
+constexpr std::int64_t kForgetRateNs = 2 * kSecond;
 // No receiver is sent more than so many times what there is.
 constexpr std::size_t kMostTimes = 4;
 constexpr std::size_t kSlackBytes = 64U << 10U;
@@ -135,8 +136,8 @@ std::size_t Passage::send(std::size_t part, std::int64_t now_ns) {
 }
 
 std::int64_t Passage::probe_ns() const {
-  const std::int64_t patience_ns = std::max(kProbeNs, 4 * window_.least_ns()) << std::min(probes_, 2);
-  return probed_ns_ + std::clamp(patience_ns, kProbeNs, kMostProbeNs);
+  const std::int64_t patience_ns = std::clamp(2 * window_.least_ns() + kSecond / 10, kProbeNs, kFirstProbeNs);
+  return probed_ns_ + std::min(patience_ns << std::min(probes_, 3), kMostProbeNs);
 }
 
 std::int64_t Passage::next_ns() const {

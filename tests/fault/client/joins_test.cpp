@@ -203,9 +203,11 @@ Outcome join_over(std::uint64_t seed, const Scenario& scenario) {
     return outcome;
   }
   session.longest_pause_ns = 0;
-  const std::uint64_t applied = session.witness().applied;
-  const double begin_s = session.now_s();
   session.join();
+  // From the announcement on, as join_ms counts: until then DDS looks for the server.
+  for (int i = 0; i < 50'000 && session.joiner().core->session() == nullptr; ++i) session.tick();
+  const double begin_s = session.now_s();
+  const std::uint64_t applied = session.witness().applied;
   // The snapshot's size is known once it is there; one that never came is taken to have 40 bytes a body.
   const double longest_s = kPatience * scenario.bound_s(40U * scenario.bodies);
   while (!session.joined() && session.now_s() < begin_s + longest_s) {
