@@ -102,8 +102,7 @@ bool within_limits(const ScheduledInputMessage& message, const Limits& /*limits*
 }
 
 bool within_limits(const SnapshotMessage& message, const Limits& limits) {
-  if (message.parts == 0) return message.bytes.empty();  // a greeting
-  return message.parts <= kMaxSnapshotParts && message.parts <= message.total_bytes &&
+  return message.parts >= 1 && message.parts <= kMaxSnapshotParts && message.parts <= message.total_bytes &&
          message.part < message.parts && message.total_bytes <= limits.max_snapshot_bytes &&
          !message.bytes.empty() && message.bytes.size() <= message.total_bytes;
 }

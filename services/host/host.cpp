@@ -144,7 +144,6 @@ struct Host::Impl {
   bool advance_if_due(StreamSet snapshots_due);
   void choose_streams(StreamSet joined);
   void make_snapshots(StreamSet due);
-  void greet_joiners();
   void publish_status();
   void plan_wake();
 
@@ -221,7 +220,6 @@ bool Host::Impl::poll() {
     const StreamSet due = snapshots_due();
     produced = advance_if_due(due);
     if (due.any() && (produced || now_ns >= frame_awaited_until_ns())) make_snapshots(due);
-    greet_joiners();
     for (Lane& lane : lanes) lane.transfer.send(roster.accounts(), now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
@@ -268,9 +266,11 @@ void Host::Impl::receive() {
 }
 
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
-  claim.acknowledged(ack.message.epoch, ack.from, now_ns);
+  const bool of_session = ack.message.epoch != 0;  // or it still looks for one
+  if (of_session) claim.acknowledged(ack.message.epoch, ack.from, now_ns);
   const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
   if (reason == Reason::kNone) {
+    if (!of_session) return;
     for (Lane& lane : lanes) lane.transfer.acknowledged(ack.message, now_ns);
     return;
   }
@@ -433,24 +433,6 @@ void Host::Impl::make_snapshots(StreamSet due) {
                         lane.joins.ready(), now_ns);
     lane.joins.served(roster, now_ns);
     ++lane.totals.snapshots;
-  }
-}
-
-// Until their snapshot is made. A reader of Cyclone DDS drops what comes from a writer that is new to it
-// before the first heartbeat; one travels with each greeting.
-void Host::Impl::greet_joiners() {
-  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
-    transport::SnapshotMessage greeting;
-    greeting.epoch = config.epoch;
-    greeting.stream = {.id = id, .generation = 0};
-    greeting.parts = 0;
-    for (const transport::ClientId client : lanes[id].joins.ready()) {
-      const auto account = roster.accounts().find(client);
-      if (account == roster.accounts().end() || was_served(account->second)) continue;
-      std::int64_t& greeted_ns = account->second.join.greeted_ns;
-      if (greeted_ns != INT64_MIN && now_ns - greeted_ns < kShortWakeNs) continue;
-      if (outbox.push(SnapshotPart{client, greeting})) greeted_ns = now_ns;
-    }
   }
 }
 

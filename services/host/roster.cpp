@@ -59,12 +59,24 @@ Account* Roster::admit(const transport::AckMessage& ack, const transport::Partic
   return &accounts_.emplace(ack.client, account).first->second;
 }
 
+Reason Roster::expect(const transport::AckMessage& ack, Account* account,
+                      const transport::ParticipantId& from, std::int64_t now_ns) {
+  if (ack.client == 0) return Reason::kInvalid;
+  if (account == nullptr) account = admit(ack, from, now_ns);
+  if (account == nullptr) return Reason::kFull;
+  account->clock_ns = ack.clock_ns;
+  account->heard_ns = now_ns;
+  account->present = true;
+  return Reason::kNone;
+}
+
 Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
                            const PublishTimes& times, const Now& now) {
   const auto known = accounts_.find(ack.client);
   Account* account = known == accounts_.end() ? nullptr : &known->second;
   if (account != nullptr && account->from != from) return Reason::kForeignClient;
   if (ack.protocol_version != transport::kProtocolVersion) return Reason::kProtocolVersion;
+  if (ack.epoch == 0) return expect(ack, account, from, now.ns);
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
   if (!lists(ack.stream)) return Reason::kNoStream;
   // It goes on with the stream that it plays until it has the other's snapshot. Its `playing` may have been
@@ -98,6 +110,7 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   // A joiner, also one whose `joining` was overwritten by its `playing`, counts only once it has caught up
   // again.
   if (!plays || starts_over || ack.role_wanted == Role::kObserver) account->counted = false;
+  account->asked = true;
   account->wanted = ack.role_wanted;
   account->applied = ack.applied;
   account->clock_ns = ack.clock_ns;

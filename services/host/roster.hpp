@@ -34,7 +34,6 @@ struct JoinAccount {
   bool served = false;
   std::uint32_t served_attempt = 0;
   std::uint32_t served_stream = 0;
-  std::int64_t greeted_ns = INT64_MIN;
 };
 
 struct ReplyAccount {
@@ -52,6 +51,7 @@ struct Account {
   std::uint32_t stream = 0;                  ///< that it plays, or joins
   std::optional<std::uint32_t> next_stream;  ///< that it joins while it goes on playing `stream`
   bool open = false;                         ///< the client has writers of its own
+  bool asked = false;                        ///< it named this session, and does not only look for it
   bool present = true;                       ///< its participant lives and it was heard of lately
   bool counted = false;  ///< a participant that plays and has caught up: the server waits for it
   bool demoted = false;
@@ -81,7 +81,8 @@ struct Peer {
 /// The stream that it is on its way into, from outside or from another.
 [[nodiscard]] inline std::optional<std::uint32_t> joined_stream(const Account& account) {
   if (!account.present) return std::nullopt;
-  if (account.phase == transport::Phase::kJoining) return account.stream;
+  if (account.phase == transport::Phase::kJoining)
+    return account.asked ? std::optional(account.stream) : std::nullopt;
   return account.next_stream;
 }
 
@@ -160,6 +161,9 @@ class Roster {
   [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
 
  private:
+  /// Somebody looks for a session: its writers are made before it asks for anything.
+  transport::Reason expect(const transport::AckMessage& ack, Account* account,
+                           const transport::ParticipantId& from, std::int64_t now_ns);
   Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
   using Accounts = std::map<transport::ClientId, Account>;
   [[nodiscard]] bool lists(const StreamId& stream) const {

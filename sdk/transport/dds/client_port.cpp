@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/announcements.hpp"
 
 namespace tandem::transport {
@@ -33,6 +34,7 @@ class DdsClientPort final : public ClientPort {
 
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
     refresh();
+    tell_servers();
     endpoints_.servers.book().take_current(out);
   }
   void pass_over_session(PassOver until) override { endpoints_.servers.book().pass_over_current(until); }
@@ -69,12 +71,16 @@ class DdsClientPort final : public ClientPort {
         delta_depth(session.frame_rate_hz, session.window_ceiling, stream.max_delta_bytes));
     auto delta = reader<DeltaMessage>("deltas", stream.id.id, {.depth = depth});
     if (!delta) return tl::unexpected(delta.error());
-    streams_.emplace(stream.id.id, Stream{std::move(*delta), std::nullopt, {}})
+    streams_.emplace(stream.id.id, Stream{std::move(*delta), {}})
         .first->second.set_limits(limits);
     return {};
   }
-  void close_stream(std::uint32_t stream) override { streams_.erase(stream); }
+  void close_stream(std::uint32_t stream) override {
+    close_snapshots(stream);
+    streams_.erase(stream);
+  }
   void close_streams() override {
+    wanted_snapshots_.reset();
     streams_.clear();
     common_.reset();
     epoch_.reset();
@@ -82,16 +88,24 @@ class DdsClientPort final : public ClientPort {
   Result<void> open_snapshots(std::uint32_t stream) override {
     const auto open = streams_.find(stream);
     if (open == streams_.end()) return fail(ErrorCode::kOutOfOrder, "that stream is not open");
-    if (open->second.snapshots) return {};
-    auto snapshots = endpoints_.node.reader<SnapshotMessage>(
-        "snapshots", {.partitions = {client_partition(options_.session, common_->client)}});
-    if (!snapshots) return tl::unexpected(snapshots.error());
-    open->second.snapshots.emplace(std::move(*snapshots));
-    open->second.set_limits(open->second.limits);
+    if (auto there = read_snapshots(common_->client); !there) return there;
+    snapshots_->set_limits(open->second.limits);
+    wanted_snapshots_ = stream;
     return {};
   }
   void close_snapshots(std::uint32_t stream) override {
-    if (const auto open = streams_.find(stream); open != streams_.end()) open->second.snapshots.reset();
+    if (wanted_snapshots_ == stream) wanted_snapshots_.reset();
+  }
+  /// From now on, for as long as the port lives: the reader of DDS takes nothing from a writer before its first
+  /// heartbeat, which is a round trip that a join need not wait for.
+  Result<void> read_snapshots(ClientId client) {
+    if (snapshots_ && snapshots_client_ == client) return {};
+    auto snapshots = endpoints_.node.reader<SnapshotMessage>(
+        "snapshots", {.partitions = {client_partition(options_.session, client)}});
+    if (!snapshots) return tl::unexpected(snapshots.error());
+    snapshots_.emplace(std::move(*snapshots));
+    snapshots_client_ = client;
+    return {};
   }
 
   void take(std::vector<Received<DeltaMessage>>& out) override {
@@ -101,9 +115,10 @@ class DdsClientPort final : public ClientPort {
     if (common_) common_->scheduled.take(dropped_, out);
   }
   void take(std::vector<Received<SnapshotMessage>>& out) override {
-    for (auto& [id, stream] : streams_) {
-      if (stream.snapshots) stream.snapshots->take(dropped_, out);
-    }
+    if (!snapshots_) return;
+    const std::size_t before = out.size();
+    snapshots_->take(dropped_, out);
+    if (!wanted_snapshots_) out.resize(before);  // late parts of one that is taken
   }
   void take(std::vector<Received<ReplyMessage>>& out) override {
     if (common_) common_->reply.take(dropped_, out);
@@ -125,13 +140,11 @@ class DdsClientPort final : public ClientPort {
  private:
   struct Stream {
     Reader<DeltaMessage> deltas;
-    std::optional<Reader<SnapshotMessage>> snapshots;
     Limits limits;
 
     void set_limits(const Limits& in_force) {
       limits = in_force;
       deltas.set_limits(limits);
-      if (snapshots) snapshots->set_limits(limits);
     }
   };
   /// What all streams of an epoch have in common.
@@ -147,6 +160,19 @@ class DdsClientPort final : public ClientPort {
     return endpoints_.node.reader<M>(name, options);
   }
 
+  // Until one is followed: a server that has heard of a client makes the writers for it while that still learns
+  // of the session.
+  void tell_servers() {
+    constexpr std::int64_t kSpacingNs = 100'000'000;
+    const std::int64_t now_ns = steady_ns();
+    if (common_ || options_.client == 0 || now_ns - told_ns_ < kSpacingNs) return;
+    told_ns_ = now_ns;
+    AckMessage looking;
+    looking.client = options_.client;
+    looking.clock_ns = now_ns;
+    static_cast<void>(endpoints_.ack.write(looking));
+  }
+
   void refresh() {
     endpoints_.servers.refresh(options_.session, dropped_, [this](const ParticipantId& server) {
       const auto delivers = [&server](auto& open) { return open.second.deltas.alive(server); };
@@ -159,6 +185,10 @@ class DdsClientPort final : public ClientPort {
   std::map<std::uint32_t, Stream> streams_;  // by id
   std::optional<Common> common_;             // once a stream was opened
   std::optional<Epoch> epoch_;               // of what is open
+  std::optional<Reader<SnapshotMessage>> snapshots_;
+  ClientId snapshots_client_ = 0;
+  std::optional<std::uint32_t> wanted_snapshots_;  // of this stream
+  std::int64_t told_ns_ = INT64_MIN / 2;
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
@@ -176,10 +206,14 @@ Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& optio
   if (!status) return tl::unexpected(status.error());
   auto servers = dds::Announcements::create(*node);
   if (!servers) return tl::unexpected(servers.error());
-  return std::make_unique<DdsClientPort>(
+  auto port = std::make_unique<DdsClientPort>(
       DdsClientPort::Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(*input),
                                std::move(*status)},
       options);
+  if (options.client != 0) {
+    if (auto there = port->read_snapshots(options.client); !there) return tl::unexpected(there.error());
+  }
+  return port;
 }
 
 }  // namespace tandem::transport

@@ -396,7 +396,7 @@ TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
   ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
   ASSERT_TRUE(client->open_snapshots(0));
   ASSERT_TRUE(eventually([&] { return server->joined(id, kClient, 0); }));
-  client->close_snapshots(0);
+  client->close_stream(0);
   EXPECT_TRUE(eventually([&] { return !server->joined(id, kClient, 0); }));
   client.reset();
   EXPECT_TRUE(eventually([&] { return !server->alive(id); }));

@@ -80,7 +80,7 @@ class StreamReader {
 
  private:
   void add(const SnapshotMessage& part) {
-    if (timeline || part.stream.id != kRich || part.parts == 0) return;
+    if (timeline || part.stream.id != kRich) return;
     cut_ = {.epoch = part.epoch, .stream = part.stream, .frame = part.frame, .parts = part.parts};
     parts_.try_emplace(part.part, part);
     if (parts_.size() < part.parts) return;

@@ -107,10 +107,6 @@ class FakePort final : public transport::ServerPort {
   }
   Result<void> write(transport::ClientId to, const transport::SnapshotMessage& m) override {
     if (!client_writers.contains(to)) return fail(ErrorCode::kInvalidArgument, "not open");
-    if (m.parts == 0) {
-      ++greetings;
-      return {};
-    }
     snapshots_to.push_back(to);
     return keep(snapshots, m, "snapshot");
   }
@@ -142,7 +138,6 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::SnapshotMessage> snapshots;
   std::vector<transport::ReplyMessage> replies;
   std::vector<transport::ClientId> snapshots_to;  // of each of these
-  std::uint64_t greetings = 0;
   std::set<transport::ClientId> client_writers;
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written

@@ -83,6 +83,7 @@ class SnapshotTransferTest : public ::testing::Test {
       account.id = client;
       account.stream = kStream.id;
       account.phase = transport::Phase::kJoining;
+      account.asked = true;
       receivers[client];
     }
     transfer.start(kEpoch, kStream, frame, bytes = content(size), clients, now_ns);
