@@ -62,22 +62,22 @@ class TransferWindow {
   void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
     flying_ -= std::min(flying_, bytes);
     // Those that were on their way at the last acknowledgement came one after another since.
-    if (last.at_ns <= arrived_ns_ && arrived_ > 0)
+    if (last.at_ns <= arrived_ns_ && arrived_ > 0) {
       saw_rate(bytes, std::max(now_ns - arrived_ns_, last.at_ns - last_arrived_at_ns_), now_ns);
+      starting_ = false;
+    }
     arrived_ += bytes;
     arrived_ns_ = now_ns;
     last_arrived_at_ns_ = std::max(last_arrived_at_ns_, last.at_ns);
     least_ns_ = std::min(least_ns_, std::max<std::int64_t>(now_ns - last.at_ns, 1));
     saw_rate(static_cast<std::size_t>(arrived_ - last.arrived),
              std::max(now_ns - last.arrived_ns, last.at_ns - last.last_arrived_at_ns), now_ns);
-    if (last.at_ns >= round_ns_) end_round(now_ns);
     resize();
   }
   /// Nothing has arrived for long: what the link carries now is unknown.
   void start_over() {
     rates_ = {};
-    rate_at_round_ = 0;
-    flat_rounds_ = 0;
+    starting_ = true;
     bytes_ = kLeast;
     pace_ = 0;
     least_ns_ = INT64_MAX;
@@ -89,7 +89,6 @@ class TransferWindow {
 
  private:
   static constexpr double kStartGain = 2.9;  // BBR's 2/ln 2: twice the rate each round trip
-  static constexpr int kFlatRounds = 2;      // in which the rate did not grow: the link is full
   static constexpr std::int64_t kBurstNs = 5 * kMillisecond;
   // Acknowledgements come 20 ms apart; two that jitter moved together must not pass for a fast link.
   static constexpr std::int64_t kLeastGapNs = 10 * kMillisecond;
@@ -107,21 +106,14 @@ class TransferWindow {
   }
   [[nodiscard]] double rate() const { return std::max(rates_[0], rates_[1]); }
 
-  void end_round(std::int64_t now_ns) {
-    round_ns_ = now_ns;
-    flat_rounds_ = rate() < 1.25 * rate_at_round_ ? flat_rounds_ + 1 : 0;
-    rate_at_round_ = std::max(rate(), rate_at_round_);
-  }
-
   void resize() {
     const auto least_s = static_cast<double>(least_ns_) * 1e-9;
     const double full = rate() * (least_s + static_cast<double>(kQueueNs) * 1e-9);
-    const double wanted = starting() ? std::max(full, kStartGain * rate() * least_s) : full;
+    const double wanted = starting_ ? std::max(full, kStartGain * rate() * least_s) : full;
     bytes_ =
         static_cast<std::size_t>(std::clamp(wanted, static_cast<double>(kLeast), static_cast<double>(kMost)));
     pace_ = static_cast<double>(bytes_) / least_s;
   }
-  [[nodiscard]] bool starting() const { return flat_rounds_ < kFlatRounds; }
 
   std::size_t bytes_ = kFirst;
   std::size_t flying_ = 0;
@@ -133,9 +125,8 @@ class TransferWindow {
   std::int64_t least_ns_ = INT64_MAX;
   std::array<double, 2> rates_{};  // bytes a second
   std::int64_t span_ns_ = 0;
-  std::int64_t round_ns_ = 0;
-  double rate_at_round_ = 0;
-  int flat_rounds_ = 0;
+  bool starting_ =
+      true;  // whatever was sent together was acknowledged together: how fast it came is not known
 };
 
 }  // namespace tandem::accounts

@@ -29,7 +29,7 @@ Domains& domains() {
 }
 
 // Reasons and effects: idl/PROTOCOL.md, "Cyclone DDS configuration".
-std::string defaults() {
+std::string defaults(Repeat repeat) {
   return "<CycloneDDS><Domain id=\"any\"><Discovery>"
          "<LeaseDuration>45s</LeaseDuration>"
          "<SPDPInterval>5s</SPDPInterval>"
@@ -37,7 +37,9 @@ std::string defaults() {
          "</Discovery>"
          "<Sizing><ReceiveBufferSize>256 KiB</ReceiveBufferSize></Sizing>"
          "<Internal>"
-         "<NackDelay>10ms</NackDelay>"
+         "<NackDelay>" +
+         std::string(repeat == Repeat::kSoon ? "10" : "100") +
+         "ms</NackDelay>"
          "<MaxSampleSize>" +
          std::to_string(kMaxSampleBytes + (1U << 20U)) +
          " B</MaxSampleSize></Internal></Domain></CycloneDDS>";
@@ -45,8 +47,8 @@ std::string defaults() {
 
 }  // namespace
 
-std::string domain_configuration() {
-  std::string configuration = defaults();
+std::string domain_configuration(Repeat repeat) {
+  std::string configuration = defaults(repeat);
   if (const char* theirs = std::getenv("CYCLONEDDS_URI"); theirs != nullptr && *theirs != '\0') {
     configuration += ',';
     configuration += theirs;
@@ -54,13 +56,13 @@ std::string domain_configuration() {
   return configuration;
 }
 
-Result<DomainUse> DomainUse::acquire(std::uint32_t domain) {
+Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat) {
   const std::lock_guard lock(domains().mutex);
   if (const auto known = domains().uses.find(domain); known != domains().uses.end()) {
     ++known->second.users;
     return DomainUse(domain);
   }
-  const dds_entity_t handle = dds_create_domain(domain, domain_configuration().c_str());
+  const dds_entity_t handle = dds_create_domain(domain, domain_configuration(repeat).c_str());
   if (handle < 0 && handle != DDS_RETCODE_PRECONDITION_NOT_MET) {
     return fail(ErrorCode::kTransport, "DDS domain " + std::to_string(domain) + " cannot be opened (" +
                                            dds_strretcode(handle) +

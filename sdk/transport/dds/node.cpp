@@ -39,7 +39,8 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
 Node::Node(DomainUse domain, const DdsOptions& options)
     : domain_(std::move(domain)), options_(options), lease_(options.lease.count()) {}
 
-Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition) {
+Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition,
+                          Repeat repeat) {
   if (options.domain > kMaxDomain) {
     return fail(ErrorCode::kInvalidArgument, "a DDS domain is 0 to " + std::to_string(kMaxDomain));
   }
@@ -49,7 +50,7 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
   if (options.lease < std::chrono::milliseconds(100)) {
     return fail(ErrorCode::kInvalidArgument, "a lease under 0.1 s declares healthy peers dead");
   }
-  auto domain = DomainUse::acquire(options.domain);
+  auto domain = DomainUse::acquire(options.domain, repeat);
   if (!domain) return tl::unexpected(domain.error());
   Node node(std::move(*domain), options);
 

@@ -123,8 +123,8 @@ struct ReaderOptions {
 class Node {
  public:
   /// `name` is what DDS tools show. `partition` may be "*".
-  static Result<Node> create(const DdsOptions& options, const std::string& name,
-                             const std::string& partition);
+  static Result<Node> create(const DdsOptions& options, const std::string& name, const std::string& partition,
+                             Repeat repeat = Repeat::kSeldom);
 
   /// In `partition`, through a publisher of its own; where that is empty, in the node's.
   template <class M>

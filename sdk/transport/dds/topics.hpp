@@ -42,7 +42,7 @@ struct Topic<ScheduledInputMessage> {
 template <>
 struct Topic<SnapshotMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
-  static constexpr TopicQos kQos{true, false, 4096, 4096, 4096};  // more than a window's parts
+  static constexpr TopicQos kQos{true, false, 64, 4096, 4096};
 };
 template <>
 struct Topic<ReplyMessage> {

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t kSessionReaderDepth = 8;
 constexpr std::uint32_t kScheduledDepth = 4096;
 constexpr std::uint32_t kInputDepth = 64;
-constexpr std::uint32_t kSnapshotWriterDepth = 4096;
+constexpr std::uint32_t kSnapshotWriterDepth = 64;
 constexpr std::uint32_t kSnapshotReaderDepth = 4096;
 
 /// What both kinds of port share: a participant and its samples.

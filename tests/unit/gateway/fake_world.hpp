@@ -44,7 +44,7 @@ class FakeWorld final : public World {
   transport::Role granted = transport::Role::kParticipant;
   Frame frame = 0;
   std::uint64_t last_input = 0;
-  transport::Bytes snapshot = transport::Bytes(5000);
+  transport::Bytes snapshot = transport::Bytes(15'000);
   int cuts = 0;
   std::vector<Sent> sent;
 };
