@@ -1,7 +1,6 @@
 #include "services/gateway/command_line.hpp"
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <filesystem>
@@ -11,6 +10,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
+#include "services/commandline/commandline.hpp"
 #include "services/gateway/admission.hpp"
 
 namespace tandem::gateway {
@@ -39,25 +39,21 @@ Result<void> check(const Options& options) {
 }  // namespace
 
 CommandLine parse_command_line(int argc, const char* const* argv) {
-  CLI::App app{"Serves a session to browsers, over HTTP and WebSocket.", "tandem-gateway"};
-  app.set_version_flag("--version", "tandem-gateway " TANDEM_VERSION);
+  commandline::Program app{"Serves a session to browsers, over HTTP and WebSocket.", "tandem-gateway"};
+  app.version("tandem-gateway " TANDEM_VERSION);
   app.footer(
       "Paths: / the viewer, /tandem the WebSocket, /healthz. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT "
       "and SIGTERM end it cleanly.");
   Options options;
-  app.add_option("--session", options.session, "Name of the session")->capture_default_str();
-  app.add_option("--domain", options.domain, "DDS domain")
-      ->check(CLI::Range(0U, transport::kMaxDomain))
-      ->capture_default_str();
+  app.add_option("--session", options.session, "Name of the session").show_default();
+  app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
   app.add_option(
          "--prefer", options.prefer,
          "Of a session's streams: auto, bandwidth, computing, error, or a name; all viewers play the same")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--listen", options.web.address, "IPv4 or IPv6 address; 0.0.0.0 or :: for all of the host's")
-      ->capture_default_str();
-  app.add_option("--port", options.web.port, "TCP port; 0 for any free one")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
+      .show_default();
+  app.add_option("--port", options.web.port, "TCP port; 0 for any free one").range(0, 65535).show_default();
   options.viewer = installed_viewer();
   app.add_option("--viewer", options.viewer,
                  "Folder with the viewer's files, read once at the start [" TANDEM_VIEWER_INSTALL_DIR
@@ -71,17 +67,13 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "Origin of pages that may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that came "
       "from here by an address may always");
   app.add_option("--max-viewers", options.limits.viewers, "Viewers at once")
-      ->check(CLI::Range(std::size_t{1}, kMostViewers))
-      ->capture_default_str();
+      .range(std::size_t{1}, kMostViewers)
+      .show_default();
   app.add_option("--queue-bytes", options.limits.queue_bytes,
                  "Deltas and scheduled inputs held for viewers that are slow, once for all of them")
-      ->check(CLI::Range(kLeastQueueBytes, kMostQueueBytes))
-      ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return {.options = std::nullopt, .exit_code = app.exit(error) == 0 ? 0 : 2};
-  }
+      .range(kLeastQueueBytes, kMostQueueBytes)
+      .show_default();
+  if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
   if (const auto good = check(options); !good) {
     std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
     return {.options = std::nullopt, .exit_code = 2};

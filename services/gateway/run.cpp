@@ -6,7 +6,6 @@
 
 #include <chrono>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <thread>
 #include <utility>
 
@@ -18,6 +17,7 @@
 #include "services/gateway/session_client.hpp"
 #include "services/gateway/site.hpp"
 #include "services/gateway/web_server.hpp"
+#include "services/json/json.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -111,25 +111,24 @@ class Service final : public WebServer::Handler {
   std::string health() override {
     const std::lock_guard lock(mutex_);
     const Counts& counts = gateway_.counts();
-    nlohmann::ordered_json refused = nlohmann::ordered_json::object();
-    for (std::size_t i = 0; i < kClosings.size(); ++i)
-      refused[std::string(kClosings[i].reason)] = counts.refused[i];
-    const nlohmann::ordered_json health{{"phase", phase_name(client_.core().phase())},
-                                        {"server_alive", gateway_.server_alive()},
-                                        {"epoch", gateway_.session() ? gateway_.session()->epoch : 0},
-                                        {"frame", gateway_.frame()},
-                                        {"viewers", gateway_.viewers()},
-                                        {"joined", counts.joined},
-                                        {"left", counts.left},
-                                        {"snapshots", counts.snapshots},
-                                        {"fell_behind", counts.skips},
-                                        {"messages", counts.messages},
-                                        {"bytes", counts.bytes},
-                                        {"inputs", counts.inputs},
-                                        {"inputs_sent", counts.inputs_sent},
-                                        {"inputs_refused", counts.inputs_refused},
-                                        {"stale", counts.stale},
-                                        {"refused", refused}};
+    Json refused = Json::object();
+    for (std::size_t i = 0; i < kClosings.size(); ++i) refused[kClosings[i].reason] = counts.refused[i];
+    const Json health{{"phase", phase_name(client_.core().phase())},
+                      {"server_alive", gateway_.server_alive()},
+                      {"epoch", gateway_.session() ? gateway_.session()->epoch : 0},
+                      {"frame", gateway_.frame()},
+                      {"viewers", gateway_.viewers()},
+                      {"joined", counts.joined},
+                      {"left", counts.left},
+                      {"snapshots", counts.snapshots},
+                      {"fell_behind", counts.skips},
+                      {"messages", counts.messages},
+                      {"bytes", counts.bytes},
+                      {"inputs", counts.inputs},
+                      {"inputs_sent", counts.inputs_sent},
+                      {"inputs_refused", counts.inputs_refused},
+                      {"stale", counts.stale},
+                      {"refused", refused}};
     return health.dump() + '\n';
   }
 

@@ -2,19 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "services/lab/cells.hpp"
+#include "services/json/json.hpp"
 #include "services/lab/paper_numbers.hpp"
 
 namespace tandem::lab {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Row = BandwidthRow;
 
 /// The rows that have a value in a column; the others have null, nothing or "-" there.
@@ -58,17 +56,17 @@ Json field(const Row& row) {
 }
 template <auto kField>
 Json optional_field(const Row& row) {
-  return json_of(row.*kField);
+  return row.*kField;
 }
 
 Json decay(const Row& row) { return row.parameters.step.decay / 65536.0; }
 Json velocity_gain(const Row& row) { return row.parameters.codec.velocity_gain / 32768.0; }
 Json acceleration_gain(const Row& row) { return row.parameters.codec.acceleration_gain / 65536.0; }
 Json paper_mbit(const Row& row) {
-  return row.number ? json_of(paper_mbit_per_s(*row.number, row.bodies, row.codec)) : Json(nullptr);
+  return row.number ? Json(paper_mbit_per_s(*row.number, row.bodies, row.codec)) : Json(nullptr);
 }
 Json paper_colliding(const Row& row) {
-  return row.number ? json_of(paper_colliding_per_frame(*row.number, row.bodies)) : Json(nullptr);
+  return row.number ? Json(paper_colliding_per_frame(*row.number, row.bodies)) : Json(nullptr);
 }
 Json missing(const Row& row) { return row.missing.empty() ? Json(nullptr) : Json(row.missing); }
 
@@ -120,10 +118,9 @@ Json value_of(const Column& column, Rows rows, const Row& row) {
 
 /// `digits` behind the point of what is no whole number, or as many as it takes.
 std::string text_of(const Json& value, std::optional<int> digits) {
-  if (value.is_string()) return value.get<std::string>();
-  if (!value.is_number_float()) return value.dump();
-  return digits ? fmt::format("{:.{}f}", value.get<double>(), *digits)
-                : fmt::format("{}", value.get<double>());
+  if (value.is_text()) return value.text();
+  if (!value.is_real()) return value.dump();
+  return digits ? fmt::format("{:.{}f}", value.number(), *digits) : fmt::format("{}", value.number());
 }
 
 std::string padded(std::string_view text, int width) {
@@ -149,9 +146,9 @@ std::vector<std::string> cells_of(const Row& row) {
 std::string to_json(std::span<const BandwidthRow> rows) {
   Json list = Json::array();
   for (const Row& row : rows) {
-    Json& object = list.emplace_back(Json::object());
+    Json& object = list.push_back(Json::object());
     for (const Column& column : kColumns) {
-      if (column.json != kNone) object[std::string(column.name)] = value_of(column, column.json, row);
+      if (column.json != kNone) object[column.name] = value_of(column, column.json, row);
     }
   }
   return Json{{"rows", list}}.dump();

@@ -13,7 +13,7 @@
 namespace tandem::lab {
 namespace {
 
-CLI::Range positive() { return CLI::Range(std::numeric_limits<double>::min(), 1e6); }
+constexpr double kLeastThreshold = std::numeric_limits<double>::min(), kMostThreshold = 1e6;
 
 }  // namespace
 
@@ -36,56 +36,55 @@ Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& n
   return loaded;
 }
 
-void add_scene_option(CLI::App& command, std::vector<std::string>& scenes) {
+void add_scene_option(commandline::Command command, std::vector<std::string>& scenes) {
   command.add_option("--scene", scenes, "Scenes by name or file, separated by commas; all: the paper's five")
-      ->delimiter(',')
-      ->required();
+      .separated_by(',')
+      .required();
 }
 
-void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies) {
+void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>& bodies) {
   command.add_option("--bodies", bodies, "Numbers of bodies, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::Range(1U, engine::kMaxBodies))
-      ->capture_default_str();
+      .separated_by(',')
+      .range(1U, engine::kMaxBodies)
+      .show_default();
 }
 
-CLI::Option* add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help) {
-  // CLI11 reads -1 as 2^64 - 1, and what is too large as that.
+commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
+                                    const std::string& help) {
+  // The parser reads -1 as 2^64 - 1, and what is too large as that.
   return command.add_option("--seed", seed, help)
-      ->check([](const std::string& text) {
+      .check([](const std::string& text) {
         std::uint64_t value = 0;
         const char* const end = text.data() + text.size();
         const auto read = std::from_chars(text.data(), end, value);
         return read.ec == std::errc() && read.ptr == end ? "" : "a whole number below 2^64";
       })
-      ->capture_default_str();
+      .show_default();
 }
 
-CLI::Option* add_threshold_scale(CLI::App& command, sessions::SessionChoice& choice) {
-  return command
-      .add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
-      ->check(positive());
+commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice) {
+  return command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
+      .range(kLeastThreshold, kMostThreshold);
 }
 
-void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice) {
-  CLI::Option* scale = add_threshold_scale(command, choice);
-  command
-      .add_option("--threshold", choice.threshold_m, "Error threshold, scene units (default: the scene's)")
-      ->check(positive())
-      ->excludes(scale);
+void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice) {
+  const commandline::Option scale = add_threshold_scale(command, choice);
+  command.add_option("--threshold", choice.threshold_m, "Error threshold, scene units (default: the scene's)")
+      .range(kLeastThreshold, kMostThreshold)
+      .excludes(scale);
 }
 
-void add_bench(CLI::App& app, Run& run) {
-  CLI::App* bench = app.add_subcommand(
+void add_bench(commandline::Command app, Run& run) {
+  commandline::Command bench = app.add_subcommand(
       "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine, clients.");
-  bench->require_subcommand(1);
-  add_bandwidth(*bench, run);
-  add_train(*bench, run);
-  add_memory(*bench, run);
-  add_engine(*bench, run);
-  add_framerate(*bench, run);
-  add_client(*bench, run);
-  add_smoothing(*bench, run);
+  bench.require_subcommand();
+  add_bandwidth(bench, run);
+  add_train(bench, run);
+  add_memory(bench, run);
+  add_engine(bench, run);
+  add_framerate(bench, run);
+  add_client(bench, run);
+  add_smoothing(bench, run);
 }
 
 }  // namespace tandem::lab

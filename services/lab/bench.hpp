@@ -13,13 +13,13 @@
 
 namespace tandem::lab {
 
-void add_bandwidth(CLI::App& bench, Run& run);
-void add_train(CLI::App& bench, Run& run);
-void add_memory(CLI::App& bench, Run& run);
-void add_engine(CLI::App& bench, Run& run);
-void add_client(CLI::App& bench, Run& run);
-void add_framerate(CLI::App& bench, Run& run);
-void add_smoothing(CLI::App& bench, Run& run);
+void add_bandwidth(commandline::Command bench, Run& run);
+void add_train(commandline::Command bench, Run& run);
+void add_memory(commandline::Command bench, Run& run);
+void add_engine(commandline::Command bench, Run& run);
+void add_client(commandline::Command bench, Run& run);
+void add_framerate(commandline::Command bench, Run& run);
+void add_smoothing(commandline::Command bench, Run& run);
 
 /// Prints the error to stderr; the exit code: 2 when the caller named something that does not exist or is out
 /// of range, else 1.
@@ -33,10 +33,11 @@ int report(const std::string& command, const Error& error);
 inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
 
 /// Flags that several subcommands have.
-void add_scene_option(CLI::App& command, std::vector<std::string>& scenes);
-void add_bodies_option(CLI::App& command, std::vector<std::uint32_t>& bodies);
-void add_threshold_options(CLI::App& command, sessions::SessionChoice& choice);
-CLI::Option* add_seed_option(CLI::App& command, std::uint64_t& seed, const std::string& help);
-CLI::Option* add_threshold_scale(CLI::App& command, sessions::SessionChoice& choice);
+void add_scene_option(commandline::Command command, std::vector<std::string>& scenes);
+void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>& bodies);
+void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice);
+commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
+                                    const std::string& help);
+commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice);
 
 }  // namespace tandem::lab

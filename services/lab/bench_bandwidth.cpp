@@ -240,8 +240,8 @@ int run_bandwidth(const BandwidthOptions& options) {
 namespace {
 
 /// As tandemd has them.
-void add_quality_options(CLI::App& command, sessions::SessionChoice& choice) {
-  CLI::Option* scale = add_threshold_scale(command, choice);
+void add_quality_options(commandline::Command command, sessions::SessionChoice& choice) {
+  const commandline::Option scale = add_threshold_scale(command, choice);
   command
       .add_option_function<std::string>(
           "--threshold",
@@ -252,81 +252,82 @@ void add_quality_options(CLI::App& command, sessions::SessionChoice& choice) {
             const char* const end = text.data() + text.size();
             const auto [rest, failure] = std::from_chars(text.data(), end, length);
             if (failure != std::errc{} || rest != end || !(length > 0 && length <= 1e6))
-              throw CLI::ValidationError("--threshold", "a positive length, or auto");
+              commandline::refuse("--threshold", "a positive length, or auto");
             choice.threshold_m = length;
           },
           "Error threshold, scene units, or auto: chosen at run time (default: the scene's)")
-      ->type_name("FLOAT|auto")
-      ->excludes(scale);
+      .type_name("FLOAT|auto")
+      .excludes(scale);
   command
       .add_option("--target-bandwidth", choice.target_mbit_per_s,
                   "Mbit/s of payload that --threshold auto keeps to (default: none, only ranges follow)")
-      ->check(CLI::Range(0.001, 1e6));
+      .range(0.001, 1e6);
   command
       .add_option("--max-error", choice.max_error_m,
                   "Largest threshold of --threshold auto, scene units (default: four times the scene's)")
-      ->check(CLI::Range(1e-9, 1e9));
+      .range(1e-9, 1e9);
 }
 
 }  // namespace
 
-void add_bandwidth(CLI::App& bench, Run& run) {
-  CLI::App* command = bench.add_subcommand(
+void add_bandwidth(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
       "bandwidth", "Codecs side by side over the same trajectory; a decoder checks every frame's hash.");
   const auto options = std::make_shared<BandwidthOptions>();
   for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
-  add_scene_option(*command, options->scenes);
-  add_bodies_option(*command, options->bodies);
-  command->get_option("--scene")->required(false);
-  command->add_option("--frames", options->frames, "Frames, from the start block on")
-      ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
-      ->capture_default_str();
-  command->add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
-      ->delimiter(',')
-      ->check(CLI::IsMember(options->codecs));
+  add_scene_option(command, options->scenes);
+  add_bodies_option(command, options->bodies);
+  command.option("--scene").required(false);
+  command.add_option("--frames", options->frames, "Frames, from the start block on")
+      .range(std::uint64_t{1}, kMaxFrames)
+      .show_default();
+  command.add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
+      .separated_by(',')
+      .one_of(options->codecs);
   command
-      ->add_option("--predictor", options->choice.predictor,
-                   "Predicted step of `tracker`: ballistic, field, contact, or auto: field for spheres, else "
-                   "ballistic; the paper's codecs have ballistic")
-      ->check(CLI::IsMember({"auto", "ballistic", "field", "contact"}))
-      ->capture_default_str();
-  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
-  add_quality_options(*command, options->choice);
-  command->add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
-      ->check(CLI::Range(1U, kMaxThreads))
-      ->capture_default_str();
-  command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
-      ->check(CLI::Range(1U, scenes::kMaxUsers));
+      .add_option("--predictor", options->choice.predictor,
+                  "Predicted step of `tracker`: ballistic, field, contact, or auto: field for spheres, else "
+                  "ballistic; the paper's codecs have ballistic")
+      .one_of({"auto", "ballistic", "field", "contact"})
+      .show_default();
+  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");
+  add_quality_options(command, options->choice);
+  command.add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
+      .range(1U, kMaxThreads)
+      .show_default();
+  command.add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+      .range(1U, scenes::kMaxUsers);
   command
-      ->add_option(
+      .add_option(
           "--budget", options->choice.budget_bytes,
           "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
-      ->check(CLI::Range(sessions::kLeastBudgetBytes, std::size_t{1} << 30U));
+      .range(sessions::kLeastBudgetBytes, std::size_t{1} << 30U);
   command
-      ->add_option("--trajectory", options->trajectory,
-                   "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
-      ->excludes("--scene", "--bodies", "--seed", "--users");
-  command->add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  command->add_flag("--peers", options->peers,
-                    "Also Draco, zfp, zstd and dead reckoning (DIS), at the threshold as the largest error");
-  command->add_option("--report", options->report,
-                      "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
-  command->add_flag("--json", options->json, "One JSON object: rows[...]");
-  command->footer(
+      .add_option("--trajectory", options->trajectory,
+                  "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
+      .excludes({"--scene", "--bodies", "--seed", "--users"});
+  command.add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
+      .range(1, 64)
+      .show_default();
+  command.add_flag("--peers", options->peers,
+                   "Also Draco, zfp, zstd and dead reckoning (DIS), at the threshold as the largest error");
+  command.add_option("--report", options->report,
+                     "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
+  command.add_flag("--json", options->json, "One JSON object: rows[...]");
+  command.footer(
       "Errors and the threshold are of centres; where a session has orientations the threshold is of surfaces:\n"
       "max surf and rms surf, of the sphere around each body.\n"
       "bound: Mbit/s of tracker's decisions at the best fixed probability of each context.\n"
       "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.\n"
       "Bits and errors are the same on any number of --threads and --jobs; times are quiet with --jobs 1.");
-  command->callback([options, &run] {
+  command.on_chosen([options, &run] {
     if (options->scenes.empty() && options->trajectory.empty())
-      throw CLI::RequiredError("--scene or --trajectory");
+      commandline::refuse_missing("--scene or --trajectory");
     const sessions::SessionChoice& choice = options->choice;
     if (!choice.automatic && choice.target_mbit_per_s > 0)
-      throw CLI::RequiresError("--target-bandwidth", "--threshold auto");
-    if (!choice.automatic && choice.max_error_m) throw CLI::RequiresError("--max-error", "--threshold auto");
+      commandline::refuse_without("--target-bandwidth", "--threshold auto");
+    if (!choice.automatic && choice.max_error_m)
+      commandline::refuse_without("--max-error", "--threshold auto");
     run = [options] { return run_bandwidth(*options); };
   });
 }

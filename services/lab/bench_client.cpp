@@ -8,8 +8,8 @@
 #include <csignal>
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/client_cost.hpp"
 #include "services/lab/client_process.hpp"
@@ -17,8 +17,6 @@
 
 namespace tandem::lab {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr const char* kCommand = "bench client";
 
@@ -174,59 +172,53 @@ int run_client(ClientOptions options) {
 
 }  // namespace
 
-void add_client(CLI::App& bench, Run& run) {
-  CLI::App* command = bench.add_subcommand(
+void add_client(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
       "client", "All that a client costs a frame, DDS included, beside the full simulation's step.");
   const auto options = std::make_shared<ClientOptions>();
   ClientProcessSetup& process = options->process;
   for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
-  command->add_option("--scene", options->scene, "Scene by name or file")->capture_default_str();
-  add_bodies_option(*command, options->bodies);
-  command->add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"ballistic", "contact", "field"}))
-      ->capture_default_str();
-  command->add_option("--codec", options->codecs, "Codecs, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::IsMember(std::vector<std::string>(options->codecs)))
-      ->capture_default_str();
-  add_threshold_options(*command, process.choice);
-  add_seed_option(*command, process.seed, "Of the start block, the scripted inputs and the network");
-  command->add_option("--runs", process.runs, "Of each row, of which medians are printed")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  command->add_option("--seconds", process.seconds, "Measured in each run")
-      ->check(CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  command->add_option("--settle", process.settle_s, "Seconds from a client's start until it is measured")
-      ->check(CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  command->add_option("--domain", process.domain, "DDS domain, on loopback")
-      ->check(CLI::Range(0, 230))
-      ->capture_default_str();
-  command->add_option("--server", process.tandemd,
-                      "The program tandemd (default: beside this one, or in PATH)");
-  command->add_flag(
-      "--in-memory", options->in_memory,
-      "Without processes and DDS: what the client's own code takes, and a sample of all bodies");
-  command->add_option("--frames", options->frames, "Measured for each row, with --in-memory")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command->add_flag(
-      "--json", options->json,
-      "One JSON object: rows[scene, predictor, codec, bodies, runs, seconds, frames_per_s, "
-      "engine_ms, cpu_ms{median, least, most}, kind_ms, thread_ms, syscalls, wakeups_per_s, "
-      "idle_wakeups_per_s, resident_mb]; with --in-memory rows[scene, predictor, codec, bodies, "
-      "frames, corrected_per_frame, engine_ms, frame_ms, predicted_ms, sampled_frame_ms, "
-      "sample_ms, sample_beside_ms]");
-  command->footer(
+  command.add_option("--scene", options->scene, "Scene by name or file").show_default();
+  add_bodies_option(command, options->bodies);
+  command.add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
+      .separated_by(',')
+      .one_of({"ballistic", "contact", "field"})
+      .show_default();
+  command.add_option("--codec", options->codecs, "Codecs, separated by commas")
+      .separated_by(',')
+      .one_of(options->codecs)
+      .show_default();
+  add_threshold_options(command, process.choice);
+  add_seed_option(command, process.seed, "Of the start block, the scripted inputs and the network");
+  command.add_option("--runs", process.runs, "Of each row, of which medians are printed")
+      .range(1, 100)
+      .show_default();
+  command.add_option("--seconds", process.seconds, "Measured in each run").range(1.0, 600.0).show_default();
+  command.add_option("--settle", process.settle_s, "Seconds from a client's start until it is measured")
+      .range(1.0, 600.0)
+      .show_default();
+  command.add_option("--domain", process.domain, "DDS domain, on loopback").range(0, 230).show_default();
+  command.add_option("--server", process.tandemd,
+                     "The program tandemd (default: beside this one, or in PATH)");
+  command.add_flag("--in-memory", options->in_memory,
+                   "Without processes and DDS: what the client's own code takes, and a sample of all bodies");
+  command.add_option("--frames", options->frames, "Measured for each row, with --in-memory")
+      .range(1, 100000)
+      .show_default();
+  command.add_flag("--json", options->json,
+                   "One JSON object: rows[scene, predictor, codec, bodies, runs, seconds, frames_per_s, "
+                   "engine_ms, cpu_ms{median, least, most}, kind_ms, thread_ms, syscalls, wakeups_per_s, "
+                   "idle_wakeups_per_s, resident_mb]; with --in-memory rows[scene, predictor, codec, bodies, "
+                   "frames, corrected_per_frame, engine_ms, frame_ms, predicted_ms, sampled_frame_ms, "
+                   "sample_ms, sample_beside_ms]");
+  command.footer(
       "A server and `tandem join` as processes on loopback; ms of processor time a frame of the whole client,\n"
       "start and joining left out, by kind (its own stopwatches; dds: the rest) and by thread, system calls a\n"
       "frame (-: the kernel does not tell, or not this user), wake-ups of all threads a second, also while the\n"
       "server is suspended (idle). With --in-memory, in one process and simulated time: a frame is taking what\n"
       "came, the predicted step, decoding, applying, checking the hash; a sample is positions, velocities, alive\n"
       "and types of all bodies; beside: in a thread of its own while another one applies, by the wall clock.");
-  command->callback([options, &run] { run = [options] { return run_client(*options); }; });
+  command.on_chosen([options, &run] { run = [options] { return run_client(*options); }; });
 }
 
 }  // namespace tandem::lab

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/scene_source.hpp"
 
@@ -36,12 +36,12 @@ int run_engine(const EngineOptions& options) {
   }
   const double updates_per_s = static_cast<double>(frames) / elapsed_s;
   if (options.json) {
-    fmt::print("{}\n", nlohmann::ordered_json{{"scene", scene->name},
-                                              {"bodies", options.run.bodies},
-                                              {"threads", options.run.threads},
-                                              {"frames", frames},
-                                              {"seconds", elapsed_s},
-                                              {"updates_per_s", updates_per_s}}
+    fmt::print("{}\n", Json{{"scene", scene->name},
+                            {"bodies", options.run.bodies},
+                            {"threads", options.run.threads},
+                            {"frames", frames},
+                            {"seconds", elapsed_s},
+                            {"updates_per_s", updates_per_s}}
                            .dump());
   } else {
     fmt::print("{} with {} bodies on {} threads: {:.1f} updates/s ({} in {:.1f} s)\n", scene->name,
@@ -52,23 +52,21 @@ int run_engine(const EngineOptions& options) {
 
 }  // namespace
 
-void add_engine(CLI::App& bench, Run& run) {
-  CLI::App* command = bench.add_subcommand(
+void add_engine(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
       "engine", "The full simulation alone, with its scripted users, as fast as it goes.");
   const auto options = std::make_shared<EngineOptions>();
-  command->add_option("--scene", options->scene, "Scene by name or file")->capture_default_str();
-  command->add_option("--bodies", options->run.bodies, "Number of bodies")
-      ->check(CLI::Range(1U, engine::kMaxBodies))
-      ->capture_default_str();
-  command->add_option("--threads", options->run.threads, "Of the engine")
-      ->check(CLI::Range(1U, kMaxThreads))
-      ->capture_default_str();
-  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs");
-  command->add_option("--seconds", options->seconds, "How long")
-      ->check(CLI::Range(0.01, 3600.0))
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options, &run] { run = [options] { return run_engine(*options); }; });
+  command.add_option("--scene", options->scene, "Scene by name or file").show_default();
+  command.add_option("--bodies", options->run.bodies, "Number of bodies")
+      .range(1U, engine::kMaxBodies)
+      .show_default();
+  command.add_option("--threads", options->run.threads, "Of the engine")
+      .range(1U, kMaxThreads)
+      .show_default();
+  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");
+  command.add_option("--seconds", options->seconds, "How long").range(0.01, 3600.0).show_default();
+  command.add_flag("--json", options->json, "One JSON object");
+  command.on_chosen([options, &run] { run = [options] { return run_engine(*options); }; });
 }
 
 }  // namespace tandem::lab

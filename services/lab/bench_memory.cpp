@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/memory.hpp"
 #include "services/lab/scene_source.hpp"
@@ -43,13 +43,13 @@ int run_memory(const MemoryOptions& options) {
   } parts[] = {{"engine", &MemoryUse::engine_bytes},
                {"server", &MemoryUse::server_bytes},
                {"client", &MemoryUse::client_bytes}};
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  Json rows = Json::array();
   if (!options.json) fmt::print("{:>8} {:<8} {:>14} {:>14}\n", "bodies", "", "total bytes", "bytes a slot");
   // Two sizes, each for itself: scratch may grow in steps, so that a line through both would tell nothing.
   for (const std::uint32_t bodies : {options.bodies, 2 * options.bodies}) {
     const auto use = measure_memory([&] { return host_scene(*scene, options, bodies); }, options.frames);
     if (!use) return report("bench memory", use.error());
-    nlohmann::ordered_json row{{"scene", scene->name}, {"bodies", bodies}, {"codec", options.codec}};
+    Json row{{"scene", scene->name}, {"bodies", bodies}, {"codec", options.codec}};
     for (const auto& part : parts) {
       const std::int64_t total = (*use).*part.bytes;
       const double a_slot = static_cast<double>(total) / bodies;
@@ -58,29 +58,27 @@ int run_memory(const MemoryOptions& options) {
     }
     rows.push_back(std::move(row));
   }
-  if (options.json) fmt::print("{}\n", nlohmann::ordered_json{{"rows", rows}}.dump());
+  if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
   return 0;
 }
 
 }  // namespace
 
-void add_memory(CLI::App& bench, Run& run) {
-  CLI::App* command =
+void add_memory(commandline::Command bench, Run& run) {
+  commandline::Command command =
       bench.add_subcommand("memory", "Heap bytes of engine, server and client while playing, DDS excluded.");
   const auto options = std::make_shared<MemoryOptions>();
-  command->add_option("--scene", options->scene, "Scene by name or file")->capture_default_str();
-  command->add_option("--bodies", options->bodies, "Number of bodies; twice as many are measured too")
-      ->check(CLI::Range(1U, engine::kMaxBodies / 2))
-      ->capture_default_str();
+  command.add_option("--scene", options->scene, "Scene by name or file").show_default();
+  command.add_option("--bodies", options->bodies, "Number of bodies; twice as many are measured too")
+      .range(1U, engine::kMaxBodies / 2)
+      .show_default();
   std::vector<std::string> names;
   for (const std::string_view name : codec_names()) names.emplace_back(name);
-  command->add_option("--codec", options->codec, "Codec")->check(CLI::IsMember(names))->capture_default_str();
-  command->add_option("--frames", options->frames, "Frames to play")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command->add_flag("--json", options->json,
-                    "One JSON object: rows[scene, bodies, codec, engine, server, client]");
-  command->callback([options, &run] { run = [options] { return run_memory(*options); }; });
+  command.add_option("--codec", options->codec, "Codec").one_of(names).show_default();
+  command.add_option("--frames", options->frames, "Frames to play").range(1, 100000).show_default();
+  command.add_flag("--json", options->json,
+                   "One JSON object: rows[scene, bodies, codec, engine, server, client]");
+  command.on_chosen([options, &run] { run = [options] { return run_memory(*options); }; });
 }
 
 }  // namespace tandem::lab

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/smoothing.hpp"
 
@@ -20,14 +20,14 @@ struct SmoothingOptions {
   bool json = false;
 };
 
-nlohmann::ordered_json to_json(const Seen& seen) {
+Json to_json(const Seen& seen) {
   return {{"jump_p999", seen.jump}, {"mean_error", seen.mean_error}, {"p999_error", seen.p999_error}};
 }
 
 int run_smoothing(const SmoothingOptions& options) {
   const auto scenes = load_scenes(options.scenes);
   if (!scenes) return report(kCommand, scenes.error());
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  Json rows = Json::array();
   if (!options.json) {
     fmt::print("{:<12} {:<10} {:>9}   {:>10} {:>10} {:>6}   {:>10} {:>10} {:>10}\n", "scene", "predictor",
                "threshold", "jump p99.9", "unsmoothed", "ratio", "mean error", "unsmoothed", "p99.9");
@@ -54,63 +54,59 @@ int run_smoothing(const SmoothingOptions& options) {
       std::fflush(stdout);
     }
   }
-  if (options.json) fmt::print("{}\n", nlohmann::ordered_json{{"rows", rows}}.dump());
+  if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
   return 0;
 }
 
 }  // namespace
 
-void add_smoothing(CLI::App& bench, Run& run) {
-  CLI::App* command = bench.add_subcommand(
+void add_smoothing(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
       "smoothing", "What is seen of corrections: two clients sample one session, one of them smoothing.");
   const auto options = std::make_shared<SmoothingOptions>();
   SmoothingSetup& setup = options->setup;
   setup.choice.bodies = 1000;
   command
-      ->add_option("--scene", options->scenes,
-                   "Scenes by name or file, separated by commas; all: the paper's five")
-      ->delimiter(',')
-      ->capture_default_str();
-  command->add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"ballistic", "contact", "field"}))
-      ->capture_default_str();
+      .add_option("--scene", options->scenes,
+                  "Scenes by name or file, separated by commas; all: the paper's five")
+      .separated_by(',')
+      .show_default();
+  command.add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
+      .separated_by(',')
+      .one_of({"ballistic", "contact", "field"})
+      .show_default();
   std::vector<std::string> names;
   for (const std::string_view name : codec_names()) names.emplace_back(name);
-  command->add_option("--codec", setup.choice.codec, "Codec")
-      ->check(CLI::IsMember(names))
-      ->capture_default_str();
-  command->add_option("--bodies", setup.choice.bodies, "Number of bodies")
-      ->check(CLI::Range(1U, engine::kMaxBodies))
-      ->capture_default_str();
-  add_threshold_options(*command, setup.choice);
-  add_seed_option(*command, setup.seed, "Of the start block, the scripted inputs and the network");
-  command->add_option("--seconds", setup.seconds, "Of simulated time, for each row")
-      ->check(CLI::Range(0.1, 3600.0))
-      ->capture_default_str();
-  command->add_option("--rate", setup.rate_hz, "Samples a second")
-      ->check(CLI::Range(1.0, 1000.0))
-      ->capture_default_str();
+  command.add_option("--codec", setup.choice.codec, "Codec").one_of(names).show_default();
+  command.add_option("--bodies", setup.choice.bodies, "Number of bodies")
+      .range(1U, engine::kMaxBodies)
+      .show_default();
+  add_threshold_options(command, setup.choice);
+  add_seed_option(command, setup.seed, "Of the start block, the scripted inputs and the network");
+  command.add_option("--seconds", setup.seconds, "Of simulated time, for each row")
+      .range(0.1, 3600.0)
+      .show_default();
+  command.add_option("--rate", setup.rate_hz, "Samples a second").range(1.0, 1000.0).show_default();
   command
-      ->add_option("--smoothing", setup.smoothing_s,
-                   "Time constant of the smoothed client, s (default: the client's own)")
-      ->check(CLI::Range(0.0, 10.0));
-  command->add_option("--delay", setup.delay_ms, "Of the network, ms each way")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  command->add_option("--jitter", setup.jitter_ms, "Of the network, ms: evenly added up to that")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  command->add_option("--outage", setup.outage_s, "Seconds that the link is cut for, every five")
-      ->check(CLI::Range(0.0, 4.0))
-      ->capture_default_str();
-  command->add_flag("--json", options->json,
-                    "One JSON object: rows[scene, predictor, codec, bodies, threshold, samples, smoothed, "
-                    "unsmoothed]");
-  command->footer(
+      .add_option("--smoothing", setup.smoothing_s,
+                  "Time constant of the smoothed client, s (default: the client's own)")
+      .range(0.0, 10.0);
+  command.add_option("--delay", setup.delay_ms, "Of the network, ms each way")
+      .range(0.0, 1000.0)
+      .show_default();
+  command.add_option("--jitter", setup.jitter_ms, "Of the network, ms: evenly added up to that")
+      .range(0.0, 1000.0)
+      .show_default();
+  command.add_option("--outage", setup.outage_s, "Seconds that the link is cut for, every five")
+      .range(0.0, 4.0)
+      .show_default();
+  command.add_flag("--json", options->json,
+                   "One JSON object: rows[scene, predictor, codec, bodies, threshold, samples, smoothed, "
+                   "unsmoothed]");
+  command.footer(
       "Jump: the 99.9th percentile over bodies and samples of how far the second difference of the place shown\n"
       "goes beyond that of the full simulation's at the same moments; scene units. All is seeded.");
-  command->callback([options, &run] { run = [options] { return run_smoothing(*options); }; });
+  command.on_chosen([options, &run] { run = [options] { return run_smoothing(*options); }; });
 }
 
 }  // namespace tandem::lab

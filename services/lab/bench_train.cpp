@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/train.hpp"
 #include "services/tool/progress.hpp"
@@ -43,7 +43,7 @@ Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const Train
 int run_train(const TrainOptions& options) {
   const auto scenes = load_scenes(options.scenes);
   if (!scenes) return report("bench train", scenes.error());
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  Json rows = Json::array();
   for (const scenes::Scene& scene : *scenes) {
     for (const std::uint32_t bodies : options.bodies) {
       const auto table = train_scene(scene, options, bodies);
@@ -62,29 +62,29 @@ int run_train(const TrainOptions& options) {
                       {"file", scenes::trained_path(scene.path)}});
     }
   }
-  if (options.json) fmt::print("{}\n", nlohmann::ordered_json{{"rows", rows}}.dump());
+  if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
   return 0;
 }
 
 }  // namespace
 
-void add_train(CLI::App& bench, Run& run) {
-  CLI::App* command = bench.add_subcommand(
+void add_train(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
       "train", "Writes quantisation ranges and code lengths beside the scene file: NAME.trained.textproto.");
   const auto options = std::make_shared<TrainOptions>();
   options->run.seed = kTrainingSeed;
-  add_scene_option(*command, options->scenes);
-  add_bodies_option(*command, options->bodies);
-  command->add_option("--frames", options->frames, "Frames, from the start block on")
-      ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
-      ->capture_default_str();
-  add_seed_option(*command, options->run.seed, "Of the training run");
-  add_threshold_options(*command, options->choice);
-  command->add_option("--threads", options->run.threads, "Of the engine")
-      ->check(CLI::Range(1U, kMaxThreads))
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object: rows[scene, bodies, threshold, ranges, file]");
-  command->callback([options, &run] { run = [options] { return run_train(*options); }; });
+  add_scene_option(command, options->scenes);
+  add_bodies_option(command, options->bodies);
+  command.add_option("--frames", options->frames, "Frames, from the start block on")
+      .range(std::uint64_t{1}, kMaxFrames)
+      .show_default();
+  add_seed_option(command, options->run.seed, "Of the training run");
+  add_threshold_options(command, options->choice);
+  command.add_option("--threads", options->run.threads, "Of the engine")
+      .range(1U, kMaxThreads)
+      .show_default();
+  command.add_flag("--json", options->json, "One JSON object: rows[scene, bodies, threshold, ranges, file]");
+  command.on_chosen([options, &run] { run = [options] { return run_train(*options); }; });
 }
 
 }  // namespace tandem::lab

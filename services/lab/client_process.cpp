@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <nlohmann/json.hpp>
 #include <thread>
 #include <vector>
 
+#include "services/json/json.hpp"
 #include "services/lab/framerate/child.hpp"
 #include "services/lab/process_counters.hpp"
 #include "services/lab/scene_source.hpp"
@@ -103,19 +103,20 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   kill(client->pid(), SIGINT);
   const auto said = client->finish(kEnd, *setup.stop);
   if (!said) return fail(said.error().code, "the client: " + said.error().message);
-  const auto json = nlohmann::json::parse(*said, nullptr, false);
-  if (json.is_discarded()) return fail(ErrorCode::kIo, "the client printed no JSON");
-  const auto played_s = json["played_s"].get<double>();
+  const auto printed = Json::parse(*said);
+  if (!printed) return fail(ErrorCode::kIo, "the client printed no JSON");
+  const Json& json = *printed;
+  const double played_s = json["played_s"].number();
   if (played_s < setup.seconds) return fail(ErrorCode::kIo, "the client joined too late: settle for longer");
 
   ClientProcessRow row;
-  row.frames_per_s = (json["frames_applied"].get<double>() - 1) / played_s;
+  row.frames_per_s = (json["frames_applied"].number() - 1) / played_s;
   const ProcessSpan playing = between(*first, *second);
   const double frames = row.frames_per_s * playing.seconds;
   row.cpu_ms = playing.cpu_ms / frames;
   for (const auto& [name, cpu_ms] : playing.cpu_ms_by_thread) row.by_thread[name] = cpu_ms / frames;
   double told_ms = 0;
-  for (const auto& [kind, ms] : json["cost_ms"].items()) told_ms += row.by_kind[kind] = ms.get<double>();
+  for (const auto& [kind, ms] : json["cost_ms"].members()) told_ms += row.by_kind[kind] = ms.number();
   row.by_kind["dds"] = row.cpu_ms - told_ms;
   if (counter) row.syscalls = static_cast<double>(calls) / frames;
   row.wakeups_per_s = playing.wakeups / playing.seconds;

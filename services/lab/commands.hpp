@@ -8,7 +8,7 @@ namespace tandem::lab {
 using tool::Run;
 
 /// As those in services/tool/commands.hpp.
-void add_bench(CLI::App& app, Run& run);
-void add_export(CLI::App& app, Run& run);
+void add_bench(commandline::Command app, Run& run);
+void add_export(commandline::Command app, Run& run);
 
 }  // namespace tandem::lab

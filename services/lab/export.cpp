@@ -75,52 +75,52 @@ Result<void> export_chosen(const ExportOptions& options) {
 
 }  // namespace
 
-void add_export(CLI::App& app, Run& run) {
-  CLI::App* command = app.add_subcommand(
+void add_export(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "export",
       "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity) or, of bodies that turn, "
       "[13], and X.json; of a scene, or of a recording, which also becomes point clouds.");
-  command->footer(std::string(kTrajectoryFormat) + "\n\n" + kRecordingFormat);
+  command.footer(std::string(kTrajectoryFormat) + "\n\n" + kRecordingFormat);
   const auto options = std::make_shared<ExportOptions>();
   options->run.bodies = 10000;
   options->run.frames = 1000;
-  CLI::Option* const scene = command->add_option("--scene", options->scene, "Scene by name or file");
-  CLI::Option* const from =
+  const commandline::Option scene = command.add_option("--scene", options->scene, "Scene by name or file");
+  const commandline::Option from =
       command
-          ->add_option("--from", options->recording,
-                       "Instead of a scene: the agreed states of what `tandem record` wrote")
-          ->excludes(scene);
-  CLI::Option* const points =
+          .add_option("--from", options->recording,
+                      "Instead of a scene: the agreed states of what `tandem record` wrote")
+          .excludes(scene);
+  const commandline::Option points =
       command
-          ->add_option("--points", options->points,
-                       "Instead of --out: an MCAP file of point clouds, as Foxglove opens them")
-          ->needs(from);
-  command->add_option("--every", options->every, "With --points: of the frames, those that this divides")
-      ->check(CLI::Range(1U, 1U << 20U))
-      ->needs(points)
-      ->capture_default_str();
-  command->add_option("--bodies", options->run.bodies, "Number of bodies")
-      ->check(CLI::Range(1U, engine::kMaxBodies))
-      ->excludes(from)
-      ->capture_default_str();
-  command->add_option("--frames", options->run.frames, "Frames after the start")
-      ->check(CLI::Range(std::uint64_t{1}, kMaxFrames))
-      ->excludes(from)
-      ->capture_default_str();
-  add_seed_option(*command, options->run.seed, "Of the start block and the scripted inputs")->excludes(from);
-  command->add_option("--threads", options->run.threads, "Of the engine")
-      ->check(CLI::Range(1U, kMaxThreads))
-      ->excludes(from)
-      ->capture_default_str();
-  command->add_option("--users", options->run.users, "Scripted users (default: the scene's)")
-      ->check(CLI::Range(1U, scenes::kMaxUsers))
-      ->excludes(from);
-  command->add_option("--out", options->out, "The .npy file; the .json beside it")->excludes(points);
-  command->callback([options, &run] {
+          .add_option("--points", options->points,
+                      "Instead of --out: an MCAP file of point clouds, as Foxglove opens them")
+          .needs(from);
+  command.add_option("--every", options->every, "With --points: of the frames, those that this divides")
+      .range(1U, 1U << 20U)
+      .needs(points)
+      .show_default();
+  command.add_option("--bodies", options->run.bodies, "Number of bodies")
+      .range(1U, engine::kMaxBodies)
+      .excludes(from)
+      .show_default();
+  command.add_option("--frames", options->run.frames, "Frames after the start")
+      .range(std::uint64_t{1}, kMaxFrames)
+      .excludes(from)
+      .show_default();
+  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs").excludes(from);
+  command.add_option("--threads", options->run.threads, "Of the engine")
+      .range(1U, kMaxThreads)
+      .excludes(from)
+      .show_default();
+  command.add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+      .range(1U, scenes::kMaxUsers)
+      .excludes(from);
+  command.add_option("--out", options->out, "The .npy file; the .json beside it").excludes(points);
+  command.on_chosen([options, &run] {
     if (options->scene.empty() && options->recording.empty())
-      throw CLI::ValidationError("--scene", "expected --scene or --from");
+      commandline::refuse("--scene", "expected --scene or --from");
     if (options->out.empty() && options->points.empty())
-      throw CLI::ValidationError("--out", "expected the .npy file to write");
+      commandline::refuse("--out", "expected the .npy file to write");
     run = [options] {
       const auto exported = export_chosen(*options);
       return exported ? 0 : report("export", exported.error());

@@ -4,11 +4,11 @@
 #include <array>
 #include <bit>
 #include <cstddef>
-#include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
 
 #include "sdk/transport/units.hpp"
+#include "services/json/json.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -83,21 +83,21 @@ std::string point_cloud(const engine::Bodies& bodies, std::span<const transport:
     if (bodies.alive[slot] != 0) points.push_back(point_of(bodies, slot, types));
   }
   const auto field = [](const char* name, std::size_t offset, NumericType type) {
-    return nlohmann::ordered_json{{"name", name}, {"offset", offset}, {"type", static_cast<int>(type)}};
+    return Json{{"name", name}, {"offset", offset}, {"type", static_cast<int>(type)}};
   };
   constexpr std::uint64_t kNsPerS = kSecond;
-  nlohmann::ordered_json cloud;
+  Json cloud;
   cloud["timestamp"] = {{"sec", time_ns / kNsPerS}, {"nsec", time_ns % kNsPerS}};
   cloud["frame_id"] = "world";
   cloud["pose"]["position"] = {{"x", 0}, {"y", 0}, {"z", 0}};
   cloud["pose"]["orientation"] = {{"x", 0}, {"y", 0}, {"z", 0}, {"w", 1}};
   cloud["point_stride"] = sizeof(Point);
-  cloud["fields"] = {
-      field("x", offsetof(Point, x), kFloat32),           field("y", offsetof(Point, y), kFloat32),
-      field("z", offsetof(Point, z), kFloat32),           field("radius", offsetof(Point, radius), kFloat32),
-      field("red", offsetof(Point, colour), kUint8),      field("green", offsetof(Point, colour) + 1, kUint8),
-      field("blue", offsetof(Point, colour) + 2, kUint8), field("alpha", offsetof(Point, colour) + 3, kUint8),
-      field("type", offsetof(Point, type), kUint32)};
+  cloud["fields"] = Json::array(
+      {field("x", offsetof(Point, x), kFloat32), field("y", offsetof(Point, y), kFloat32),
+       field("z", offsetof(Point, z), kFloat32), field("radius", offsetof(Point, radius), kFloat32),
+       field("red", offsetof(Point, colour), kUint8), field("green", offsetof(Point, colour) + 1, kUint8),
+       field("blue", offsetof(Point, colour) + 2, kUint8),
+       field("alpha", offsetof(Point, colour) + 3, kUint8), field("type", offsetof(Point, type), kUint32)});
   cloud["data"] = base64(std::as_bytes(std::span(points)));
   return cloud.dump();
 }

@@ -1,7 +1,6 @@
 #include "services/tandemd/command_line.hpp"
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
+#include "services/commandline/commandline.hpp"
 #include "services/tandemd/config.hpp"
 #include "services/tandemd/number.hpp"
 
@@ -19,23 +19,23 @@ namespace {
 /// Flags that each set a field of the configuration.
 class Flags {
  public:
-  Flags(CLI::App& app, idl::ServerConfig& config) : app_(&app), config_(&config) {}
+  Flags(commandline::Command app, idl::ServerConfig& config) : app_(app), config_(&config) {}
 
   template <class T>
   void add(const char* flag, void (idl::ServerConfig::*set)(T), const std::string& help) {
-    CLI::Option* const option = app_->add_option_function<T>(
+    commandline::Option option = app_.add_option_function<T>(
         flag, [config = config_, set](T value) { (config->*set)(value); }, help);
-    // CLI11 reads -1 as the largest number, and what is too large as that.
+    // The parser reads -1 as the largest number, and what is too large as that.
     if constexpr (std::is_unsigned_v<T>)
-      option->check([](const std::string& text) { return number<T>(text) ? "" : "a whole number"; });
+      option.check([](const std::string& text) { return number<T>(text) ? "" : "a whole number"; });
   }
   void add(const char* flag, std::string* (idl::ServerConfig::*field)(), const std::string& help) {
-    app_->add_option_function<std::string>(
+    app_.add_option_function<std::string>(
         flag, [config = config_, field](const std::string& value) { *(config->*field)() = value; }, help);
   }
 
  private:
-  CLI::App* app_;
+  commandline::Command app_;
   idl::ServerConfig* config_;
 };
 
@@ -46,7 +46,7 @@ void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
   if (config.threshold_auto()) return;
   const auto length = number<double>(text);
-  if (!length) throw CLI::ValidationError("--threshold", "a positive length, or auto");
+  if (!length) commandline::refuse("--threshold", "a positive length, or auto");
   config.set_threshold(*length);
 }
 
@@ -54,12 +54,12 @@ void add_streams(idl::ServerConfig& config, const std::vector<std::string>& text
   config.clear_stream();
   for (const std::string& text : texts) {
     auto stream = parse_stream(text);
-    if (!stream) throw CLI::ValidationError("--stream", stream.error().message);
+    if (!stream) commandline::refuse("--stream", stream.error().message);
     *config.add_stream() = std::move(*stream);
   }
 }
 
-void add_flags(CLI::App& app, idl::ServerConfig& config) {
+void add_flags(commandline::Command app, idl::ServerConfig& config) {
   using Config = idl::ServerConfig;
   const Options defaults;
   Flags flags(app, config);
@@ -83,13 +83,13 @@ void add_flags(CLI::App& app, idl::ServerConfig& config) {
          "it. NAME:PREDICTOR, or NAME:key=value,... with codec, predictor, threshold, target-bandwidth, "
          "max-error, budget; the rest as the flags of these names say. Clients choose by themselves; one that "
          "chooses nothing plays the first [thin:ballistic and rich:field where --predictor auto is field]")
-      ->type_name("NAME:SPEC")
-      ->allow_extra_args(false);
+      .type_name("NAME:SPEC")
+      .one_value_each();
   app.add_option_function<std::string>(
          "--threshold", [&config](const std::string& text) { set_threshold(config, text); },
          "Position error above which a body is corrected, in metres, or auto: chosen at run time [the "
          "scene's]")
-      ->type_name("METRES|auto");
+      .type_name("METRES|auto");
   flags.add("--target-bandwidth", &Config::set_target_bandwidth,
             "Mbit/s of payload at the nominal rate that --threshold auto keeps to, from a quarter of the "
             "threshold it starts from up to --max-error");
@@ -118,7 +118,7 @@ void add_flags(CLI::App& app, idl::ServerConfig& config) {
   flags.add("--threads", &Config::set_threads,
             fmt::format("Threads of the full simulation [{}]", defaults.choice.threads));
   flags.add("--seed", &Config::set_seed, fmt::format("Seed of start block and script [{}]", defaults.seed));
-  app.add_flag_callback(
+  app.add_flag_function(
       "--scripted", [&config] { config.set_scripted(true); },
       "The server itself sends what the scene's users would");
   flags.add("--users", &Config::set_users, "Users of that script [as many as the scene says]");
@@ -128,9 +128,9 @@ void add_flags(CLI::App& app, idl::ServerConfig& config) {
 }  // namespace
 
 CommandLine parse_command_line(int argc, const char* const* argv) {
-  CLI::App app{"Simulates a scene and streams it over DDS to clients, which hold bit-identical state.",
-               "tandemd"};
-  app.set_version_flag("--version", "tandemd " TANDEM_VERSION);
+  commandline::Program app{
+      "Simulates a scene and streams it over DDS to clients, which hold bit-identical state.", "tandemd"};
+  app.version("tandemd " TANDEM_VERSION);
   app.footer(
       "Exit codes: 0 done, 1 failed (also: the session has a server already), 2 wrong usage. SIGINT and "
       "SIGTERM end it cleanly.");
@@ -140,11 +140,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   add_flags(app, config);
   app.add_option("--config", path, "Configuration file (protobuf text, idl/server.proto); flags win over it");
   app.add_flag("--json", json, "Print one JSON object on stdout at the end");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return {.options = std::nullopt, .exit_code = app.exit(error) == 0 ? 0 : 2};
-  }
+  if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
   if (!path.empty()) {
     auto file = load_config(path);
     if (!file) {

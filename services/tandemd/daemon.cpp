@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -17,6 +16,7 @@
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/publisher.hpp"
+#include "services/json/json.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"
@@ -192,7 +192,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       totals.frames, mbit_per_s, totals.frame_ms_p50, totals.frame_ms_p99, totals.clients_seen, totals.stalls,
       totals.suspended_ms, totals.refused_inputs);
   if (!json) return {};
-  nlohmann::ordered_json streams = nlohmann::ordered_json::array();
+  Json streams = Json::array();
   for (const host::StreamTotals& stream : totals.streams) {
     const double bits = static_cast<double>(stream.payload_bytes) * 8 / kBitsPerMbit;
     streams.push_back(
@@ -202,17 +202,16 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
          {"snapshots", stream.snapshots},
          {"snapshot_bytes", stream.snapshot_bytes}});
   }
-  const nlohmann::ordered_json object{
-      {"frames", totals.frames},
-      {"mbit_per_s", mbit_per_s},
-      {"frame_ms", {{"p50", totals.frame_ms_p50}, {"p99", totals.frame_ms_p99}}},
-      {"clients_seen", totals.clients_seen},
-      {"stalls", totals.stalls},
-      {"refused_inputs", totals.refused_inputs},
-      {"snapshots", totals.snapshots},
-      {"snapshot_bytes", totals.snapshot_bytes},
-      {"demotions", totals.demotions},
-      {"streams", streams}};
+  const Json object{{"frames", totals.frames},
+                    {"mbit_per_s", mbit_per_s},
+                    {"frame_ms", {{"p50", totals.frame_ms_p50}, {"p99", totals.frame_ms_p99}}},
+                    {"clients_seen", totals.clients_seen},
+                    {"stalls", totals.stalls},
+                    {"refused_inputs", totals.refused_inputs},
+                    {"snapshots", totals.snapshots},
+                    {"snapshot_bytes", totals.snapshot_bytes},
+                    {"demotions", totals.demotions},
+                    {"streams", streams}};
   const std::string line = object.dump() + '\n';
   if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     return fail(ErrorCode::kIo, "the report could not be written to stdout");

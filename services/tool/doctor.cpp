@@ -15,8 +15,8 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "services/json/json.hpp"
 #include "services/tool/commands.hpp"
 
 namespace tandem::tool {
@@ -200,14 +200,14 @@ int print(const std::vector<Check>& checks, bool json) {
   const bool failed = std::any_of(checks.begin(), checks.end(),
                                   [](const Check& c) { return c.verdict == Verdict::kFailure; });
   if (json) {
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    Json rows = Json::array();
     for (const Check& check : checks) {
       rows.push_back({{"name", check.name},
                       {"verdict", word(check.verdict)},
                       {"detail", check.detail},
                       {"advice", check.advice}});
     }
-    fmt::print("{}\n", nlohmann::ordered_json{{"ok", !failed}, {"checks", rows}}.dump());
+    fmt::print("{}\n", Json{{"ok", !failed}, {"checks", rows}}.dump());
     return failed ? 1 : 0;
   }
   for (const Check& check : checks) {
@@ -248,13 +248,13 @@ std::vector<Check> judge(const MachineFacts& facts) {
           judge_configuration(facts)};
 }
 
-void add_doctor(CLI::App& app, Run& run) {
-  CLI::App* command = app.add_subcommand(
+void add_doctor(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "doctor", "Checks interfaces, multicast, socket buffers and limits, and says what to change.");
   const auto json = std::make_shared<bool>(false);
-  command->add_flag("--json", *json, "One JSON object: ok, checks[name, verdict, detail, advice]");
-  command->footer("Exit 1 when something keeps sessions from working at all; warnings exit 0.");
-  command->callback([json, &run] { run = [json] { return print(judge(machine_facts()), *json); }; });
+  command.add_flag("--json", *json, "One JSON object: ok, checks[name, verdict, detail, advice]");
+  command.footer("Exit 1 when something keeps sessions from working at all; warnings exit 0.");
+  command.on_chosen([json, &run] { run = [json] { return print(judge(machine_facts()), *json); }; });
 }
 
 }  // namespace tandem::tool

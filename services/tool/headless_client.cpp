@@ -194,7 +194,7 @@ void HeadlessClient::tell_live(client::Now now) {
   const client::Statistics& figures = core_->statistics();
   const auto bytes = static_cast<double>(figures.payload_bytes - live_bytes_);
   static constexpr const char* kPhases[] = {"searching", "refused", "joining", "playing"};
-  nlohmann::ordered_json line;
+  Json line;
   line["client"] = options_.index;
   line["seconds"] = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
   line["phase"] = kPhases[static_cast<std::size_t>(core_->phase())];
@@ -219,12 +219,12 @@ bool HeadlessClient::succeeded() const {
          core_->statistics().hash_mismatches == 0;
 }
 
-nlohmann::ordered_json HeadlessClient::report() const {
+Json HeadlessClient::report() const {
   const client::Statistics& figures = core_->statistics();
   const auto pair = [](const DurationHistogram& q) {
-    return nlohmann::ordered_json{{"p50", q.quantile_ms(0.5)}, {"p99", q.quantile_ms(0.99)}};
+    return Json{{"p50", q.quantile_ms(0.5)}, {"p99", q.quantile_ms(0.99)}};
   };
-  nlohmann::ordered_json out;
+  Json out;
   out["frames_applied"] = figures.frames_applied;
   out["resyncs"] = figures.resyncs;
   out["hash_mismatches"] = figures.hash_mismatches;
@@ -243,7 +243,7 @@ nlohmann::ordered_json HeadlessClient::report() const {
                     {"hash", mean_ms(figures.costs.hash_ns)},
                     {"acknowledge", mean_ms(figures.costs.acknowledge_ns)}};
   out["played_s"] = static_cast<double>(figures.last_applied_ns - figures.first_applied_ns) / 1e9;
-  out["join_ms"] = first_join_ms_ ? nlohmann::ordered_json(*first_join_ms_) : nlohmann::ordered_json(nullptr);
+  out["join_ms"] = first_join_ms_ ? Json(*first_join_ms_) : Json(nullptr);
   out["inputs_sent"] = figures.inputs_sent;
   out["inputs_refused"] = figures.inputs_refused;
   out["last_frame"] = last_frame_;

@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
+#include "services/json/json.hpp"
 #include "services/recording/recorder.hpp"
 #include "services/tool/recording_port.hpp"
 
@@ -50,7 +50,7 @@ class HeadlessClient final : public client::CoreListener {
   /// True when it played, with no hash mismatch, and all files are written.
   [[nodiscard]] bool succeeded() const;
   /// The JSON object of the result, valid after run().
-  [[nodiscard]] nlohmann::ordered_json report() const;
+  [[nodiscard]] Json report() const;
   /// Of the capture, valid after run(); null without one.
   [[nodiscard]] const recording::Recorder* recorder() const { return recorder_.get(); }
   /// The same in a few lines for humans.

@@ -57,7 +57,7 @@ int run_join(const JoinOptions& options) {
     clients[0]->run(signals.stop());
   }
   if (options.json) {
-    nlohmann::ordered_json out;
+    Json out;
     if (options.count == 1) {
       out = clients[0]->report();
     } else {
@@ -73,37 +73,36 @@ int run_join(const JoinOptions& options) {
 
 }  // namespace
 
-void add_join(CLI::App& app, Run& run) {
-  CLI::App* command = app.add_subcommand("join", "Joins a session as a client without a picture.");
+void add_join(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand("join", "Joins a session as a client without a picture.");
   const auto options = std::make_shared<JoinOptions>();
   HeadlessOptions& client = options->client;
-  add_endpoint_options(*command, client.domain, client.session);
-  command->add_flag("--observe", client.observe, "Only watch: the server does not wait for this client");
+  add_endpoint_options(command, client.domain, client.session);
+  command.add_flag("--observe", client.observe, "Only watch: the server does not wait for this client");
   command
-      ->add_option("--count", options->count, "Clients in this process; log files get the suffix .0, .1, ...")
-      ->check(CLI::Range(1U, kMaxCount))
-      ->capture_default_str();
-  command->add_option("--input-script", client.input_script, "Inputs to send, as protobuf text (InputScript)")
-      ->check(CLI::ExistingFile);
-  command->add_option("--lead", client.lead, "Frames to simulate beyond the last delta")
-      ->check(CLI::Range(0, 1))
-      ->capture_default_str();
-  add_prefer_option(*command, client.prefer);
+      .add_option("--count", options->count, "Clients in this process; log files get the suffix .0, .1, ...")
+      .range(1U, kMaxCount)
+      .show_default();
+  command.add_option("--input-script", client.input_script, "Inputs to send, as protobuf text (InputScript)")
+      .existing_file();
+  command.add_option("--lead", client.lead, "Frames to simulate beyond the last delta")
+      .range(0, 1)
+      .show_default();
+  add_prefer_option(command, client.prefer);
+  command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
+      .positive();
+  command.add_option("--hash-log", client.hash_log,
+                     "Write a line `epoch,frame,hash` for every applied frame");
+  command.add_option("--capture", client.capture,
+                     "Record into this file, without compression (MCAP; see `tandem record`)");
   command
-      ->add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--hash-log", client.hash_log,
-                      "Write a line `epoch,frame,hash` for every applied frame");
-  command->add_option("--capture", client.capture,
-                      "Record into this file, without compression (MCAP; see `tandem record`)");
-  command
-      ->add_option("--seconds", client.seconds,
-                   "How long, from the first applied frame (default: until stopped)")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--live", client.live, "A JSON line a second on stderr");
-  command->add_flag("--json", options->json, "Print the result as one JSON object");
-  command->footer("Exit 1 on any hash mismatch, or when it never played.");
-  command->callback([options, &run] { run = [options] { return run_join(*options); }; });
+      .add_option("--seconds", client.seconds,
+                  "How long, from the first applied frame (default: until stopped)")
+      .positive();
+  command.add_flag("--live", client.live, "A JSON line a second on stderr");
+  command.add_flag("--json", options->json, "Print the result as one JSON object");
+  command.footer("Exit 1 on any hash mismatch, or when it never played.");
+  command.on_chosen([options, &run] { run = [options] { return run_join(*options); }; });
 }
 
 }  // namespace tandem::tool

@@ -10,20 +10,11 @@
 #include "services/lab/commands.hpp"
 #endif
 
-namespace {
-
-// CLI11 would only say that a command is needed, not that this one is unknown.
-bool unknown(const CLI::App& app, const std::string& command) {
-  const auto known = app.get_subcommands([&](const CLI::App* one) { return one->get_name() == command; });
-  return known.empty();
-}
-
-}  // namespace
-
 int main(int argc, char** argv) {
-  CLI::App app{"Streams large interactive simulations over DDS: clients, measurements, diagnosis.", "tandem"};
-  app.set_version_flag("--version", "tandem " TANDEM_VERSION);
-  app.require_subcommand(1);
+  tandem::commandline::Program app{
+      "Streams large interactive simulations over DDS: clients, measurements, diagnosis.", "tandem"};
+  app.version("tandem " TANDEM_VERSION);
+  app.require_subcommand();
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage. With --json, stdout holds one JSON object.");
   tandem::tool::Run run;
   tandem::tool::add_join(app, run);
@@ -42,15 +33,12 @@ int main(int argc, char** argv) {
     return 2;
   }
 #endif
-  if (argc > 1 && argv[1][0] != '-' && unknown(app, argv[1])) {
+  // The parser would only say that a command is needed, not that this one is unknown.
+  if (argc > 1 && argv[1][0] != '-' && !app.has_subcommand(argv[1])) {
     std::fprintf(stderr, "tandem: unknown command '%s'; see tandem --help\n", argv[1]);
     return 2;
   }
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  if (const auto code = app.parse(argc, argv)) return *code;
   try {
     const int code = run();
     if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;

@@ -20,9 +20,9 @@ struct RecordOptions {
   bool json = false;
 };
 
-nlohmann::ordered_json report(const HeadlessClient& client) {
+Json report(const HeadlessClient& client) {
   const recording::Recorder::Totals& totals = client.recorder()->totals();
-  nlohmann::ordered_json out = client.report();
+  Json out = client.report();
   // Behind the payloads themselves: what the file adds to them, and what is no delta.
   out["file_bytes"] = totals.file_bytes;
   out["frames_recorded"] = totals.frames;
@@ -61,34 +61,33 @@ int run_record(RecordOptions options) {
 
 }  // namespace
 
-void add_record(CLI::App& app, Run& run) {
-  CLI::App* command =
+void add_record(commandline::Command app, Run& run) {
+  commandline::Command command =
       app.add_subcommand("record", "Records a session into a file (MCAP), for `tandem replay`.");
   const auto options = std::make_shared<RecordOptions>();
   HeadlessOptions& client = options->client;
-  command->add_option("file", client.capture, "The file, FILE.mcap")->required();
-  add_endpoint_options(*command, client.domain, client.session);
+  command.add_option("file", client.capture, "The file, FILE.mcap").required();
+  add_endpoint_options(command, client.domain, client.session);
   client.prefer = "bandwidth";
-  add_prefer_option(*command, client.prefer);
+  add_prefer_option(command, client.prefer);
+  command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
+      .positive();
   command
-      ->add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
-      ->check(CLI::PositiveNumber);
-  command
-      ->add_option("--seconds", client.seconds,
-                   "How long, from the first applied frame (default: until stopped)")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--no-compression", options->plain, "Chunks as they are, not in zstd");
-  command->add_option("--hash-log", client.hash_log,
-                      "Write a line `epoch,frame,hash` for every applied frame");
-  command->add_flag("--json", options->json, "Print the result as one JSON object");
-  command->footer(
+      .add_option("--seconds", client.seconds,
+                  "How long, from the first applied frame (default: until stopped)")
+      .positive();
+  command.add_flag("--no-compression", options->plain, "Chunks as they are, not in zstd");
+  command.add_option("--hash-log", client.hash_log,
+                     "Write a line `epoch,frame,hash` for every applied frame");
+  command.add_flag("--json", options->json, "Print the result as one JSON object");
+  command.footer(
       "Recorded are what a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, TandemDelta, "
       "TandemReply to it,\n"
       "TandemServerStatus), what it sends, and a snapshot of the agreed state once a minute. The file is "
       "readable while it grows;\n"
       "until the first snapshot it is FILE.part, and an older FILE stays.\n"
       "Exit 1 on any hash mismatch, when no frame came, or when the file could not be written.");
-  command->callback([options, &run] { run = [options] { return run_record(*options); }; });
+  command.on_chosen([options, &run] { run = [options] { return run_record(*options); }; });
 }
 
 }  // namespace tandem::tool

@@ -166,24 +166,21 @@ int run_replay(const ReplayOptions& options) {
 
 }  // namespace
 
-void add_replay(CLI::App& app, Run& run) {
-  CLI::App* command = app.add_subcommand("replay", "Publishes a recorded session again.");
+void add_replay(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand("replay", "Publishes a recorded session again.");
   const auto options = std::make_shared<ReplayOptions>();
-  command->add_option("file", options->file, "What `tandem record` wrote")->required();
-  add_endpoint_options(*command, options->domain, options->session);
+  command.add_option("file", options->file, "What `tandem record` wrote").required();
+  add_endpoint_options(command, options->domain, options->session);
+  command.add_option("--rate", options->rate, "Speed; 1 is that of the session, frames a second at most 1000")
+      .range(0.01, 100.0)
+      .show_default();
+  command.add_option("--from", options->from_s, "Seconds into the recording").not_negative().show_default();
+  command.add_flag("--loop", options->loop, "Again from there at its end, until stopped");
   command
-      ->add_option("--rate", options->rate, "Speed; 1 is that of the session, frames a second at most 1000")
-      ->check(CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  command->add_option("--from", options->from_s, "Seconds into the recording")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command->add_flag("--loop", options->loop, "Again from there at its end, until stopped");
-  command
-      ->add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
-      ->check(CLI::Range(0U, 256U))
-      ->capture_default_str();
-  command->footer(
+      .add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
+      .range(0U, 256U)
+      .show_default();
+  command.footer(
       "Clients join at any frame. Each run of the recording (where it has a gap, or the server was restarted, another "
       "begins) is\n"
       "an epoch of its own. Participants may seek, which begins another; all other inputs are refused. --rate changes "
@@ -192,7 +189,7 @@ void add_replay(CLI::App& app, Run& run) {
       "but one\n"
       "in which somebody sought stays there, until it is sought back or stopped. A file that is cut short is\n"
       "replayed up to there. Exit 1 when it cannot be read.");
-  command->callback([options, &run] { run = [options] { return run_replay(*options); }; });
+  command.on_chosen([options, &run] { run = [options] { return run_replay(*options); }; });
 }
 
 }  // namespace tandem::tool

@@ -88,21 +88,21 @@ int run_top(const TopOptions& options) {
 
 }  // namespace
 
-void add_top(CLI::App& app, Run& run) {
-  CLI::App* command =
+void add_top(commandline::Command app, Run& run) {
+  commandline::Command command =
       app.add_subcommand("top", "Shows the sessions and clients of a domain, their bandwidth and lag.");
   const auto options = std::make_shared<TopOptions>();
-  command->add_option("--domain", options->domain, "DDS domain")
-      ->check(CLI::Range(0U, transport::kMaxDomain))
-      ->capture_default_str();
-  command->add_option("--session", options->session, "Only this session (default: all)");
-  CLI::Option* once = command->add_flag("--once", options->once,
-                                        "Listen for 2.5 s, print once and end; exit 1 if nothing was heard");
-  command->add_flag("--json", options->json, "One JSON object: sessions, clients")->needs(once);
-  command->add_flag("--stream", options->stream, "A JSON object a line, once a second, until stopped")
-      ->excludes(once);
-  command->footer("Without flags: a table that is refreshed once a second, until Ctrl-C.");
-  command->callback([options, &run] { run = [options] { return run_top(*options); }; });
+  command.add_option("--domain", options->domain, "DDS domain")
+      .range(0U, transport::kMaxDomain)
+      .show_default();
+  command.add_option("--session", options->session, "Only this session (default: all)");
+  const commandline::Option once = command.add_flag(
+      "--once", options->once, "Listen for 2.5 s, print once and end; exit 1 if nothing was heard");
+  command.add_flag("--json", options->json, "One JSON object: sessions, clients").needs(once);
+  command.add_flag("--stream", options->stream, "A JSON object a line, once a second, until stopped")
+      .excludes(once);
+  command.footer("Without flags: a table that is refreshed once a second, until Ctrl-C.");
+  command.on_chosen([options, &run] { run = [options] { return run_top(*options); }; });
 }
 
 }  // namespace tandem::tool

@@ -5,12 +5,10 @@
 #include <array>
 #include <iterator>
 
-#include <nlohmann/json.hpp>
+#include "services/json/json.hpp"
 
 namespace tandem::tool {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::int64_t kSilenceNs = 3'000'000'000;
 // A machine that floods the status topics shall not fill this one's memory.
@@ -168,8 +166,7 @@ std::string TopView::to_json() const {
   }
   Json clients = Json::array();
   for (const auto& [id, heard] : clients_) clients.push_back(json_of(heard.status));
-  return Json{{"sessions", sessions}, {"clients", clients}}.dump(-1, ' ', false,
-                                                                 Json::error_handler_t::replace);
+  return Json{{"sessions", sessions}, {"clients", clients}}.dump();
 }
 
 std::string TopView::to_table() const {

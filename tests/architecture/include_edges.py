@@ -43,6 +43,8 @@ EDGES = {
     "sdk/python": ["public"],
     "sdk/examples": ["public", "services/host/include"],
     "services/heap": [],
+    "services/commandline": [],
+    "services/json": [],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp"],
@@ -60,20 +62,24 @@ EDGES = {
     "services/tandemd": SIMULATION
     + LAYOUT
     + CODEC
-    + ["sdk/transport", "sdk/transport/dds", "services/host", "services/scenes", "services/sessions", "services/signals", "services/workers"],
+    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
+    + ["services/host", "services/scenes", "services/sessions", "services/signals", "services/workers"],
     "services/tandemd/main.cpp": ["services/tandemd", "services/heap", "services/signals"],
     "services/signals": [],
     "services/gateway": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "services/accounts", "services/signals"],
+    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds"]
+    + ["services/accounts", "services/commandline", "services/json", "services/signals"],
     "services/gateway/main.cpp": ["services/gateway", "services/heap", "services/signals"],
     "services/tool": TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
-    + ["services/accounts", "services/heap", "services/host", "services/recording", "services/scenes", "services/signals"],
+    + ["services/accounts", "services/commandline", "services/heap", "services/host", "services/json", "services/recording"]
+    + ["services/scenes", "services/signals"],
     "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
     "services/lab": SIMULATION
     + TIMELINE
     + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
-    + ["sdk/statistics", "services/engine/shape", "services/host", "services/recording", "services/scenes", "services/sessions", "services/tool", "services/workers"],
+    + ["sdk/statistics", "services/commandline", "services/engine/shape", "services/host", "services/json", "services/recording"]
+    + ["services/scenes", "services/sessions", "services/tool", "services/workers"],
     "tests": ["*"],
 }
 
@@ -85,10 +91,10 @@ OWNERS = [
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
-    (re.compile(r"^CLI/"), "CLI11", ["services/gateway", "services/tool", "services/lab", "services/tandemd", "tests"]),
+    (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
-    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services", "tests"]),
+    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]
 

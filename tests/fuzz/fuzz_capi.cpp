@@ -9,7 +9,7 @@
 
 #include "sdk/client/api/scene_text.hpp"
 #include "tests/fuzz/program.hpp"
-#include "tests/unit/api/playground.hpp"
+#include "tests/support/playground/playground.hpp"
 
 namespace tandem::api {
 namespace {

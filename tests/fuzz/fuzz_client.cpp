@@ -3,7 +3,7 @@
 
 #include "tests/fuzz/program.hpp"
 #include "tests/property/synthetic.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {
@@ -270,7 +270,8 @@ class Run {
     poll(5000 * kMs);
     for (std::size_t i = 0; i < honest_.successor_deltas.size(); ++i) {
       port_.deltas.push_back(from_server(honest_.successor_deltas[i]));
-      if (!port_.snapshots_open.empty()) port_.snapshots.push_back(from_server(honest_.successor_snapshots[i]));
+      if (!port_.snapshots_open.empty())
+        port_.snapshots.push_back(from_server(honest_.successor_snapshots[i]));
       poll(100 * kMs);
     }
     require(core_->phase() == ClientPhase::kPlaying);

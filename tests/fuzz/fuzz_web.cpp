@@ -3,7 +3,7 @@
 
 #include "sdk/web/module/web_client.hpp"
 #include "tests/fuzz/program.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::web {
 namespace {

@@ -7,18 +7,18 @@
 // frames with their hashes, and the bodies' positions in the last one. The recording client sends gravity and
 // a push itself.
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/envelope.hpp"
 #include "sdk/transport/simulated/network.hpp"
+#include "services/commandline/commandline.hpp"
 #include "services/host/host.hpp"
+#include "services/json/json.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
 
@@ -65,7 +65,8 @@ class Recorder final : public client::CoreListener {
     message.payload = delta.payload;
     write(message);
     const ClientTimeline& timeline = *core->timeline();
-    told_["frames"].push_back({delta.frame, to_hex(timeline.hash()), timeline.corrected().size()});
+    told_["frames"].push_back(
+        Json::array({delta.frame, to_hex(timeline.hash()), timeline.corrected().size()}));
   }
 
   /// Of the last frame; false where the file cannot be written.
@@ -74,13 +75,13 @@ class Recorder final : public client::CoreListener {
     const State& state = timeline.state(timeline.applied());
     told_["bodies"] = state.alive_count();
     told_["at_rest"] = state.rest_count();
-    auto& positions = told_["positions"] = nlohmann::json::array();
+    Json& positions = told_["positions"] = Json::array();
     for (Slot slot = 0; slot < state.capacity(); ++slot) {
       for (std::size_t axis = 0; axis < kPositionChannels; ++axis)
         positions.push_back(static_cast<float>(state.p(axis)[slot] * lattice_unit_));
     }
     std::ofstream out(path_ + ".json");
-    out << told_ << '\n';
+    out << told_.dump() << '\n';
     return trace_.flush().good() && out.flush().good();
   }
 
@@ -101,7 +102,7 @@ class Recorder final : public client::CoreListener {
 
   std::ofstream trace_;
   std::string path_;
-  nlohmann::json told_;
+  Json told_;
   StreamId stream_;
   double lattice_unit_ = 0;
 };
@@ -113,15 +114,15 @@ int run(int argc, char** argv) {
   choice.bodies = 300;
   std::uint64_t frames = 300;
   Epoch epoch = 1'700'000'000'000;
-  CLI::App app("records a session for the tests of the WebAssembly module");
+  commandline::Program app("records a session for the tests of the WebAssembly module");
   app.add_option("--scene", scene_name);
   app.add_option("--bodies", choice.bodies);
   app.add_option("--frames", frames);
   app.add_option("--epoch", epoch);
   app.add_option("--codec", choice.codec);
   app.add_option("--predictor", choice.predictor);
-  app.add_option("OUT", out)->required();
-  CLI11_PARSE(app, argc, argv);
+  app.add_option("OUT", out).required();
+  if (const auto code = app.parse(argc, argv)) return *code;
 
   const scenes::Scene scene = must(scenes::load_scene(scene_name));
   auto simulation = must(scenes::make_simulation(scene, choice.bodies, 1, 1));

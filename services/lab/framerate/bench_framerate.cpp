@@ -8,7 +8,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <map>
 #include <memory>
 
 #include "services/lab/bench.hpp"
@@ -144,71 +143,70 @@ int run_framerate(FramerateOptions options) {
 
 }  // namespace
 
-void add_framerate(CLI::App& bench, Run& run) {
-  CLI::App* command = bench.add_subcommand(
+void add_framerate(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
       "framerate", "Updates a second of a user behind a slow link, as the thesis's table 5.6.");
   const auto options = std::make_shared<FramerateOptions>();
   command
-      ->add_option("--scene", options->scenes,
-                   "Scenes by name or file, separated by commas; all: the rows of the paper's table")
-      ->delimiter(',')
-      ->capture_default_str();
-  add_bodies_option(*command, options->bodies);
+      .add_option("--scene", options->scenes,
+                  "Scenes by name or file, separated by commas; all: the rows of the paper's table")
+      .separated_by(',')
+      .show_default();
+  add_bodies_option(command, options->bodies);
   std::vector<std::string> methods{std::string(kClientOnly)};
   for (const std::string_view name : codec_names()) methods.emplace_back(name);
   for (const std::string_view name : {kBallistic, kField, kAsItComes}) methods.emplace_back(name);
   std::erase(methods, "tracker");  // by its predicted step, or as it comes
   command
-      ->add_option(
+      .add_option(
           "--method", options->methods,
           "client-only, codecs, tracker's predicted steps, or auto (as it comes), separated by commas")
-      ->delimiter(',')
-      ->check(CLI::IsMember(methods))
-      ->capture_default_str();
+      .separated_by(',')
+      .one_of(methods)
+      .show_default();
   command
-      ->add_option(
+      .add_option(
           "--device", options->devices,
           "Of the measured user, separated by commas: native (this machine), or a slow processor: thin or "
           "thesis")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"native", "thin", "thesis"}))
-      ->capture_default_str();
+      .separated_by(',')
+      .one_of({"native", "thin", "thesis"})
+      .show_default();
   command
-      ->add_option("--step-us", options->step_us, "Of a body, microseconds: what the thesis device is set by")
-      ->check(CLI::Range(0.01, 100.0))
-      ->capture_default_str();
+      .add_option("--step-us", options->step_us, "Of a body, microseconds: what the thesis device is set by")
+      .range(0.01, 100.0)
+      .show_default();
   command
-      ->add_option("--users", options->users,
-                   "Users of each scene (default: as in the paper's table 5.5, else the scene's)")
-      ->check(CLI::Range(1, 16));
-  command->add_option("--seconds", options->setup.seconds, "Measured for each row, from the first update on")
-      ->check(CLI::Range(1.0, 600.0))
-      ->capture_default_str();
-  add_seed_option(*command, options->setup.seed, "Of the start block and the scripted inputs");
+      .add_option("--users", options->users,
+                  "Users of each scene (default: as in the paper's table 5.5, else the scene's)")
+      .range(1, 16);
+  command.add_option("--seconds", options->setup.seconds, "Measured for each row, from the first update on")
+      .range(1.0, 600.0)
+      .show_default();
+  add_seed_option(command, options->setup.seed, "Of the start block and the scripted inputs");
   command
-      ->add_option("--link", options->setup.kind,
-                   "namespaces: DDS between processes, as root; memory: one process, simulated time")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, LinkKind>{
-          {"namespaces", LinkKind::kNamespaces}, {"memory", LinkKind::kMemory}}))
-      ->default_str("namespaces");
-  command->add_option("--rate", options->setup.link.bits_per_s, "Of the link, bit/s each way")
-      ->check(CLI::Range(1e4, 1e10))
-      ->capture_default_str();
-  command->add_option("--delay", options->delay_ms, "Of the link, ms each way")
-      ->check(CLI::Range(0.0, 10000.0))
-      ->capture_default_str();
-  command->add_option("--queue", options->queue_ms, "Of the link, ms: what would wait longer is dropped")
-      ->check(CLI::Range(0.0, 10000.0))
-      ->capture_default_str();
-  command->add_option("--server", options->tandemd,
-                      "The program tandemd (default: beside this one, or in PATH)");
-  command->add_flag("--json", options->json, "One JSON object: devices[...], rows[...]");
-  command->footer(
+      .add_choice<LinkKind>("--link", options->setup.kind,
+                            {{"namespaces", LinkKind::kNamespaces}, {"memory", LinkKind::kMemory}},
+                            "namespaces: DDS between processes, as root; memory: one process, simulated time")
+      .show_default("namespaces");
+  command.add_option("--rate", options->setup.link.bits_per_s, "Of the link, bit/s each way")
+      .range(1e4, 1e10)
+      .show_default();
+  command.add_option("--delay", options->delay_ms, "Of the link, ms each way")
+      .range(0.0, 10000.0)
+      .show_default();
+  command.add_option("--queue", options->queue_ms, "Of the link, ms: what would wait longer is dropped")
+      .range(0.0, 10000.0)
+      .show_default();
+  command.add_option("--server", options->tandemd,
+                     "The program tandemd (default: beside this one, or in PATH)");
+  command.add_flag("--json", options->json, "One JSON object: devices[...], rows[...]");
+  command.footer(
       "Needs root unless with --link memory: server and users run in network namespaces joined by one link.\n"
       "The thin device gets the share of a processor at which client-only, the engine as it is here, makes the "
       "thesis's 4.4 updates/s\n"
       "with 10,000 bodies; the thesis device that at which a plain grid, one body after another, does.");
-  command->callback([options, &run] { run = [options] { return run_framerate(*options); }; });
+  command.on_chosen([options, &run] { run = [options] { return run_framerate(*options); }; });
 }
 
 }  // namespace tandem::lab

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "sdk/transport/units.hpp"
+#include "services/json/json.hpp"
 #include "services/lab/cells.hpp"
 #include "services/lab/framerate/child.hpp"
 #include "services/lab/framerate/enclave.hpp"
@@ -14,8 +14,6 @@
 
 namespace tandem::lab {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr const char* kServerAddress = "10.77.0.1";
 constexpr const char* kUsersAddress = "10.77.0.2";
@@ -47,10 +45,10 @@ Result<Json> run(const FramerateSetup& setup, const std::vector<std::string>& ar
   auto said = child->finish(at_most, *setup.stop);
   if (device != nullptr) device->release();
   if (!said) return fail(said.error().code, fmt::format("{}: {}", arguments[1], said.error().message));
-  Json parsed = Json::parse(*said, nullptr, false);
-  if (parsed.is_discarded()) return fail(ErrorCode::kIo, arguments[1] + " printed no JSON");
-  parsed["cpu_ms"] = child->cpu_ms();
-  return parsed;
+  auto parsed = Json::parse(*said);
+  if (!parsed) return fail(ErrorCode::kIo, arguments[1] + " printed no JSON");
+  (*parsed)["cpu_ms"] = child->cpu_ms();
+  return std::move(*parsed);
 }
 
 Result<double> client_only(const FramerateSetup& setup, ThinDevice* device, const std::string& scene,
@@ -59,7 +57,7 @@ Result<double> client_only(const FramerateSetup& setup, ThinDevice* device, cons
              {setup.tandem, "bench", "engine", "--scene", scene, "--bodies", std::to_string(bodies), "--seed",
               std::to_string(setup.seed), "--seconds", fmt::format("{}", seconds), "--json"},
              {}, device)
-      .map([](const Json& json) { return json["updates_per_s"].get<double>(); });
+      .map([](const Json& json) { return json["updates_per_s"].number(); });
 }
 
 std::vector<std::string> server_command(const FramerateSetup& setup, const FramerateRow& row) {
@@ -120,14 +118,14 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device,
   const double server_busy = before && after ? between(*before, *after).cpu_ms / (1e3 * setup.seconds)
                                              : 0;  // it waits for who joins
   if (!json) return tl::unexpected(json.error());
-  row.updates_per_s = (*json)["frames_applied"].get<double>() / setup.seconds;
-  row.client_ms_p50 = (*json)["client_ms"]["p50"].get<double>();
-  row.latency_ms_p50 = (*json)["latency_ms"]["p50"].get<double>();
-  row.client_cpu_ms = (*json)["cpu_ms"].get<double>() / (*json)["frames_applied"].get<double>();
-  row.resyncs = (*json)["resyncs"].get<std::uint64_t>();
+  row.updates_per_s = (*json)["frames_applied"].number() / setup.seconds;
+  row.client_ms_p50 = (*json)["client_ms"]["p50"].number();
+  row.latency_ms_p50 = (*json)["latency_ms"]["p50"].number();
+  row.client_cpu_ms = (*json)["cpu_ms"].number() / (*json)["frames_applied"].number();
+  row.resyncs = static_cast<std::uint64_t>((*json)["resyncs"].number());
   row.link_mbit_per_s = static_cast<double>(carried.bytes_there) * 8 / kBitsPerMbit / setup.seconds;
   row.dropped = carried.dropped;
-  row.stream = (*json)["stream"].get<std::string>();
+  row.stream = (*json)["stream"].text();
   row.bound = find_bound(row, setup.link.bits_per_s, calibration ? calibration->share : 1, server_busy);
   return {};
 }
@@ -207,20 +205,20 @@ std::string to_json(std::span<const FramerateRow> rows, const std::string& limit
   Json list = Json::array();
   for (const FramerateRow& row : rows) {
     list.push_back({{"scene", row.scene},
-                    {"number", json_of(row.number)},
+                    {"number", row.number},
                     {"users", row.users},
                     {"bodies", row.bodies},
                     {"method", row.method},
                     {"device", row.device},
                     {"updates_per_s", row.missing.empty() ? Json(row.updates_per_s) : Json(nullptr)},
-                    {"paper_updates_per_s", json_of(in_paper(row))},
+                    {"paper_updates_per_s", in_paper(row)},
                     {"seconds", row.seconds},
-                    {"client_cpu_ms", json_of(row.client_cpu_ms)},
-                    {"client_ms_p50", json_of(row.client_ms_p50)},
-                    {"latency_ms_p50", json_of(row.latency_ms_p50)},
-                    {"link_mbit_per_s", json_of(row.link_mbit_per_s)},
-                    {"dropped", json_of(row.dropped)},
-                    {"resyncs", json_of(row.resyncs)},
+                    {"client_cpu_ms", row.client_cpu_ms},
+                    {"client_ms_p50", row.client_ms_p50},
+                    {"latency_ms_p50", row.latency_ms_p50},
+                    {"link_mbit_per_s", row.link_mbit_per_s},
+                    {"dropped", row.dropped},
+                    {"resyncs", row.resyncs},
                     {"stream", row.stream.empty() ? Json(nullptr) : Json(row.stream)},
                     {"bound", row.bound.empty() ? Json(nullptr) : Json(row.bound)},
                     {"missing", row.missing.empty() ? Json(nullptr) : Json(row.missing)}});

@@ -3,8 +3,8 @@
 #include <benchmark/benchmark.h>
 #include <time.h>
 
-#include "tests/unit/client/fake_server.hpp"
-#include "tests/unit/client/taken.hpp"
+#include "tests/support/client/fake_server.hpp"
+#include "tests/support/client/taken.hpp"
 
 namespace tandem::client {
 namespace {

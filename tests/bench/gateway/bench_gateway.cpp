@@ -5,7 +5,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <csignal>
@@ -26,6 +25,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/commandline/commandline.hpp"
 #include "tests/bench/gateway/crowd.hpp"
 
 namespace tandem::bench {
@@ -185,15 +185,15 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   tandem::bench::Options options;
-  CLI::App app{"What a gateway with many viewers costs and adds."};
-  app.add_option("--tandemd", options.tandemd)->required();
-  app.add_option("--gateway", options.gateway)->required();
-  app.add_option("--scene", options.scene)->capture_default_str();
-  app.add_option("--viewers", options.viewers)->capture_default_str();
-  app.add_option("--sleepers", options.sleepers)->capture_default_str();
-  app.add_option("--bodies", options.bodies)->capture_default_str();
-  app.add_option("--seconds", options.seconds)->check(CLI::Range(1, 60))->capture_default_str();
-  app.add_option("--domain", options.domain)->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  tandem::commandline::Program app{"What a gateway with many viewers costs and adds."};
+  app.add_option("--tandemd", options.tandemd).required();
+  app.add_option("--gateway", options.gateway).required();
+  app.add_option("--scene", options.scene).show_default();
+  app.add_option("--viewers", options.viewers).show_default();
+  app.add_option("--sleepers", options.sleepers).show_default();
+  app.add_option("--bodies", options.bodies).show_default();
+  app.add_option("--seconds", options.seconds).range(1, 60).show_default();
+  app.add_option("--domain", options.domain).show_default();
+  if (const auto code = app.parse(argc, argv)) return *code;
   return tandem::bench::run(options);
 }

@@ -11,9 +11,7 @@
 namespace tandem::client {
 namespace {
 
-#ifndef TANDEM_FAULT_DEFAULT_SEEDS
-#define TANDEM_FAULT_DEFAULT_SEEDS 60
-#endif
+constexpr std::uint64_t kSeeds = 60;
 
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
   const char* text = std::getenv(name);
@@ -70,8 +68,7 @@ void live(std::uint64_t seed, Sums& sums) {
 TEST(Interleavings, EveryClientHoldsTheServersStateOnEveryFrameAndPlaysAgainInTheEnd) {
   const std::uint64_t replay = from_environment("TANDEM_FAULT_SEED", 0);
   const std::uint64_t first = replay != 0 ? replay : 1;
-  const std::uint64_t count =
-      replay != 0 ? 1 : from_environment("TANDEM_FAULT_SEEDS", TANDEM_FAULT_DEFAULT_SEEDS);
+  const std::uint64_t count = replay != 0 ? 1 : from_environment("TANDEM_FAULT_SEEDS", kSeeds);
   Sums sums;
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     SCOPED_TRACE("replay with TANDEM_FAULT_SEED=" + std::to_string(seed));

@@ -2,11 +2,10 @@
 
 #include <libwebsockets.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cstdio>
+#include <cstring>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,8 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/units.hpp"
 #include "sdk/web/module/web_port.hpp"
+#include "services/commandline/commandline.hpp"
+#include "services/json/json.hpp"
 
 namespace {
 
@@ -76,7 +77,7 @@ class Viewer final : private client::CoreListener {
     }
   }
 
-  [[nodiscard]] nlohmann::ordered_json report() const {
+  [[nodiscard]] Json report() const {
     const ClientStatus status = core_.status();
     return {{"frames_applied", status.frames_applied},
             {"hash_mismatches", status.hash_mismatches},
@@ -227,28 +228,28 @@ class Viewer final : private client::CoreListener {
   int connections_ = 0, failures_ = 0, inputs_ = 0;
   std::int64_t connect_at_ns_ = 0, input_at_ns_ = 0;
   bool sent_zeros_ = false;
-  nlohmann::ordered_json closed_ = nlohmann::ordered_json::array();
+  Json closed_ = Json::array();
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"A viewer of tandem-gateway for tests."};
-  app.add_option("--port", options.port)->required();
+  tandem::commandline::Program app{"A viewer of tandem-gateway for tests."};
+  app.add_option("--port", options.port).required();
   app.add_option("--address", options.address);
   app.add_option("--tls-ca", options.tls_ca);
   app.add_option("--query", options.query);
   app.add_option("--origin", options.origin);
   app.add_option("--session", options.session);
   app.add_option("--hash-log", options.hash_log);
-  app.add_option("--seconds", options.seconds)->required();
+  app.add_option("--seconds", options.seconds).required();
   app.add_option("--timeout", options.timeout);
   app.add_option("--input-every", options.input_every_s);
   app.add_option("--sleep-after", options.sleep_after_s);
   app.add_option("--zeros", options.message_bytes);
   app.add_flag("--once", options.once);
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = app.parse(argc, argv)) return *code;
   Viewer viewer(options);
   viewer.run();
   std::printf("%s\n", viewer.report().dump().c_str());

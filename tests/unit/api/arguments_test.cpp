@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "playground.hpp"
 #include "sdk/client/api/browsers.hpp"
+#include "tests/support/playground/playground.hpp"
 
 namespace tandem::api {
 namespace {

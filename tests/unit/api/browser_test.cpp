@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sdk/client/api/browsers.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::api {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "playground.hpp"
+#include "tests/support/playground/playground.hpp"
 
 namespace tandem::api {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <vector>
 
-#include "playground.hpp"
 #include "sdk/client/api/structs.hpp"
+#include "tests/support/playground/playground.hpp"
 
 namespace tandem::api {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
-#include "tests/unit/client/fake_port.hpp"
+#include "tests/support/client/fake_port.hpp"
 
 namespace tandem::api {
 namespace {

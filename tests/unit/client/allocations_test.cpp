@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <new>
 
-#include "fake_server.hpp"
-#include "taken.hpp"
+#include "tests/support/client/fake_server.hpp"
+#include "tests/support/client/taken.hpp"
 
 namespace {
 

@@ -9,7 +9,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "tandem/client.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem {
 namespace {

@@ -3,8 +3,8 @@
 #include <atomic>
 #include <thread>
 
-#include "fake_server.hpp"
 #include "sdk/client/picture.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

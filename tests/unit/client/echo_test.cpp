@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fake_server.hpp"
-#include "taken.hpp"
+#include "tests/support/client/fake_server.hpp"
+#include "tests/support/client/taken.hpp"
 
 namespace tandem::client {
 namespace {

@@ -1,5 +1,5 @@
 // Bytes that are wrong in every way: counted, never in the state, and the client plays again.
-#include "fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

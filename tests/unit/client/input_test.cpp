@@ -1,6 +1,6 @@
 #include <limits>
 
-#include "fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <string>
 
-#include "fake_server.hpp"
 #include "sdk/client/lag_limit.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

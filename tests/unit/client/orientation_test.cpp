@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "taken.hpp"
+#include "tests/support/client/taken.hpp"
 
 namespace tandem::client {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "fake_server.hpp"
-#include "taken.hpp"
+#include "tests/support/client/fake_server.hpp"
+#include "tests/support/client/taken.hpp"
 
 namespace tandem::client {
 namespace {

@@ -1,7 +1,7 @@
 #include <limits>
 
-#include "fake_server.hpp"
 #include "sdk/client/session_check.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fake_server.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "taken.hpp"
+#include "tests/support/client/fake_server.hpp"
+#include "tests/support/client/taken.hpp"
 
 namespace tandem::client {
 namespace {

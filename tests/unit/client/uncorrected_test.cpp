@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "fake_server.hpp"
 #include "sdk/core/predict/predictor.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
 namespace {

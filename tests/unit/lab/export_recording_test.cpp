@@ -9,7 +9,7 @@
 #include "services/recording/playback.hpp"
 #include "services/recording/recorder.hpp"
 #include "services/scenes/scene.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::lab {
 namespace {

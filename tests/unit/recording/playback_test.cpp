@@ -8,7 +8,7 @@
 #include <iterator>
 
 #include "services/recording/recorder.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::recording {
 namespace {

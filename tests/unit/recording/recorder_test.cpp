@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "services/recording/playback.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::recording {
 namespace {

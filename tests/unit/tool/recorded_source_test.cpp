@@ -7,7 +7,7 @@
 
 #include "services/recording/recorder.hpp"
 #include "services/scenes/scene.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::tool {
 namespace {

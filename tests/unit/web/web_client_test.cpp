@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "tests/unit/client/fake_server.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::web {
 namespace {

@@ -1,4 +1,4 @@
-#include "playground.hpp"
+#include "tests/support/playground/playground.hpp"
 
 #include <stdexcept>
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "fake_port.hpp"
 #include "sdk/client/client_core.hpp"
+#include "tests/support/client/fake_port.hpp"
 
 namespace tandem::client {
 
