@@ -62,7 +62,7 @@ class TransferWindow {
   void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
     flying_ -= std::min(flying_, bytes);
     // Those that were on their way at the last acknowledgement came one after another since.
-    if (last.at_ns <= arrived_ns_ && arrived_ > 0) {
+    if (last.at_ns < arrived_ns_ && arrived_ > 0) {
       saw_rate(bytes, std::max(now_ns - arrived_ns_, last.at_ns - last_arrived_at_ns_), now_ns);
       starting_ = false;
     }

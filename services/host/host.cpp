@@ -495,8 +495,9 @@ void Host::Impl::plan_wake() {
       at(std::max(now_ns, pacing.suspended_from_ns()) + *left + kMillisecond);
     }
   }
+  const bool serves = state == State::kWaiting || state == State::kRunning;
   for (const Lane& lane : lanes) {
-    at(lane.transfer.next_ns());
+    if (serves) at(lane.transfer.next_ns());
     if (const auto due = lane.joins.due_ns(lane.transfer, now_ns))
       at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
   }

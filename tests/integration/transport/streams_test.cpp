@@ -81,7 +81,8 @@ class StreamReader {
  private:
   void add(const SnapshotMessage& part) {
     if (timeline || part.stream.id != kRich) return;
-    cut_ = {.epoch = part.epoch, .stream = part.stream, .frame = part.frame, .parts = part.parts};
+    frame_ = part.frame;
+    part_count_ = part.parts;
     parts_.try_emplace(part.part, part);
     if (parts_.size() < part.parts) return;
     Bytes whole;
@@ -118,10 +119,10 @@ class StreamReader {
     ack.phase = timeline ? Phase::kPlaying : Phase::kJoining;
     ack.applied = ack.simulated = timeline ? timeline->applied() : 0;
     ack.join_attempt = 1;
-    if (!timeline && cut_.parts > 0) {
-      ack.snapshot_frame = cut_.frame;
-      ack.snapshot_parts = cut_.parts;
-      for (std::uint32_t part = 0; part < cut_.parts && ack.missing.size() < 2 * kMaxMissingRuns; ++part)
+    if (!timeline && part_count_ > 0) {
+      ack.snapshot_frame = frame_;
+      ack.snapshot_parts = part_count_;
+      for (std::uint32_t part = 0; part < part_count_ && ack.missing.size() < 2 * kMaxMissingRuns; ++part)
         if (!parts_.contains(part)) ack.missing.insert(ack.missing.end(), {part, 1});
     }
     ack.clock_ns = steady_ns();
@@ -136,7 +137,8 @@ class StreamReader {
   dds::Reader<SnapshotMessage> snapshots_;
   std::atomic<std::uint64_t> dropped_ = 0;
   std::map<std::uint32_t, SnapshotMessage> parts_;
-  SnapshotMessage cut_{.parts = 0};  // that these are of
+  Frame frame_ = 0;  // of the snapshot that these are of
+  std::uint32_t part_count_ = 0;
   std::vector<ScheduledInputMessage> scheduled_;
   std::vector<DeltaMessage> deltas_kept_;
 };
