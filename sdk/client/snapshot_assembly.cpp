@@ -8,8 +8,8 @@
 namespace tandem::client {
 
 SnapshotAssembly::Outcome SnapshotAssembly::add(transport::SnapshotMessage&& part) {
-  const bool malformed = part.parts == 0 || part.parts > transport::kMaxSnapshotParts || part.parts > part.total_bytes ||
-                         part.part >= part.parts || part.bytes.empty() ||
+  const bool malformed = part.parts == 0 || part.parts > transport::kMaxSnapshotParts ||
+                         part.parts > part.total_bytes || part.part >= part.parts || part.bytes.empty() ||
                          part.bytes.size() > part.total_bytes || part.total_bytes > most_bytes_;
   if (malformed) {
     clear();

@@ -119,7 +119,7 @@ struct SnapshotMessage {
   StreamId stream;
   Frame frame = 0;
   std::uint32_t part = 0, parts = 1;
-  std::uint32_t total_bytes = 0;      ///< of all parts together
+  std::uint32_t total_bytes = 0;  ///< of all parts together
   Bytes bytes;
   bool operator==(const SnapshotMessage&) const = default;
 };
@@ -171,7 +171,7 @@ struct InputMessage {
 struct AckMessage {
   static constexpr const char* kTopic = "TandemAck";
   ClientId client = 0;  ///< key
-  Epoch epoch = 0;  ///< 0: looks for the session
+  Epoch epoch = 0;      ///< 0: looks for the session
   std::uint32_t protocol_version = kProtocolVersion;
   StreamId stream;  ///< played or joined
   Phase phase = Phase::kJoining;

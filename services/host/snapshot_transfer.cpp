@@ -9,8 +9,8 @@
 namespace tandem::host {
 namespace {
 
-// DDS repairs what it loses; where nothing is heard for two round trips and a little, a part is sent once more, so
-// that a link that was gone is found again soon.
+// DDS repairs what it loses; where nothing is heard for two round trips and a little, a part is sent once
+// more, so that a link that was gone is found again soon.
 constexpr std::int64_t kProbeNs = kSecond / 4;
 constexpr std::int64_t kFirstProbeNs = kSecond;  // at most
 constexpr std::int64_t kMostProbeNs = 2 * kSecond;

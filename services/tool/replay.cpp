@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <future>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -39,7 +40,7 @@ struct ReplayOptions {
   std::uint32_t wait_for = 0;
 };
 
-// How long whoever reads has to take what was written last.
+// Readers have this long to take what was written last.
 constexpr std::chrono::milliseconds kTakingFrames(500), kTakingReplies(50);
 
 /// How a run was left.
@@ -52,17 +53,27 @@ struct Served {
 struct ReplayState {
   Epoch epoch = 0;      ///< the last; 0 before the first
   bool sought = false;  ///< a client did
-  /// Of the last run. It stays when all is over: whoever runs the replay has something to say before DDS
-  /// ends.
+  /// Of the last run. It stays when all is over, as the program reports its end before DDS ends.
   std::unique_ptr<transport::ServerPort> port;
+  std::future<void> ending;  ///< the end of the port before; its destructor waits for that
   accounts::TokenBucket seeks{1, 1};
 };
+
+/// Ends the port of the last run and waits for that, but not beyond a stop: DDS never ends when the network
+/// interface is gone, and the work has to.
+void end_port(ReplayState& state, const std::atomic<bool>& stop) {
+  if (!state.port) return;
+  state.ending = std::async(std::launch::async, [port = std::move(state.port)]() mutable { port.reset(); });
+  while (!stop && state.ending.wait_for(std::chrono::milliseconds(5)) != std::future_status::ready) {
+  }
+}
 
 /// Publishes the run at hand to its end, or until a client seeks. `hold`: no frame, and no end of its own.
 Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplayState& state, bool hold,
                      const std::atomic<bool>& stop) {
   const bool first = state.epoch == 0;
-  state.port.reset();
+  end_port(state, stop);
+  if (stop) return Served{};
   // An epoch of its own for each run, as frames follow one another within one.
   state.epoch = std::max<Epoch>(state.epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
   host::ServiceConfig config;
@@ -133,7 +144,7 @@ Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState&
     if (!served) return tl::unexpected(served.error());
     if (served->sought_s) {
       state.sought = true;
-      state.port.reset();  // the way there may be long
+      end_port(state, stop);  // the way there may be long
     }
     step = served->sought_s ? go_to(playback, *served->sought_s) : served->behind;
   }
@@ -148,7 +159,7 @@ Result<void> replay(const ReplayOptions& options, ReplayState& state, const std:
     print_error(fmt::format("tandem replay: {} is cut short at byte {}; replayed up to there\n", options.file,
                             *torn));
   do {
-    state.port.reset();
+    end_port(state, stop);
     if (auto played = play(**playback, options, state, stop); !played)
       return fail(played.error().code, options.file + ": " + played.error().message);
   } while (options.loop && !stop);

@@ -71,8 +71,7 @@ class DdsClientPort final : public ClientPort {
         delta_depth(session.frame_rate_hz, session.window_ceiling, stream.max_delta_bytes));
     auto delta = reader<DeltaMessage>("deltas", stream.id.id, {.depth = depth});
     if (!delta) return tl::unexpected(delta.error());
-    streams_.emplace(stream.id.id, Stream{std::move(*delta), {}})
-        .first->second.set_limits(limits);
+    streams_.emplace(stream.id.id, Stream{std::move(*delta), {}}).first->second.set_limits(limits);
     return {};
   }
   void close_stream(std::uint32_t stream) override {
@@ -96,8 +95,8 @@ class DdsClientPort final : public ClientPort {
   void close_snapshots(std::uint32_t stream) override {
     if (wanted_snapshots_ == stream) wanted_snapshots_.reset();
   }
-  /// From now on, for as long as the port lives: the reader of DDS takes nothing from a writer before its first
-  /// heartbeat, which is a round trip that a join need not wait for.
+  /// From now on, for as long as the port lives: the reader of DDS takes nothing from a writer before its
+  /// first heartbeat, which is a round trip that a join need not wait for.
   Result<void> read_snapshots(ClientId client) {
     if (snapshots_ && snapshots_client_ == client) return {};
     auto snapshots = endpoints_.node.reader<SnapshotMessage>(
@@ -160,8 +159,8 @@ class DdsClientPort final : public ClientPort {
     return endpoints_.node.reader<M>(name, options);
   }
 
-  // Until one is followed: a server that has heard of a client makes the writers for it while that still learns
-  // of the session.
+  // Until one is followed: a server that has heard of a client makes the writers for it while that still
+  // learns of the session.
   void tell_servers() {
     constexpr std::int64_t kSpacingNs = 100'000'000;
     const std::int64_t now_ns = steady_ns();

@@ -19,8 +19,8 @@ inline constexpr std::uint32_t kMaxDomain = 230;
 struct DdsOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
   std::string session = "default";
-  /// Client ports: shown by DDS tools, and told to servers before the session is known, so that their writers for
-  /// it are there when it joins. 0: not told.
+  /// Client ports: shown by DDS tools, and told to servers before the session is known, so that their writers
+  /// for it are there when it joins. 0: not told.
   ClientId client = 0;
   /// Server ports: deltas kept for slow readers; see delta_depth() in limits.hpp.
   std::uint32_t delta_depth = 64;

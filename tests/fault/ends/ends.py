@@ -86,7 +86,7 @@ def wait_all(programs, since, limit_s):
 
 def left(program):
     """What it says that it left; None where it does not."""
-    time.sleep(0.1)  # for who reads its lines
+    time.sleep(0.1)  # until its lines are read
     return next((line for _, line in program.lines if LEFT in line), None)
 
 
