@@ -61,11 +61,7 @@ class TransferWindow {
   /// Parts of so many bytes were acknowledged together; `last` is the one that was sent last.
   void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
     flying_ -= std::min(flying_, bytes);
-    // Those that were on their way at the last acknowledgement came one after another since.
-    if (last.at_ns < arrived_ns_ && arrived_ > 0) {
-      saw_rate(bytes, std::max(now_ns - arrived_ns_, last.at_ns - last_arrived_at_ns_), now_ns);
-      starting_ = false;
-    }
+    follow_train(bytes, last, now_ns);
     arrived_ += bytes;
     arrived_ns_ = now_ns;
     last_arrived_at_ns_ = std::max(last_arrived_at_ns_, last.at_ns);
@@ -83,7 +79,6 @@ class TransferWindow {
     least_ns_ = INT64_MAX;
   }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
-  [[nodiscard]] std::size_t flying() const { return flying_; }
   /// From sending to acknowledgement at best; 0: nothing arrived yet.
   [[nodiscard]] std::int64_t least_ns() const { return least_ns_ == INT64_MAX ? 0 : least_ns_; }
 
@@ -92,7 +87,22 @@ class TransferWindow {
   static constexpr std::int64_t kBurstNs = 5 * kMillisecond;
   // Acknowledgements come 20 ms apart; two that jitter moved together must not pass for a fast link.
   static constexpr std::int64_t kLeastGapNs = 10 * kMillisecond;
-  static constexpr std::int64_t kRateLastsNs = 2 * kSecond;
+  static constexpr std::size_t kTrain = 5'200;  // bytes: four parts
+  static constexpr std::int64_t kRateLastsNs = kSecond;
+
+  // Parts that were on their way together arrive at the rate of the link. A few of them do not tell it: a
+  // bucket, or acknowledgements that waited in one queue, bring two parts at once on any link.
+  void follow_train(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
+    if (arrived_ > 0 && last.at_ns < train_ns_) {
+      train_bytes_ += bytes;
+      if (train_bytes_ < kTrain) return;
+      saw_rate(train_bytes_, std::max(now_ns - train_ns_, last.at_ns - train_at_ns_), now_ns);
+      starting_ = false;
+    }
+    train_bytes_ = 0;
+    train_ns_ = now_ns;
+    train_at_ns_ = last.at_ns;
+  }
 
   void saw_rate(std::size_t bytes, std::int64_t within_ns, std::int64_t now_ns) {
     const double rate =
@@ -122,11 +132,13 @@ class TransferWindow {
   std::uint64_t arrived_ = 0;
   std::int64_t arrived_ns_ = 0;
   std::int64_t last_arrived_at_ns_ = 0;
+  std::size_t train_bytes_ = 0;  // that arrived since
+  std::int64_t train_ns_ = 0;
+  std::int64_t train_at_ns_ = 0;  // when what arrived then had been sent
   std::int64_t least_ns_ = INT64_MAX;
   std::array<double, 2> rates_{};  // bytes a second
   std::int64_t span_ns_ = 0;
-  bool starting_ =
-      true;  // whatever was sent together was acknowledged together: how fast it came is not known
+  bool starting_ = true;  // how fast the link is was not seen yet
 };
 
 }  // namespace tandem::accounts

@@ -30,6 +30,7 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
   const std::int32_t durable_depth = topic.durable_depth != 0 ? topic.durable_depth : depth;
   dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, durable_depth, DDS_LENGTH_UNLIMITED,
                               DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  dds_qset_lifespan(qos.get(), topic.lifespan);
   dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, lease);
   // Instances may have writers in two participants; the end of one must not end the other's.
   dds_qset_writer_data_lifecycle(qos.get(), false);

@@ -15,9 +15,10 @@ struct TopicQos {
   bool reliable = true;
   bool transient_local = false;
   std::int32_t writer_depth = 1;
-  std::int32_t reader_depth = 1;   ///< per instance
-  std::int32_t kept = 1;           ///< of one writer until they are taken from a reader: see Arrivals
-  std::int32_t durable_depth = 0;  ///< of the writer's history, what late readers get; 0: all of it
+  std::int32_t reader_depth = 1;           ///< per instance
+  std::int32_t kept = 1;                   ///< of one writer until they are taken from a reader: see Arrivals
+  std::int32_t durable_depth = 0;          ///< of the writer's history, what late readers get; 0: all of it
+  dds_duration_t lifespan = DDS_INFINITY;  ///< a sample older than that is not repeated
 };
 
 template <class M>
@@ -42,7 +43,9 @@ struct Topic<ScheduledInputMessage> {
 template <>
 struct Topic<SnapshotMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
-  static constexpr TopicQos kQos{true, false, 64, 4096, 4096};
+  // A thin link queues for longer than readers wait before they ask again. Without an end of repeating, the
+  // repetitions fill it.
+  static constexpr TopicQos kQos{true, false, 64, 4096, 4096, 0, DDS_MSECS(300)};
 };
 template <>
 struct Topic<ReplyMessage> {
