@@ -6,12 +6,11 @@
 
 #include "sdk/client/text_message.hpp"
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/predict/predictor_table.hpp"
 
 namespace tandem::client {
 namespace {
 
-constexpr std::string_view kBallistic = "ballistic";
 // Losses of so short a time are the link's.
 constexpr std::int64_t kLossSpanNs = 30 * kSecond;
 constexpr std::size_t kManyLosses = 2;
@@ -63,7 +62,7 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
     offers.push_back({.index = index,
                       .id = stream.id,
                       .name = names[index],
-                      .is_ballistic = stream.layout.predictor == kBallistic,
+                      .is_ballistic = stream.layout.predictor == basic_predictor().name,
                       .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .per_body_ns = double{1} * stream.client_cost_ns,
                       .announced_ns = double{1} * stream.client_cost_ns * session.capacity});
@@ -76,7 +75,7 @@ std::optional<double> measure_own_step(std::int64_t (*clock_ns)()) {
   constexpr std::uint32_t kBodies = 4096;
   constexpr int kMostSteps = 1024;  // for a clock that stands still, or nearly so
   constexpr std::int64_t kEnoughNs = 20 * kMillisecond;
-  const auto predictor = make_predictor(kBallistic, kBodies, {});
+  const auto predictor = make_predictor(basic_predictor().name, kBodies, {});
   if (!predictor) return std::nullopt;
   State state(kBodies);
   for (Slot slot = 0; slot < kBodies; ++slot)

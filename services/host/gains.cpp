@@ -8,24 +8,6 @@ namespace {
 
 constexpr std::uint32_t kFramesPerDecision = 15;
 
-constexpr GainGoal kFieldGoal{0.1, -0.1};
-
-struct FirstGains {
-  std::uint16_t decay, beta, gamma;  // as in StreamParameters
-};
-// Bodies move at the start, so that little of c is worth keeping.
-constexpr FirstGains kBallistic{13000, 26214, 9830};  // 20 %; 0.8, 0.15
-// Contacts are predicted: there is no force to learn. c is kept only as long as it takes to see whether it
-// should be.
-constexpr FirstGains kContact{60000, 22938, 0};  // 92 %; 0.7, 0
-// Contacts in one step for several: they leave a force to learn.
-constexpr FirstGains kField{13000, 39322, 16384};  // 20 %; 1.2, 0.25
-
-const FirstGains& first_gains(std::string_view predictor) {
-  if (predictor == "field") return kField;
-  return predictor == "contact" ? kContact : kBallistic;
-}
-
 // How much the logarithms of beta and E move for a cosine, and at most, in one decision. The logarithms are
 // never taken: beta and E are multiplied by exp(change).
 constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
@@ -57,12 +39,12 @@ bool differs(double wanted, double held, double band) { return std::abs(wanted -
 
 }  // namespace
 
-GainGoal usual_gain_goal(std::string_view predictor) {
-  return predictor == "field" ? kFieldGoal : GainGoal{};
+GainGoal usual_gain_goal(const PredictorTraits& predictor) {
+  return {predictor.gain_aim.agreement / 100.0, predictor.gain_aim.forwardness / 100.0};
 }
 
-void set_first_gains(std::string_view predictor, StreamParameters& parameters) {
-  const FirstGains& first = first_gains(predictor);
+void set_first_gains(const PredictorTraits& predictor, StreamParameters& parameters) {
+  const FirstGains& first = predictor.first_gains;
   parameters.step.decay = first.decay;
   parameters.codec.velocity_gain = first.beta;
   parameters.codec.acceleration_gain = first.gamma;

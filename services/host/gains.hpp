@@ -3,24 +3,22 @@
 // trained for it. The choice travels in the deltas.
 
 #include <cstdint>
-#include <string_view>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/predict/predictor_table.hpp"
 
 namespace tandem::host {
 
-/// Mean cosines, see GainEvidence, at which bits are fewest. Not 0, as corrections come late, when a body is
-/// beyond the threshold, or early, where the encoder likes to be.
+/// Mean cosines at which bits are fewest; see GainAim.
 struct GainGoal {
   double agreement = 0.25;
   double forwardness = 0.2;
 };
 
-/// For a predictor: Predictor::name().
-[[nodiscard]] GainGoal usual_gain_goal(std::string_view predictor);
+[[nodiscard]] GainGoal usual_gain_goal(const PredictorTraits& predictor);
 
-/// Sets decay and gains of the first frame; they suit most scenes. `predictor`: Predictor::name().
-void set_first_gains(std::string_view predictor, StreamParameters& parameters);
+/// Sets decay and gains of the first frame.
+void set_first_gains(const PredictorTraits& predictor, StreamParameters& parameters);
 
 /// Looks at every frame and decides every fifteen. Deterministic; no clock. Not thread-safe.
 ///

@@ -159,9 +159,10 @@ Result<void> choose_gains(StreamConfig& config) {
   // What the constants make of the predictor, which may be another than the name says.
   const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
-  const std::string_view kind = (*predictor)->name();
-  set_first_gains(kind, config.layout.parameters);
-  config.gains = usual_gain_goal(kind);
+  const auto traits = find_predictor((*predictor)->name());
+  if (!traits) return tl::unexpected(traits.error());
+  set_first_gains(**traits, config.layout.parameters);
+  config.gains = usual_gain_goal(**traits);
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <system_error>
 
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::lab {
@@ -34,6 +35,12 @@ Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& n
     loaded.push_back(std::move(*scene));
   }
   return loaded;
+}
+
+std::vector<std::string> predictor_choices() {
+  std::vector<std::string> names = predictor_names();
+  names.insert(names.begin(), std::string(sessions::kAutomaticPredictor));
+  return names;
 }
 
 void add_scene_option(commandline::Command command, std::vector<std::string>& scenes) {

@@ -32,6 +32,9 @@ int report(const std::string& command, const Error& error);
 
 inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
 
+/// What --predictor takes where it may be chosen automatically.
+[[nodiscard]] std::vector<std::string> predictor_choices();
+
 /// Flags that several subcommands have.
 void add_scene_option(commandline::Command command, std::vector<std::string>& scenes);
 void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>& bodies);

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <thread>
 
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/lab/bandwidth.hpp"
 #include "services/lab/bandwidth_columns.hpp"
 #include "services/lab/bandwidth_report.hpp"
@@ -53,7 +54,7 @@ Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& so
     choice.codec = codec;
     const auto traits = codec_traits(codec);
     if (!traits) return tl::unexpected(traits.error());
-    choice.predictor = traits->is_baseline ? "ballistic" : options.choice.predictor;
+    choice.predictor = traits->is_baseline ? std::string(basic_predictor().name) : options.choice.predictor;
     auto stream = sessions::plan_stream(scene, choice);
     if (!stream) return tl::unexpected(stream.error());
     if (!traits->reads_threshold) stream->quality.reset();
@@ -139,8 +140,8 @@ Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const Ba
     const auto traits = codec_traits(codec);
     return traits && !traits->is_baseline;
   };
-  const bool asked =
-      (predictor == "field" || predictor == "contact") && std::ranges::any_of(options.codecs, is_ours);
+  const auto named = find_predictor(predictor);  // none where it is chosen automatically
+  const bool asked = named && (*named)->reads_world && std::ranges::any_of(options.codecs, is_ours);
   if (!asked || !trajectory.info().scene.empty()) return {};
   return fail(ErrorCode::kInvalidArgument,
               fmt::format("{}: no \"scene\"; --predictor {} needs one for radius, materials and walls (see "
@@ -288,7 +289,7 @@ void add_bandwidth(commandline::Command bench, Run& run) {
       .add_option("--predictor", options->choice.predictor,
                   "Predicted step of `tracker`: ballistic, field, contact, or auto: field for spheres, else "
                   "ballistic; the paper's codecs have ballistic")
-      .one_of({"auto", "ballistic", "field", "contact"})
+      .one_of(predictor_choices())
       .show_default();
   add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");
   add_quality_options(command, options->choice);

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/client_cost.hpp"
@@ -26,7 +27,7 @@ static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler
 struct ClientOptions {
   std::string scene = "half_pipe";
   std::vector<std::uint32_t> bodies{10000};
-  std::vector<std::string> predictors{"ballistic", "contact", "field"};
+  std::vector<std::string> predictors = predictor_names();
   std::vector<std::string> codecs;
   ClientProcessSetup process;
   std::uint64_t frames = 300;
@@ -182,7 +183,7 @@ void add_client(commandline::Command bench, Run& run) {
   add_bodies_option(command, options->bodies);
   command.add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
       .separated_by(',')
-      .one_of({"ballistic", "contact", "field"})
+      .one_of(predictor_names())
       .show_default();
   command.add_option("--codec", options->codecs, "Codecs, separated by commas")
       .separated_by(',')

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/json/json.hpp"
 #include "services/lab/bench.hpp"
 #include "services/lab/smoothing.hpp"
@@ -15,7 +16,7 @@ constexpr const char* kCommand = "bench smoothing";
 
 struct SmoothingOptions {
   std::vector<std::string> scenes{"all"};
-  std::vector<std::string> predictors{"ballistic", "contact", "field"};
+  std::vector<std::string> predictors = predictor_names();
   SmoothingSetup setup;
   bool json = false;
 };
@@ -73,7 +74,7 @@ void add_smoothing(commandline::Command bench, Run& run) {
       .show_default();
   command.add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
       .separated_by(',')
-      .one_of({"ballistic", "contact", "field"})
+      .one_of(predictor_names())
       .show_default();
   std::vector<std::string> names;
   for (const std::string_view name : codec_names()) names.emplace_back(name);

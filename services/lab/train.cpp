@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/host/residual_statistics.hpp"
 
 namespace tandem::lab {
@@ -54,7 +55,7 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
                                    const std::function<void(Frame)>& progress) {
   scene.trained.clear();
   choice.codec = "selective";
-  choice.predictor = "ballistic";
+  choice.predictor = basic_predictor().name;
   choice.automatic = false;
   const auto first = sessions::plan_stream(scene, choice);
   if (!first) return tl::unexpected(first.error());

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/host/block_threads.hpp"
 #include "services/host/groups.hpp"
 #include "services/sessions/contact_plan.hpp"
@@ -55,29 +56,40 @@ bool alike(const std::vector<engine::ParticleType>& types) {
   return smallest.radius >= 0.5F * largest.radius;
 }
 
-// `field` computes everything as a sphere. Where bodies are none it costs more than it gains.
 bool are_spheres(const std::vector<scenes::BodyType>& types) {
   return std::ranges::all_of(
       types, [](const scenes::BodyType& type) { return type.shape.kind == engine::Shape::Kind::kSphere; });
 }
 
+bool suits(const PredictorTraits& predictor, const scenes::Scene& scene, const SessionChoice& choice,
+           const CodecTraits& traits) {
+  if (traits.is_baseline) return predictor.name == basic_predictor().name;
+  return choice.bodies <= predictor.most_bodies &&
+         (!predictor.only_spheres || (are_spheres(scene.types) && alike(scene.world.types)));
+}
+
+Result<void> set_predictor(const scenes::Scene& scene, const PredictorTraits& predictor,
+                           host::StreamConfig& stream) {
+  if (predictor.reads_world) {
+    auto constants = contact_constants(scene, stream.lattice, predictor.name);
+    if (!constants) return tl::unexpected(constants.error());
+    stream.layout.predictor_constants = std::move(*constants);
+  }
+  stream.layout.predictor = predictor.name;
+  return {};
+}
+
 // Sets the predictor and its constants.
 Result<void> choose_predictor(const scenes::Scene& scene, const SessionChoice& choice,
                               const CodecTraits& traits, host::StreamConfig& stream) {
-  const bool automatic = choice.predictor == "auto";
-  const bool field_pays = !traits.is_baseline && choice.bodies <= kMostBodiesForField &&
-                          are_spheres(scene.types) && alike(scene.world.types);
-  stream.layout.predictor = !automatic ? choice.predictor : field_pays ? "field" : "ballistic";
-  if (stream.layout.predictor != "field" && stream.layout.predictor != "contact") return {};
-  auto constants = contact_constants(scene, stream.lattice, stream.layout.predictor);
-  if (constants) {
-    stream.layout.predictor_constants = std::move(*constants);
-  } else if (automatic) {
-    stream.layout.predictor = "ballistic";
-  } else {
-    return tl::unexpected(constants.error());
+  if (choice.predictor != kAutomaticPredictor) {
+    const auto predictor = find_predictor(choice.predictor);
+    if (!predictor) return tl::unexpected(predictor.error());
+    return set_predictor(scene, **predictor, stream);
   }
-  return {};
+  for (const PredictorTraits& predictor : predictors())
+    if (suits(predictor, scene, choice, traits) && set_predictor(scene, predictor, stream)) return {};
+  return set_predictor(scene, basic_predictor(), stream);
 }
 
 /// Of a stream, in metres.
@@ -164,15 +176,13 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
 
 Result<std::vector<StreamChoice>> usual_streams(const scenes::Scene& scene, const SessionChoice& choice) {
   std::vector<StreamChoice> streams;
-  if (choice.predictor != "auto") return streams;
+  if (choice.predictor != kAutomaticPredictor) return streams;
   const auto one = plan_stream(scene, choice);
   if (!one) return tl::unexpected(one.error());
-  if (one->layout.predictor != "field") return streams;
-  for (const auto& [name, predictor] : {std::pair{"thin", "ballistic"}, std::pair{"rich", "field"}}) {
-    streams.emplace_back();
-    streams.back().name = name;
-    streams.back().predictor = predictor;
-  }
+  const std::string basic(basic_predictor().name);
+  if (one->layout.predictor == basic) return streams;
+  streams.push_back({.name = "thin", .predictor = basic});
+  streams.push_back({.name = "rich", .predictor = one->layout.predictor});
   return streams;
 }
 

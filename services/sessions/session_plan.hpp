@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "services/host/host.hpp"
@@ -15,27 +16,25 @@ namespace tandem::sessions {
 
 /// Below, a frame has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
-/// Beyond, `field` would take even a fast client most of a frame.
-inline constexpr std::uint32_t kMostBodiesForField = 50'000;
+/// As a predictor's name: the first of predictors() that suits codec, bodies and scene.
+inline constexpr std::string_view kAutomaticPredictor = "auto";
 
 /// What an operator chooses for one of several streams; what is empty comes from the session's choice, where
 /// the codec has a use for it.
 struct StreamChoice {
-  std::string name;  ///< see host::check_stream_names()
-  std::optional<std::string> codec, predictor;
-  std::optional<double> threshold_m;        ///< and no automatic quality
-  std::optional<double> target_mbit_per_s;  ///< and automatic quality
-  std::optional<double> max_error_m;        ///< with automatic quality
-  std::optional<std::size_t> budget_bytes;
+  std::string name = {};  ///< see host::check_stream_names()
+  std::optional<std::string> codec = {}, predictor = {};
+  std::optional<double> threshold_m = {};        ///< and no automatic quality
+  std::optional<double> target_mbit_per_s = {};  ///< and automatic quality
+  std::optional<double> max_error_m = {};        ///< with automatic quality
+  std::optional<std::size_t> budget_bytes = {};
 };
 
 /// What an operator chooses on top of the scene.
 struct SessionChoice {
   std::uint32_t bodies = 0;
   std::string codec = "tracker";
-  /// auto: `field` for `tracker` with at most kMostBodiesForField bodies in a scene whose types are spheres
-  /// of about one size, else `ballistic`
-  std::string predictor = "auto";
+  std::string predictor{kAutomaticPredictor};
   std::optional<double> threshold_m;  ///< empty: the scene's, times threshold_scale
   double threshold_scale = 1;
   bool automatic = false;        ///< quality follows the scene at run time, from a quarter of that threshold
@@ -51,8 +50,8 @@ struct SessionChoice {
 /// What is chosen for one of several streams, all told.
 [[nodiscard]] SessionChoice choice_of(const SessionChoice& session, const StreamChoice& stream);
 
-/// The streams of a session where nobody chose any: where predictor `auto` is `field`, `thin`, which is
-/// `ballistic`, and `rich`, which is `field`; else none, which means one without a name. Errors: as
+/// The streams of a session where nobody chose any: where the automatic predictor is not the basic one,
+/// `thin` with the basic one and `rich` with that; else none, which means one without a name. Errors: as
 /// plan_stream().
 [[nodiscard]] Result<std::vector<StreamChoice>> usual_streams(const scenes::Scene& scene,
                                                               const SessionChoice& choice);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/predict/predictor_table.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/tandemd/config.hpp"
 #include "services/tandemd/number.hpp"
@@ -70,13 +71,15 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("--domain", &Config::set_domain, fmt::format("DDS domain [{}]", defaults.domain));
   flags.add("--codec", &Config::mutable_codec,
             fmt::format("{} [{}]", fmt::join(codec_names(), ", "), defaults.choice.codec));
+  const PredictorTraits& best = predictors().front();
+  const std::string_view basic = basic_predictor().name;
   flags.add(
       "--predictor", &Config::mutable_predictor,
       fmt::format(
-          "Predicted step of server and clients: ballistic, field, contact, or auto: with codec "
-          "tracker and at most {} spheres of about one size a stream of ballistic and one of field, else "
-          "ballistic [{}]",
-          sessions::kMostBodiesForField, defaults.choice.predictor));
+          "Predicted step of server and clients: {}, or auto: with codec tracker and at most {} spheres of about "
+          "one size a stream of {} and one of {}, else {} [{}]",
+          fmt::join(predictor_names(), ", "), best.most_bodies, basic, best.name, basic,
+          defaults.choice.predictor));
   app.add_option_function<std::vector<std::string>>(
          "--stream", [&config](const std::vector<std::string>& texts) { add_streams(config, texts); },
          "One of up to 8 ways of telling the world, each for clients of other means; made while somebody plays "

@@ -61,6 +61,7 @@ EDGES = {
     + ["public", "sdk/client", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"],
     "services/tandemd": SIMULATION
     + LAYOUT
+    + ["sdk/core/predict"]
     + CODEC
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
     + ["services/host", "services/scenes", "services/sessions", "services/signals", "services/workers"],

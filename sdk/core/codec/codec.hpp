@@ -13,6 +13,7 @@
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/layout/parameters.hpp"
+#include "sdk/core/layout/tracker_kind.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem {
@@ -112,7 +113,7 @@ struct CodecSetup {
   std::string_view name;
   std::uint32_t capacity = 0;                ///< 1 .. kMaxCapacity
   std::span<const std::byte> tables = {};    ///< as the session has them; empty without takes_tables
-  std::string_view predictor = "ballistic";  ///< Predictor::name() of the session; gains depend on it
+  TrackerKind tracker = {};                  ///< of the session's predictor
   Groups groups = {};                        ///< of the stream's states
   std::span<const std::int32_t> radii = {};  ///< lattice units, by type; with orientations
   RunBlocks run_blocks = {};  ///< how to code blocks side by side, where a codec can; empty: one by one

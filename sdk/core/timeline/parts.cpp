@@ -2,15 +2,18 @@
 
 #include <utility>
 
+#include "sdk/core/predict/predictor_table.hpp"
+
 namespace tandem {
 
 Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local,
                                  std::unique_ptr<Predictor> predictor) {
   if (auto good = check_layout(layout); !good) return tl::unexpected<Error>(good.error());
+  const auto traits = find_predictor(predictor->name());  // none of a caller's own
   auto codec = make_codec({.name = layout.codec,
                            .capacity = layout.capacity,
                            .tables = layout.codec_tables,
-                           .predictor = predictor->name(),
+                           .tracker = traits ? (*traits)->tracker : basic_predictor().tracker,
                            .groups = groups_of(layout),
                            .radii = layout.radii,
                            .run_blocks = local.run_blocks});

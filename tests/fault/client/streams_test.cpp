@@ -74,7 +74,7 @@ class TwoStreams : public ::testing::Test {
     stream.layout.lead = 1;
     stream.layout.capacity = kBodies;
     stream.layout.codec = "tracker";
-    host::set_first_gains(stream.layout.predictor, stream.layout.parameters);
+    host::set_first_gains(**find_predictor(stream.layout.predictor), stream.layout.parameters);
     config.streams = {stream, stream};
     config.streams[0].name = "fine";
     config.streams[0].layout.parameters.codec = *host::codec_parameters(stream.lattice, kFine, 0.1, 2);
@@ -96,8 +96,7 @@ class TwoStreams : public ::testing::Test {
          now_ns += kTickNs) {
       network.advance_to(now_ns);
       if (host_->poll(now_ns, now_ns + kWallNs)) {
-        for (const auto& delta : host_->report().deltas)
-          truth[{delta.stream, host_->frame()}] = delta.hash;
+        for (const auto& delta : host_->report().deltas) truth[{delta.stream, host_->frame()}] = delta.hash;
       }
       ASSERT_TRUE(host::drain(host_->outbox(), *server_port));
       for (const auto& client : clients) {

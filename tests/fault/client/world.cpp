@@ -119,7 +119,8 @@ void World::start_server() {
   config.streams[0].layout.parameters.codec =
       must(host::codec_parameters(config.streams[0].lattice, 0.01, 0.1, 2));
   if (config.streams[0].layout.codec == "tracker") {
-    host::set_first_gains(config.streams[0].layout.predictor, config.streams[0].layout.parameters);
+    host::set_first_gains(**find_predictor(config.streams[0].layout.predictor),
+                          config.streams[0].layout.parameters);
     config.streams[0].gains = host::GainGoal{};
   }
   config.types = {{"ball", 0.1F, 0xFFFFFFFF}};

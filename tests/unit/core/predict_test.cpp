@@ -4,6 +4,7 @@
 #include <random>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
+#include "sdk/core/predict/predictor_table.hpp"
 
 namespace tandem {
 namespace {
@@ -115,7 +116,23 @@ TEST(Ballistic, FreeFallFollowsTheParabola) {
   EXPECT_EQ(state.v(1)[0], -640 * 20);
 }
 
+TEST(Predictors, EachIsMadeUnderItsNameAndTheBasicOneSuitsEveryWorld) {
+  for (const PredictorTraits& traits : predictors()) {
+    const auto found = find_predictor(traits.name);
+    ASSERT_TRUE(found) << traits.name;
+    EXPECT_EQ(*found, &traits);
+    EXPECT_LE(traits.tracker.hit_k, traits.tracker.least_k) << traits.name;
+    if (!traits.reads_world) {
+      EXPECT_EQ((*make_predictor(traits.name, 1, {}))->name(), traits.name);
+    }
+  }
+  EXPECT_EQ(basic_predictor().most_bodies, UINT32_MAX);
+  EXPECT_FALSE(basic_predictor().only_spheres);
+  EXPECT_FALSE(basic_predictor().reads_world);
+}
+
 TEST(MakePredictor, RefusesWhatItDoesNotKnow) {
+  EXPECT_EQ(find_predictor("psychic").error().code, ErrorCode::kUnsupported);
   EXPECT_EQ(make_predictor("psychic", 1, {}).error().code, ErrorCode::kUnsupported);
   const std::vector<std::int32_t> constants{1};
   EXPECT_EQ(make_predictor("ballistic", 1, constants).error().code, ErrorCode::kMalformed);

@@ -44,8 +44,8 @@ TEST(PredictorPlan, WhereABodyIsNoSphereNobodyDoes) {
 
 TEST(PredictorPlan, NorInTooLargeASessionOrWithAPapersCodec) {
   const auto spheres = scene_of({kSphere});
-  EXPECT_EQ(predictor_of(spheres, kMostBodiesForField), "field");
-  EXPECT_EQ(predictor_of(spheres, kMostBodiesForField + 1), "ballistic");
+  EXPECT_EQ(predictor_of(spheres, predictors().front().most_bodies), "field");
+  EXPECT_EQ(predictor_of(spheres, predictors().front().most_bodies + 1), "ballistic");
   EXPECT_EQ(predictor_of(spheres, 100, "entropy"), "ballistic");
 }
 

@@ -413,7 +413,7 @@ TEST(SessionPlan, TheUsualStreamsAreThinAndRichWhereFieldPays) {
   choice.predictor = "field";
   EXPECT_TRUE(usual().empty()) << "said";
   choice.predictor = "auto";
-  choice.bodies = sessions::kMostBodiesForField + 1;
+  choice.bodies = predictors().front().most_bodies + 1;
   EXPECT_TRUE(usual().empty());
 }
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int32_t kThreshold = 4096;
 
-const TrackerGains kGains("ballistic");
+const TrackerGains kGains(TrackerKind{});
 
 TrackerFilter filter_of(std::int32_t threshold, const Vec3i& gravity = {}) {
   CodecParameters parameters;

@@ -5,37 +5,7 @@
 #include "sdk/core/lattice/fixed_point.hpp"
 
 namespace tandem {
-// What follows from the errors that a predicted step leaves.
-//
-// A position error d that grew over k frames is explained by a velocity error d / k, or by an acceleration
-// error of about 2 d / k^2. Noise (rounding to steps, the error inside the ball) is as large as d itself, so
-// only a part beta of the first is believed, and gamma of that of the second; both change at run time.
-//   least_k  Below so many frames one correction says too little about either: k counts as this. Usual 3; 2
-//            takes 0.5 % more bits, 4 takes 1.6 % (RESEARCH.md).
-//   hit_k    A body corrected twice running (k = 1) was hit: more of it is believed to be velocity, so this
-//            is less than least_k.
-//   early    How likely, in 1/65536, a correction must be for a body to go before it has to. Usual 0.3: a
-//   tenth
-//            off the RMS error for 1.4 % of the bits. Encoder only; the rest is part of the protocol.
-struct TrackerKind {
-  std::int64_t least_k;
-  std::int64_t hit_k;
-  std::uint32_t early;
-};
-
 namespace {
-
-constexpr TrackerKind kBallistic{3, 2, 19661};
-// Contacts are predicted: what is left grows slower.
-constexpr TrackerKind kContact{3, 3, 19661};
-// Contacts in one step for several are corrected more often, and early at 0.08: the RMS error falls by 4 %
-// for 4 % of the bits.
-constexpr TrackerKind kField{3, 3, 5243};
-
-const TrackerKind& kind_of(std::string_view predictor) {
-  if (predictor == "field") return kField;
-  return predictor == "contact" ? kContact : kBallistic;
-}
 
 // Steps in 1/256 of the threshold.
 Vec3i relative(const TrackerSteps& steps) {
@@ -73,12 +43,12 @@ std::int64_t cosine(std::int64_t product, const InverseLength& a, const InverseL
 
 }  // namespace
 
-TrackerGains::TrackerGains(std::string_view predictor) : kind_(&kind_of(predictor)) {
+TrackerGains::TrackerGains(const TrackerKind& kind) : kind_(kind) {
   const CodecParameters usual;
   set(usual.velocity_gain, usual.acceleration_gain);
 }
 
-std::uint32_t TrackerGains::early() const { return kind_->early; }
+std::uint32_t TrackerGains::early() const { return kind_.early; }
 
 void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
   if (beta == beta_ && gamma == gamma_) return;
@@ -86,9 +56,9 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
   gamma_ = gamma;
   const std::int64_t share = std::int64_t{128} * beta;
   for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
-    const std::int64_t k = std::max(i, kind_->least_k);
+    const std::int64_t k = std::max(i, kind_.least_k);
     const auto at = static_cast<std::size_t>(i);
-    velocity_[at] = share / (i == 1 ? kind_->hit_k : k);
+    velocity_[at] = share / (i == 1 ? kind_.hit_k : k);
     acceleration_[at] = ((share * gamma) >> 16) / (k * k);
   }
 }

@@ -7,11 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string_view>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/layout/tracker_kind.hpp"
 
 namespace tandem {
 
@@ -41,14 +41,11 @@ struct TrackerBody {
   TrackerSteps steps{};        ///< of the last correction, saturated at +-127
 };
 
-struct TrackerKind;
-
 /// How much of a correction is believed to be an error of the velocity and of the acceleration, by
 /// k = min(age + 1, 255): 64 beta / k and 64 beta gamma / k^2, in 1/65536.
 class TrackerGains {
  public:
-  /// For the errors that a predictor leaves; as for `ballistic` with a name not known here.
-  explicit TrackerGains(std::string_view predictor);
+  explicit TrackerGains(const TrackerKind& kind);
   /// beta in 1/32768, gamma in 1/65536: as in CodecParameters.
   void set(std::uint16_t beta, std::uint16_t gamma);
 
@@ -59,7 +56,7 @@ class TrackerGains {
   [[nodiscard]] std::uint32_t early() const;
 
  private:
-  const TrackerKind* kind_;
+  TrackerKind kind_;
   std::uint16_t beta_ = 0, gamma_ = 0;
   std::array<std::int64_t, kMostAge + 1> velocity_{};
   std::array<std::int64_t, kMostAge + 1> acceleration_{};

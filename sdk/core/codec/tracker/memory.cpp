@@ -61,7 +61,7 @@ TrackerMemory::TrackerMemory(const CodecSetup& setup)
       columns_((turns() ? 2 : 1) * kColumns * setup.capacity),
       history_(setup.capacity),
       youngest_(turns() ? setup.capacity : 0),
-      gains_(setup.predictor) {}
+      gains_(setup.tracker) {}
 
 void TrackerMemory::write(std::size_t column, Slot slot, const TrackerBody& body) {
   std::byte* at = columns_.data() + column * capacity_ + slot;
