@@ -90,10 +90,10 @@ void ClientCore::take_scheduled() {
 
 void ClientCore::take_snapshots(Now now) {
   using Outcome = SnapshotAssembly::Outcome;
+  inbox_.snapshots.clear();
+  port_.take(inbox_.snapshots);  // also while nothing joins: what comes late is not kept
   FollowedStream* const joined = joined_stream();
   if (joined == nullptr) return;
-  inbox_.snapshots.clear();
-  port_.take(inbox_.snapshots);
   for (auto& received : inbox_.snapshots) {
     if (!belongs(received)) continue;
     FollowedStream* const to = followed(received.message.stream);

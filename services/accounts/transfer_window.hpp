@@ -50,7 +50,7 @@ class TransferWindow {
     }
     flying_ += bytes;
     if (pace_ > 0) {
-      // Behind its pace by a few milliseconds, as who polls is, it catches up; not after a pause.
+      // A caller that polls is a few milliseconds late and may catch up by that much, but not after a pause.
       const std::int64_t from_ns = std::max(next_ns_, now_ns - kBurstNs);
       next_ns_ = from_ns + static_cast<std::int64_t>(static_cast<double>(bytes) / pace_ * 1e9);
     }
@@ -90,8 +90,8 @@ class TransferWindow {
   static constexpr std::size_t kTrain = 5'200;  // bytes: four parts
   static constexpr std::int64_t kRateLastsNs = kSecond;
 
-  // Parts that were on their way together arrive at the rate of the link. A few of them do not tell it: a
-  // bucket, or acknowledgements that waited in one queue, bring two parts at once on any link.
+  // Parts that were on their way together arrive at the rate of the link. Two or three are not enough: a
+  // token bucket on the way, or acknowledgements queued together, make two parts appear at once on any link.
   void follow_train(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
     if (arrived_ > 0 && last.at_ns < train_ns_) {
       train_bytes_ += bytes;

@@ -193,7 +193,7 @@ std::optional<std::int64_t> Gateway::cut_due_ns() const {
   return std::max(*collecting_since_ns_ + kCollectNs, spaced_ns);
 }
 
-// Whoever waits gets the same one: what is live follows from here on.
+// All viewers that wait share one snapshot; live messages follow it.
 void Gateway::cut(std::int64_t now_ns) {
   const auto made = world_.cut();
   if (!made) return;
@@ -222,7 +222,8 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
   const bool role_changed = std::exchange(granted_, granted) != granted;
   for (auto& [id, viewer] : viewers_) {
     if (role_changed) viewer.now.reply.on_change();
-    if (viewer.now.passage.unfinished() && now_ns - viewer.now.passage.began_ns() > kLongestPassageNs)
+    if (viewer.now.passage.unfinished() && (now_ns - viewer.now.passage.progress_ns() > kStalledPassageNs ||
+                                            now_ns - viewer.now.passage.began_ns() > kLongestPassageNs))
       viewer.now.passage = {};
     if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
   }

@@ -40,8 +40,10 @@ class Gateway {
   static constexpr std::int64_t kBehindNs = kSecond;
   /// One that takes nothing for so long is let go.
   static constexpr std::int64_t kNotReadingNs = 30 * kSecond;
-  /// One snapshot may take so long.
-  static constexpr std::int64_t kLongestPassageNs = 60 * kSecond;
+  /// A snapshot of which nothing arrived for so long is given up.
+  static constexpr std::int64_t kStalledPassageNs = 30 * kSecond;
+  /// And one that takes longer, whatever the viewer says that arrived.
+  static constexpr std::int64_t kLongestPassageNs = 1800 * kSecond;
   /// Inputs of a viewer without an outcome; what a reply can tell of.
   static constexpr std::size_t kMostUndecided = transport::kReplyRing;
 

@@ -48,6 +48,7 @@ void SnapshotPassage::acknowledged(const transport::AckMessage& ack, std::int64_
   if (held <= arrived_) return;
   window_.arrived((held - arrived_) * snapshot_->part_bytes, sent_[held - 1], now_ns);
   arrived_ = held;
+  progress_ns_ = now_ns;
 }
 
 }  // namespace tandem::gateway

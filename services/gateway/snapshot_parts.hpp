@@ -36,11 +36,13 @@ class SnapshotPassage {
   /// Nothing to send.
   SnapshotPassage() = default;
   SnapshotPassage(std::shared_ptr<const SnapshotParts> snapshot, std::int64_t now_ns)
-      : snapshot_(std::move(snapshot)), began_ns_(now_ns) {}
+      : snapshot_(std::move(snapshot)), began_ns_(now_ns), progress_ns_(now_ns) {}
 
   /// Not all of it has been handed out.
   [[nodiscard]] bool unfinished() const { return snapshot_ != nullptr; }
   [[nodiscard]] std::int64_t began_ns() const { return began_ns_; }
+  /// When a part arrived last, or it began.
+  [[nodiscard]] std::int64_t progress_ns() const { return progress_ns_; }
   [[nodiscard]] bool has_next() const;
   /// The next message, of those that have one.
   [[nodiscard]] OutgoingPtr next(std::int64_t now_ns);
@@ -50,6 +52,7 @@ class SnapshotPassage {
  private:
   std::shared_ptr<const SnapshotParts> snapshot_;  // null once all is handed out
   std::int64_t began_ns_ = 0;
+  std::int64_t progress_ns_ = 0;
   std::size_t inputs_sent_ = 0;
   std::size_t arrived_ = 0;                           // parts
   std::vector<accounts::TransferWindow::Sent> sent_;  // by part

@@ -7,18 +7,22 @@ namespace tandem::host {
 bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
                    std::int64_t now_ns) {
   ready_.clear();
+  const bool spaced = !served_at_ns_ || now_ns - *served_at_ns_ >= kSpacingNs;
+  const bool may_cut = spaced && !transfer.full(now_ns);
+  bool someone_asks = false;
   for (const auto& [id, account] : roster.accounts()) {
     if (joined_stream(account) != stream_ || was_served(account) || transfer.serves(id, now_ns)) continue;
     if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
-    if (account.open && port.joined(account.from, id, stream_)) ready_.push_back(id);
+    if (!account.open) continue;
+    someone_asks = true;
+    if (may_cut && port.joined(account.from, id, stream_)) ready_.push_back(id);  // which takes a while
   }
-  if (ready_.empty()) {
+  if (may_cut ? ready_.empty() : !someone_asks) {
     collecting_since_ns_.reset();
     return false;
   }
   if (!collecting_since_ns_) collecting_since_ns_ = now_ns;
-  const bool spaced = !served_at_ns_ || now_ns - *served_at_ns_ >= kSpacingNs;
-  return spaced && now_ns - *collecting_since_ns_ >= kCollectNs && !transfer.full(now_ns);
+  return may_cut && now_ns - *collecting_since_ns_ >= kCollectNs;
 }
 
 void JoinDesk::served(Roster& roster, std::int64_t now_ns) {

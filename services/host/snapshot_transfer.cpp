@@ -22,8 +22,8 @@ constexpr std::size_t kSlackBytes = 64U << 10U;
 // Parts of one receiver queued in one go, so that many receivers take turns.
 constexpr int kTurn = 16;
 
-// Of each part, whether the acknowledgement says that it is held. Where all runs that there is room for are
-// used, nothing is said of what lies behind them.
+// Of each part, whether the acknowledgement says that it is held. One with the most runs allowed says nothing
+// of the parts after the last run.
 std::vector<bool> held_parts(const transport::AckMessage& ack, std::size_t parts) {
   std::vector<bool> held(parts, true);
   std::size_t told = 0;
@@ -68,7 +68,7 @@ bool Passage::names(const transport::AckMessage& ack) const {
 
 bool Passage::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns) {
   if (!names(ack)) {
-    // Whoever held parts of it and names it no more cannot use it.
+    // A receiver that held parts of this snapshot and no longer names it cannot use it.
     return progress_ns_ == began_ns_;
   }
   heard_ns_ = now_ns;
@@ -80,21 +80,31 @@ bool Passage::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns
 void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
   std::size_t bytes = 0;
   std::size_t settled = 0;  // entries up to the last one that arrived
+  std::vector<bool> is_new(holds_.size()), counts(flying_.size());
+  const bool was_silent = now_ns - progress_ns_ >= kForgetRateNs;
   for (std::size_t i = 0; i < flying_.size(); ++i) {
     const Flying& entry = flying_[i];
-    if (!held[entry.part] || holds_[entry.part]) continue;
-    holds_[entry.part] = true;
-    bytes += entry.sent.bytes;
-    settled = i + 1;
+    if (!held[entry.part]) continue;
+    const bool is_first = !holds_[entry.part];
+    if (is_first) {
+      holds_[entry.part] = is_new[entry.part] = counts[i] = true;
+      bytes += entry.sent.bytes;
+    }
+    // After a silence a part that was sent twice is taken to have come by its last copy: DDS has given up
+    // what was sent before.
+    if (is_first || (was_silent && is_new[entry.part])) settled = i + 1;
   }
+  std::erase_if(again_, [this, &held](std::size_t part) {  // it was on its way after all
+    if (held[part]) holds_[part] = true;
+    return held[part];
+  });
   if (settled == 0) return;
   progress_ns_ = probed_ns_ = now_ns;
   probes_ = 0;
   window_.arrived(bytes, flying_[settled - 1].sent, now_ns);
   for (std::size_t i = 0; i < settled; ++i) {
-    if (holds_[flying_[i].part]) continue;
-    window_.lost(flying_[i].sent);
-    again_.push_back(flying_[i].part);
+    if (!counts[i]) window_.lost(flying_[i].sent);
+    if (!holds_[flying_[i].part]) again_.push_back(flying_[i].part);
   }
   flying_.erase(flying_.begin(), flying_.begin() + static_cast<std::ptrdiff_t>(settled));
   std::erase_if(flying_, [this](const Flying& entry) {  // sent twice
@@ -149,8 +159,8 @@ std::int64_t Passage::next_ns() const {
 
 bool Passage::exhausted() const { return sent_bytes_ > kMostTimes * snapshot_->bytes.size() + kSlackBytes; }
 
-void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
-                             std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
+std::shared_ptr<const Snapshot> SnapshotTransfer::make_snapshot(Epoch epoch, StreamId stream, Frame frame,
+                                                                std::span<const std::byte> bytes) {
   auto snapshot = std::make_shared<Snapshot>();
   snapshot->bytes.assign(bytes.begin(), bytes.end());
   snapshot->head.epoch = epoch;
@@ -158,8 +168,19 @@ void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::spa
   snapshot->head.frame = frame;
   snapshot->head.parts = static_cast<std::uint32_t>((bytes.size() + kPartBytes - 1) / kPartBytes);
   snapshot->head.total_bytes = static_cast<std::uint32_t>(bytes.size());
-  largest_ = std::max(largest_, bytes.size());
-  if (held_count_and_bytes(true, now_ns).second + bytes.size() > kMostHeldBytes)
+  return snapshot;
+}
+
+void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
+                             std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
+  const StreamId cut_of = latest_ ? latest_->head.stream : StreamId{};
+  // A frame that stands still is cut once: receivers tell snapshots apart by their frame. Inputs that came
+  // since reach them by the topic of inputs.
+  if (!latest_ || latest_->head.epoch != epoch || cut_of != stream || latest_->head.frame != frame)
+    latest_ = make_snapshot(epoch, stream, frame, bytes);
+  const std::shared_ptr<const Snapshot> snapshot = latest_;
+  largest_ = std::max(largest_, snapshot->bytes.size());
+  if (held_count_and_bytes(true, now_ns).second + snapshot->bytes.size() > kMostHeldBytes)
     std::erase_if(passages_, [&](const auto& entry) { return stalled(entry.second, now_ns); });
   for (const transport::ClientId client : receivers)
     passages_.insert_or_assign(client, Passage(snapshot, now_ns));

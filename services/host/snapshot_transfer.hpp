@@ -44,7 +44,8 @@ class Passage {
   [[nodiscard]] std::int64_t began_ns() const { return began_ns_; }
   [[nodiscard]] std::int64_t heard_ns() const { return heard_ns_; }        ///< it named this snapshot
   [[nodiscard]] std::int64_t progress_ns() const { return progress_ns_; }  ///< something arrived
-  /// It was sent several times what there is: whoever acknowledges like that is not served further.
+  /// Several times the snapshot's size was sent. Its acknowledgements cannot be right: it is served no
+  /// further.
   [[nodiscard]] bool exhausted() const;
 
  private:
@@ -76,9 +77,9 @@ class Passage {
 class SnapshotTransfer {
  public:
   static constexpr std::size_t kPartBytes = 1'300;
-  /// Whoever got nothing for so long holds no memory that somebody else needs.
+  /// A receiver to which nothing got through for this long is dropped when another needs the memory.
   static constexpr std::int64_t kStalledNs = 3 * kSecond;
-  /// Nor does anybody who was served for so long.
+  /// So is one that has been served for this long.
   static constexpr std::int64_t kLongestNs = 60 * kSecond;
   /// Of all snapshots held; two of any size have room.
   static constexpr std::size_t kMostHeldBytes = std::size_t{128} << 20U;
@@ -89,7 +90,10 @@ class SnapshotTransfer {
   void start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
              std::span<const transport::ClientId> receivers, std::int64_t now_ns);
   /// The stream ends: snapshots of it are of no use any more.
-  void end() { passages_.clear(); }
+  void end() {
+    passages_.clear();
+    latest_.reset();
+  }
   /// What a client that joins holds by now. Untrusted.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
   /// Forgets receivers that do not join the stream any more, and queues what their windows and the outbox
@@ -107,6 +111,9 @@ class SnapshotTransfer {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
+  [[nodiscard]] static std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream,
+                                                                     Frame frame,
+                                                                     std::span<const std::byte> bytes);
   [[nodiscard]] static bool stalled(const Passage& passage, std::int64_t now_ns);
   /// Of the snapshots held; `all`: also of those whose receivers are stalled.
   [[nodiscard]] std::pair<std::size_t, std::size_t> held_count_and_bytes(bool all, std::int64_t now_ns) const;
@@ -115,6 +122,7 @@ class SnapshotTransfer {
 
   Outbox* outbox_;
   std::map<transport::ClientId, Passage> passages_;
+  std::shared_ptr<const Snapshot> latest_;
   transport::ClientId last_served_ = 0;
   std::size_t largest_ = 0;  // snapshot so far
   std::int64_t next_ns_ = INT64_MAX;

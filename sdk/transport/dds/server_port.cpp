@@ -2,6 +2,7 @@
 #include <deque>
 #include <map>
 #include <mutex>
+#include <set>
 #include <utility>
 
 #include "sdk/transport/dds/announcements.hpp"
@@ -68,6 +69,10 @@ class DdsServerPort final : public ServerPort {
   Result<void> write(const ReplyMessage& message) override {
     const auto own = clients_.find(message.client);
     if (own != clients_.end()) return own->second.reply.write(message);
+    if (asked_for_.contains(message.client)) {  // its writers could not be made before
+      if (auto opened = open_client(message.client); !opened) return opened;
+      return write(message);
+    }
     auto written = endpoints_.reply.write(message);
     if (written) remember_stranger(message.client);
     return written;
@@ -76,6 +81,7 @@ class DdsServerPort final : public ServerPort {
 
   Result<void> open_client(ClientId client) override {
     if (clients_.contains(client)) return {};
+    asked_for_.insert(client);
     const std::string partition = client_partition(session_, client);
     auto snapshot = endpoints_.node.writer<SnapshotMessage>(
         "snapshots", Topic<SnapshotMessage>::kQos.writer_depth, partition);
@@ -91,6 +97,7 @@ class DdsServerPort final : public ServerPort {
     return {};
   }
   void close_client(ClientId client) override {
+    asked_for_.erase(client);
     const std::scoped_lock lock(clients_mutex_);
     clients_.erase(client);
   }
@@ -173,6 +180,7 @@ class DdsServerPort final : public ServerPort {
   // Changed by the writing thread alone, which reads without the lock.
   std::map<ClientId, Client> clients_;
   std::mutex clients_mutex_;
+  std::set<ClientId> asked_for_;    // of the writing thread: whose writers are there, or are tried again
   std::deque<ClientId> strangers_;  // of the writing thread
   std::atomic<std::uint64_t> dropped_ = 0;
 };

@@ -43,8 +43,8 @@ struct Topic<ScheduledInputMessage> {
 template <>
 struct Topic<SnapshotMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
-  // A thin link queues for longer than readers wait before they ask again. Without an end of repeating, the
-  // repetitions fill it.
+  // On a thin link a part may queue for longer than a reader waits before it asks again. Without this limit
+  // the repetitions would fill the link.
   static constexpr TopicQos kQos{true, false, 64, 4096, 4096, 0, DDS_MSECS(300)};
 };
 template <>

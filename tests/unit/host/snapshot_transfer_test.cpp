@@ -32,8 +32,9 @@ struct Link {
   std::int64_t delay_ns = 10 * kMillisecond;
   std::int64_t jitter_ns = 0;
   double loss = 0;
-  std::int64_t queue_ns = kNever;  // what would wait longer is dropped
-  bool is_cut = false;             // what is sent meanwhile arrives once it is mended
+  std::int64_t queue_ns = kNever;     // what would wait longer is dropped
+  bool is_cut = false;                // what is sent meanwhile arrives once it is mended
+  std::int64_t lifespan_ns = kNever;  // but not what is older than that
 };
 
 class Receiver {
@@ -62,6 +63,8 @@ class Receiver {
   /// True when something came that is to be acknowledged.
   bool receive(std::int64_t now_ns) {
     bool stored = false;
+    if (link.is_cut)
+      std::erase_if(flying_, [&](const auto& entry) { return now_ns - entry.first > link.lifespan_ns; });
     while (!link.is_cut && !flying_.empty() && flying_.front().first <= now_ns) {
       stored |= held.add(std::move(flying_.front().second)) == SnapshotAssembly::Outcome::kStored;
       flying_.pop_front();
@@ -197,7 +200,7 @@ TEST_F(SnapshotTransferTest, DelayJitterAndLossAreNotTakenForAThinLink) {
     returning.clear();
     start(static_cast<Frame>(7 + 100 * loss), 85'000, {1});
     receivers[1].link = {.delay_ns = 100 * kMillisecond, .jitter_ns = 50 * kMillisecond, .loss = loss};
-    EXPECT_LT(run_until_whole(1, 20'000), 1'000 + static_cast<int>(20'000 * loss));
+    EXPECT_LT(run_until_whole(1, 20'000), 1'200 + static_cast<int>(20'000 * loss));
     EXPECT_EQ(receivers[1].sent_bytes, 85'000U) << "what DDS repairs is not sent again besides";
   }
 }
@@ -247,6 +250,34 @@ TEST_F(SnapshotTransferTest, ALinkThatWasGoneForSecondsIsFoundAgainSoon) {
   run_until_whole(1, 20'000);
   ASSERT_TRUE(receivers[1].whole_ns);
   EXPECT_LT(*receivers[1].whole_ns - back_ns, 4 * kSecond);
+}
+
+TEST_F(SnapshotTransferTest, WhatDdsRepeatsNoLongerIsSentAgainSoonAfterALossOfSeconds) {
+  for (const int lost_ms : {1'800, 2'200, 4'000}) {
+    SCOPED_TRACE(lost_ms);
+    start(static_cast<Frame>(lost_ms), 1500 * kPart, {1});
+    receivers[1] = {};
+    receivers[1].link = {.bytes_per_s = 6e6, .lifespan_ns = 300 * kMillisecond};
+    run_ms(200);
+    receivers[1].link.is_cut = true;
+    run_ms(lost_ms);
+    receivers[1].link.is_cut = false;
+    const std::int64_t back_ns = now_ns;
+    run_until_whole(1, 60'000);
+    ASSERT_TRUE(receivers[1].whole_ns);
+    EXPECT_LT(*receivers[1].whole_ns - back_ns, 4 * kSecond);
+  }
+}
+
+TEST_F(SnapshotTransferTest, AFrameThatStandsStillIsOneSnapshot) {
+  // While the server waits, inputs are scheduled, and a later cut of the same frame is longer by them.
+  start(7, 50 * kPart, {1});
+  receivers[1].link.bytes_per_s = 50'000;
+  run_ms(400);
+  ASSERT_GT(receivers[1].held.parts(), 0U);
+  ASSERT_FALSE(receivers[1].whole_ns);
+  start(7, 50 * kPart + 30, {1});
+  EXPECT_LT(run_until_whole(1, 20'000), 10'000);
 }
 
 TEST_F(SnapshotTransferTest, ALinkWhoseRateFallsIsNotFlooded) {
