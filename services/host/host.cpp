@@ -324,8 +324,10 @@ void Host::Impl::note_mishaps() {
   if (now == noted_mishaps || now_ns - last_mishap_note_ns < kSecond) return;
   last_mishap_note_ns = now_ns;
   noted_mishaps = now;
-  note(fmt::format("the simulation explodes: {} bodies removed and {} slowed down since its start",
-                   now.removed, now.clamped));
+  const std::string& last = live->mirror().last_removed();
+  const std::string told = last.empty() ? last : "; the last that clients cannot be told of: " + last;
+  note(fmt::format("bodies of the simulation are not sound: {} removed and {} slowed down since its start{}",
+                   now.removed, now.clamped, told));
 }
 
 void Host::Impl::note_target(std::uint32_t stream) {

@@ -37,19 +37,25 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
 
 Result<void> Mirror::check(const engine::Bodies& bodies) const {
   const std::size_t capacity = shown_.size();
-  bool whole = bodies.alive.size() == capacity && bodies.type.size() == capacity;
-  const auto look_at = [&](const auto& columns) {
-    for (const auto& column : columns) whole = whole && column.size() == capacity;
+  std::string wrong;  // the first
+  const auto look_at = [&](std::string_view name, std::size_t size) {
+    if (wrong.empty() && size != capacity)
+      wrong = fmt::format("the simulation's column {} has {} slots, not {}", name, size, capacity);
   };
-  look_at(bodies.position);
-  look_at(bodies.velocity);
+  const auto look_at_axes = [&](std::string_view name, const auto& columns) {
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      look_at(fmt::format("{}[{}]", name, i), columns[i].size());
+  };
+  look_at("alive", bodies.alive.size());
+  look_at("type", bodies.type.size());
+  look_at_axes("position", bodies.position);
+  look_at_axes("velocity", bodies.velocity);
   if (target_.groups().orientation) {
-    look_at(bodies.orientation);
-    look_at(bodies.angular_velocity);
+    look_at_axes("orientation", bodies.orientation);
+    look_at_axes("angular_velocity", bodies.angular_velocity);
   }
-  if (whole) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("the simulation has body columns that are not of {} slots", capacity));
+  if (wrong.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument, wrong);
 }
 
 void Mirror::quantise(const engine::Bodies& bodies) {
@@ -99,6 +105,32 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
   }
 }
 
+// Says of a body that cannot be told what is wrong with it.
+void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
+  ++mishaps_.removed;
+  const double world = kPositionLimit * lattice_.unit;
+  constexpr std::string_view kAxes = "xyz";
+  std::string why;
+  if (bodies.type[slot] >= type_count_) {
+    why = fmt::format("its type is {}, and the session has {}", bodies.type[slot], type_count_);
+  } else if (target_.groups().orientation) {
+    double norm = 0;
+    for (const auto& column : bodies.orientation) norm += double{column[slot]} * double{column[slot]};
+    why = fmt::format("its orientation has norm {:.3g}, or its angular velocity is not a number",
+                      std::sqrt(norm));
+  }
+  for (std::size_t i = kPositionChannels; i-- > 0;) {
+    const double p = double{bodies.position[i][slot]}, v = double{bodies.velocity[i][slot]};
+    if (!std::isfinite(v)) why = fmt::format("its velocity along {} is not a number", kAxes[i]);
+    if (std::isnan(p)) {
+      why = fmt::format("its {} is not a number", kAxes[i]);
+    } else if (std::abs(p) > world) {
+      why = fmt::format("its {} is {:.4g}, beyond {:.4g}", kAxes[i], p, world);
+    }
+  }
+  last_removed_ = fmt::format("slot {} ({})", slot, why);
+}
+
 void Mirror::clear_hidden() {
   for (Slot s = 0; s < target_.capacity(); ++s) {
     if (shown_[s] == 0) target_.despawn(s);
@@ -110,7 +142,7 @@ void Mirror::start(const engine::Bodies& bodies) {
   quantise(bodies);
   for (Slot s = 0; s < target_.capacity(); ++s) {
     expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
-    mishaps_.removed += expelled_[s];
+    if (expelled_[s] != 0) remove(s, bodies);
     target_.alive()[s] = shown_[s];
     target_.reuse()[s] = 0;
     target_.type()[s] = bodies.type[s];
@@ -143,7 +175,7 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
   const bool shown = shown_[slot] != 0 && expelled_[slot] == 0;
   if (lives && shown_[slot] == 0 && expelled_[slot] == 0) {
     expelled_[slot] = 1;
-    ++mishaps_.removed;
+    remove(slot, bodies);
   }
   shown_[slot] = static_cast<std::uint8_t>(shown);
 

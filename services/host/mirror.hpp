@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
@@ -24,7 +25,7 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
 /// type; one that stops being so is despawned and stays away until the engine despawns, spawns or teleports
 /// it. Velocities saturate, and what turns by more than kMaxTurn in a step is slowed. With orientations they
 /// must be some too: a quaternion that is not finite or far from norm 1 takes a body off. Allocates nothing
-/// after construction. Not thread-safe.
+/// after construction but the text of last_removed(). Not thread-safe.
 class Mirror {
  public:
   /// `type_count`: types the session lists, 1 or more. `groups`: those of all its streams together.
@@ -42,12 +43,15 @@ class Mirror {
   [[nodiscard]] const State& target() const { return target_; }
   /// Of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
+  /// Which body it took off last, and why: "slot 3 (its x is not a number)". Empty: none yet.
+  [[nodiscard]] const std::string& last_removed() const { return last_removed_; }
   /// What it mended since the start: bodies taken off, and turns that were slowed, each once a frame.
   [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
 
  private:
   void quantise(const engine::Bodies& bodies);
   void quantise_turns(const engine::Bodies& bodies);
+  void remove(Slot slot, const engine::Bodies& bodies);
   void clear_hidden();
   void record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks);
   void spawn(Slot slot, TypeId type);
@@ -62,6 +66,7 @@ class Mirror {
   std::vector<std::uint8_t> generations_;  // of the next spawn in the slot
   std::vector<LifecycleRecord> lifecycle_;
   engine::Mishaps mishaps_;
+  std::string last_removed_;
 };
 
 }  // namespace tandem::host

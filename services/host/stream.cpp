@@ -19,6 +19,9 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
   };
   if (config.quality) {
+    if (!(config.quality->target_mbit_per_s >= 0))
+      return refuse(
+          fmt::format("a target of {} Mbit/s: it is 0 (none) or more", config.quality->target_mbit_per_s));
     if (!valid_goal(*config.quality, config.layout.parameters.codec))
       return refuse("automatic quality: the threshold must lie between its smallest and its largest");
     const std::size_t least = least_budget(*config.quality, start.frame_rate_hz);

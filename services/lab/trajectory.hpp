@@ -20,7 +20,7 @@ namespace tandem::lab {
 inline constexpr const char* kTrajectoryFormat =
     "X.npy: row 0 is the start; little-endian float32 as numpy saves it, in any unit of length, and "
     "seconds.\n"
-    "Of a body 6 columns: position, velocity; or 13: then the quaternion w, x, y, z from body to world, norm 1 "
+    "Of a body 6 columns: position, velocity; or 13: then the quaternion w, x, y, z (the SDK has x, y, z, w) from body to world, norm 1 "
     "within\n"
     "0.001, and the angular velocity in the world's frame, rad / s, at most 2 rad a row.\n"
     "X.json: an object with\n"

@@ -47,7 +47,7 @@ void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
   if (config.threshold_auto()) return;
   const auto length = number<double>(text);
-  if (!length) commandline::refuse("--threshold", "a positive length, or auto");
+  if (!length) commandline::refuse("--threshold", "a length in metres, or auto");
   config.set_threshold(*length);
 }
 

@@ -46,6 +46,7 @@ CodecTraits traits_of(const std::string& codec) {
   return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
 }
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
+constexpr const char* kLength = "a length from 1e-9 to 1e9 metres";
 bool is_length(double metres) { return within(metres, 1e-9, 1e9); }
 
 /// Numbers that may be words.
@@ -91,7 +92,7 @@ Result<void> check_numbers(const Options& options) {
 /// Threshold, automatic quality and budget: which of them go together.
 Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
   const CodecTraits traits = traits_of(choice.codec);
-  if (choice.threshold_m && !is_length(*choice.threshold_m)) return refuse("threshold", "a positive length");
+  if (choice.threshold_m && !is_length(*choice.threshold_m)) return refuse("threshold", kLength);
   if (!within(choice.threshold_scale, 1e-6, 1e6)) return refuse("threshold-scale", "a positive factor");
   if (choice.threshold_m && config.has_threshold_scale())
     return refuse("threshold-scale", "not together with --threshold");
@@ -105,7 +106,7 @@ Result<void> check_quality(const ServerConfig& config, const sessions::SessionCh
   if (!choice.automatic && choice.max_error_m) return refuse("max-error", "needs --threshold auto");
   if (config.has_target_bandwidth() && !within(choice.target_mbit_per_s, 0.001, 1e6))
     return refuse("target-bandwidth", "Mbit/s, at least 0.001");
-  if (choice.max_error_m && !is_length(*choice.max_error_m)) return refuse("max-error", "a positive length");
+  if (choice.max_error_m && !is_length(*choice.max_error_m)) return refuse("max-error", kLength);
   if (choice.budget_bytes && !traits.takes_budget)
     return refuse("budget", "only with --codec limited or tracker");
   if (choice.budget_bytes && *choice.budget_bytes < sessions::kLeastBudgetBytes)
@@ -138,7 +139,7 @@ Result<void> check_stream(const idl::Stream& stream, const ServerConfig& config,
                                            config.predictor(), stream.name(), stream.predictor()));
   }
   if (stream.has_threshold() && !is_length(stream.threshold()))
-    return wrong("a threshold is a positive length");
+    return wrong(fmt::format("a threshold is {}", kLength));
   if (stream.has_threshold() && (stream.has_target_bandwidth() || stream.has_max_error()))
     return wrong("either a threshold, or one that is chosen at run time by target-bandwidth and max-error");
   if (stream.has_target_bandwidth() && !within(stream.target_bandwidth(), 0.001, 1e6))
@@ -146,7 +147,7 @@ Result<void> check_stream(const idl::Stream& stream, const ServerConfig& config,
   if (stream.has_target_bandwidth() && !traits.reads_threshold)
     return wrong(fmt::format("codec {} has no threshold to reach a target-bandwidth with", choice.codec));
   if (stream.has_max_error() && !is_length(stream.max_error()))
-    return wrong("max-error is a positive length");
+    return wrong(fmt::format("max-error is {}", kLength));
   if (stream.has_max_error() && !choice.automatic)
     return wrong("max-error needs target-bandwidth, or --threshold auto");
   if (stream.has_budget_bytes() && !traits.takes_budget)

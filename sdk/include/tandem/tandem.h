@@ -293,7 +293,8 @@ typedef struct tandem_columns {
   float* velocities; /**< x, y, z; scene units / s: how fast `positions` move, with a correction that is being
                         blended in. With `smoothing_s` 0, as the bodies move on the server */
   float* orientations; /**< quaternion x, y, z, w of norm 1, from the body's frame to the world's; q and -q
-                          are the same. Left as they are where the session has none */
+                          are the same. Left as they are where the session has none. Trajectory files have w
+                          first */
   float* angular_velocities; /**< x, y, z in the world's frame; rad / s; without corrections; likewise */
   uint16_t* types;           /**< for tandem_get_type() */
   uint8_t* alive;            /**< 1: the slot holds a body. 0: the other columns but `changes` say nothing */

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -38,7 +39,16 @@ TEST(HeapTest, WhatIsFreeBelowABlockInUseIsGivenBack) {
 }
 
 TEST(HeapTest, ATrimmerEndsWithoutWaitingForItsTime) {
-  for (int i = 0; i < 100; ++i) tandem::HeapTrimmer trimmer;
+  const auto threads = [] {
+    const std::filesystem::directory_iterator tasks("/proc/self/task");
+    return std::distance(begin(tasks), end(tasks));
+  };
+  const auto before = threads();
+  for (int i = 0; i < 100; ++i) {
+    const tandem::HeapTrimmer trimmer;
+    EXPECT_EQ(threads(), before + 1);
+  }
+  EXPECT_EQ(threads(), before);
 }
 
 }  // namespace

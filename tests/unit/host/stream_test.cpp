@@ -145,10 +145,10 @@ TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
   simulation.turn();
   EXPECT_EQ(refused(), "");
   simulation.orientation[3].pop_back();
-  EXPECT_NE(refused().find("body columns"), std::string::npos) << refused();
+  EXPECT_NE(refused().find("column "), std::string::npos) << refused();
   simulation.turn();
   simulation.angular_velocity[0].clear();
-  EXPECT_NE(refused().find("body columns"), std::string::npos) << refused();
+  EXPECT_NE(refused().find("column "), std::string::npos) << refused();
 }
 
 TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {

@@ -337,7 +337,7 @@ TEST(StreamOption, WhatMakesNoSessionIsSaidInOneLine) {
        "1 to 8 streams, not 9");
   says({"thin:ballistic", "rich:field"}, "--stream rich says field",
        [](Config& config) { config.set_predictor("ballistic"); });
-  says({"a:threshold=-1"}, "a threshold is a positive length");
+  says({"a:threshold=-1"}, "a threshold is a length from 1e-9 to 1e9 metres");
   says({"a:threshold=1,target-bandwidth=1"}, "either a threshold");
   says({"a:codec=none,target-bandwidth=1"}, "codec none has no threshold");
   says({"a:max-error=1"}, "max-error needs target-bandwidth");
