@@ -112,6 +112,16 @@ struct Server::Impl {
     return host->state() == host::Host::State::kRefused || host->state() == host::Host::State::kEnded;
   }
   bool poll(std::int64_t longest_ns) {
+    if (polling) {
+      error = {ErrorCode::kOutOfOrder, "poll() was called by the simulation or the log, inside poll()"};
+      return false;
+    }
+    polling = true;
+    const bool goes_on = poll_once(longest_ns);
+    polling = false;
+    return goes_on;
+  }
+  bool poll_once(std::int64_t longest_ns) {
     if (over() || publisher.gave_up()) return false;
     host->poll(steady_ns(), wall_ns());
     for (const std::string& line : host->take_notices())
@@ -133,6 +143,7 @@ struct Server::Impl {
   std::unique_ptr<transport::ServerPort> port;
   std::unique_ptr<host::Host> host;
   host::Publisher publisher;  // last: it stops before what it writes to is gone
+  bool polling = false;
   Error error{ErrorCode::kOutOfOrder, "the session goes on"};
 };
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <functional>
 #include <limits>
 
 namespace tandem {
@@ -19,6 +20,7 @@ class Standing : public engine::Simulation {
   [[nodiscard]] engine::Vec3 gravity() const override { return {0, 0, 0}; }
   void step() override {
     if (++steps == shrinks_at) zeros.resize(1);
+    if (on_step) on_step();
   }
   [[nodiscard]] engine::Bodies bodies() const override {
     return {{zeros, zeros, zeros}, {zeros, zeros, zeros}, alive, types};
@@ -27,6 +29,7 @@ class Standing : public engine::Simulation {
   std::vector<std::uint8_t> alive = std::vector<std::uint8_t>(2, 1);
   std::vector<std::uint16_t> types = std::vector<std::uint16_t>(2, 0);
   int steps = 0, shrinks_at = 0;
+  std::function<void()> on_step;
 };
 
 class ServerApi : public ::testing::Test {
@@ -91,9 +94,22 @@ TEST_F(ServerApi, ColumnsThatShrinkEndTheSessionAndSayWhy) {
   ASSERT_TRUE(server.has_value()) << server.error().message;
   while (server->poll()) ASSERT_LT(standing.steps, 4);
   EXPECT_EQ(server->error().code, ErrorCode::kInvalidArgument);
-  EXPECT_NE(server->error().message.find("columns"), std::string::npos);
+  EXPECT_NE(server->error().message.find("column position[0] has 1 slots"), std::string::npos);
   EXPECT_EQ(server->status().frame, 2U);
   EXPECT_FALSE(server->run_for(1));
+}
+
+TEST_F(ServerApi, APollInsideAPollIsRefusedAndTheSessionGoesOn) {
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server) << server.error().message;
+  int refused = 0;
+  standing.on_step = [&] {
+    if (!server->poll(1) && server->error().code == ErrorCode::kOutOfOrder) ++refused;
+    EXPECT_FALSE(server->run_for(1));
+  };
+  for (int i = 0; i < 10'000 && standing.steps < 5; ++i) ASSERT_TRUE(server->poll());
+  EXPECT_EQ(refused, standing.steps);
+  EXPECT_GE(standing.steps, 5);
 }
 
 TEST_F(ServerApi, TimesThatAreNoneAreNoTime) {

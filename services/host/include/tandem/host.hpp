@@ -84,7 +84,8 @@ class __attribute__((visibility("default"))) Server {
 
   /// Does what is due, which may be a step of the simulation, and waits at most `wait_s`, 0..1, for the next
   /// thing. What is below the range or no number counts as 0, what is above it as 1. False once the session
-  /// cannot go on: see error().
+  /// cannot go on: see error(). False too, doing nothing (kOutOfOrder), where the simulation or the log calls
+  /// it inside a poll(); the outer one goes on.
   bool poll(double wait_s = 0.05);
   /// Polls for so long, or until the session cannot go on; returns as poll(). What is negative or no number
   /// counts as 0: then it does nothing.
