@@ -63,7 +63,10 @@ constexpr std::array kTable{
 
 std::string known_names() {
   std::string text;
-  for (const std::string& name : predictor_names()) (text += text.empty() ? "" : ", ") += name;
+  for (auto each = kTable.rbegin(); each != kTable.rend(); ++each) {
+    if (!text.empty()) text += ", ";
+    text += each->name;
+  }
   return text;
 }
 
