@@ -35,6 +35,13 @@ class TransferWindow {
     std::int64_t last_arrived_at_ns = 0;  // when the last of them had been sent
   };
 
+  /// Called whenever the caller looks what may leave. One that looks seldom, as a server whose frames take
+  /// long, may catch up by the time between two looks.
+  void look(std::int64_t now_ns) {
+    if (now_ns == looked_ns_) return;
+    behind_ns_ = std::clamp(now_ns - looked_ns_, kBurstNs, kMostBehindNs);
+    looked_ns_ = now_ns;
+  }
   /// A part of so many bytes may leave beside those in flight.
   [[nodiscard]] bool admits(std::size_t bytes, std::int64_t now_ns) const {
     return flying_ == 0 || (flying_ + bytes <= bytes_ && now_ns >= next_ns_);
@@ -50,8 +57,7 @@ class TransferWindow {
     }
     flying_ += bytes;
     if (pace_ > 0) {
-      // A caller that polls is a few milliseconds late and may catch up by that much, but not after a pause.
-      const std::int64_t from_ns = std::max(next_ns_, now_ns - kBurstNs);
+      const std::int64_t from_ns = std::max(next_ns_, now_ns - behind_ns_);
       next_ns_ = from_ns + static_cast<std::int64_t>(static_cast<double>(bytes) / pace_ * 1e9);
     }
     return {now_ns, bytes, arrived_, arrived_ns_, last_arrived_at_ns_};
@@ -85,6 +91,7 @@ class TransferWindow {
  private:
   static constexpr double kStartGain = 2.9;  // BBR's 2/ln 2: twice the rate each round trip
   static constexpr std::int64_t kBurstNs = 5 * kMillisecond;
+  static constexpr std::int64_t kMostBehindNs = kSecond;
   // Acknowledgements come 20 ms apart; two that jitter moved together must not pass for a fast link.
   static constexpr std::int64_t kLeastGapNs = 10 * kMillisecond;
   static constexpr std::size_t kTrain = 5'200;  // bytes: four parts
@@ -129,6 +136,8 @@ class TransferWindow {
   std::size_t flying_ = 0;
   double pace_ = 0;  // bytes a second; 0: none
   std::int64_t next_ns_ = INT64_MIN;
+  std::int64_t looked_ns_ = 0;
+  std::int64_t behind_ns_ = kBurstNs;
   std::uint64_t arrived_ = 0;
   std::int64_t arrived_ns_ = 0;
   std::int64_t last_arrived_at_ns_ = 0;

@@ -121,6 +121,7 @@ std::optional<std::size_t> Passage::wanted() {
 }
 
 std::optional<std::size_t> Passage::next(std::int64_t now_ns) {
+  window_.look(now_ns);
   if (const auto part = wanted()) {
     if (window_.admits(snapshot_->size_of(*part), now_ns)) {
       if (*part == unsent_) {
