@@ -43,7 +43,7 @@ class Mirror {
   [[nodiscard]] const State& target() const { return target_; }
   /// Of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
-  /// Which body it took off last, and why: "slot 3 (its x is not a number)". Empty: none yet.
+  /// The body that was taken off last and the reason, as "slot 3 (its x is not a number)". Empty: none yet.
   [[nodiscard]] const std::string& last_removed() const { return last_removed_; }
   /// What it mended since the start: bodies taken off, and turns that were slowed, each once a frame.
   [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }

@@ -22,8 +22,8 @@ constexpr std::size_t kSlackBytes = 64U << 10U;
 // Parts of one receiver queued in one go, so that many receivers take turns.
 constexpr int kTurn = 16;
 
-// Of each part, whether the acknowledgement says that it is held. One with the most runs allowed says nothing
-// of the parts after the last run.
+// Tells for each part whether the acknowledgement says that it is held. An acknowledgement with the most runs
+// allowed says nothing about the parts after the last run.
 std::vector<bool> held_parts(const transport::AckMessage& ack, std::size_t parts) {
   std::vector<bool> held(parts, true);
   std::size_t told = 0;
@@ -37,6 +37,19 @@ std::vector<bool> held_parts(const transport::AckMessage& ack, std::size_t parts
   if (ack.missing.size() >= 2 * transport::kMaxMissingRuns)
     std::fill(held.begin() + static_cast<std::ptrdiff_t>(told), held.end(), false);
   return held;
+}
+
+std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream, Frame frame,
+                                              std::span<const std::byte> bytes) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->bytes.assign(bytes.begin(), bytes.end());
+  snapshot->head.epoch = epoch;
+  snapshot->head.stream = stream;
+  snapshot->head.frame = frame;
+  snapshot->head.parts = static_cast<std::uint32_t>((bytes.size() + SnapshotTransfer::kPartBytes - 1) /
+                                                    SnapshotTransfer::kPartBytes);
+  snapshot->head.total_bytes = static_cast<std::uint32_t>(bytes.size());
+  return snapshot;
 }
 
 }  // namespace
@@ -160,31 +173,18 @@ std::int64_t Passage::next_ns() const {
 
 bool Passage::exhausted() const { return sent_bytes_ > kMostTimes * snapshot_->bytes.size() + kSlackBytes; }
 
-std::shared_ptr<const Snapshot> SnapshotTransfer::make_snapshot(Epoch epoch, StreamId stream, Frame frame,
-                                                                std::span<const std::byte> bytes) {
-  auto snapshot = std::make_shared<Snapshot>();
-  snapshot->bytes.assign(bytes.begin(), bytes.end());
-  snapshot->head.epoch = epoch;
-  snapshot->head.stream = stream;
-  snapshot->head.frame = frame;
-  snapshot->head.parts = static_cast<std::uint32_t>((bytes.size() + kPartBytes - 1) / kPartBytes);
-  snapshot->head.total_bytes = static_cast<std::uint32_t>(bytes.size());
-  return snapshot;
-}
-
 void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
                              std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
-  const StreamId cut_of = latest_ ? latest_->head.stream : StreamId{};
   // A frame that stands still is cut once: receivers tell snapshots apart by their frame. Inputs that came
   // since reach them by the topic of inputs.
-  if (!latest_ || latest_->head.epoch != epoch || cut_of != stream || latest_->head.frame != frame)
-    latest_ = make_snapshot(epoch, stream, frame, bytes);
-  const std::shared_ptr<const Snapshot> snapshot = latest_;
-  largest_ = std::max(largest_, snapshot->bytes.size());
-  if (held_count_and_bytes(true, now_ns).second + snapshot->bytes.size() > kMostHeldBytes)
+  const bool is_same = latest_ && latest_->head.epoch == epoch && latest_->head.stream == stream &&
+                       latest_->head.frame == frame;
+  if (!is_same) latest_ = make_snapshot(epoch, stream, frame, bytes);
+  largest_ = std::max(largest_, latest_->bytes.size());
+  if (held_count_and_bytes(true, now_ns).second + latest_->bytes.size() > kMostHeldBytes)
     std::erase_if(passages_, [&](const auto& entry) { return stalled(entry.second, now_ns); });
   for (const transport::ClientId client : receivers)
-    passages_.insert_or_assign(client, Passage(snapshot, now_ns));
+    passages_.insert_or_assign(client, Passage(latest_, now_ns));
   next_ns_ = now_ns;
 }
 

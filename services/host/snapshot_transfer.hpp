@@ -111,9 +111,6 @@ class SnapshotTransfer {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  [[nodiscard]] static std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream,
-                                                                     Frame frame,
-                                                                     std::span<const std::byte> bytes);
   [[nodiscard]] static bool stalled(const Passage& passage, std::int64_t now_ns);
   /// Of the snapshots held; `all`: also of those whose receivers are stalled.
   [[nodiscard]] std::pair<std::size_t, std::size_t> held_count_and_bytes(bool all, std::int64_t now_ns) const;
@@ -122,7 +119,7 @@ class SnapshotTransfer {
 
   Outbox* outbox_;
   std::map<transport::ClientId, Passage> passages_;
-  std::shared_ptr<const Snapshot> latest_;
+  std::shared_ptr<const Snapshot> latest_;  // kept for those who ask again while its frame stands still
   transport::ClientId last_served_ = 0;
   std::size_t largest_ = 0;  // snapshot so far
   std::int64_t next_ns_ = INT64_MAX;

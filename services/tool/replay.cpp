@@ -53,7 +53,7 @@ struct Served {
 struct ReplayState {
   Epoch epoch = 0;      ///< the last; 0 before the first
   bool sought = false;  ///< a client did
-  /// Of the last run. It stays when all is over, as the program reports its end before DDS ends.
+  /// The port of the last run. It outlives the work, so that the program can report before DDS ends.
   std::unique_ptr<transport::ServerPort> port;
   std::future<void> ending;  ///< the end of the port before; its destructor waits for that
   accounts::TokenBucket seeks{1, 1};

@@ -1,11 +1,11 @@
 #pragma once
-// What a codec has to know of the predicted step whose errors it corrects.
+// How the codec `tracker` reads the errors of a predicted step.
 
 #include <cstdint>
 
 namespace tandem {
 
-/// What the codec `tracker` makes of the errors that a predicted step leaves.
+/// Constants of the codec `tracker` that depend on the predictor whose errors it corrects.
 ///
 /// A position error d that grew over k frames is explained by a velocity error d / k, or by an acceleration
 /// error of about 2 d / k^2. Noise (rounding to steps, the error inside the ball) is as large as d itself, so

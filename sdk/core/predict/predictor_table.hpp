@@ -29,8 +29,8 @@ struct GainAim {
 /// A new predictor is a line of predictor_table.cpp, and a folder with its step.
 struct PredictorTraits {
   std::string_view name;
-  /// Which bodies it suits, for `--predictor auto`: worlds with at most so many, 0: it is never chosen by
-  /// itself; and where set, only spheres of about one size. Others cost it more than it gains.
+  /// `--predictor auto` chooses this predictor for worlds with at most this many bodies; 0: never. Where
+  /// `only_spheres` is set, they must be spheres of about one size: others cost it more than it gains.
   std::uint32_t most_bodies = 0;
   bool only_spheres = false;
   /// Its constants are the world's geometry and materials (ContactConstants); otherwise it has none.
