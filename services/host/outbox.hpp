@@ -41,7 +41,7 @@ class Outbox {
  public:
   struct Limits {
     std::uint32_t frames = 8;      ///< whatever their number of streams and parts
-    std::uint32_t snapshots = 64;  ///< parts of snapshots
+    std::uint32_t snapshots = 512;  ///< parts of snapshots
     std::uint32_t control = 1024;  ///< everything else
   };
   explicit Outbox(const Limits& limits) : limits_(limits) {}

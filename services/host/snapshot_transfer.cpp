@@ -209,11 +209,16 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
   if (passages_.empty()) return;
   // In turns: whoever follows the one that was served last comes first.
   auto next = passages_.upper_bound(last_served_);
-  for (std::size_t i = 0; i < passages_.size(); ++i, ++next) {
+  std::size_t satisfied = 0;  // one after another, in this round
+  while (satisfied < passages_.size()) {
     if (next == passages_.end()) next = passages_.begin();
+    const std::uint64_t before = bytes_;
     if (!serve(next->first, next->second, now_ns)) return;
+    satisfied = bytes_ == before ? satisfied + 1 : 0;
     last_served_ = next->first;
+    ++next;
   }
+  for (const auto& [client, passage] : passages_) next_ns_ = std::min(next_ns_, passage.next_ns());
 }
 
 bool SnapshotTransfer::serve(transport::ClientId client, Passage& passage, std::int64_t now_ns) {
@@ -227,7 +232,6 @@ bool SnapshotTransfer::serve(transport::ClientId client, Passage& passage, std::
     static_cast<void>(outbox_->push(SnapshotPart{client, passage.snapshot()->cut(*part)}));
     bytes_ += passage.snapshot()->size_of(*part);
   }
-  next_ns_ = std::min(next_ns_, passage.next_ns());
   return true;
 }
 

@@ -270,19 +270,18 @@ TEST_F(SnapshotTransferTest, WhatDdsRepeatsNoLongerIsSentAgainSoonAfterALossOfSe
 }
 
 TEST_F(SnapshotTransferTest, AServerWhoseFramesTakeLongStillFillsALink) {
-  start(7, 3'000'000, {1});
-  receivers[1].link.bytes_per_s = 1e7;
+  start(7, 15'000'000, {1});  // a million bodies
+  receivers[1].link.bytes_per_s = 1e8;
   for (int frame = 0; frame < 100 && !receivers[1].whole_ns; ++frame) {
-    for (int turn = 0; turn < 8; ++turn)
-      for (const auto& [client, part] : send()) receivers.at(client).send(part, now_ns, random);
-    for (int ms = 0; ms < 200; ++ms) {
+    for (const auto& [client, part] : send()) receivers.at(client).send(part, now_ns, random);
+    for (int ms = 0; ms < 333; ++ms) {
       if (receivers[1].receive(now_ns)) due[1] = true;
       now_ns += kMillisecond;
     }
     if (due[1]) acknowledge(1);
   }
   ASSERT_TRUE(receivers[1].whole_ns);
-  EXPECT_LT(*receivers[1].whole_ns - began_ns, 10 * kSecond);
+  EXPECT_LT(*receivers[1].whole_ns - began_ns, 15 * kSecond);
 }
 
 TEST_F(SnapshotTransferTest, AFrameThatStandsStillIsOneSnapshot) {
