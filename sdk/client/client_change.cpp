@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "sdk/client/client_core.hpp"
-#include "sdk/client/session_check.hpp"
+#include "sdk/client/session/session_check.hpp"
 #include "sdk/transport/units.hpp"
 
 namespace tandem::client {

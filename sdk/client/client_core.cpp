@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/client/reply_reason.hpp"
-#include "sdk/client/session_check.hpp"
+#include "sdk/client/session/reply_reason.hpp"
+#include "sdk/client/session/session_check.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
 

@@ -10,14 +10,14 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/drawing/picture.hpp"
+#include "sdk/client/drawing/sampler.hpp"
 #include "sdk/client/epoch_state.hpp"
-#include "sdk/client/picture.hpp"
-#include "sdk/client/sampler.hpp"
-#include "sdk/client/sent_inputs.hpp"
-#include "sdk/client/statistics.hpp"
-#include "sdk/client/status_report.hpp"
-#include "sdk/client/stream_choice.hpp"
+#include "sdk/client/following/delta_assembly.hpp"
+#include "sdk/client/session/sent_inputs.hpp"
+#include "sdk/client/session/statistics.hpp"
+#include "sdk/client/session/status_report.hpp"
+#include "sdk/client/session/stream_choice.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/client_types.hpp"

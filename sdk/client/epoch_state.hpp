@@ -4,13 +4,13 @@
 #include <cstdint>
 #include <optional>
 
-#include "sdk/client/followed_stream.hpp"
-#include "sdk/client/lag_limit.hpp"
-#include "sdk/client/local_echo.hpp"
-#include "sdk/client/picture_writer.hpp"
-#include "sdk/client/scheduled_inputs.hpp"
-#include "sdk/client/server_clock.hpp"
-#include "sdk/client/uncorrected.hpp"
+#include "sdk/client/drawing/local_echo.hpp"
+#include "sdk/client/drawing/picture_writer.hpp"
+#include "sdk/client/drawing/server_clock.hpp"
+#include "sdk/client/drawing/uncorrected.hpp"
+#include "sdk/client/following/followed_stream.hpp"
+#include "sdk/client/following/lag_limit.hpp"
+#include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/transport/messages.hpp"
 
 namespace tandem::client {

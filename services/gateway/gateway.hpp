@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "sdk/client/delta_assembly.hpp"
-#include "sdk/client/sent_inputs.hpp"
+#include "sdk/client/following/delta_assembly.hpp"
+#include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/transport/messages.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/gateway/counts.hpp"

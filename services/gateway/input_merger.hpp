@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "sdk/client/sent_inputs.hpp"
+#include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/transport/messages.hpp"
 #include "services/accounts/token_bucket.hpp"
 #include "services/gateway/world.hpp"

@@ -7,8 +7,8 @@
 
 #include "services/gateway/command_line.hpp"
 #include "services/gateway/run.hpp"
-#include "services/heap/heap.hpp"
-#include "services/signals/signal_watch.hpp"
+#include "services/process/heap.hpp"
+#include "services/process/signal_watch.hpp"
 
 int main(int argc, char** argv) {
   try {

@@ -10,18 +10,18 @@
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
-#include "services/host/audience.hpp"
-#include "services/host/claim.hpp"
-#include "services/host/inputs.hpp"
-#include "services/host/joins.hpp"
-#include "services/host/live_source.hpp"
-#include "services/host/pacing.hpp"
-#include "services/host/publication.hpp"
-#include "services/host/replies.hpp"
-#include "services/host/roster.hpp"
-#include "services/host/snapshot_transfer.hpp"
-#include "services/host/status.hpp"
-#include "services/host/window.hpp"
+#include "services/host/clients/audience.hpp"
+#include "services/host/clients/claim.hpp"
+#include "services/host/clients/inputs.hpp"
+#include "services/host/clients/joins.hpp"
+#include "services/host/clients/pacing.hpp"
+#include "services/host/clients/replies.hpp"
+#include "services/host/clients/roster.hpp"
+#include "services/host/clients/snapshot_transfer.hpp"
+#include "services/host/clients/window.hpp"
+#include "services/host/frames/live_source.hpp"
+#include "services/host/outgoing/publication.hpp"
+#include "services/host/outgoing/status.hpp"
 
 namespace tandem::host {
 namespace {
@@ -70,26 +70,22 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   return {};
 }
 
-// Names by id, of a source that has none of its own the numbers.
-std::vector<std::string> names_of(std::size_t streams, const LiveSource* live) {
+std::vector<std::string> names_of(const FrameSource& source) {
   std::vector<std::string> names;
-  for (std::uint32_t id = 0; id < streams; ++id)
-    names.push_back(live != nullptr ? live->config(id).name : std::to_string(id));
+  for (std::uint32_t id = 0; id < source.session().streams.size(); ++id) names.push_back(source.name(id));
   return names;
 }
 
 }  // namespace
 
 struct Host::Impl {
-  Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames, LiveSource* simulated,
-       transport::ServerPort& endpoints)
+  Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames, transport::ServerPort& endpoints)
       : config(std::move(configuration)),
         port(&endpoints),
         source(std::move(frames)),
-        live(simulated),
         outbox(config.outbox),
         roster({.epoch = config.epoch,
-                .streams = names_of(source->session().streams.size(), live),
+                .streams = names_of(*source),
                 .client_limit = config.client_limit,
                 .participant_limit = config.participant_limit,
                 .stall_timeout_ns = config.stall_timeout_ns,
@@ -100,17 +96,16 @@ struct Host::Impl {
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate) {
     const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
-    const std::vector<std::string> names = names_of(streams, live);
     for (std::uint32_t id = 0; id < streams; ++id) {
       lanes.emplace_back(id, config, outbox);
-      lanes.back().totals.name = names[id];
+      lanes.back().totals.name = source->name(id);
     }
     report.frame = source->frame();
     report.deltas.reserve(streams);
   }
 
   static Result<std::unique_ptr<Host>> create(ServiceConfig config, std::unique_ptr<FrameSource> source,
-                                              LiveSource* live, transport::ServerPort& port);
+                                              transport::ServerPort& port);
 
   // --- What the rules see ---
   [[nodiscard]] Roster::Now moment() const {
@@ -153,9 +148,7 @@ struct Host::Impl {
   [[nodiscard]] HostTotals totals_now() const;
   void note(std::string notice);
   void note_foreigner(transport::ClientId client);
-  void note_mishaps();
   void refuse_stream(const transport::Received<transport::AckMessage>& ack);
-  void note_target(std::uint32_t stream);
 
   // What each stream has of its own.
   struct Lane {
@@ -165,7 +158,6 @@ struct Host::Impl {
     SnapshotTransfer transfer;
     StatusDesk status;
     StreamTotals totals;
-    bool out_of_reach = false;  // of its target of quality
   };
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
@@ -173,7 +165,6 @@ struct Host::Impl {
   ServiceConfig config;
   transport::ServerPort* port;
   std::unique_ptr<FrameSource> source;
-  LiveSource* live;  // the same, where a simulation runs
   Outbox outbox;
   Roster roster;
   InputDesk inputs;
@@ -189,8 +180,6 @@ struct Host::Impl {
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
   std::optional<std::int64_t> first_poll_ns;
   std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
-  std::int64_t last_mishap_note_ns = -kSecond;
-  engine::Mishaps noted_mishaps;
   Waiting waiting = Waiting::kNothing;  // what the due frame waits for, since the last poll
   Frame written_then = 0;               // at the last poll
   bool held = false;                    // the due frame had to wait
@@ -316,34 +305,6 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
   note(fmt::format("client {} is used by a second participant: refused", client_name(client)));
 }
 
-void Host::Impl::note_mishaps() {
-  engine::Mishaps now = live->simulation().mishaps();
-  const engine::Mishaps shown = live->mirror().mishaps();
-  now.removed += shown.removed;
-  now.clamped += shown.clamped;
-  if (now == noted_mishaps || now_ns - last_mishap_note_ns < kSecond) return;
-  last_mishap_note_ns = now_ns;
-  noted_mishaps = now;
-  const std::string& last = live->mirror().last_removed();
-  const std::string told = last.empty() ? last : "; the last that clients cannot be told of: " + last;
-  note(fmt::format("bodies of the simulation are not sound: {} removed and {} slowed down since its start{}",
-                   now.removed, now.clamped, told));
-}
-
-void Host::Impl::note_target(std::uint32_t stream) {
-  const Stream* const made = live->stream(stream);
-  if (made->target_out_of_reach() == lanes[stream].out_of_reach) return;
-  lanes[stream].out_of_reach = made->target_out_of_reach();
-  const StreamConfig& of = made->config();
-  const std::string which = of.name.empty() ? std::string() : " of stream " + of.name;
-  if (!made->target_out_of_reach()) {
-    note(fmt::format("the target of {} Mbit/s{} is kept again", of.quality->target_mbit_per_s, which));
-    return;
-  }
-  note(fmt::format("the target of {} Mbit/s{} is exceeded even at the largest threshold, {:.3g} m",
-                   of.quality->target_mbit_per_s, which, of.quality->largest_threshold * of.lattice.unit));
-}
-
 StreamSet Host::Impl::snapshots_due() {
   StreamSet due;
   for (std::uint32_t id = 0; id < lanes.size(); ++id)
@@ -356,11 +317,8 @@ void Host::Impl::choose_streams(StreamSet joined) {
   const StreamSet before = source->active();
   source->set_active(audience.wanted(roster, now_ns) | joined);
   const StreamSet ended = before & ~source->active();
-  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
-    if (!ended[id]) continue;
-    lanes[id].transfer.end();
-    lanes[id].out_of_reach = false;
-  }
+  for (std::uint32_t id = 0; id < lanes.size(); ++id)
+    if (ended[id]) lanes[id].transfer.end();
 }
 
 void Host::Impl::look_around() {
@@ -400,25 +358,24 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   const auto frame = source->next(snapshots_due, outbox);
   if (!frame) {
     state = State::kEnded;
-    if (live != nullptr) error = live->error();
+    error = source->error();
     return false;
   }
   const std::int64_t produced = clock();
   push_frame(outbox, config.epoch, *frame, wall_ns + (produced - start));
   times.published(frame->frame, now_ns);
-  if (live != nullptr) note_mishaps();
   report.frame = frame->frame;
   report.frame_ms = static_cast<double>(produced - start) * 1e-6;
   report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
   report.deltas.clear();
-  for (const FrameSource::MadeDelta& made : frame->deltas) {
+  for (const MadeDelta& made : frame->deltas) {
     report.deltas.push_back({made.stream, made.hash, made.payload.size(), made.corrected});
     StreamTotals& of_stream = lanes[made.stream].totals;
     ++of_stream.frames;
     of_stream.payload_bytes += made.payload.size();
     of_stream.corrected += made.corrected;
-    if (live != nullptr) note_target(made.stream);
   }
+  for (std::string& line : source->take_notices(now_ns)) note(std::move(line));
   ++totals.frames;
   frame_durations.add(produced - start);
   for (Lane& lane : lanes) lane.status.frame_took(produced - start);
@@ -515,24 +472,22 @@ Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
   auto source = LiveSource::create(config, simulation);
   if (!source) return tl::unexpected(source.error());
-  LiveSource* const live = source->get();
-  return Impl::create(std::move(config), std::move(*source), live, port);
+  return Impl::create(std::move(config), std::move(*source), port);
 }
 
 Result<std::unique_ptr<Host>> Host::create(ServiceConfig config, std::unique_ptr<FrameSource> source,
                                            transport::ServerPort& port) {
-  return Impl::create(std::move(config), std::move(source), nullptr, port);
+  return Impl::create(std::move(config), std::move(source), port);
 }
 
 Result<std::unique_ptr<Host>> Host::Impl::create(ServiceConfig config, std::unique_ptr<FrameSource> source,
-                                                 LiveSource* live, transport::ServerPort& port) {
+                                                 transport::ServerPort& port) {
   if (auto good = check(config); !good) return tl::unexpected(good.error());
   if (auto good = transport::check_announcement(source->session()); !good)
     return tl::unexpected(good.error());
   const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
   if (auto opened = port.open_streams(streams); !opened) return tl::unexpected(opened.error());
-  return std::unique_ptr<Host>(
-      new Host(std::make_unique<Impl>(std::move(config), std::move(source), live, port)));
+  return std::unique_ptr<Host>(new Host(std::make_unique<Impl>(std::move(config), std::move(source), port)));
 }
 
 Host::Host(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -549,15 +504,9 @@ Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
-Result<Frame> Host::inject(const engine::Input& input) {
-  if (impl_->live == nullptr) return fail(ErrorCode::kUnsupported, "nothing is simulated here");
-  return impl_->live->inject(input, impl_->outbox);
-}
+Result<Frame> Host::inject(const engine::Input& input) { return impl_->source->inject(input, impl_->outbox); }
 Result<void> Host::set_parameters(const StreamParameters& parameters, std::uint32_t stream) {
-  if (impl_->live == nullptr) return fail(ErrorCode::kUnsupported, "nothing is simulated here");
-  Stream* const made = impl_->live->stream(stream);
-  if (made == nullptr) return fail(ErrorCode::kOutOfOrder, "nobody plays this stream");
-  return made->set_parameters(parameters);
+  return impl_->source->set_parameters(stream, parameters);
 }
 const StreamParameters& Host::parameters(std::uint32_t stream) const {
   return impl_->source->parameters(stream);

@@ -10,85 +10,14 @@
 #include <vector>
 
 #include "sdk/transport/port.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/host/frame_source.hpp"
-#include "services/host/outbox.hpp"
-#include "services/host/stream.hpp"
+#include "services/host/frames/configuration.hpp"
+#include "services/host/frames/frame_source.hpp"
+#include "services/host/outgoing/outbox.hpp"
+#include "services/host/outgoing/report.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::host {
-
-/// What a host decides by itself, whatever its frames come from.
-struct ServiceConfig {
-  std::string session = "default";
-  Epoch epoch = 1;  ///< ms of wall clock at the process's start
-
-  double frame_rate_hz = 30;            ///< nominal; decides the period and what a client is blamed for
-  bool free_rate = false;               ///< as fast as window and queue allow (--rate max)
-  std::optional<std::uint32_t> window;  ///< frames; empty: automatic from measured round trips
-  std::uint32_t window_ceiling = 24;
-  std::optional<std::int64_t> stall_timeout_ns = kSecond / 2;  ///< empty: nobody is demoted
-  std::uint32_t wait_for = 0;                                  ///< participants that must play before frame 1
-  std::uint32_t client_limit = 256;
-  std::uint32_t participant_limit = 16;  ///< clients of one DDS participant, or it could take all seats
-  std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
-  Outbox::Limits outbox;
-
-  /// For measurement only: a monotonic clock in nanoseconds; without one all durations read 0, and deltas are
-  /// stamped with the time at which their frame started.
-  std::int64_t (*clock_ns)() = nullptr;
-};
-
-/// The same with a simulation that runs.
-struct HostConfig : ServiceConfig {
-  Frame start_frame = 0;
-  /// 1 to 8 ways of telling all bodies, of one lattice and one lead, 0 or 1; layout.capacity is the
-  /// simulation's. Several have names, each its own. Clients choose (sdk/client/stream_choice.hpp); one that
-  /// chooses nothing plays the first.
-  std::vector<StreamConfig> streams;
-
-  std::string scene;
-  std::string scene_description;
-  /// layout.type_count of them: what clients draw.
-  std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
-};
-
-/// A stream's share of a frame.
-struct DeltaReport {
-  std::uint32_t stream = 0;
-  std::uint64_t hash = 0;
-  std::size_t payload_bytes = 0;
-  std::uint32_t corrected = 0;
-};
-
-/// One frame that was just produced.
-struct FrameReport {
-  Frame frame = 0;
-  std::vector<DeltaReport> deltas;   ///< of each stream that was made, ascending
-  double frame_ms = 0, step_ms = 0;  ///< whole frame (step, quantise, predict, encode, apply); engine alone
-};
-
-/// Counts of one stream since the start.
-struct StreamTotals {
-  std::string name;
-  bool made = false;  ///< now
-  std::uint64_t frames = 0, corrected = 0, payload_bytes = 0;
-  std::uint64_t snapshots = 0, snapshot_bytes = 0;
-  std::uint32_t participants = 0, observers = 0;  ///< now
-};
-
-/// Counts since the start, of all streams together where streams differ.
-struct HostTotals {
-  std::uint64_t frames = 0, corrected = 0;
-  std::uint64_t payload_bytes = 0, snapshot_bytes = 0;  ///< of the deltas and snapshots themselves
-  std::uint64_t reply_bytes = 0, input_bytes = 0;       ///< of replies and scheduled inputs as messages
-  std::uint64_t stalls = 0;                             ///< suspensions that a participant caused
-  std::uint64_t suspended_ms = 0;  ///< waiting past due, for participants or for the queue
-  std::uint64_t refused_inputs = 0, refused_messages = 0, snapshots = 0, demotions = 0, clients_seen = 0;
-  double frame_ms_p50 = 0, frame_ms_p99 = 0;
-  std::vector<StreamTotals> streams;  ///< in the order of their ids
-};
 
 /// Drives one session. Call poll() from one thread, whenever something arrived and at the latest at
 /// next_wake_ns(). Drain outbox() in another thread (Publisher) or with drain(). Memory is bounded by the

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "sdk/client/delta_assembly.hpp"
-#include "sdk/client/scheduled_inputs.hpp"
-#include "sdk/client/session_check.hpp"
-#include "sdk/client/snapshot_assembly.hpp"
+#include "sdk/client/following/delta_assembly.hpp"
+#include "sdk/client/following/scheduled_inputs.hpp"
+#include "sdk/client/following/snapshot_assembly.hpp"
+#include "sdk/client/session/session_check.hpp"
 #include "services/recording/mapped_file.hpp"
 #include "services/recording/mcap_reader.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "sdk/client/scheduled_inputs.hpp"
+#include "sdk/client/following/scheduled_inputs.hpp"
 
 namespace tandem::recording {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "services/engine/bullet/inputs.hpp"
-#include "services/engine/shape/shape.hpp"
+#include "services/engine/common/shape.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::scenes {

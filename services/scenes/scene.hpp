@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "services/engine/bullet/world.hpp"
-#include "services/engine/particles/world.hpp"
-#include "services/engine/shape/shape.hpp"
+#include "services/engine/common/shape.hpp"
+#include "services/engine/common/world.hpp"
 #include "services/scenes/script.hpp"
 #include "services/scenes/trained.hpp"
 #include "tandem/result.hpp"

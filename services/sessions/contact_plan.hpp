@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "services/host/lattice_choice.hpp"
+#include "services/host/streams/lattice_choice.hpp"
 #include "services/scenes/scene.hpp"
 #include "tandem/result.hpp"
 

@@ -7,9 +7,10 @@
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
-#include "sdk/core/predict/predictor_table.hpp"
-#include "services/host/block_threads.hpp"
-#include "services/host/groups.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
+#include "services/host/streams/block_threads.hpp"
+#include "services/host/streams/groups.hpp"
 #include "services/sessions/contact_plan.hpp"
 
 namespace tandem::sessions {

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "sdk/core/codec/codec.hpp"
-#include "sdk/core/predict/predictor_table.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/tandemd/config.hpp"
 #include "services/tandemd/number.hpp"

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"

@@ -1,4 +1,5 @@
 #include "services/tandemd/console.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/transport/units.hpp"
 
 #include <fmt/format.h>

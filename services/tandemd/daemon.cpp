@@ -15,7 +15,7 @@
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
-#include "services/host/publisher.hpp"
+#include "services/host/outgoing/publisher.hpp"
 #include "services/json/json.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"

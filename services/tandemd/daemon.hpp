@@ -1,7 +1,7 @@
 #pragma once
 // One session from start to end: what tandemd does once it knows its options.
 
-#include "services/signals/signal_watch.hpp"
+#include "services/process/signal_watch.hpp"
 #include "services/tandemd/options.hpp"
 
 namespace tandem::daemon {

@@ -5,8 +5,8 @@
 
 #include <exception>
 
-#include "services/heap/heap.hpp"
-#include "services/signals/signal_watch.hpp"
+#include "services/process/heap.hpp"
+#include "services/process/signal_watch.hpp"
 #include "services/tandemd/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
 

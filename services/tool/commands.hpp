@@ -1,5 +1,5 @@
 #pragma once
-// The subcommands of `tandem` for operators, one file each.
+// The subcommands of `tandem`, one file each.
 
 #include <functional>
 
@@ -16,6 +16,9 @@ using Run = std::function<int()>;
 void add_join(commandline::Command app, Run& run);
 void add_record(commandline::Command app, Run& run);
 void add_replay(commandline::Command app, Run& run);
+/// Of evaluation; services/lab defines them, where it is a part of the build.
+void add_bench(commandline::Command app, Run& run);
+void add_export(commandline::Command app, Run& run);
 void add_top(commandline::Command app, Run& run);
 void add_doctor(commandline::Command app, Run& run);
 

@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "services/heap/heap.hpp"
-#include "services/signals/signal_watch.hpp"
+#include "services/process/heap.hpp"
+#include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"

@@ -6,9 +6,6 @@
 #include <string>
 
 #include "services/tool/commands.hpp"
-#ifdef TANDEM_LAB
-#include "services/lab/commands.hpp"
-#endif
 
 int main(int argc, char** argv) {
   tandem::commandline::Program app{
@@ -21,8 +18,8 @@ int main(int argc, char** argv) {
   tandem::tool::add_record(app, run);
   tandem::tool::add_replay(app, run);
 #ifdef TANDEM_LAB
-  tandem::lab::add_bench(app, run);
-  tandem::lab::add_export(app, run);
+  tandem::tool::add_bench(app, run);
+  tandem::tool::add_export(app, run);
 #endif
   tandem::tool::add_top(app, run);
   tandem::tool::add_doctor(app, run);

@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "services/heap/heap.hpp"
-#include "services/signals/signal_watch.hpp"
+#include "services/process/heap.hpp"
+#include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"

@@ -29,8 +29,8 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
   playback.timeline().rename(config.epoch, {});
 }
 
-std::optional<host::FrameSource::Made> RecordedSource::next(host::StreamSet /*snapshots_follow*/,
-                                                            host::Outbox& outbox) {
+std::optional<host::MadeFrame> RecordedSource::next(host::StreamSet /*snapshots_follow*/,
+                                                    host::Outbox& outbox) {
   if (sought_s_ || !ending_ || *ending_ != Playback::Step::kFrame) return std::nullopt;
   ending_ = playback_->next();
   if (!ending_ || *ending_ != Playback::Step::kFrame) return std::nullopt;
@@ -45,7 +45,7 @@ std::optional<host::FrameSource::Made> RecordedSource::next(host::StreamSet /*sn
   delta_ = {.hash = delta.hash,
             .payload = delta.payload,
             .corrected = static_cast<std::uint32_t>(timeline().touched().size())};
-  return Made{.frame = delta.frame, .last_input = delta.last_input, .deltas = {&delta_, 1}};
+  return host::MadeFrame{.frame = delta.frame, .last_input = delta.last_input, .deltas = {&delta_, 1}};
 }
 
 transport::Reason RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,

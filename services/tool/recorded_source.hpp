@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "services/accounts/token_bucket.hpp"
-#include "services/host/frame_source.hpp"
+#include "services/host/frames/frame_source.hpp"
 #include "services/host/host.hpp"
 #include "services/recording/playback.hpp"
 
@@ -34,7 +34,7 @@ class RecordedSource final : public host::FrameSource {
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t /*stream*/) const override {
     return timeline().parameters();
   }
-  std::optional<Made> next(host::StreamSet snapshots_follow, host::Outbox& outbox) override;
+  std::optional<host::MadeFrame> next(host::StreamSet snapshots_follow, host::Outbox& outbox) override;
   void snapshot(std::uint32_t /*stream*/, std::vector<std::byte>& out) override { timeline().snapshot(out); }
   transport::Reason accept(const engine::Input& input, const host::InputOrigin& origin, host::Outbox& outbox,
                            Frame& acts_on) override;
@@ -52,7 +52,7 @@ class RecordedSource final : public host::FrameSource {
   accounts::TokenBucket* seeks_;
   std::int64_t (*clock_ns_)();
   transport::SessionMessage session_;
-  MadeDelta delta_;  // the last
+  host::MadeDelta delta_;  // the last
   std::optional<double> sought_s_;
   Result<recording::Playback::Step> ending_ = recording::Playback::Step::kFrame;
 };

@@ -13,7 +13,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
-#include "services/signals/signal_watch.hpp"
+#include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/top_view.hpp"
 

@@ -18,69 +18,88 @@ SKIPPED = {"build", ".git"}
 # A name ending in .hpp is that header alone. "public" is sdk/include/tandem.
 CORE = ["public/result.hpp", "sdk/core/lattice"]
 LAYOUT = CORE + ["sdk/core/layout"]
-PREDICT = ["sdk/core/predict", "sdk/core/predict/ballistic", "sdk/core/predict/contact"]
+PREDICT = ["sdk/core/predict", "sdk/core/predict/contact"]
 CODEC = ["sdk/core/codec", "sdk/core/codec/paper", "sdk/core/codec/tracker"]
-TIMELINE = LAYOUT + PREDICT + CODEC + ["sdk/core/timeline"]
+TABLES = LAYOUT + PREDICT + CODEC + ["sdk/core/tables"]
+TIMELINE = TABLES + ["sdk/core/timeline"]
+CLIENT = ["sdk/client", "sdk/client/drawing", "sdk/client/following", "sdk/client/session"]
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
+HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/outgoing", "services/host/streams"]
+LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
+# What all rooms of a target may include besides one another.
+OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
+OF_HOST = SIMULATION + TIMELINE + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"]
+OF_LAB = (
+    SIMULATION
+    + TIMELINE
+    + ["public", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated", "sdk/statistics"]
+    + CLIENT
+    + HOST
+    + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
+    + ["services/sessions", "services/tool", "services/workers"]
+)
 EDGES = {
     "sdk/include": [],
     "sdk/core/lattice": ["public/result.hpp"],
     "sdk/core/layout": CORE,
-    "sdk/core/predict": LAYOUT + PREDICT,
+    "sdk/core/predict": LAYOUT,
     "sdk/core/predict/ballistic": LAYOUT + ["sdk/core/predict"],
     "sdk/core/predict/contact": LAYOUT + ["sdk/core/predict"],
-    "sdk/core/codec": LAYOUT + CODEC,
+    "sdk/core/codec": LAYOUT,
     "sdk/core/codec/paper": LAYOUT + ["sdk/core/codec"],
     "sdk/core/codec/tracker": LAYOUT + ["sdk/core/codec"],
-    "sdk/core/timeline": TIMELINE,
+    "sdk/core/tables": LAYOUT + PREDICT + CODEC + ["sdk/core/predict/ballistic"],
+    "sdk/core/timeline": TABLES,
     "sdk/transport": LAYOUT + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
     "sdk/transport/dds": LAYOUT + ["sdk/transport"],
     "sdk/statistics": [],
-    "sdk/client": TIMELINE + ["public", "sdk/statistics", "sdk/transport"],
-    "sdk/client/api": TIMELINE + ["public", "sdk/client", "sdk/transport", "sdk/transport/dds"],
-    "sdk/web/module": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
+    "sdk/client/drawing": OF_CLIENT,
+    "sdk/client/following": OF_CLIENT,
+    "sdk/client/session": OF_CLIENT,
+    "sdk/client": OF_CLIENT + CLIENT,
+    "sdk/client/api": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds"] + CLIENT,
+    "sdk/web/module": OF_CLIENT + CLIENT,
     "sdk/python": ["public"],
     "sdk/examples": ["public", "services/host/include"],
-    "services/heap": [],
+    "services/process": [],
     "services/commandline": [],
     "services/json": [],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp"],
-    "services/host/api": TIMELINE + ["services/host", "services/host/include", "sdk/transport", "sdk/transport/dds"],
-    "services/host": SIMULATION + TIMELINE + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"],
-    "services/engine/particles": ["public/result.hpp", "services/workers"] + SIMULATION,
-    "services/engine/shape": ["public/result.hpp"],
-    "services/engine/bullet": ["public/result.hpp", "services/engine/particles", "services/engine/shape"] + SIMULATION,
-    "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/particles", "services/engine/shape"]
+    "services/host/streams": OF_HOST,
+    "services/host/outgoing": OF_HOST,
+    "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],
+    "services/host/clients": OF_HOST + ["services/host/frames", "services/host/outgoing"],
+    "services/host": OF_HOST + HOST,
+    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds"] + HOST,
+    "services/engine/common": ["public/result.hpp"] + SIMULATION,
+    "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
+    "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
+    "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
     + SIMULATION,
-    "services/sessions": SIMULATION + TIMELINE + ["sdk/transport", "services/host", "services/scenes"],
-    "services/recording": TIMELINE + ["public", "sdk/client", "sdk/statistics", "sdk/transport"],
-    "services/recording/python": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"],
+    "services/sessions": SIMULATION + TIMELINE + ["sdk/transport", "services/scenes"] + HOST,
+    "services/recording": OF_CLIENT + CLIENT,
+    "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd": SIMULATION
-    + LAYOUT
-    + ["sdk/core/predict"]
-    + CODEC
+    + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
-    + ["services/host", "services/scenes", "services/sessions", "services/signals", "services/workers"],
-    "services/tandemd/main.cpp": ["services/tandemd", "services/heap", "services/signals"],
-    "services/signals": [],
-    "services/gateway": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds"]
-    + ["services/accounts", "services/commandline", "services/json", "services/signals"],
-    "services/gateway/main.cpp": ["services/gateway", "services/heap", "services/signals"],
-    "services/tool": TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/statistics", "sdk/transport", "sdk/transport/dds"]
-    + ["services/accounts", "services/commandline", "services/heap", "services/host", "services/json", "services/recording"]
-    + ["services/scenes", "services/signals"],
-    "services/tool/main.cpp": ["services/tool", "services/lab/commands.hpp"],
-    "services/lab": SIMULATION
-    + TIMELINE
-    + ["public", "sdk/client", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated"]
-    + ["sdk/statistics", "services/commandline", "services/engine/shape", "services/host", "services/json", "services/recording"]
-    + ["services/scenes", "services/sessions", "services/tool", "services/workers"],
+    + ["services/process", "services/scenes", "services/sessions", "services/workers"]
+    + HOST,
+    "services/gateway": OF_CLIENT
+    + CLIENT
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json", "services/process"],
+    "services/tool": OF_CLIENT
+    + CLIENT
+    + HOST
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
+    + ["services/process", "services/recording", "services/scenes"],
+    "services/lab/measures": OF_LAB,
+    "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
+    "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
+    "services/lab/framerate": OF_LAB + ["services/lab/measures"],
+    "services/lab/commands": OF_LAB + LAB,
     "tests": ["*"],
 }
 

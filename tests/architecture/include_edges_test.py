@@ -49,7 +49,7 @@ class IncludeEdges(unittest.TestCase):
         self.assertIn("may not include", found[0])
 
     def test_the_host_sees_no_scene_and_no_engine(self):
-        for header in ("services/scenes/scene.hpp", "services/engine/particles/world.hpp"):
+        for header in ("services/scenes/scene.hpp", "services/engine/common/world.hpp"):
             found = self.found((header, ""), ("services/host/a.cpp", f'#include "{header}"\n'))
             self.assertEqual(len(found), 1, found)
             self.assertIn("may not include", found[0])

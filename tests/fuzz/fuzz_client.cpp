@@ -1,6 +1,7 @@
 // Whatever a server's topics may carry, in any order, to a client: it never holds a broken state, and plays
 // again when the server behaves.
 
+#include "sdk/core/tables/codec_table.hpp"
 #include "tests/fuzz/program.hpp"
 #include "tests/property/synthetic.hpp"
 #include "tests/support/client/fake_server.hpp"

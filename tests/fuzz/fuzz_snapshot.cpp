@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/snapshot.hpp"
 #include "tests/property/synthetic.hpp"
 

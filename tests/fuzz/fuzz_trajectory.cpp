@@ -1,7 +1,7 @@
 // Any pair of files as a recorded trajectory: refused naming a file, or every row can be read. The first two
 // bytes say how many of the rest are the sidecar.
 
-#include "services/lab/trajectory.hpp"
+#include "services/lab/trajectories/trajectory.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

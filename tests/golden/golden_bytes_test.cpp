@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

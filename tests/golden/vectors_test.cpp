@@ -9,6 +9,7 @@
 #include <map>
 #include <sstream>
 
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
 #include "sdk/core/timeline/parts.hpp"
 #include "sdk/core/timeline/snapshot.hpp"

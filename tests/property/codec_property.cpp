@@ -2,6 +2,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "sdk/core/codec/paper/residual.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {

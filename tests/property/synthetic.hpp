@@ -9,6 +9,7 @@
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "tests/property/random.hpp"
 
 namespace tandem::synthetic {

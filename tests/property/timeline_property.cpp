@@ -6,6 +6,8 @@
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

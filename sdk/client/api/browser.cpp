@@ -1,6 +1,6 @@
 #include "sdk/client/api/browser.hpp"
 
-#include "sdk/client/session_check.hpp"
+#include "sdk/client/session/session_check.hpp"
 
 namespace tandem::api {
 namespace {

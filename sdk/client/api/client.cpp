@@ -8,7 +8,7 @@
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
 #include "sdk/client/api/structs.hpp"
-#include "sdk/client/reply_reason.hpp"
+#include "sdk/client/session/reply_reason.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "sdk/client/text_message.hpp"
+#include "sdk/client/session/text_message.hpp"
 
 namespace tandem::api {
 namespace {

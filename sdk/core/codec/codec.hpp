@@ -90,25 +90,7 @@ class Codec {
   }
 };
 
-/// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
-inline constexpr std::size_t kPaperBudgetBytes = 6553;
-
-/// What a codec is like, for those who choose, configure or compare codecs.
-struct CodecTraits {
-  bool is_baseline = false;      ///< of the paper: compared as the paper has it, with its predicted step
-  bool reads_threshold = false;  ///< the others send every body
-  bool reads_steps = false;      ///< quantisation steps
-  bool reads_gains = false;      ///< and the decay that goes with them
-  bool takes_tables = false;     ///< code lengths (code_tables.hpp)
-  bool keeps_rounding = false;   ///< corrected bodies stay round: CodecFrame::position_bits
-  bool turns = false;            ///< codes orientations too
-  bool takes_budget = false;     ///< is meant to have one; any codec obeys it
-  std::size_t usual_budget = kNoBudget;  ///< bytes a frame
-};
-/// Errors: kUnsupported for a name that make_codec() does not know.
-[[nodiscard]] Result<CodecTraits> codec_traits(std::string_view name);
-
-/// All that a codec needs to know. Views are read by make_codec() alone.
+/// All that a codec needs to know. Views are read by its constructor alone.
 struct CodecSetup {
   std::string_view name;
   std::uint32_t capacity = 0;                ///< 1 .. kMaxCapacity
@@ -118,12 +100,5 @@ struct CodecSetup {
   std::span<const std::int32_t> radii = {};  ///< lattice units, by type; with orientations
   RunBlocks run_blocks = {};  ///< how to code blocks side by side, where a codec can; empty: one by one
 };
-
-/// Makes the codec a session names. Errors: kUnsupported for an unknown name, kMalformed for tables that do
-/// not fit it, kInvalidArgument for the capacity.
-[[nodiscard]] Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup);
-
-/// The names make_codec() knows: those of the paper's table 5.1 in its order, then ours.
-[[nodiscard]] std::span<const std::string_view> codec_names();
 
 }  // namespace tandem

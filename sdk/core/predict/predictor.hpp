@@ -33,9 +33,4 @@ class Predictor {
   [[nodiscard]] virtual bool interacts() const = 0;
 };
 
-/// Makes the predictor a session names, with the constants the session carries.
-/// Errors: kUnsupported for a name this build does not know, kMalformed for constants that do not fit it.
-[[nodiscard]] Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
-                                                                std::span<const std::int32_t> constants);
-
 }  // namespace tandem

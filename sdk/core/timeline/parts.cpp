@@ -2,7 +2,8 @@
 
 #include <utility>
 
-#include "sdk/core/predict/predictor_table.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 
 namespace tandem {
 

@@ -1,6 +1,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
 #include "sdk/core/timeline/parts.hpp"
 #include "sdk/core/timeline/snapshot.hpp"

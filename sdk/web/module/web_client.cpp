@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "sdk/client/reply_reason.hpp"
+#include "sdk/client/session/reply_reason.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/web/module/json.hpp"
 

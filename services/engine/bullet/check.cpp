@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "services/engine/bullet/inputs.hpp"
-#include "services/engine/particles/check.hpp"
+#include "services/engine/common/check.hpp"
 
 namespace tandem::engine {
 namespace {

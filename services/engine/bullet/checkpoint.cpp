@@ -1,8 +1,7 @@
 #include <utility>
 
 #include "services/engine/bullet/columns.hpp"
-#include "services/engine/particles/checkpoint_bytes.hpp"
-#include "services/engine/particles/columns.hpp"
+#include "services/engine/common/checkpoint_bytes.hpp"
 
 namespace tandem::engine {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/engine/particles/check.hpp"
+#include "services/engine/common/check.hpp"
 
 namespace tandem::engine {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <vector>
 
-#include "services/engine/particles/world.hpp"
-#include "services/engine/shape/shape.hpp"
+#include "services/engine/common/shape.hpp"
+#include "services/engine/common/world.hpp"
 
 namespace tandem::engine {
 

@@ -1,4 +1,4 @@
-#include "services/engine/particles/checkpoint_bytes.hpp"
+#include "services/engine/common/checkpoint_bytes.hpp"
 #include "services/engine/particles/columns.hpp"
 
 namespace tandem::engine {
@@ -27,35 +27,6 @@ void each_fixed(Io& io, C& columns) {
 }
 
 }  // namespace
-
-std::uint64_t fingerprint(const World& world) {
-  std::vector<std::byte> bytes;
-  Writer out(bytes);
-  out.value(world.capacity);
-  out.value(world.seed);
-  out.value(world.dt_s);
-  out.value(world.substeps);
-  out.value(world.damping_per_s);
-  out.value(world.low);
-  out.value(world.high);
-  out.value(world.pair);
-  out.value(world.wall);
-  out.column(world.types);
-  out.column(world.planes);
-  out.column(world.boxes);
-  out.column(world.balls);
-  for (const Emitter& e : world.emitters) {
-    for (const Vec3f& v : {e.low, e.high, e.velocity}) out.value(v);
-    out.value(e.rate_per_s);
-    out.value(e.type);
-  }
-  for (const Region& r : world.regions) {
-    for (const Vec3f& v : {r.low, r.high, r.offset}) out.value(v);
-    out.value(r.action);
-    out.value(r.type);
-  }
-  return checksum(bytes);
-}
 
 void save_columns(const Columns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out) {
   const std::size_t begin = out.size();

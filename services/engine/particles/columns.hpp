@@ -48,7 +48,4 @@ void save_columns(const Columns& columns, std::uint64_t world_fingerprint, std::
 [[nodiscard]] bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint,
                                 Columns& columns);
 
-/// Hash of everything in `world` that a trajectory depends on.
-[[nodiscard]] std::uint64_t fingerprint(const World& world);
-
 }  // namespace tandem::engine

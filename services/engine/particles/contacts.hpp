@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <span>
 
+#include "services/engine/common/world.hpp"
 #include "services/engine/particles/grid.hpp"
 #include "services/engine/particles/vec.hpp"
-#include "services/engine/particles/world.hpp"
 
 namespace tandem::engine {
 

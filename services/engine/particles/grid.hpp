@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "services/engine/particles/world.hpp"
+#include "services/engine/common/world.hpp"
 
 namespace tandem::engine {
 

@@ -7,7 +7,7 @@
 #include <atomic>
 #include <utility>
 
-#include "services/engine/particles/check.hpp"
+#include "services/engine/common/check.hpp"
 #include "services/engine/particles/columns.hpp"
 #include "services/engine/particles/float_environment.hpp"
 #include "services/engine/particles/grid.hpp"

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "services/engine/particles/world.hpp"
+#include "services/engine/common/world.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 

@@ -7,12 +7,13 @@
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
-#include "services/host/groups.hpp"
 #include "services/host/host.hpp"
-#include "services/host/publisher.hpp"
+#include "services/host/outgoing/publisher.hpp"
+#include "services/host/streams/groups.hpp"
 
 namespace tandem {
 namespace {

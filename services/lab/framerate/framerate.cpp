@@ -6,11 +6,11 @@
 
 #include "sdk/transport/units.hpp"
 #include "services/json/json.hpp"
-#include "services/lab/cells.hpp"
-#include "services/lab/framerate/child.hpp"
-#include "services/lab/framerate/enclave.hpp"
-#include "services/lab/paper_numbers.hpp"
-#include "services/lab/process_counters.hpp"
+#include "services/lab/framerate/cells.hpp"
+#include "services/lab/measures/child.hpp"
+#include "services/lab/measures/enclave.hpp"
+#include "services/lab/measures/paper_numbers.hpp"
+#include "services/lab/measures/process_counters.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -8,9 +8,9 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
 #include "sdk/transport/units.hpp"
-#include "services/host/outbox.hpp"
+#include "services/host/outgoing/outbox.hpp"
 #include "services/lab/framerate/framerate.hpp"
-#include "services/lab/scene_source.hpp"
+#include "services/lab/measures/scene_source.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::lab {

@@ -9,6 +9,7 @@
 
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 
 namespace tandem {
 namespace {

@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/clock.hpp"
-#include "services/host/block_threads.hpp"
+#include "services/host/streams/block_threads.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {

@@ -8,7 +8,7 @@
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/clock.hpp"
-#include "services/host/live_source.hpp"
+#include "services/host/frames/live_source.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"

@@ -12,7 +12,7 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
 #include "services/host/host.hpp"
-#include "services/host/outbox.hpp"
+#include "services/host/outgoing/outbox.hpp"
 #include "wanderers.hpp"
 
 namespace tandem::client {

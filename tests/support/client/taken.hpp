@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "sdk/client/sampler.hpp"
+#include "sdk/client/drawing/sampler.hpp"
 
 namespace tandem::client {
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "sdk/client/server_clock.hpp"
+#include "sdk/client/drawing/server_clock.hpp"
 
 namespace tandem::client {
 namespace {

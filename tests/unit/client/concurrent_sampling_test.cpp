@@ -3,7 +3,7 @@
 #include <atomic>
 #include <thread>
 
-#include "sdk/client/picture.hpp"
+#include "sdk/client/drawing/picture.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {

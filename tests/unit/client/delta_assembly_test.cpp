@@ -1,4 +1,4 @@
-#include "sdk/client/delta_assembly.hpp"
+#include "sdk/client/following/delta_assembly.hpp"
 
 #include <gtest/gtest.h>
 

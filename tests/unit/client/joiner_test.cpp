@@ -1,4 +1,4 @@
-#include "sdk/client/joiner.hpp"
+#include "sdk/client/following/joiner.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <string>
 
-#include "sdk/client/lag_limit.hpp"
+#include "sdk/client/following/lag_limit.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {

@@ -1,4 +1,4 @@
-#include "sdk/client/rotation.hpp"
+#include "sdk/client/drawing/rotation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #include <limits>
 
-#include "sdk/client/session_check.hpp"
+#include "sdk/client/session/session_check.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {

@@ -1,4 +1,4 @@
-#include "sdk/client/snapshot_assembly.hpp"
+#include "sdk/client/following/snapshot_assembly.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sdk/client/stream_choice.hpp"
+#include "sdk/client/session/stream_choice.hpp"
 
 #include <gtest/gtest.h>
 

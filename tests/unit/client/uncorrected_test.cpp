@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {

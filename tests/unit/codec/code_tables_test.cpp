@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 
 namespace tandem {
 namespace {

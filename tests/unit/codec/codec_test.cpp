@@ -1,4 +1,5 @@
 #include "sdk/core/codec/codec.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 
 #include <gtest/gtest.h>
 

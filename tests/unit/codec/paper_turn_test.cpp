@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sdk/core/codec/errors.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 

@@ -10,6 +10,7 @@
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "tests/unit/core/contact_world.hpp"
 
 namespace tandem {

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
-#include "sdk/core/predict/predictor_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 
 namespace tandem {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "tests/property/random.hpp"
 #include "tests/unit/core/contact_world.hpp"
 

@@ -1,4 +1,4 @@
-#include "services/engine/shape/shape.hpp"
+#include "services/engine/common/shape.hpp"
 
 #include <gtest/gtest.h>
 

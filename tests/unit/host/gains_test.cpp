@@ -1,5 +1,5 @@
 // Decay and gains that the server chooses while a session runs.
-#include "services/host/gains.hpp"
+#include "services/host/streams/gains.hpp"
 
 #include <gtest/gtest.h>
 

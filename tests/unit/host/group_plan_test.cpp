@@ -1,5 +1,6 @@
 // Which sessions have orientations.
-#include "services/host/groups.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+#include "services/host/streams/groups.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "services/host/live_source.hpp"
+#include "services/host/frames/live_source.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

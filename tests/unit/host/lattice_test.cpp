@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "services/host/lattice_choice.hpp"
+#include "services/host/streams/lattice_choice.hpp"
 
 namespace tandem::host {
 namespace {

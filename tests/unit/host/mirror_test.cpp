@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "services/host/mirror.hpp"
+#include "services/host/streams/mirror.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "services/host/mirror.hpp"
+#include "services/host/streams/mirror.hpp"
 #include "tests/property/random.hpp"
 #include "tests/unit/host/fakes.hpp"
 

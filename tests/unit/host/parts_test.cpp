@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include "services/accounts/token_bucket.hpp"
-#include "services/host/notices.hpp"
-#include "services/host/outbox.hpp"
-#include "services/host/pacing.hpp"
-#include "services/host/stall_meter.hpp"
-#include "services/host/window.hpp"
+#include "services/host/clients/notices.hpp"
+#include "services/host/clients/pacing.hpp"
+#include "services/host/clients/stall_meter.hpp"
+#include "services/host/clients/window.hpp"
+#include "services/host/outgoing/outbox.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

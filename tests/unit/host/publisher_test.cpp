@@ -1,4 +1,4 @@
-#include "services/host/publisher.hpp"
+#include "services/host/outgoing/publisher.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,12 @@
 // Parameters that change while a session runs, set by hand or chosen by automatic quality.
-#include "services/host/quality.hpp"
+#include "services/host/streams/quality.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "tests/unit/host/fakes.hpp"

@@ -1,4 +1,4 @@
-#include "services/host/residual_statistics.hpp"
+#include "services/host/streams/residual_statistics.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "services/host/snapshot_transfer.hpp"
+#include "services/host/clients/snapshot_transfer.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "sdk/client/snapshot_assembly.hpp"
+#include "sdk/client/following/snapshot_assembly.hpp"
 #include "sdk/transport/limits.hpp"
 
 namespace tandem::host {

@@ -1,4 +1,5 @@
-#include "services/host/stream.hpp"
+#include "services/host/streams/stream.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 
 #include <gtest/gtest.h>
 

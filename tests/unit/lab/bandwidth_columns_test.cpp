@@ -1,4 +1,4 @@
-#include "services/lab/bandwidth_columns.hpp"
+#include "services/lab/bandwidth/bandwidth_columns.hpp"
 
 #include <gmock/gmock.h>
 

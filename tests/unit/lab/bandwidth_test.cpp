@@ -1,11 +1,11 @@
-#include "services/lab/bandwidth.hpp"
+#include "services/lab/bandwidth/bandwidth.hpp"
 
 #include <gmock/gmock.h>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
-#include "services/lab/bandwidth_columns.hpp"
-#include "services/lab/paper_numbers.hpp"
-#include "services/lab/peers.hpp"
+#include "services/lab/bandwidth/bandwidth_columns.hpp"
+#include "services/lab/bandwidth/peers.hpp"
+#include "services/lab/measures/paper_numbers.hpp"
 #include "tests/unit/lab/bouncing.hpp"
 
 namespace tandem::lab {

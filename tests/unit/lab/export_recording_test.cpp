@@ -1,11 +1,11 @@
-#include "services/lab/export_recording.hpp"
+#include "services/lab/trajectories/export_recording.hpp"
 
 #include <gmock/gmock.h>
 
 #include <filesystem>
 #include <fstream>
 
-#include "services/lab/trajectory.hpp"
+#include "services/lab/trajectories/trajectory.hpp"
 #include "services/recording/playback.hpp"
 #include "services/recording/recorder.hpp"
 #include "services/scenes/scene.hpp"

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "services/lab/paper_numbers.hpp"
+#include "services/lab/measures/paper_numbers.hpp"
 
 namespace tandem::lab {
 namespace {

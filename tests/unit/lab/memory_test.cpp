@@ -1,4 +1,4 @@
-#include "services/lab/memory.hpp"
+#include "services/lab/measures/memory.hpp"
 
 #include <gtest/gtest.h>
 

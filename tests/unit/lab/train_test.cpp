@@ -1,4 +1,4 @@
-#include "services/lab/train.hpp"
+#include "services/lab/measures/train.hpp"
 
 #include <gtest/gtest.h>
 

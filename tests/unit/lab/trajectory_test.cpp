@@ -1,4 +1,4 @@
-#include "services/lab/trajectory.hpp"
+#include "services/lab/trajectories/trajectory.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>

@@ -8,6 +8,7 @@
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/command_line.hpp"
 #include "services/tandemd/config.hpp"

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "sdk/core/tables/codec_table.hpp"
 #include "tests/unit/timeline/session.hpp"
 
 namespace {

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "tests/unit/timeline/session.hpp"
 
 // A session whose predicted bodies interact: what was simulated ahead is simulated again as a whole.

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/timeline/snapshot.hpp"
 #include "tests/unit/timeline/session.hpp"
 

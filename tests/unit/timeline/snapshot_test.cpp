@@ -1,4 +1,5 @@
 #include "sdk/core/timeline/snapshot.hpp"
+#include "sdk/core/tables/codec_table.hpp"
 
 #include <gtest/gtest.h>
 

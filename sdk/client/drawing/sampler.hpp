@@ -1,0 +1,53 @@
+#pragma once
+// What to draw: the client state at any moment, without the jerks of frames and corrections.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/client/drawing/motion.hpp"
+#include "sdk/client/drawing/picture.hpp"
+#include "sdk/client/drawing/rotation.hpp"
+#include "sdk/client/drawing/sample_columns.hpp"
+#include "sdk/client/drawing/sampled_moment.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::client {
+
+/// Remembers what it drew last, 27 bytes a slot or 43 with orientations, and so can tell what changed and
+/// blend corrections in. Not thread-safe.
+class Sampler {
+ public:
+  /// Time constant of the blend after a correction. Shorter shows jerks, longer shows bodies off their place.
+  static constexpr double kSmoothingS = 0.05;
+
+  /// Errors: kCapacity (the columns hold fewer slots than the picture).
+  Result<SampledFrame> sample(const Picture& picture, const SampleRequest& request,
+                              const SampleColumns& columns, std::int64_t now_ns);
+
+ private:
+  struct Run;
+
+  void begin(const Picture& picture);
+  [[nodiscard]] bool tell_changes(const Picture& picture, Run& run);
+  static void fill_extra(const SampledMoment& moment, Run& run);
+  void show_places(const SampledMoment& moment, const Smoothing& smoothing, const SampleColumns& columns,
+                   const Picture& picture, Run& run);
+  void show_turns(const SampledMoment& moment, float blend, const SampleColumns& columns,
+                  const Picture& picture, const Run& run);
+
+  std::size_t capacity_ = 0;
+  Epoch epoch_ = 0;  ///< 0: none
+  std::uint64_t load_ = 0;
+  std::int64_t last_ns_ = 0, last_at_ns_ = 0;  ///< when it was taken, and of when it was
+  double last_frame_ = 0;
+  // As in the last sample.
+  std::array<std::vector<float>, kPositionChannels> place_;  // lattice units
+  std::array<std::vector<float>, kPositionChannels> speed_;  // lattice units per frame
+  std::vector<Rotation> turns_;                              // empty without orientations
+  std::vector<std::uint8_t> alive_, reuse_, jumps_;
+};
+
+}  // namespace tandem::client

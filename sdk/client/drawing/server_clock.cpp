@@ -1,0 +1,106 @@
+#include "sdk/client/drawing/server_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::client {
+namespace {
+
+// Both clocks are bounded here so that differences of received stamps cannot overflow.
+constexpr std::int64_t kClockLimitNs = std::numeric_limits<std::int64_t>::max() / 4;
+// Stamps within this of each other do not contradict: the kernel slews a wall clock by less in one span.
+constexpr std::int64_t kToleranceNs = 2'000'000;
+// Weight of a new stamp in the phase and in the jitter: 1/8 settles within half a second at 30 Hz.
+constexpr double kPhaseGain = 1.0 / 8;
+constexpr double kJitterGain = 1.0 / 16;
+// Further off than this many periods, the server has been suspended or runs at another rate.
+constexpr double kRestartPeriods = 1.5;
+
+std::int64_t bounded(std::int64_t time_ns) { return std::clamp(time_ns, -kClockLimitNs, kClockLimitNs); }
+
+}  // namespace
+
+void ServerClock::turn(std::int64_t now_ns) {
+  if (turned_ns_ == kNone) turned_ns_ = now_ns;
+  if (now_ns - turned_ns_ < kSpanNs) return;
+  previous_ = current_;
+  current_ = {};
+  turned_ns_ = now_ns;
+}
+
+void ServerClock::on_message(std::int64_t server_time_ns, std::int64_t now_ns) {
+  turn(now_ns);
+  const std::int64_t bound = bounded(server_time_ns) - bounded(now_ns);
+  if (upper() < bound - kToleranceNs) {
+    current_ = {};
+    previous_ = {};
+  }
+  current_.lower = std::max(current_.lower, bound);
+}
+
+void ServerClock::on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns) {
+  // Before turn(): only a message that brings bounds may make older ones be forgotten.
+  if (echoed_client_ns <= 0 || echoed_client_ns > now_ns) return;
+  turn(now_ns);
+  const std::int64_t bound = bounded(server_time_ns) - bounded(echoed_client_ns);
+  if (lower() != kNone && bound < lower() - kToleranceNs) {
+    current_ = {};
+    previous_ = {};
+  }
+  current_.upper = std::min(current_.upper, bound);
+  current_.lower = std::max(current_.lower, bounded(server_time_ns) - bounded(now_ns));
+}
+
+std::int64_t ServerClock::lower() const { return std::max(current_.lower, previous_.lower); }
+std::int64_t ServerClock::upper() const { return std::min(current_.upper, previous_.upper); }
+
+std::int64_t ServerClock::offset_ns() const {
+  if (upper() == std::numeric_limits<std::int64_t>::max() || upper() < lower()) return lower();
+  return lower() + (upper() - lower()) / 2;
+}
+
+std::int64_t ServerClock::round_trip_ns() const {
+  if (!known() || upper() == std::numeric_limits<std::int64_t>::max()) return 0;
+  return std::max<std::int64_t>(0, upper() - lower());
+}
+
+void Pacer::on_delta(Frame frame, std::int64_t server_time_ns, std::int64_t now_ns) {
+  const std::int64_t stamp = bounded(server_time_ns);
+  clock_.on_message(stamp, now_ns);
+  if (started_) {
+    const double expected = static_cast<double>(frame - base_frame_) * period_ns_ + phase_ns_;
+    const double late = static_cast<double>(stamp - base_ns_) - expected;
+    if (frame > base_frame_ && std::abs(late) < kRestartPeriods * period_ns_) {
+      phase_ns_ = late * kPhaseGain;
+      jitter_ns_ += (std::abs(late) - jitter_ns_) * kJitterGain;
+      base_ns_ += std::llround(expected);
+      base_frame_ = frame;
+      return;
+    }
+  }
+  started_ = true;
+  base_frame_ = frame;
+  base_ns_ = stamp;
+  phase_ns_ = 0;
+}
+
+double Pacer::server_frame(std::int64_t now_ns) const {
+  return static_cast<double>(base_frame_) +
+         (static_cast<double>(bounded(now_ns) + clock_.offset_ns() - base_ns_) - phase_ns_) / period_ns_;
+}
+
+double Pacer::arrived_frame(std::int64_t now_ns) const {
+  const auto since = static_cast<double>(bounded(now_ns) + clock_.arrival_offset_ns() - base_ns_);
+  return static_cast<double>(base_frame_) + (since - phase_ns_ - 2 * jitter_ns_) / period_ns_;
+}
+
+std::int64_t Pacer::due_ns(Frame frame) const {
+  // A server may number its frames as it likes, but nothing is due further off than any clock goes.
+  constexpr double kFarNs = 1e18;
+  const double ahead =
+      std::clamp((static_cast<double>(frame) - static_cast<double>(base_frame_)) * period_ns_ + phase_ns_,
+                 -kFarNs, kFarNs);
+  return base_ns_ + std::llround(ahead) - clock_.offset_ns();
+}
+
+}  // namespace tandem::client

@@ -1,0 +1,39 @@
+#include "sdk/client/session/reply_reason.hpp"
+
+#include "sdk/transport/messages.hpp"
+
+namespace tandem::client {
+
+std::string describe(std::uint32_t reason) {
+  switch (static_cast<transport::Reason>(reason)) {
+    case transport::Reason::kNone:
+      return "";
+    case transport::Reason::kObserver:
+      return "observers may not send input";
+    case transport::Reason::kDemoted:
+      return "made an observer: it had delayed the others for too long";
+    case transport::Reason::kInvalid:
+      return "input refused: not finite, out of range or of an unknown kind";
+    case transport::Reason::kRateLimited:
+      return "input refused: too many a second";
+    case transport::Reason::kStaleEpoch:
+      return "input refused: of an earlier run of the server";
+    case transport::Reason::kDuplicate:
+      return "input refused: its number was handled before";
+    case transport::Reason::kNotPlaying:
+      return "input refused: this client was still joining";
+    case transport::Reason::kForeignClient:
+      return "the client id belongs to another participant";
+    case transport::Reason::kProtocolVersion:
+      return "the server speaks another protocol version";
+    case transport::Reason::kFull:
+      return "the server is full";
+    case transport::Reason::kNoStream:
+      return "the server does not play this stream any more";
+    case transport::Reason::kRecording:
+      return "input refused: the session is a recording";
+  }
+  return "refused for reason " + std::to_string(reason);
+}
+
+}  // namespace tandem::client

@@ -1,0 +1,87 @@
+#include "sdk/client/session/session_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sdk/transport/port.hpp"
+
+namespace tandem::client {
+namespace {
+
+constexpr std::uint32_t kDefinedLead = 1;
+constexpr double kMinFrameRateHz = 1;
+constexpr double kMaxFrameRateHz = 10'000;
+// The largest payload has a correction and a lifecycle record of every slot: below 128 bytes a slot with
+// orientations, plus headers.
+constexpr std::uint64_t kMaxBytesPerSlot = 256;
+constexpr std::uint64_t kMaxFixedBytes = 1U << 20U;
+
+tl::unexpected<Error> bad(const std::string& what) { return fail(ErrorCode::kMalformed, what); }
+
+Result<void> check_session(const transport::SessionMessage& s) {
+  if (s.protocol_version != transport::kProtocolVersion) {
+    return fail(ErrorCode::kUnsupported, "the server speaks protocol version " +
+                                             std::to_string(s.protocol_version) + ", this client " +
+                                             std::to_string(transport::kProtocolVersion));
+  }
+  if (s.epoch == 0) return bad("epoch 0");
+  if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))
+    return bad("frame rate out of range");
+  if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
+  if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
+  for (const auto& type : s.types) {
+    if (!std::isfinite(type.radius) || type.radius < 0) return bad("radius of type " + type.name);
+  }
+  return {};
+}
+
+Result<void> check_stream(const transport::SessionMessage& session, const transport::StreamMessage& s) {
+  if (auto good = check_layout(s.layout); !good) return good;
+  if (session.types.size() != s.layout.type_count)
+    return bad("a list of " + std::to_string(session.types.size()) + " body types");
+  const std::uint64_t most = kMaxFixedBytes + kMaxBytesPerSlot * s.layout.capacity;
+  if (s.max_delta_bytes > most) return bad("deltas of " + std::to_string(s.max_delta_bytes) + " bytes");
+  if (s.max_snapshot_bytes > most)
+    return bad("snapshots of " + std::to_string(s.max_snapshot_bytes) + " bytes");
+  if (transport::layout_hash(session, s) != s.layout_hash) {
+    return fail(ErrorCode::kMismatch, "its layout hash differs from what this client computes");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Playable> choose_stream(const transport::SessionMessage& session) {
+  return playable_streams(session).and_then([&](const std::vector<std::size_t>& playable) {
+    return ClientTimeline::create(session.streams[playable.front()].layout)
+        .map([&](ClientTimeline&& timeline) {
+          return Playable{playable.front(), std::move(timeline)};
+        });
+  });
+}
+
+Result<std::vector<std::size_t>> playable_streams(const transport::SessionMessage& session) {
+  if (auto good = check_session(session); !good) {
+    return fail(good.error().code, "session refused: " + good.error().message);
+  }
+  Error refused{ErrorCode::kMalformed, "session refused: no stream can be played"};
+  std::vector<std::size_t> playable;
+  for (std::size_t i = 0; i < session.streams.size(); ++i) {
+    const transport::StreamMessage& stream = session.streams[i];
+    const auto good = check_stream(session, stream);
+    const auto timeline = good ? ClientTimeline::create(stream.layout) : tl::unexpected<Error>(good.error());
+    const bool listed_twice = std::any_of(playable.begin(), playable.end(), [&](std::size_t other) {
+      return session.streams[other].id.id == stream.id.id;
+    });
+    if (timeline && !listed_twice) playable.push_back(i);
+    if (timeline) continue;
+    if (i == 0) refused.code = timeline.error().code;
+    refused.message +=
+        (i == 0 ? ": stream " : "; stream ") + std::to_string(stream.id.id) + ": " + timeline.error().message;
+  }
+  if (playable.empty()) return tl::unexpected<Error>(std::move(refused));
+  return playable;
+}
+
+}  // namespace tandem::client

@@ -1,0 +1,381 @@
+#include "sdk/client/session/stream_choice.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sdk/client/session/text_message.hpp"
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
+
+namespace tandem::client {
+namespace {
+
+// Losses of so short a time are the link's.
+constexpr std::int64_t kLossSpanNs = 30 * kSecond;
+constexpr std::size_t kManyLosses = 2;
+// Frames that come later than this part of the rate, over a link whose round trip has grown, are queued in
+// it.
+constexpr double kFullRate = 0.85;
+constexpr std::int64_t kQueuedNs = 150 * kMillisecond;
+
+std::string milliseconds(double ns) {
+  const std::int64_t tenths = std::llround(ns / 1e5);
+  return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10);
+}
+
+std::vector<std::string> names_of(const transport::SessionMessage& session) {
+  std::vector<std::string> names;
+  // One stream needs no name, and most scenes are long.
+  const auto scene =
+      session.streams.size() > 1 ? read_text_message(session.scene_description) : TextMessage{};
+  if (scene) {
+    for (const TextField& field : *scene) {
+      if (field.name == "stream_names" && !field.is_message) names.emplace_back(field.scalar);
+    }
+  }
+  names.resize(session.streams.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    constexpr std::size_t kMostBytes = 32;
+    if (names[i].empty() || names[i].size() > kMostBytes) names[i] = std::to_string(session.streams[i].id.id);
+  }
+  return names;
+}
+
+}  // namespace
+
+StreamPreference read_preference(std::string_view text) {
+  using Kind = StreamPreference::Kind;
+  if (text.empty() || text == "auto") return {};
+  if (text == "bandwidth") return {.kind = Kind::kBandwidth};
+  if (text == "computing") return {.kind = Kind::kComputing};
+  if (text == "error") return {.kind = Kind::kError};
+  return {.kind = Kind::kNamed, .name = std::string(text)};
+}
+
+std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
+                                     const std::vector<std::size_t>& playable) {
+  const std::vector<std::string> names = names_of(session);
+  std::vector<StreamOffer> offers;
+  for (const std::size_t index : playable) {
+    const transport::StreamMessage& stream = session.streams[index];
+    offers.push_back({.index = index,
+                      .id = stream.id,
+                      .name = names[index],
+                      .is_ballistic = stream.layout.predictor == basic_predictor().name,
+                      .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
+                      .per_body_ns = double{1} * stream.client_cost_ns,
+                      .announced_ns = double{1} * stream.client_cost_ns * session.capacity});
+  }
+  return offers;
+}
+
+std::optional<double> measure_own_step(std::int64_t (*clock_ns)()) {
+  if (clock_ns == nullptr) return std::nullopt;
+  constexpr std::uint32_t kBodies = 4096;
+  constexpr int kMostSteps = 1024;  // for a clock that stands still, or nearly so
+  constexpr std::int64_t kEnoughNs = 20 * kMillisecond;
+  const auto predictor = make_predictor(basic_predictor().name, kBodies, {});
+  if (!predictor) return std::nullopt;
+  State state(kBodies);
+  for (Slot slot = 0; slot < kBodies; ++slot)
+    state.spawn(slot, 0, 0, {.p = {static_cast<std::int32_t>(slot), 0, 0}, .v = {64, 0, 0}});
+  StateHasher hasher;
+  const StepInput input;
+  const std::int64_t began_ns = clock_ns();
+  std::int64_t took_ns = 0;
+  int steps = 0;
+  while (took_ns < kEnoughNs && steps < kMostSteps) {
+    (*predictor)->step(state, state, input);
+    static_cast<void>(hasher.hash(state));
+    ++steps;
+    took_ns = clock_ns() - began_ns;
+  }
+  if (took_ns <= 0) return std::nullopt;
+  return static_cast<double>(took_ns) / steps / kBodies;
+}
+
+StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference preference, double period_ns,
+                             std::optional<double> own_step_ns)
+    : preference_(std::move(preference)), period_ns_(period_ns) {
+  for (StreamOffer& offer : offers) offers_.push_back({.offer = std::move(offer)});
+  if (own_step_ns) {
+    const auto ballistic = std::find_if(offers_.begin(), offers_.end(), [](const Candidate& c) {
+      return c.offer.is_ballistic && c.offer.announced_ns > 0;
+    });
+    if (ballistic != offers_.end())
+      slowness_ = std::clamp(*own_step_ns / ballistic->offer.per_body_ns, 0.1, 1000.0);
+  }
+  reason_ = choose_first();
+  before_ = chosen_;
+}
+
+std::string StreamChooser::choose_first() {
+  std::string but;
+  if (preference_.kind == StreamPreference::Kind::kNamed) {
+    if (const auto named = find_named()) {
+      chosen_ = *named;
+      return "asked for by name";
+    }
+    but = ", as there is no stream '" + preference_.name + "'";
+    preference_ = {};
+  }
+  const Best first = best(INT64_MAX);
+  chosen_ = first.index;
+  return (offers_.size() == 1 ? "the only one" : first.why) + but;
+}
+
+double StreamChooser::cost_ns(const Candidate& candidate) const {
+  return candidate.measured_ns > 0 ? candidate.measured_ns : candidate.offer.announced_ns * slowness_;
+}
+
+// Like with like: a frame that was measured has more in it than its announced step.
+double StreamChooser::relative_cost(const Candidate& a, const Candidate& b) {
+  const bool measured = a.measured_ns > 0 && b.measured_ns > 0;
+  const double of_a = measured ? a.measured_ns : a.offer.announced_ns;
+  const double of_b = measured ? b.measured_ns : b.offer.announced_ns;
+  return of_b > 0 ? of_a / of_b : 1;
+}
+
+bool StreamChooser::fits(const Candidate& candidate, double share) const {
+  return cost_ns(candidate) <= share * period_ns_;
+}
+
+// Where rates are not known: a dearer step saves bits, or nobody would offer it, and so does a coarser
+// threshold.
+bool StreamChooser::fewer_bits(const Candidate& a, const Candidate& b) const {
+  if (a.bits_per_s > 0 && b.bits_per_s > 0) return a.bits_per_s < b.bits_per_s;
+  if (a.offer.announced_ns != b.offer.announced_ns) return a.offer.announced_ns > b.offer.announced_ns;
+  return a.offer.threshold > b.offer.threshold;
+}
+
+template <class Admits, class Less>
+std::optional<std::size_t> StreamChooser::best_of(std::int64_t now_ns, Admits&& admits, Less&& less) const {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < offers_.size(); ++i) {
+    if (now_ns < offers_[i].barred_until_ns || offers_[i].is_unreachable || !admits(offers_[i])) continue;
+    if (!best || less(offers_[i], offers_[*best])) best = i;
+  }
+  return best;
+}
+
+std::size_t StreamChooser::cheapest(std::int64_t now_ns) const {
+  return best_of(
+             now_ns, [](const Candidate&) { return true; },
+             [](const Candidate& a, const Candidate& b) { return relative_cost(a, b) < 1; })
+      .value_or(chosen_);
+}
+
+StreamChooser::Best StreamChooser::best(std::int64_t now_ns) const {
+  using Kind = StreamPreference::Kind;
+  const auto fewer = [this](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); };
+  const auto keeps_up = [this](const Candidate& c) { return fits(c, kMostShare); };
+  switch (preference_.kind) {
+    case Kind::kBandwidth:
+      if (const auto found = best_of(now_ns, keeps_up, fewer)) return {*found, "fewest bits"};
+      break;
+    case Kind::kError: {
+      const auto finer = [this](const Candidate& a, const Candidate& b) {
+        return a.offer.threshold != b.offer.threshold ? a.offer.threshold < b.offer.threshold
+                                                      : fewer_bits(a, b);
+      };
+      if (const auto found = best_of(now_ns, keeps_up, finer)) return {*found, "smallest error"};
+      break;
+    }
+    case Kind::kAutomatic: {
+      const auto easy = [this](const Candidate& c) { return fits(c, kEasyShare); };
+      if (const auto found = best_of(now_ns, easy, fewer)) return {*found, "fewest bits of the easy ones"};
+      break;
+    }
+    case Kind::kComputing:
+    case Kind::kNamed:
+      break;
+  }
+  return {cheapest(now_ns), "cheapest step"};
+}
+
+// By what the preference looks at; who is not known is worth a try.
+bool StreamChooser::worthwhile(const Candidate& other, const Candidate& present) const {
+  using Kind = StreamPreference::Kind;
+  if (preference_.kind == Kind::kError && other.offer.threshold < present.offer.threshold) return true;
+  const bool by_cost = preference_.kind == Kind::kComputing || !fits(present, 2 * kEasyShare);
+  if (preference_.kind != Kind::kBandwidth && by_cost) return relative_cost(other, present) < kWorthwhile;
+  if (other.bits_per_s > 0 && present.bits_per_s > 0)
+    return other.bits_per_s < kWorthwhile * present.bits_per_s;
+  return fewer_bits(other, present);
+}
+
+void StreamChooser::on_status(const transport::ServerStatusMessage& status) {
+  for (Candidate& candidate : offers_) {
+    if (candidate.offer.id.id != status.stream) continue;
+    if (status.threshold > 0) candidate.offer.threshold = status.threshold;
+    if (status.mbit_per_s > 0) candidate.bits_per_s = status.mbit_per_s * kBitsPerMbit;
+    candidate.is_played = candidate.is_played || status.participants + status.observers > 0;
+  }
+}
+
+void StreamChooser::on_frame(std::int64_t cost_ns) {
+  costs_.add(cost_ns);
+  ++frames_;
+}
+
+void StreamChooser::on_loss(std::int64_t now_ns) {
+  std::erase_if(losses_ns_, [now_ns](std::int64_t at_ns) { return now_ns - at_ns > kLossSpanNs; });
+  if (losses_ns_.size() < kManyLosses) losses_ns_.push_back(now_ns);
+}
+
+void StreamChooser::look_at_last_second(const Seen& seen) {
+  Candidate& present = offers_[chosen_];
+  if (frames_ > 0 && !seen.idle_since_ns) {
+    const double median_ns = 1e6 * costs_.quantile_ms(0.5);
+    if (median_ns > 0) present.measured_ns = median_ns;
+  }
+  slow_seconds_ = frames_ > 0 && !fits(present, kMostShare) ? slow_seconds_ + 1 : 0;
+  starved_seconds_ = starved(seen) ? starved_seconds_ + 1 : 0;
+  costs_.clear();
+  frames_ = 0;
+}
+
+// Of streams that are not played here: a processor that was hot, or a scene that was wild, may have calmed
+// down.
+void StreamChooser::forget_old_figures(std::int64_t now_ns) {
+  for (Candidate& candidate : offers_) {
+    if (std::exchange(candidate.is_played, false) || &candidate == &offers_[chosen_])
+      candidate.played_ns = now_ns;
+    if (candidate.played_ns != INT64_MIN && now_ns - candidate.played_ns >= kKnownNs)
+      candidate.bits_per_s = 0;
+    if (candidate.barred_until_ns == INT64_MIN || now_ns < candidate.barred_until_ns) continue;
+    candidate.barred_until_ns = INT64_MIN;
+    candidate.is_unreachable = false;
+    candidate.measured_ns = 0;
+  }
+}
+
+std::optional<std::size_t> StreamChooser::find(const StreamId& stream) const {
+  const auto found =
+      std::find_if(offers_.begin(), offers_.end(), [&](const Candidate& c) { return c.offer.id == stream; });
+  if (found == offers_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - offers_.begin());
+}
+
+std::optional<std::size_t> StreamChooser::find_named() const {
+  if (preference_.kind != StreamPreference::Kind::kNamed) return std::nullopt;
+  const auto found = std::find_if(offers_.begin(), offers_.end(),
+                                  [this](const Candidate& c) { return c.offer.name == preference_.name; });
+  if (found == offers_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - offers_.begin());
+}
+
+// Fewer frames than the session has, while what is sent waits in a queue on the way. A server that waits for
+// another client, or is slow itself, leaves the round trip as it is.
+bool StreamChooser::starved(const Seen& seen) const {
+  if (seen.idle_since_ns || seen.round_trip_ns == 0 || best_round_trip_ns_ == 0) return false;
+  const auto elapsed_ns = static_cast<double>(seen.now_ns - looked_ns_);
+  const bool late = static_cast<double>(frames_) * period_ns_ < kFullRate * elapsed_ns;
+  return late && seen.round_trip_ns > 2 * best_round_trip_ns_ + kQueuedNs;
+}
+
+void StreamChooser::prefer(StreamPreference preference) {
+  preference_ = std::move(preference);
+  is_new_preference_ = true;
+}
+
+bool StreamChooser::reconsider(const Seen& seen) {
+  if (looked_ns_ == INT64_MIN) looked_ns_ = changed_ns_ = seen.now_ns;
+  if (std::exchange(is_new_preference_, false)) {
+    const std::size_t before = chosen_;
+    std::string why = choose_first();
+    const std::size_t wanted = std::exchange(chosen_, before);
+    if (wanted != before) {
+      change(wanted, std::move(why), seen.now_ns);
+      return true;
+    }
+    reason_ = std::move(why);
+  }
+  if (offers_.size() == 1 || seen.now_ns - looked_ns_ < kLookNs) return false;
+  if (seen.round_trip_ns > 0 && (best_round_trip_ns_ == 0 || seen.round_trip_ns < best_round_trip_ns_))
+    best_round_trip_ns_ = seen.round_trip_ns;
+  look_at_last_second(seen);
+  looked_ns_ = seen.now_ns;
+  forget_old_figures(seen.now_ns);
+  if (seen.idle_since_ns) {  // a join that gets on is not given up for another
+    return seen.now_ns - std::max(*seen.idle_since_ns, changed_ns_) >= kLongJoinNs &&
+           leave_link("nothing of " + offers_[chosen_].offer.name + " came for 10 s while joining",
+                      seen.now_ns);
+  }
+  if (const auto named = find_named()) {  // elsewhere only after a change that was given up
+    if (*named == chosen_ || seen.now_ns < offers_[*named].barred_until_ns) return false;
+    change(*named, "asked for by name", seen.now_ns);
+    return true;
+  }
+  const std::string name = offers_[chosen_].offer.name;
+  if (slow_seconds_ >= kSlowSeconds && leave_slow(seen.now_ns)) return true;
+  if (losses_ns_.size() >= kManyLosses && seen.now_ns - losses_ns_.front() <= kLossSpanNs &&
+      leave_link("the link loses " + name, seen.now_ns))
+    return true;
+  if (starved_seconds_ >= kStarvedSeconds && leave_link("the link is too thin for " + name, seen.now_ns))
+    return true;
+  const Best wanted = best(seen.now_ns);
+  const bool better = wanted.index != chosen_ && worthwhile(offers_[wanted.index], offers_[chosen_]);
+  better_seconds_ = better && wanted.index == better_ ? better_seconds_ + 1 : (better ? 1 : 0);
+  better_ = wanted.index;
+  if (better_seconds_ < kBetterSeconds || seen.now_ns - changed_ns_ < dwell_ns_) return false;
+  dwell_ns_ = std::min(2 * dwell_ns_, kMostDwellNs);
+  change(wanted.index, wanted.why, seen.now_ns);
+  return true;
+}
+
+bool StreamChooser::leave_slow(std::int64_t now_ns) {
+  const Candidate& present = offers_[chosen_];
+  const std::size_t other = cheapest(INT64_MAX);  // also one that the link was left for
+  if (relative_cost(offers_[other], present) >= kWorthwhile) return false;
+  return leave_for(other,
+                   "a frame of " + present.offer.name + " takes " + milliseconds(cost_ns(present)) + " of " +
+                       milliseconds(period_ns_) + " ms",
+                   now_ns);
+}
+
+bool StreamChooser::leave_link(const std::string& what, std::int64_t now_ns) {
+  const Candidate& present = offers_[chosen_];
+  return leave_for(
+      best_of(
+          now_ns,
+          [&](const Candidate& c) { return &c != &present && fewer_bits(c, present) && fits(c, kMostShare); },
+          [this](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); }),
+      what, now_ns);
+}
+
+bool StreamChooser::leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns) {
+  if (!other || *other == chosen_) return false;
+  Candidate& left = offers_[chosen_];
+  left.barred_until_ns = now_ns + left.barred_ns;
+  left.barred_ns = std::min(2 * left.barred_ns, kMostBarredNs);
+  change(*other, std::move(why), now_ns);
+  return true;
+}
+
+void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns) {
+  before_ = std::exchange(chosen_, to);
+  reason_before_ = std::exchange(reason_, std::move(why));
+  changed_ns_ = now_ns;
+  slow_seconds_ = starved_seconds_ = better_seconds_ = 0;
+  losses_ns_.clear();
+  costs_.clear();
+  frames_ = 0;
+}
+
+void StreamChooser::keep(const StreamId& chosen, const StreamId& before) {
+  const auto kept = find(chosen);
+  if (kept) chosen_ = *kept;
+  before_ = find(before).value_or(chosen_);
+}
+
+void StreamChooser::gave_up(std::int64_t now_ns) {
+  Candidate& other = offers_[chosen_];
+  other.barred_until_ns = now_ns + other.barred_ns;
+  other.barred_ns = std::min(2 * other.barred_ns, kMostBarredNs);
+  other.is_unreachable = true;
+  change(before_, reason_before_, now_ns);
+}
+
+}  // namespace tandem::client

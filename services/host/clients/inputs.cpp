@@ -1,0 +1,62 @@
+#include "services/host/clients/inputs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sdk/transport/limits.hpp"
+
+namespace tandem::host {
+namespace {
+
+using transport::Reason;
+
+bool well_formed(const transport::InputMessage& input) {
+  return input.values.size() <= transport::kMaxInputValues &&
+         input.bytes.size() <= transport::kMaxInputBytes &&
+         std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
+}
+
+// A client that was handed a snapshot and sends input plays already, whichever topic is faster.
+bool may_play(const Account& account) {
+  return account.phase == transport::Phase::kPlaying || was_served(account);
+}
+
+}  // namespace
+
+Reason InputDesk::handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns) {
+  account.reply.schedule.on_outcome();
+  if (input.epoch != epoch_) {
+    // Its number belongs to another epoch's count, so it must not enter this one's outcomes.
+    ++refused_;
+    account.reply.once = Reason::kStaleEpoch;
+    return Reason::kStaleEpoch;
+  }
+  transport::ReplyEntry entry{.number = input.number, .frame = 0, .code = 0};
+  if (input.number <= account.inputs.highest) {
+    // The first outcome of a number is the one that counts; the reply tells it again.
+    ++refused_;
+    entry.code = static_cast<std::uint32_t>(Reason::kDuplicate);
+    if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
+    return Reason::kDuplicate;
+  }
+  const Reason reason = decide(account, input, now_ns, entry.frame);
+  if (reason != Reason::kNone) ++refused_;
+  entry.code = static_cast<std::uint32_t>(reason);
+  account.inputs.highest = input.number;
+  account.inputs.outcomes.add(entry, now_ns);
+  return reason;
+}
+
+Reason InputDesk::decide(Account& account, const transport::InputMessage& input, std::int64_t now_ns,
+                         Frame& acts_on) {
+  if (!account.inputs.rate.take(now_ns)) return Reason::kRateLimited;
+  if (!may_play(account)) return Reason::kNotPlaying;
+  if (account.demoted) return Reason::kDemoted;
+  if (account.role() == transport::Role::kObserver) return Reason::kObserver;
+  if (!well_formed(input)) return Reason::kInvalid;
+  return source_->accept({.kind = input.kind, .values = input.values, .bytes = input.bytes},
+                         {input.client, input.number}, *outbox_, acts_on);
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,66 @@
+#include "services/host/clients/replies.hpp"
+
+#include <algorithm>
+
+namespace tandem::host {
+namespace {
+
+using transport::Reason;
+
+Reason standing_reason(const Account& account) {
+  if (account.reply.once != Reason::kNone) return account.reply.once;
+  return account.demoted ? Reason::kDemoted : Reason::kNone;
+}
+
+}  // namespace
+
+// False while there is no room: a writer has to end before its client's next one is opened.
+bool ReplyDesk::close_forgotten(Roster& roster) {
+  auto& forgotten = roster.forgotten();
+  while (!forgotten.empty()) {
+    if (!outbox_->push(CloseClient{forgotten.back()})) return false;
+    forgotten.pop_back();
+  }
+  return true;
+}
+
+void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns) {
+  if (!close_forgotten(roster)) return;
+  for (auto& [id, account] : roster.accounts()) {
+    ReplyAccount& reply = account.reply;
+    if (!account.present || !reply.schedule.due(account.role(), now_ns)) continue;
+    if (!account.open && !outbox_->push(OpenClient{id})) return;
+    account.open = true;
+    const bool queued =
+        outbox_->push(transport::ReplyMessage{.client = id,
+                                              .epoch = epoch_,
+                                              .role = account.role(),
+                                              .phase = account.phase,
+                                              .reason = static_cast<std::uint32_t>(standing_reason(account)),
+                                              .highest_input = account.inputs.highest,
+                                              .client_clock_ns = account.clock_ns,
+                                              .server_time_ns = wall_ns,
+                                              .entries = account.inputs.outcomes.told(now_ns)});
+    if (!queued) return;
+    reply.schedule.sent(account.role(), now_ns);
+    reply.once = Reason::kNone;
+  }
+}
+
+void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t now_ns, std::int64_t wall_ns) {
+  auto stranger = std::ranges::find(strangers_, client, &Stranger::client);
+  if (stranger == strangers_.end()) stranger = std::ranges::min_element(strangers_, {}, &Stranger::last_ns);
+  const bool answered = stranger->client == client && stranger->last_ns != INT64_MIN;
+  if (answered && now_ns - stranger->last_ns < kStrangerNs) return;
+  if (!strangers_rate_.take(now_ns)) return;
+  *stranger = {client, now_ns};
+  transport::ReplyMessage reply;
+  reply.client = client;
+  reply.epoch = epoch_;
+  reply.reason = static_cast<std::uint32_t>(reason);
+  reply.server_time_ns = wall_ns;
+  // Without room the stranger asks again and is answered then.
+  if (!outbox_->push(std::move(reply))) stranger->last_ns = INT64_MIN;
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,204 @@
+#pragma once
+// The clients of a session: who they are, whether the server waits for them, and what they did to deserve it.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/accounts/outcomes.hpp"
+#include "services/accounts/reply_schedule.hpp"
+#include "services/accounts/token_bucket.hpp"
+#include "services/host/clients/notices.hpp"
+#include "services/host/clients/stall_meter.hpp"
+#include "services/host/clients/window.hpp"
+
+namespace tandem::host {
+
+inline constexpr double kInputsPerSecond = 60;  ///< per client, on average
+inline constexpr double kInputBurst = 60;       ///< per client, at once
+
+/// The last outcomes of a client's inputs, and how fast it may send.
+struct InputAccount {
+  std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
+  accounts::Outcomes outcomes;
+  accounts::TokenBucket rate{kInputsPerSecond, kInputBurst};
+};
+
+struct JoinAccount {
+  bool served = false;
+  std::uint32_t served_attempt = 0;
+  std::uint32_t served_stream = 0;
+};
+
+struct ReplyAccount {
+  accounts::ReplySchedule schedule;
+  transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
+};
+
+/// One client id. Survives rejoins; forgotten with its DDS participant, or a minute after the client was last
+/// heard of.
+struct Account {
+  transport::ClientId id = 0;
+  transport::ParticipantId from;
+  transport::Phase phase = transport::Phase::kJoining;
+  transport::Role wanted = transport::Role::kObserver;
+  std::uint32_t stream = 0;                  ///< that it plays, or joins
+  std::optional<std::uint32_t> next_stream;  ///< that it joins while it goes on playing `stream`
+  bool open = false;                         ///< the client has writers of its own
+  bool asked = false;                        ///< it named this session, and does not only look for it
+  bool present = true;                       ///< its participant lives and it was heard of lately
+  bool counted = false;  ///< a participant that plays and has caught up: the server waits for it
+  bool demoted = false;
+  bool kept_up = false;  ///< while demoted: since kept_up_since_ns
+  std::int64_t kept_up_since_ns = 0;
+  Frame applied = 0;
+  Frame timed_from = 0;  ///< acknowledgements of later frames tell a round trip
+  std::uint32_t attempt = 0;
+  std::int64_t clock_ns = 0;
+  std::int64_t heard_ns = 0;
+  RoundTrip round_trip;
+  InputAccount inputs;
+  JoinAccount join;
+  ReplyAccount reply;
+  accounts::TokenBucket notices = kNoticesOfClient;
+
+  [[nodiscard]] transport::Role role() const { return demoted ? transport::Role::kObserver : wanted; }
+  [[nodiscard]] bool plays() const { return present && phase == transport::Phase::kPlaying; }
+};
+
+/// What all clients of one DDS participant may cost together, or ids would multiply it.
+struct Peer {
+  StallMeter stalls;
+  accounts::TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
+};
+
+/// The stream that it is on its way into, from outside or from another.
+[[nodiscard]] inline std::optional<std::uint32_t> joined_stream(const Account& account) {
+  if (!account.present) return std::nullopt;
+  if (account.phase == transport::Phase::kJoining)
+    return account.asked ? std::optional(account.stream) : std::nullopt;
+  return account.next_stream;
+}
+
+/// It was served a snapshot of the stream that it asked for last, since it asked.
+[[nodiscard]] inline bool was_served(const Account& account) {
+  return account.join.served && account.join.served_attempt == account.attempt &&
+         account.join.served_stream == account.next_stream.value_or(account.stream);
+}
+
+/// Whose deltas it applies, or will as soon as it has the snapshot that was cut for it.
+[[nodiscard]] inline bool needs(const Account& account, std::uint32_t stream) {
+  if (!account.present) return false;
+  if (account.phase == transport::Phase::kPlaying && account.stream == stream) return true;
+  return joined_stream(account) == stream && was_served(account);
+}
+
+/// Rules of clients, without I/O. Not thread-safe.
+class Roster {
+ public:
+  struct Rules {
+    Epoch epoch = 0;
+    std::vector<std::string> streams = {""};  ///< names by id; all of generation 0
+    std::uint32_t client_limit = 256;
+    std::uint32_t participant_limit = 16;  ///< clients of one DDS participant
+    std::optional<std::int64_t> stall_timeout_ns;
+    std::optional<std::uint32_t> fixed_window;
+    std::uint32_t window_ceiling = 24;
+  };
+  explicit Roster(Rules rules)
+      : rules_(std::move(rules)), window_(rules_.fixed_window.value_or(kSmallestWindow)) {}
+
+  /// Where the server stands when something happens.
+  struct Now {
+    std::int64_t ns = 0;
+    Frame frame = 0;    ///< last delta made; s is the next
+    Frame written = 0;  ///< last delta that left the queue: nobody is to blame for lacking a later one
+    std::int64_t period_ns = 0;
+  };
+
+  /// Digests an acknowledgement. kNone: taken. Otherwise why not; what concerns a known account is left as it
+  /// was.
+  transport::Reason acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
+                                const PublishTimes& times, const Now& now);
+  /// The account of `id` if it belongs to `from`; null and kForeignClient or kNotPlaying otherwise.
+  Account* find(transport::ClientId id, const transport::ParticipantId& from, transport::Reason& reason);
+
+  /// Forgets clients whose participant is gone; call now and then, and while suspended.
+  void look_for_dead(transport::ServerPort& port, const Now& now);
+  /// Who keeps the server from starting frame s = now.frame + 1.
+  [[nodiscard]] bool blocked(const Now& now) const;
+  /// Whether a client is to blame for that: it lacks a delta that was written.
+  [[nodiscard]] bool blamed(const Now& now) const;
+  /// Charges a suspension that lasted `duration_ns` to the DDS participants of all who are to blame, and
+  /// demotes those of them whose participant caused too much.
+  void charge(std::int64_t duration_ns, const Now& now);
+  /// Shortest time until somebody who is to blame has used up its allowance; nothing if nobody does or may.
+  [[nodiscard]] std::optional<std::int64_t> patience_ns(const Now& now);
+  /// Frame s = now.frame + 1 starts: notes which demoted clients do not keep up.
+  void frame_starts(const Now& now);
+  /// Demoted clients that kept up for 10 s are participants again; caught-up joiners count; the window
+  /// follows.
+  void refresh(const Now& now);
+
+  [[nodiscard]] std::uint32_t window() const { return window_; }
+  [[nodiscard]] std::uint32_t counted() const;
+  [[nodiscard]] std::uint32_t counted(std::uint32_t stream) const;
+  [[nodiscard]] std::uint32_t watching() const;  ///< playing and not counted
+  [[nodiscard]] std::uint32_t watching(std::uint32_t stream) const;
+  [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
+  [[nodiscard]] Peer& peer(const Account& account) { return peers_.at(account.from); }
+  [[nodiscard]] std::uint64_t seen() const { return seen_; }
+  [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
+  [[nodiscard]] Notices& notices() { return notices_; }
+  /// Accounts with writers of their own that were forgotten, for whoever ends their writers and removes them
+  /// here.
+  [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
+
+ private:
+  /// Somebody looks for a session: its writers are made before it asks for anything.
+  transport::Reason expect(const transport::AckMessage& ack, Account* account,
+                           const transport::ParticipantId& from, std::int64_t now_ns);
+  Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
+  using Accounts = std::map<transport::ClientId, Account>;
+  [[nodiscard]] bool lists(const StreamId& stream) const {
+    return stream.id < rules_.streams.size() && stream.generation == 0;
+  }
+  /// Which stream it plays and joins; true when it enters the session anew, or another stream without having
+  /// joined that first.
+  bool follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now);
+  /// " of stream NAME"; nothing of a session that has but one.
+  [[nodiscard]] std::string of_stream(std::uint32_t stream) const;
+  void note(Account& account, std::string_view what, std::int64_t now_ns);
+  Accounts::iterator forget(Accounts::iterator account);
+  [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
+    return account.applied + window_ >= now.frame + 1;
+  }
+  // While the server waits, whoever lives and lacks nothing says so; not to wait for the silent one by one.
+  [[nodiscard]] static bool silent(const Account& account, const Now& now) {
+    return now.ns - account.heard_ns > transport::kAckSpacingNs + account.round_trip.high_ns();
+  }
+  [[nodiscard]] bool blamed(const Account& account, const Now& now) const {
+    return account.counted && account.applied < now.written &&
+           (!keeps_up(account, now) || silent(account, now));
+  }
+
+  Rules rules_;
+  std::uint32_t window_;
+  std::map<transport::ClientId, Account>
+      accounts_;  // ordered, so that rules apply in the same order everywhere
+  std::map<transport::ParticipantId, Peer> peers_;  // those with an account
+  std::uint64_t seen_ = 0, demotions_ = 0;
+  Notices notices_;
+  std::vector<transport::ClientId> forgotten_;
+};
+
+/// Sixteen hex digits, as ids are shown everywhere.
+[[nodiscard]] std::string client_name(transport::ClientId id);
+
+}  // namespace tandem::host

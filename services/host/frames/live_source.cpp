@@ -1,0 +1,248 @@
+#include "services/host/frames/live_source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "sdk/core/lattice/assert.hpp"
+#include "services/host/frames/announcement.hpp"
+
+namespace tandem::host {
+
+using transport::Reason;
+
+namespace {
+
+// More than one core for a stream would be for its blocks: StreamConfig::local.
+std::uint32_t threads_for(std::size_t streams) {
+  return std::min(static_cast<std::uint32_t>(streams), std::max(1U, std::thread::hardware_concurrency()));
+}
+
+}  // namespace
+
+LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror,
+                       const Drive& drive)
+    : simulation_(&simulation),
+      mirror_(std::move(mirror)),
+      workers_(threads_for(config.streams.size())),
+      session_(session_message(config)),
+      frame_rate_hz_(config.frame_rate_hz),
+      clock_ns_(config.clock_ns),
+      frame_(config.start_frame),
+      drive_(drive) {
+  for (const StreamConfig& stream : config.streams) lanes_.push_back({stream, {}});
+}
+
+Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
+                                                       engine::Simulation& simulation) {
+  const Lattice& lattice = config.streams.front().lattice;
+  const auto drive = to_drive(lattice, simulation.gravity(), simulation.damping_per_s());
+  if (!drive) return tl::unexpected(drive.error());
+  auto mirror = make_mirror(config.streams, simulation.bodies());
+  if (!mirror) return tl::unexpected(mirror.error());
+  std::unique_ptr<LiveSource> source(new LiveSource(config, simulation, std::move(*mirror), *drive));
+  for (std::uint32_t id = 0; id < source->lanes_.size(); ++id) {
+    auto stream = source->begin(id);
+    const std::string& name = config.streams[id].name;
+    if (!stream && name.empty()) return tl::unexpected(stream.error());
+    if (!stream) return fail(stream.error().code, fmt::format("stream {}: {}", name, stream.error().message));
+    list_stream(*stream, source->session_);
+    if (id == 0) source->lanes_[id].stream.emplace(std::move(*stream));
+  }
+  return source;
+}
+
+Result<Stream> LiveSource::begin(std::uint32_t id) const {
+  std::vector<ScheduledDrive> pending;
+  for (const Waiting& waiting : scheduled_) pending.push_back(waiting.drive);
+  auto stream = Stream::create(lanes_[id].config, {.mirror = mirror_,
+                                                   .drive = drive_,
+                                                   .epoch = session_.epoch,
+                                                   .id = {.id = id, .generation = 0},
+                                                   .frame = frame_,
+                                                   .frame_rate_hz = frame_rate_hz_,
+                                                   .last_input = last_input_,
+                                                   .pending = pending,
+                                                   .under_way = under_way_});
+  if (stream) stream->set_clock(clock_ns_);
+  return stream;
+}
+
+StreamSet LiveSource::active() const {
+  StreamSet active;
+  for (std::size_t id = 0; id < lanes_.size(); ++id) active[id] = lanes_[id].stream.has_value();
+  return active;
+}
+
+void LiveSource::set_active(StreamSet streams) {
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    Lane& lane = lanes_[id];
+    if (!streams[id]) {
+      lane.stream.reset();
+      lane.told_out_of_reach = false;
+    }
+    if (!streams[id] || lane.stream) continue;
+    auto stream = begin(id);
+    TANDEM_ASSERT(stream.has_value());  // it was begun once, from the same configuration
+    lane.stream.emplace(std::move(*stream));
+  }
+}
+
+const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
+  const Lane& lane = lanes_[id];
+  return lane.stream ? lane.stream->parameters() : lane.config.layout.parameters;
+}
+
+std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
+  const std::int64_t start_ns = clock();
+  apply(next_frame());
+  simulation_->step();
+  under_way_ = true;
+  const std::int64_t stepped_ns = clock();
+  const engine::Bodies bodies = simulation_->bodies();
+  if (auto good = mirror_.check(bodies); !good) {
+    error_ = good.error();
+    return std::nullopt;
+  }
+  mirror_.update(bodies, simulation_->events());
+  ++frame_;
+  deltas_.clear();
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    if (!lanes_[id].stream) continue;
+    if (snapshots_follow[id]) lanes_[id].stream->round_next();
+    deltas_.push_back({.stream = id});
+  }
+  make_deltas();
+  return MadeFrame{
+      .frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = stepped_ns - start_ns};
+}
+
+void LiveSource::make_deltas() {
+  workers_.run(static_cast<std::uint32_t>(deltas_.size()), 1, [this](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) {
+      MadeDelta& made = deltas_[i];
+      const Stream::FrameResult frame = lanes_[made.stream].stream->produce(mirror_);
+      made.hash = frame.hash;
+      made.payload = frame.payload;
+      made.corrected = frame.corrected;
+    }
+  });
+}
+
+Reason LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
+                          Frame& acts_on) {
+  const engine::Classification effect = simulation_->classify(input);
+  switch (effect.effect) {
+    case engine::Classification::Effect::kScheduled:
+      return schedule(input, effect, origin, outbox, acts_on);
+    case engine::Classification::Effect::kImmediate:
+      if (immediate_.size() >= kMostImmediate) return Reason::kRateLimited;
+      immediate_.push_back(input);
+      acts_on = next_frame();
+      return Reason::kNone;
+    case engine::Classification::Effect::kRefused:
+      break;
+  }
+  return Reason::kInvalid;
+}
+
+Reason LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
+                            const InputOrigin& origin, Outbox& outbox, Frame& acts_on) {
+  const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);
+  if (!drive) return Reason::kInvalid;
+  // s + A: no client can have simulated it, as none is further than A beyond delta s - 1.
+  const Frame frame = next_frame() + session_.lead;
+  if (scheduling_frame_ != frame) scheduled_now_ = 0;
+  if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return Reason::kRateLimited;
+  if (scheduled_.size() >= kMaxPendingInputs) return Reason::kRateLimited;
+  const ScheduledDrive scheduled{.number = last_input_ + 1, .frame = frame, .drive = *drive};
+  for (Lane& lane : lanes_) {
+    // What one of them refuses, all do: they hold the same inputs, and the drive is checked above.
+    if (lane.stream && !lane.stream->schedule(scheduled)) return Reason::kInvalid;
+  }
+  ++last_input_;
+  scheduling_frame_ = frame;
+  ++scheduled_now_;
+  scheduled_.push_back({scheduled, input});
+  acts_on = frame;
+  const bool queued = outbox.push(transport::ScheduledInputMessage{
+      .epoch = session_.epoch,
+      .number = scheduled.number,
+      .frame = frame,
+      .source_client = origin.client,
+      .source_number = origin.number,
+      .kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive),
+      .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping}});
+  return queued ? Reason::kNone : Reason::kRateLimited;
+}
+
+Result<Frame> LiveSource::inject(const engine::Input& input, Outbox& outbox) {
+  Frame acts_on = 0;
+  switch (accept(input, {}, outbox, acts_on)) {
+    case Reason::kNone:
+      return acts_on;
+    case Reason::kInvalid:
+      return fail(ErrorCode::kInvalidArgument, "the simulation refuses this input");
+    default:
+      return fail(ErrorCode::kCapacity, "too many inputs at once");
+  }
+}
+
+Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters& parameters) {
+  if (!lanes_[id].stream) return fail(ErrorCode::kOutOfOrder, "nobody plays this stream");
+  return lanes_[id].stream->set_parameters(parameters);
+}
+
+std::vector<std::string> LiveSource::take_notices(std::int64_t now_ns) {
+  std::vector<std::string> lines;
+  note_mishaps(now_ns, lines);
+  for (Lane& lane : lanes_)
+    if (lane.stream) note_target(lane, lines);
+  return lines;
+}
+
+void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines) {
+  engine::Mishaps now = simulation_->mishaps();
+  const engine::Mishaps shown = mirror_.mishaps();
+  now.removed += shown.removed;
+  now.clamped += shown.clamped;
+  if (now == noted_mishaps_ || now_ns - noted_mishaps_ns_ < kSecond) return;
+  noted_mishaps_ns_ = now_ns;
+  noted_mishaps_ = now;
+  const std::string& last = mirror_.last_removed();
+  const std::string told = last.empty() ? last : "; the last that clients cannot be told of: " + last;
+  lines.push_back(
+      fmt::format("bodies of the simulation are not sound: {} removed and {} slowed down since its start{}",
+                  now.removed, now.clamped, told));
+}
+
+void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
+  const bool out_of_reach = lane.stream->target_out_of_reach();
+  if (out_of_reach == lane.told_out_of_reach) return;
+  lane.told_out_of_reach = out_of_reach;
+  const StreamConfig& of = lane.config;
+  const std::string which = of.name.empty() ? std::string() : " of stream " + of.name;
+  if (!out_of_reach) {
+    lines.push_back(
+        fmt::format("the target of {} Mbit/s{} is kept again", of.quality->target_mbit_per_s, which));
+    return;
+  }
+  lines.push_back(fmt::format("the target of {} Mbit/s{} is exceeded even at the largest threshold, {:.3g} m",
+                              of.quality->target_mbit_per_s, which,
+                              of.quality->largest_threshold * of.lattice.unit));
+}
+
+void LiveSource::apply(Frame s) {
+  const auto later = std::ranges::find_if(scheduled_, [s](const Waiting& w) { return w.drive.frame > s; });
+  for (auto it = scheduled_.begin(); it != later; ++it) {
+    simulation_->apply(it->input);
+    drive_ = it->drive.drive;
+  }
+  scheduled_.erase(scheduled_.begin(), later);
+  for (const engine::Input& input : immediate_) simulation_->apply(input);
+  immediate_.clear();
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,93 @@
+#pragma once
+// A simulation that runs, as a source of frames: inputs, step, streams.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/host/frames/configuration.hpp"
+#include "services/host/frames/frame_source.hpp"
+#include "services/host/streams/stream.hpp"
+#include "services/workers/workers.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::host {
+
+inline constexpr std::size_t kMostImmediate = 1024;  ///< waiting for one step, all clients together
+/// Scheduled inputs per frame, all clients together; those of lead + 1 frames fit kMaxPendingInputs.
+inline constexpr std::uint32_t kMostScheduledPerFrame = 100;
+
+/// Gives inputs their frame, hands them to the simulation in time, and streams what becomes of its bodies:
+/// all streams follow one mirror, side by side, each on a thread of its own where there are cores. Not
+/// thread-safe.
+class LiveSource final : public FrameSource {
+ public:
+  /// `simulation` must outlive it; its bodies now are those of config.start_frame. The first stream is made
+  /// from the start. Errors: as Host::create(), naming the stream where there are several.
+  static Result<std::unique_ptr<LiveSource>> create(const HostConfig& config, engine::Simulation& simulation);
+
+  [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
+  [[nodiscard]] Frame frame() const override { return frame_; }
+  [[nodiscard]] StreamSet active() const override;
+  void set_active(StreamSet streams) override;
+  [[nodiscard]] const State& agreed(std::uint32_t id) const override { return lanes_[id].stream->agreed(); }
+  [[nodiscard]] std::uint64_t hash(std::uint32_t id) const override { return lanes_[id].stream->hash(); }
+  [[nodiscard]] const StreamParameters& parameters(std::uint32_t id) const override;
+  std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
+  void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
+  transport::Reason accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
+                           Frame& acts_on) override;
+
+  [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
+  Result<Frame> inject(const engine::Input& input, Outbox& outbox) override;
+  Result<void> set_parameters(std::uint32_t id, const StreamParameters& parameters) override;
+  [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns) override;
+  [[nodiscard]] std::optional<Error> error() const override { return error_; }
+
+ private:
+  struct Lane {
+    StreamConfig config;
+    std::optional<Stream> stream;
+    bool told_out_of_reach = false;  // of its target of quality
+  };
+  struct Waiting {
+    ScheduledDrive drive;
+    engine::Input input;
+  };
+  LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror, const Drive& drive);
+
+  [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
+  transport::Reason schedule(const engine::Input& input, const engine::Classification& effect,
+                             const InputOrigin& origin, Outbox& outbox, Frame& acts_on);
+  /// Hands the simulation all that acts on frame s, the one about to be stepped.
+  void apply(Frame s);
+  void make_deltas();
+  void note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines);
+  static void note_target(Lane& lane, std::vector<std::string>& lines);
+  [[nodiscard]] Frame next_frame() const { return frame_ + 1; }
+  [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
+
+  engine::Simulation* simulation_;
+  Mirror mirror_;
+  std::vector<Lane> lanes_;
+  Workers workers_;
+  transport::SessionMessage session_;
+  double frame_rate_hz_;
+  std::int64_t (*clock_ns_)();
+  Frame frame_;
+  bool under_way_ = false;                // the simulation was stepped
+  Drive drive_;                           // in force at frame_
+  std::uint64_t last_input_ = 0;          // number
+  std::vector<MadeDelta> deltas_;         // of the frame at hand
+  std::vector<Waiting> scheduled_;        // in the order of their numbers, so ascending by frame
+  std::vector<engine::Input> immediate_;  // in the order of arrival
+  Frame scheduling_frame_ = 0;
+  std::uint32_t scheduled_now_ = 0;  // for scheduling_frame_
+  std::int64_t noted_mishaps_ns_ = -kSecond;
+  engine::Mishaps noted_mishaps_;
+  std::optional<Error> error_;
+};
+
+}  // namespace tandem::host

@@ -1,0 +1,94 @@
+#pragma once
+// What the host wants published, in order, bounded. The one place where its thread meets the publisher's.
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <variant>
+
+#include "sdk/transport/port.hpp"
+
+namespace tandem::host {
+
+/// Asks the publisher for a client's own writers.
+struct OpenClient {
+  transport::ClientId client = 0;
+};
+/// Asks the publisher to end them.
+struct CloseClient {
+  transport::ClientId client = 0;
+};
+/// Part of a snapshot for one client.
+struct SnapshotPart {
+  transport::ClientId client = 0;
+  transport::SnapshotMessage part;
+};
+
+/// All deltas of a frame, one a stream that is made, are in front of this.
+struct EndOfFrame {};
+
+using Outgoing = std::variant<transport::SessionMessage, transport::DeltaMessage,
+                              transport::ScheduledInputMessage, SnapshotPart, transport::ReplyMessage,
+                              transport::ServerStatusMessage, OpenClient, CloseClient, EndOfFrame>;
+
+/// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
+/// for one producer and one consumer.
+class Outbox {
+ public:
+  struct Limits {
+    std::uint32_t frames = 8;       ///< whatever their number of streams and parts
+    std::uint32_t snapshots = 512;  ///< parts of snapshots
+    std::uint32_t control = 1024;   ///< everything else
+  };
+  explicit Outbox(const Limits& limits) : limits_(limits) {}
+
+  /// Room for the deltas of one more frame; stays true until the producer pushes its end.
+  [[nodiscard]] bool has_frame_room() const;
+  [[nodiscard]] bool has_control_room() const;
+  [[nodiscard]] bool has_snapshot_room() const;
+  /// False, and nothing queued, when the message's kind is at its limit. The deltas of a frame count once,
+  /// with its end; check has_frame_room() before the first.
+  [[nodiscard]] bool push(Outgoing message);
+
+  /// The oldest message, or nothing after `timeout`. Asking for the next says that the one before is written.
+  [[nodiscard]] std::optional<Outgoing> pop(std::chrono::nanoseconds timeout);
+  /// Wakes a waiting pop().
+  void wake();
+
+  [[nodiscard]] std::size_t size() const;
+  /// Frames of which some delta is pushed and not yet written.
+  [[nodiscard]] std::uint32_t unwritten_frames() const;
+  /// Of all messages of a kind pushed so far, in their byte form (sdk/transport/cdr.hpp).
+  struct Traffic {
+    std::uint64_t replies = 0, scheduled_inputs = 0;
+  };
+  [[nodiscard]] Traffic traffic() const;
+  /// Most messages ever queued.
+  [[nodiscard]] std::size_t high_water() const;
+
+ private:
+  std::uint32_t* count_of(const Outgoing& message, std::uint32_t& limit);
+  void weigh(const Outgoing& message);
+
+  mutable std::mutex mutex_;
+  std::condition_variable ready_;
+  Limits limits_;
+  std::deque<Outgoing> queue_;
+  std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
+  std::size_t high_water_ = 0;
+  Traffic traffic_;
+  transport::Bytes cdr_;  // kept to reuse its memory
+};
+
+/// Writes one message. Errors: what the port says.
+[[nodiscard]] Result<void> publish(transport::ServerPort& port, const Outgoing& message);
+
+/// Writes everything that is queued, in the caller's thread: for tests and single-threaded hosts. Stops at
+/// the first error; that message is lost.
+Result<void> drain(Outbox& outbox, transport::ServerPort& port);
+
+}  // namespace tandem::host

@@ -1,0 +1,35 @@
+#include "services/host/outgoing/publication.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "sdk/transport/limits.hpp"
+
+namespace tandem::host {
+
+void push_frame(Outbox& outbox, Epoch epoch, const MadeFrame& frame, std::int64_t wall_ns) {
+  // There is room: the caller made sure of it, and its thread is the only producer.
+  for (const MadeDelta& made : frame.deltas) {
+    const std::size_t size = made.payload.size();
+    const std::size_t parts =
+        std::max<std::size_t>((size + transport::kPartBytes - 1) / transport::kPartBytes, 1);
+    for (std::size_t part = 0; part < parts; ++part) {
+      const auto bytes = made.payload.subspan(
+          part * transport::kPartBytes, std::min(transport::kPartBytes, size - part * transport::kPartBytes));
+      transport::DeltaMessage delta;
+      delta.epoch = epoch;
+      delta.stream.id = made.stream;
+      delta.frame = frame.frame;
+      delta.part = static_cast<std::uint32_t>(part);
+      delta.parts = static_cast<std::uint32_t>(parts);
+      delta.last_input = frame.last_input;
+      delta.server_time_ns = wall_ns;
+      delta.hash = made.hash;
+      delta.payload.assign(bytes.begin(), bytes.end());
+      static_cast<void>(outbox.push(std::move(delta)));
+    }
+  }
+  static_cast<void>(outbox.push(EndOfFrame{}));
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,77 @@
+#include "services/host/outgoing/publisher.hpp"
+
+#include <chrono>
+
+namespace tandem::host {
+
+using namespace std::chrono_literals;
+
+Publisher::Publisher(Outbox& outbox, transport::ServerPort& port, std::chrono::nanoseconds patience)
+    : outbox_(&outbox),
+      port_(&port),
+      patience_(patience),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+void Publisher::flush() const {
+  constexpr int kMostTicks = 200;
+  constexpr std::chrono::milliseconds kTick(5);
+  for (int i = 0; i < kMostTicks && outbox_->size() > 0 && !gave_up(); ++i)
+    std::this_thread::sleep_for(kTick);
+}
+
+void Publisher::stop() {
+  thread_.request_stop();
+  outbox_->wake();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Publisher::run(const std::stop_token& stop) {
+  while (!stop.stop_requested() && !gave_up()) {
+    const auto message = outbox_->pop(100ms);
+    if (!message) continue;
+    // A delta or a scheduled input that is lost would send every client back to joining.
+    const bool precious = std::holds_alternative<transport::DeltaMessage>(*message) ||
+                          std::holds_alternative<transport::ScheduledInputMessage>(*message) ||
+                          std::holds_alternative<transport::SessionMessage>(*message);
+    if (precious) {
+      insist(*message, stop);
+    } else {
+      write(*message);
+    }
+  }
+}
+
+void Publisher::insist(const Outgoing& message, const std::stop_token& stop) {
+  using Clock = std::chrono::steady_clock;
+  std::optional<Clock::time_point> refused_since;
+  while (const auto failed = write(message)) {
+    if (stop.stop_requested()) return;
+    if (failed == ErrorCode::kTimeout) {
+      refused_since.reset();
+    } else if (!refused_since) {
+      refused_since = Clock::now();
+    } else if (Clock::now() - *refused_since >= patience_) {
+      gave_up_.store(true, std::memory_order_relaxed);
+      return;
+    }
+    std::this_thread::sleep_for(5ms);
+  }
+}
+
+std::optional<ErrorCode> Publisher::write(const Outgoing& message) {
+  const auto written = publish(*port_, message);
+  if (written) return std::nullopt;
+  {
+    const std::scoped_lock lock(mutex_);
+    last_failure_ = written.error().message;
+  }
+  failures_.fetch_add(1, std::memory_order_relaxed);
+  return written.error().code;
+}
+
+std::string Publisher::last_failure() const {
+  const std::scoped_lock lock(mutex_);
+  return last_failure_;
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,49 @@
+#pragma once
+// What a host tells its operator of what it did.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sdk/core/layout/layout.hpp"
+
+namespace tandem::host {
+
+/// A stream's share of a frame.
+struct DeltaReport {
+  std::uint32_t stream = 0;
+  std::uint64_t hash = 0;
+  std::size_t payload_bytes = 0;
+  std::uint32_t corrected = 0;
+};
+
+/// One frame that was just produced.
+struct FrameReport {
+  Frame frame = 0;
+  std::vector<DeltaReport> deltas;   ///< of each stream that was made, ascending
+  double frame_ms = 0, step_ms = 0;  ///< whole frame (step, quantise, predict, encode, apply); engine alone
+};
+
+/// Counts of one stream since the start.
+struct StreamTotals {
+  std::string name;
+  bool made = false;  ///< now
+  std::uint64_t frames = 0, corrected = 0, payload_bytes = 0;
+  std::uint64_t snapshots = 0, snapshot_bytes = 0;
+  std::uint32_t participants = 0, observers = 0;  ///< now
+};
+
+/// Counts since the start, of all streams together where streams differ.
+struct HostTotals {
+  std::uint64_t frames = 0, corrected = 0;
+  std::uint64_t payload_bytes = 0, snapshot_bytes = 0;  ///< of the deltas and snapshots themselves
+  std::uint64_t reply_bytes = 0, input_bytes = 0;       ///< of replies and scheduled inputs as messages
+  std::uint64_t stalls = 0;                             ///< suspensions that a participant caused
+  std::uint64_t suspended_ms = 0;  ///< waiting past due, for participants or for the queue
+  std::uint64_t refused_inputs = 0, refused_messages = 0, snapshots = 0, demotions = 0, clients_seen = 0;
+  double frame_ms_p50 = 0, frame_ms_p99 = 0;
+  std::vector<StreamTotals> streams;  ///< in the order of their ids
+};
+
+}  // namespace tandem::host

@@ -1,0 +1,62 @@
+#include "services/host/outgoing/status.hpp"
+
+#include <algorithm>
+
+#include "sdk/transport/units.hpp"
+
+namespace tandem::host {
+namespace {
+
+constexpr double kRawBytesPerBody = 24;
+
+}  // namespace
+
+void StatusDesk::publish(const HostTotals& totals, const Present& present, std::int64_t now_ns) {
+  next_ns_ = now_ns + kSecond;
+  const double elapsed_s = std::max(static_cast<double>(now_ns - second_ns_) * 1e-9, 1e-9);
+  const auto frames = static_cast<double>(totals.frames - second_.frames);
+  const StreamTotals& stream = totals.streams[stream_];
+  const StreamTotals before = second_.streams.empty() ? StreamTotals{} : second_.streams[stream_];
+  if (present.made) {
+    const auto made = static_cast<double>(stream.frames - before.frames);
+    mbit_per_s_ =
+        static_cast<double>(stream.payload_bytes - before.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
+    corrected_per_frame_ = made > 0 ? static_cast<double>(stream.corrected - before.corrected) / made : 0;
+  }
+  transport::ServerStatusMessage status;
+  status.session = session_;
+  status.stream = stream_;
+  status.epoch = epoch_;
+  status.frame = present.frame;
+  status.uptime_s = static_cast<double>(now_ns - started_ns_) * 1e-9;
+  status.frame_rate_hz = frames / elapsed_s;
+  status.mbit_per_s = mbit_per_s_;
+  status.raw_mbit_per_s = present.bodies * kRawBytesPerBody * 8 * status.frame_rate_hz / kBitsPerMbit;
+  status.frame_ms_p50 = durations_.quantile_ms(0.5);
+  status.frame_ms_p99 = durations_.quantile_ms(0.99);
+  status.corrected_per_frame = corrected_per_frame_;
+  status.threshold = present.threshold_m;
+  status.codec = present.codec;
+  status.predictor = present.predictor;
+  status.bodies = present.bodies;
+  status.at_rest = present.at_rest;
+  status.participants = present.participants;
+  status.observers = present.observers;
+  status.window = present.window;
+  status.delta_bytes = stream.payload_bytes;
+  status.reply_bytes = totals.reply_bytes;
+  status.input_bytes = totals.input_bytes;
+  status.snapshot_bytes = stream.snapshot_bytes;
+  status.stalls = totals.stalls;
+  status.suspended_ms = totals.suspended_ms;
+  status.refused_inputs = totals.refused_inputs;
+  status.refused_messages = totals.refused_messages;
+  status.snapshots = stream.snapshots;
+  status.queue_high_water = static_cast<std::uint32_t>(outbox_->high_water());
+  if (!outbox_->push(std::move(status))) return;
+  second_ = totals;
+  second_ns_ = now_ns;
+  durations_.clear();
+}
+
+}  // namespace tandem::host

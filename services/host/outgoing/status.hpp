@@ -1,0 +1,49 @@
+#pragma once
+// Figures of a stream for any DDS monitor, once a second.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "sdk/statistics/duration_histogram.hpp"
+#include "services/host/outgoing/outbox.hpp"
+#include "services/host/outgoing/report.hpp"
+
+namespace tandem::host {
+
+/// Turns counts since the start into rates of the last second. Not thread-safe.
+class StatusDesk {
+ public:
+  StatusDesk(std::string session, std::uint32_t stream, Epoch epoch, Outbox& outbox)
+      : session_(std::move(session)), stream_(stream), epoch_(epoch), outbox_(&outbox) {}
+
+  void start(std::int64_t now_ns) { started_ns_ = second_ns_ = now_ns; }
+  void frame_took(std::int64_t duration_ns) { durations_.add(duration_ns); }
+
+  [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
+  /// What is so at the moment.
+  struct Present {
+    Frame frame = 0;
+    std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0;
+    bool made = true;        ///< the stream is; if not, its figures of the last second in which it was stay
+    double threshold_m = 0;  ///< in force
+    std::string_view codec, predictor;
+  };
+  /// Best effort: without room in the outbox this second's figures are lost.
+  void publish(const HostTotals& totals, const Present& present, std::int64_t now_ns);
+
+ private:
+  std::string session_;
+  std::uint32_t stream_;
+  Epoch epoch_;
+  Outbox* outbox_;
+  std::int64_t started_ns_ = 0, next_ns_ = 0;
+  // Of the last status.
+  HostTotals second_;
+  std::int64_t second_ns_ = 0;
+  DurationHistogram durations_;  // since then
+  double mbit_per_s_ = 0, corrected_per_frame_ = 0;
+};
+
+}  // namespace tandem::host

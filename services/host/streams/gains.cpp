@@ -1,0 +1,90 @@
+#include "services/host/streams/gains.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::host {
+namespace {
+
+constexpr std::uint32_t kFramesPerDecision = 15;
+
+// How much the logarithms of beta and E move for a cosine, and at most, in one decision. The logarithms are
+// never taken: beta and E are multiplied by exp(change).
+constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
+constexpr double kDecayRate = 2, kMostDecayChange = 0.7;
+constexpr double kLeastGain = 0.35, kMostGain = 1.8;
+constexpr double kLeastDecay = 15, kMostDecay = 60000;  // in 1/65536
+// The less of c is kept, the less is worth learning: gamma = 0.25 where E is below 800, then its inverse.
+constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
+// Corrections of a fifth of the bodies, and a hundred at least; beta needs three times as many, because
+// bodies that start to fall agree with themselves for a while.
+constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
+// Smaller changes, as shares, are not worth the bytes of saying so.
+constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
+
+// exp(x) for |x| <= 1 by its Pade approximant of order [3/3], to 1e-6. Not std::exp: that one may differ from
+// machine to machine in the last bit, and the gains go on the wire.
+double exp_of(double x) {
+  const double even = 120 + 12 * x * x;
+  const double odd = 60 * x + x * x * x;
+  return (even + odd) / (even - odd);
+}
+
+double mean(std::int64_t cosines, std::uint64_t count) {
+  return static_cast<double>(cosines) /
+         (static_cast<double>(GainEvidence::kCosineOne) * static_cast<double>(count));
+}
+
+bool differs(double wanted, double held, double band) { return std::abs(wanted - held) > band * held; }
+
+}  // namespace
+
+GainGoal usual_gain_goal(const PredictorTraits& predictor) {
+  return {predictor.gain_aim.agreement / 100.0, predictor.gain_aim.forwardness / 100.0};
+}
+
+void set_first_gains(const PredictorTraits& predictor, StreamParameters& parameters) {
+  const FirstGains& first = predictor.first_gains;
+  parameters.step.decay = first.decay;
+  parameters.codec.velocity_gain = first.beta;
+  parameters.codec.acceleration_gain = first.gamma;
+}
+
+GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const StreamParameters& parameters)
+    : goal_(goal),
+      enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+      decay_(std::clamp<double>(parameters.step.decay, kLeastDecay, kMostDecay)),
+      gain_(std::clamp(parameters.codec.velocity_gain / 32768.0, kLeastGain, kMostGain)) {}
+
+bool GainControl::after_frame(StreamParameters& parameters) {
+  if (++frames_ < kFramesPerDecision) return false;
+  const GainEvidence seen = evidence_;
+  evidence_ = {};
+  frames_ = 0;
+  const auto belief = [](std::uint64_t count, double enough) {
+    return std::min(1.0, static_cast<double>(count) / enough);
+  };
+  if (seen.repeated > 0) {
+    const double off = mean(seen.agreement, seen.repeated) - goal_.agreement;
+    const double change = kGainRate * off * belief(seen.repeated, kMoreForGain * enough_);
+    gain_ = std::clamp(gain_ * exp_of(std::clamp(change, -kMostGainChange, kMostGainChange)), kLeastGain,
+                       kMostGain);
+  }
+  if (seen.driven > 0) {
+    const double off = goal_.forwardness - mean(seen.forwardness, seen.driven);
+    const double change = kDecayRate * off * belief(seen.driven, enough_);
+    decay_ = std::clamp(decay_ * exp_of(std::clamp(change, -kMostDecayChange, kMostDecayChange)), kLeastDecay,
+                        kMostDecay);
+  }
+  const double gain = 32768 * gain_;
+  if (!differs(decay_, parameters.step.decay, kDecayDeadBand) &&
+      !differs(gain, parameters.codec.velocity_gain, kGainDeadBand))
+    return false;
+  parameters.step.decay = static_cast<std::uint16_t>(decay_);
+  parameters.codec.velocity_gain = static_cast<std::uint16_t>(gain);
+  parameters.codec.acceleration_gain =
+      static_cast<std::uint16_t>(65536 * kMostAcceleration * std::min(1.0, kDecayOfMost / decay_));
+  return true;
+}
+
+}  // namespace tandem::host

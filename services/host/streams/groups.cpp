@@ -1,0 +1,29 @@
+#include "services/host/streams/groups.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace tandem::host {
+
+Result<void> choose_groups(bool turns, std::span<const BodySize> types, const Lattice& lattice,
+                           const CodecTraits& traits, Layout& layout) {
+  layout.groups = {kPositionGroup};
+  layout.radii.clear();
+  if (!turns || !traits.turns) return {};
+  layout.groups.emplace_back(kOrientationGroup);
+  for (const BodySize& type : types) {
+    const double units = std::ceil(type.radius * lattice.position_scale());
+    if (!(units >= 1 && units <= double{kPositionLimit})) {
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("body type '{}': orientations need a radius above 0 that fits the lattice, not {}",
+                      type.name, type.radius));
+    }
+    layout.radii.push_back(static_cast<std::int32_t>(units));
+  }
+  return {};
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,95 @@
+#include "services/host/streams/lattice_choice.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace tandem::host {
+namespace {
+
+bool positive(double value) { return std::isfinite(value) && value > 0; }
+
+constexpr double kDefaultRange = 8;  // thresholds; about what fast scenes leave behind in one frame
+constexpr double kRangeSteps = 127;
+constexpr int kAngleBits = 28;  // of a radian on the lattice
+
+// Rounded up, at least 1. Errors are the caller's: the value was checked to be finite and not negative.
+std::int32_t step_of(double range) {
+  return static_cast<std::int32_t>(std::clamp(std::ceil(range / kRangeSteps), 1.0, double{kPositionLimit}));
+}
+
+}  // namespace
+
+Result<Lattice> choose_lattice(double smallest_threshold, double extent, double dt_s) {
+  if (!positive(smallest_threshold) || !positive(extent) || !positive(dt_s)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "threshold, world extent and frame time must be positive numbers");
+  }
+  constexpr double kSpare = 4;
+  for (int s = kMostHalvings; s >= kFewestHalvings; --s) {
+    const double unit = std::ldexp(smallest_threshold, -s);
+    if (extent * kSpare <= unit * double{kPositionLimit}) return Lattice{unit, dt_s, s};
+  }
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("threshold {} is too fine for a world that reaches {}: at least {} is needed",
+                          smallest_threshold, extent,
+                          std::ldexp(extent * kSpare / double{kPositionLimit}, kFewestHalvings)));
+}
+
+Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshold, double position_range,
+                                         double velocity_range) {
+  const double units = threshold * lattice.position_scale();
+  if (!positive(threshold) || units < 0.5 || units > double{kPositionLimit}) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("threshold {} does not fit the lattice", threshold));
+  }
+  if (!std::isfinite(position_range) || position_range < 0 || !std::isfinite(velocity_range) ||
+      velocity_range < 0) {
+    return fail(ErrorCode::kInvalidArgument, "quantisation ranges must be finite and not negative");
+  }
+  if (position_range == 0) position_range = kDefaultRange * threshold;
+  if (velocity_range == 0) velocity_range = kDefaultRange * threshold / lattice.dt_s;
+  CodecParameters parameters;
+  parameters.threshold = static_cast<std::int32_t>(std::lround(units));
+  parameters.position_step = step_of(position_range * lattice.position_scale());
+  parameters.velocity_step = step_of(velocity_range * lattice.velocity_scale());
+  return parameters;
+}
+
+Result<void> set_turn_steps(const Lattice& lattice, double turn_range, double spin_range, double radius,
+                            CodecParameters& parameters) {
+  if (!std::isfinite(turn_range) || turn_range < 0 || !std::isfinite(spin_range) || spin_range < 0 ||
+      !positive(radius)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "ranges of turns must be finite and not negative, radii positive");
+  }
+  const double usual = kDefaultRange * parameters.threshold * lattice.unit / radius;
+  if (turn_range == 0) turn_range = usual;
+  if (spin_range == 0) spin_range = usual / lattice.dt_s;
+  // No turn is larger than kSpinLimit.
+  const auto step = [](double range) {
+    return step_of(std::min(std::ldexp(range, kAngleBits), double{kSpinLimit}));
+  };
+  parameters.turn_step = step(turn_range);
+  parameters.spin_step = step(spin_range * lattice.dt_s);
+  return {};
+}
+
+Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity, double damping_per_s) {
+  Drive drive;
+  for (std::size_t i = 0; i < gravity.size(); ++i) {
+    const double g = std::nearbyint(gravity[i] * lattice.dt_s * lattice.velocity_scale());
+    if (!(std::abs(g) <= double{kVelocityLimit})) {
+      return fail(ErrorCode::kInvalidArgument, "gravity does not fit the lattice");
+    }
+    drive.gravity[i] = static_cast<std::int32_t>(g);
+  }
+  const double damping = std::nearbyint(damping_per_s * lattice.dt_s * 65536.0);
+  if (!(damping >= 0 && damping < 65536.0)) {
+    return fail(ErrorCode::kInvalidArgument, "damping per frame must lie in [0, 1)");
+  }
+  drive.damping = static_cast<std::uint16_t>(damping);
+  return drive;
+}
+
+}  // namespace tandem::host

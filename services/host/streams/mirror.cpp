@@ -1,0 +1,217 @@
+#include "services/host/streams/mirror.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tandem::host {
+namespace {
+
+constexpr std::uint8_t mark(engine::Event::Kind kind) {
+  return static_cast<std::uint8_t>(1U << static_cast<unsigned>(kind));
+}
+// Of a quaternion's squared norm: single precision and an engine that seldom normalises.
+constexpr double kNormSlack = 0.01;
+// One short of the limit, whose square a double does not tell from the next integers.
+constexpr double kMostSpin = kSpinLimit - 1;
+
+constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
+constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
+constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
+
+}  // namespace
+
+Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups)
+    : lattice_(lattice),
+      type_count_(type_count),
+      target_(capacity, groups),
+      off_(capacity),
+      shown_(capacity),
+      expelled_(capacity),
+      marks_(capacity),
+      generations_(capacity) {
+  lifecycle_.reserve(std::size_t{2} * capacity);
+}
+
+Result<void> Mirror::check(const engine::Bodies& bodies) const {
+  const std::size_t capacity = shown_.size();
+  std::string wrong;  // the first
+  const auto look_at = [&](std::string_view name, std::size_t size) {
+    if (wrong.empty() && size != capacity)
+      wrong = fmt::format("the simulation's column {} has {} slots, not {}", name, size, capacity);
+  };
+  const auto look_at_axes = [&](std::string_view name, const auto& columns) {
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      look_at(fmt::format("{}[{}]", name, i), columns[i].size());
+  };
+  look_at("alive", bodies.alive.size());
+  look_at("type", bodies.type.size());
+  look_at_axes("position", bodies.position);
+  look_at_axes("velocity", bodies.velocity);
+  if (target_.groups().orientation) {
+    look_at_axes("orientation", bodies.orientation);
+    look_at_axes("angular_velocity", bodies.angular_velocity);
+  }
+  if (wrong.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument, wrong);
+}
+
+void Mirror::quantise(const engine::Bodies& bodies) {
+  std::ranges::fill(off_, 0);
+  const double position = lattice_.position_scale();
+  const double velocity = lattice_.velocity_scale();
+  const auto world = static_cast<float>(kPositionLimit * lattice_.unit);
+  constexpr float kFinite = std::numeric_limits<float>::max();
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    quantise_column(bodies.position[i], position, kPositionLimit, world, target_.p(i), off_);
+    quantise_column(bodies.velocity[i], velocity, kVelocityLimit, kFinite, target_.v(i), off_);
+  }
+  if (target_.groups().orientation) quantise_turns(bodies);
+  const std::size_t capacity = shown_.size();
+  for (std::size_t s = 0; s < capacity; ++s) {
+    const bool sound = off_[s] == 0 && bodies.type[s] < type_count_;
+    shown_[s] = static_cast<std::uint8_t>((bodies.alive[s] != 0) & sound);
+  }
+}
+
+void Mirror::quantise_turns(const engine::Bodies& bodies) {
+  const double per_frame = std::ldexp(lattice_.dt_s, 28);
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    if (bodies.alive[s] == 0) continue;
+    std::array<double, 4> q{};
+    std::array<double, 3> w{};
+    double norm = 0, speed = 0;
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      q[i] = double{bodies.orientation[i][s]};
+      norm += q[i] * q[i];
+    }
+    for (std::size_t i = 0; i < w.size(); ++i) {
+      w[i] = double{bodies.angular_velocity[i][s]} * per_frame;
+      speed += w[i] * w[i];
+    }
+    if (!(std::abs(norm - 1) <= kNormSlack) || !std::isfinite(speed)) {
+      off_[s] = 1;
+      continue;
+    }
+    const double unit = kQuaternionOne / std::sqrt(norm);
+    const double kept = std::min(1.0, kMostSpin / std::sqrt(std::max(speed, 1.0)));
+    mishaps_.clamped += kept < 1 ? 1 : 0;
+    for (std::size_t i = 0; i < q.size(); ++i)
+      target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
+    // Towards zero, so that no rounding leads out of the limit.
+    for (std::size_t i = 0; i < w.size(); ++i) target_.w(i)[s] = static_cast<std::int32_t>(w[i] * kept);
+  }
+}
+
+// Says of a body that cannot be told what is wrong with it.
+void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
+  ++mishaps_.removed;
+  const double world = kPositionLimit * lattice_.unit;
+  constexpr std::string_view kAxes = "xyz";
+  std::string why;
+  if (bodies.type[slot] >= type_count_) {
+    why = fmt::format("its type is {}, and the session has {}", bodies.type[slot], type_count_);
+  } else if (target_.groups().orientation) {
+    double norm = 0;
+    for (const auto& column : bodies.orientation) norm += double{column[slot]} * double{column[slot]};
+    why = fmt::format("its orientation has norm {:.3g}, or its angular velocity is not a number",
+                      std::sqrt(norm));
+  }
+  for (std::size_t i = kPositionChannels; i-- > 0;) {
+    const double p = double{bodies.position[i][slot]}, v = double{bodies.velocity[i][slot]};
+    if (!std::isfinite(v)) why = fmt::format("its velocity along {} is not a number", kAxes[i]);
+    if (std::isnan(p)) {
+      why = fmt::format("its {} is not a number", kAxes[i]);
+    } else if (std::abs(p) > world) {
+      why = fmt::format("its {} is {:.4g}, beyond {:.4g}", kAxes[i], p, world);
+    }
+  }
+  last_removed_ = fmt::format("slot {} ({})", slot, why);
+}
+
+void Mirror::clear_hidden() {
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    if (shown_[s] == 0) target_.despawn(s);
+  }
+}
+
+void Mirror::start(const engine::Bodies& bodies) {
+  lifecycle_.clear();
+  quantise(bodies);
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
+    if (expelled_[s] != 0) remove(s, bodies);
+    target_.alive()[s] = shown_[s];
+    target_.reuse()[s] = 0;
+    target_.type()[s] = bodies.type[s];
+    generations_[s] = shown_[s];
+  }
+  clear_hidden();
+}
+
+void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event> events) {
+  lifecycle_.clear();
+  quantise(bodies);
+  for (const engine::Event& event : events) {
+    if (event.slot < marks_.size()) marks_[event.slot] |= mark(event.kind);
+  }
+  const std::span<const std::uint8_t> was = target_.alive();
+  const std::span<const TypeId> type = target_.type();
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    const bool quiet = (marks_[s] | expelled_[s]) == 0 && was[s] == shown_[s];
+    if (quiet && (shown_[s] == 0 || type[s] == bodies.type[s])) continue;
+    record(s, bodies, marks_[s]);
+    marks_[s] = 0;
+  }
+  clear_hidden();
+}
+
+void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks) {
+  const bool was = target_.alive()[slot] != 0;
+  const bool lives = bodies.alive[slot] != 0;
+  if (!lives || (marks & (kDespawned | kSpawned | kTeleported)) != 0) expelled_[slot] = 0;
+  const bool shown = shown_[slot] != 0 && expelled_[slot] == 0;
+  if (lives && shown_[slot] == 0 && expelled_[slot] == 0) {
+    expelled_[slot] = 1;
+    remove(slot, bodies);
+  }
+  shown_[slot] = static_cast<std::uint8_t>(shown);
+
+  const TypeId type = bodies.type[slot];
+  const bool reused = was && shown && (marks & kSpawned) != 0;
+  if (was && (!shown || reused)) {
+    lifecycle_.push_back({.kind = LifecycleKind::kDespawn, .slot = slot, .reuse = 0, .type = 0, .body = {}});
+  }
+  if (shown && (!was || reused)) {
+    spawn(slot, type);
+  } else if (shown && (marks & kTeleported) != 0) {
+    // A slot gets one record a frame; a type changed in the same step differs still in the next and follows
+    // then.
+    lifecycle_.push_back({.kind = LifecycleKind::kTeleport,
+                          .slot = slot,
+                          .reuse = 0,
+                          .type = 0,
+                          .body = target_.body(slot),
+                          .groups = moves_all(target_.groups())});
+  } else if (shown && target_.type()[slot] != type) {
+    target_.type()[slot] = type;
+    lifecycle_.push_back(
+        {.kind = LifecycleKind::kTypeChange, .slot = slot, .reuse = 0, .type = type, .body = {}});
+  }
+}
+
+void Mirror::spawn(Slot slot, TypeId type) {
+  const std::uint8_t generation = generations_[slot]++;
+  target_.alive()[slot] = 1;
+  target_.reuse()[slot] = generation;
+  target_.type()[slot] = type;
+  lifecycle_.push_back({.kind = LifecycleKind::kSpawn,
+                        .slot = slot,
+                        .reuse = generation,
+                        .type = type,
+                        .body = target_.body(slot)});
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,72 @@
+#pragma once
+// The engine's bodies on the lattice, frame by frame: what all streams encode towards, and what happened to
+// the slots.
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sdk/core/codec/delta.hpp"
+#include "sdk/core/lattice/state.hpp"
+#include "services/host/streams/lattice_choice.hpp"
+#include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
+
+namespace tandem::host {
+
+/// Rounds one column of floats (times `scale`) to integers, saturating at +-limit; `off` is set to 1 (never
+/// cleared) where a value is NaN or its magnitude exceeds `off_bound` (units of `in`). Spans have equal
+/// length. Plain loops that vectorise.
+void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
+                     std::span<std::int32_t> out, std::span<std::int32_t> off);
+
+/// Follows a simulation. A body is shown to clients while it is alive, finite, on the lattice and of a listed
+/// type; one that stops being so is despawned and stays away until the engine despawns, spawns or teleports
+/// it. Velocities saturate, and what turns by more than kMaxTurn in a step is slowed. With orientations they
+/// must be some too: a quaternion that is not finite or far from norm 1 takes a body off. Allocates nothing
+/// after construction but the text of last_removed(). Not thread-safe.
+class Mirror {
+ public:
+  /// `type_count`: types the session lists, 1 or more. `groups`: those of all its streams together.
+  Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {});
+
+  /// That it can take these. Errors: kInvalidArgument (columns not as long as the capacity).
+  [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
+  /// The start state: everything shown is simply there, in generation 0.
+  void start(const engine::Bodies& bodies);
+  /// After a step, of bodies that check() takes. `events` may be incomplete: births, deaths and types are
+  /// read off the bodies themselves; only reuse of a slot within the step and teleports need their event.
+  /// Events out of range are ignored.
+  void update(const engine::Bodies& bodies, std::span<const engine::Event> events);
+
+  [[nodiscard]] const State& target() const { return target_; }
+  /// Of the last update(): ascending by slot, despawn before spawn.
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
+  /// The body that was taken off last and the reason, as "slot 3 (its x is not a number)". Empty: none yet.
+  [[nodiscard]] const std::string& last_removed() const { return last_removed_; }
+  /// What it mended since the start: bodies taken off, and turns that were slowed, each once a frame.
+  [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
+
+ private:
+  void quantise(const engine::Bodies& bodies);
+  void quantise_turns(const engine::Bodies& bodies);
+  void remove(Slot slot, const engine::Bodies& bodies);
+  void clear_hidden();
+  void record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks);
+  void spawn(Slot slot, TypeId type);
+
+  Lattice lattice_;
+  TypeId type_count_;
+  State target_;                           // p and v are written whole, the other columns by records
+  std::vector<std::int32_t> off_;          // 1: not finite or off the lattice, this frame
+  std::vector<std::uint8_t> shown_;        // 1: clients shall see it, this frame
+  std::vector<std::uint8_t> expelled_;     // 1: the engine keeps it, clients lost it
+  std::vector<std::uint8_t> marks_;        // bits of Event::Kind, this frame
+  std::vector<std::uint8_t> generations_;  // of the next spawn in the slot
+  std::vector<LifecycleRecord> lifecycle_;
+  engine::Mishaps mishaps_;
+  std::string last_removed_;
+};
+
+}  // namespace tandem::host

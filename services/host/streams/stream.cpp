@@ -1,0 +1,301 @@
+#include "services/host/streams/stream.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
+#include "sdk/transport/limits.hpp"
+
+namespace tandem::host {
+namespace {
+
+Result<void> check(const StreamConfig& config, const StreamStart& start) {
+  const auto refuse = [](std::string message) {
+    return fail(ErrorCode::kInvalidArgument, std::move(message));
+  };
+  if (config.quality) {
+    if (!(config.quality->target_mbit_per_s >= 0))
+      return refuse(
+          fmt::format("a target of {} Mbit/s: it is 0 (none) or more", config.quality->target_mbit_per_s));
+    if (!valid_goal(*config.quality, config.layout.parameters.codec))
+      return refuse("automatic quality: the threshold must lie between its smallest and its largest");
+    const std::size_t least = least_budget(*config.quality, start.frame_rate_hz);
+    if (config.budget < least) {
+      return refuse(fmt::format(
+          "a budget of {} bytes a frame is too tight for a target of {} Mbit/s, which needs at least {} bytes",
+          config.budget, config.quality->target_mbit_per_s, least));
+    }
+  }
+  return {};
+}
+
+// What a stream with these groups tells of a mirror that may know orientations besides.
+State told(const State& shown, const Groups& groups) {
+  if (shown.groups() == groups) return shown;
+  State state(shown.capacity(), groups);
+  for (Slot slot = 0; slot < shown.capacity(); ++slot) {
+    if (shown.alive()[slot] != 0)
+      state.spawn(slot, shown.reuse()[slot], shown.type()[slot], shown.body(slot));
+  }
+  return state;
+}
+
+// So a snapshot cut soon after has little to say of a heap that lies there. One at the top of its throw is
+// slow as well: it is corrected once more.
+void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) {
+  // Further than the threshold after so many frames, in 1/64 lattice unit a frame.
+  constexpr std::int64_t kFrames = 30;
+  const auto slow = [&](Slot slot) {
+    for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+      if (std::abs(std::int64_t{state.v(axis)[slot]}) * kFrames > std::int64_t{threshold} * 64) return false;
+    }
+    return state.groups() == Groups{} || state.body(slot).w == Spin{};
+  };
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.alive()[slot] == 0 || !slow(slot)) continue;
+    state.rest()[slot] = 1;
+    for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
+      state.v(axis)[slot] = 0;
+      state.c(axis)[slot] = -drive.gravity[axis];
+    }
+  }
+}
+
+// A session may begin without a body: a measure of what bodies cost then takes these, far from each other.
+State spread_bodies(const Layout& layout) {
+  constexpr Slot kMost = 4096, kSide = 16;
+  constexpr std::int32_t kApart = 4096;
+  State state(std::min(layout.capacity, kMost), groups_of(layout));
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    const Vec3i place{static_cast<std::int32_t>(slot % kSide) * kApart,
+                      static_cast<std::int32_t>(slot / kSide % kSide) * kApart,
+                      static_cast<std::int32_t>(slot / (kSide * kSide)) * kApart};
+    state.spawn(slot, 0, 0, {.p = place});
+  }
+  return state;
+}
+
+}  // namespace
+
+struct Stream::Impl final : EncodeObserver {
+  Impl(StreamConfig configuration, const StreamStart& start, ServerTimeline server)
+      : config(std::move(configuration)),
+        timeline(std::move(server)),
+        parameters(config.layout.parameters),
+        drive(start.drive) {
+    State state = told(start.mirror.target(), groups_of(config.layout));
+    if (start.under_way && codec_traits(config.layout.codec)->reads_gains)
+      put_slow_to_rest(state, start.drive, parameters.codec.threshold);
+    timeline.start(start.frame, state, start.drive, start.last_input, start.pending);
+    bodies = state.alive_count();
+    if (config.quality) {
+      quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters.codec,
+                      config.layout.capacity, start.frame_rate_hz, config.layout.radii);
+    }
+    if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
+  }
+
+  // What the encoder tells goes to whom it concerns.
+  void frame(const State& predicted, const State& target, const CodecParameters& in_force) override {
+    if (quality) quality->observe(predicted, target, in_force);
+    if (other != nullptr) other->frame(predicted, target, in_force);
+  }
+  void decided(std::span<const std::uint16_t> p1,
+               std::span<const std::array<std::uint32_t, 2>> seen) override {
+    if (other != nullptr) other->decided(p1, seen);
+  }
+  void steered(const GainEvidence& evidence) override {
+    if (gains) gains->observe(evidence);
+    if (other != nullptr) other->steered(evidence);
+  }
+
+  void choose_parameters(const FrameResult& result);
+  std::span<const LifecycleRecord> records_of(const Mirror& mirror);
+
+  StreamConfig config;
+  ServerTimeline timeline;
+  StreamParameters parameters;  // of the next frame
+  Drive drive;                  // of the start
+  std::optional<QualityControl> quality;
+  std::optional<GainControl> gains;
+  std::vector<LifecycleRecord> records;  // of the frame at hand, where the mirror's name groups of others
+  EncodeObserver* other = nullptr;       // of the frame at hand
+  std::uint32_t bodies = 0;
+  std::int64_t (*clock)() = nullptr;
+};
+
+Result<void> check_stream_names(std::span<const StreamConfig> streams) {
+  const auto refuse = [](std::string message) {
+    return fail(ErrorCode::kInvalidArgument, std::move(message));
+  };
+  if (streams.empty() || streams.size() > transport::kMaxStreams)
+    return refuse(
+        fmt::format("a session has 1 to {} streams, not {}", transport::kMaxStreams, streams.size()));
+  if (streams.size() == 1 && streams.front().name.empty()) return {};
+  constexpr std::size_t kMostCharacters = 32;
+  constexpr std::array<std::string_view, 4> kPreferences{"auto", "bandwidth", "computing", "error"};
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  for (auto stream = streams.begin(); stream != streams.end(); ++stream) {
+    const std::string& name = stream->name;
+    if (name.empty() || name.size() > kMostCharacters || !std::ranges::all_of(name, allowed)) {
+      return refuse(
+          fmt::format("a stream's name has 1 to {} characters of a-z, 0-9, '_' and '-', unlike '{}'",
+                      kMostCharacters, name));
+    }
+    if (std::ranges::find(kPreferences, name) != kPreferences.end()) {
+      return refuse(fmt::format("a stream cannot be called '{}': to a client that is a preference", name));
+    }
+    if (std::ranges::find(streams.begin(), stream, name, &StreamConfig::name) != stream)
+      return refuse(fmt::format("two streams are called '{}': give each a name of its own", name));
+  }
+  return {};
+}
+
+Result<void> choose_gains(StreamConfig& config) {
+  // What the constants make of the predictor, which may be another than the name says.
+  const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
+  if (!predictor) return tl::unexpected(predictor.error());
+  const auto traits = find_predictor((*predictor)->name());
+  if (!traits) return tl::unexpected(traits.error());
+  set_first_gains(**traits, config.layout.parameters);
+  config.gains = usual_gain_goal(**traits);
+  return {};
+}
+
+Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies) {
+  const StreamConfig& first = streams.front();
+  Groups groups;
+  for (const StreamConfig& stream : streams) {
+    if (stream.lattice != first.lattice || stream.layout.capacity != first.layout.capacity ||
+        stream.layout.type_count != first.layout.type_count)
+      return fail(ErrorCode::kInvalidArgument, "streams of another lattice, capacity or number of types");
+    groups.orientation = groups.orientation || groups_of(stream.layout).orientation;
+  }
+  if (groups.orientation && bodies.orientation[0].empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "the stream has orientations, which the simulation's bodies do not have");
+  }
+  Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups);
+  if (auto good = mirror.check(bodies); !good) return tl::unexpected(good.error());
+  mirror.start(bodies);
+  return mirror;
+}
+
+Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams) {
+  std::size_t largest = 0;
+  for (const StreamConfig& stream : streams) {
+    const auto timeline = ServerTimeline::create(stream.layout, Epoch{1});
+    if (!timeline && stream.name.empty()) return tl::unexpected(timeline.error());
+    if (!timeline) {
+      return fail(timeline.error().code, fmt::format("stream {}: {}", stream.name, timeline.error().message));
+    }
+    largest = std::max(largest, timeline->payload_bound());
+  }
+  return largest;
+}
+
+Result<Stream> Stream::create(StreamConfig config, const StreamStart& start) {
+  if (auto good = host::check(config, start); !good) return tl::unexpected(good.error());
+  auto timeline = ServerTimeline::create(config.layout, start.epoch, config.local, start.id);
+  if (!timeline) return tl::unexpected(timeline.error());
+  return Stream(std::make_unique<Impl>(std::move(config), start, std::move(*timeline)));
+}
+
+Stream::Stream(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Stream::Stream(Stream&&) noexcept = default;
+Stream& Stream::operator=(Stream&&) noexcept = default;
+Stream::~Stream() = default;
+
+std::span<const LifecycleRecord> Stream::Impl::records_of(const Mirror& mirror) {
+  const Groups groups = groups_of(config.layout);
+  if (mirror.target().groups() == groups) return mirror.lifecycle();
+  records.assign(mirror.lifecycle().begin(), mirror.lifecycle().end());
+  for (LifecycleRecord& record : records) record.groups &= moves_all(groups);
+  return records;
+}
+
+Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer) {
+  Impl& m = *impl_;
+  const std::span<const LifecycleRecord> records = m.records_of(mirror);
+  for (const LifecycleRecord& record : records) {
+    if (record.kind == LifecycleKind::kSpawn) ++m.bodies;
+    if (record.kind == LifecycleKind::kDespawn) --m.bodies;
+  }
+  m.other = observer;
+  EncodeObserver* const listener = m.quality || m.gains ? &m : observer;
+  const FrameResult result{m.timeline.advance(mirror.target(), records, m.config.budget, listener), records};
+  m.choose_parameters(result);
+  return result;
+}
+
+void Stream::Impl::choose_parameters(const FrameResult& result) {
+  const bool coarser =
+      quality && quality->after_frame(result.payload.size(), result.corrected, parameters.codec);
+  const bool steered = gains && gains->after_frame(parameters);
+  if (coarser || steered) timeline.set_parameters(parameters);
+}
+
+Result<void> Stream::set_parameters(const StreamParameters& parameters) {
+  if (!valid_parameters(parameters.codec) ||
+      has_turn_steps(parameters.codec) != has_turn_steps(impl_->parameters.codec))
+    return fail(ErrorCode::kInvalidArgument, "parameters out of range");
+  if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
+  impl_->parameters = parameters;
+  impl_->timeline.set_parameters(parameters);
+  return {};
+}
+
+void Stream::set_clock(std::int64_t (*now_ns)()) {
+  impl_->clock = now_ns;
+  impl_->timeline.set_clock(now_ns);
+}
+
+std::uint32_t Stream::measure_client_cost() const {
+  const Impl& m = *impl_;
+  const Layout& layout = m.config.layout;
+  const State from = m.bodies == 0 ? spread_bodies(layout) : agreed();
+  const auto predictor = make_predictor(layout.predictor, from.capacity(), layout.predictor_constants);
+  if (m.clock == nullptr || !predictor) return 0;
+  const StepInput input{.drive = m.drive, .parameters = m.parameters.step};
+  State to(from.capacity(), from.groups());
+  StateHasher hasher;
+  std::array<std::int64_t, 9> took_ns{};
+  for (std::int64_t& took : took_ns) {
+    const std::int64_t began_ns = m.clock();
+    (*predictor)->step(from, to, input);
+    static_cast<void>(hasher.hash(to));
+    took = m.clock() - began_ns;
+  }
+  std::ranges::nth_element(took_ns, took_ns.begin() + took_ns.size() / 2);
+  const std::int64_t bodies = from.alive_count();
+  return static_cast<std::uint32_t>(
+      std::max<std::int64_t>((took_ns[took_ns.size() / 2] + bodies - 1) / bodies, 1));
+}
+
+Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timeline.schedule(input); }
+void Stream::round_next() {
+  if (codec_traits(impl_->config.layout.codec)->keeps_rounding) impl_->timeline.round_next();
+}
+void Stream::snapshot(std::vector<std::byte>& out) { impl_->timeline.snapshot(out); }
+const StreamParameters& Stream::parameters() const { return impl_->parameters; }
+double Stream::threshold_m() const { return impl_->parameters.codec.threshold * impl_->config.lattice.unit; }
+bool Stream::target_out_of_reach() const { return impl_->quality && impl_->quality->out_of_reach(); }
+const StreamConfig& Stream::config() const { return impl_->config; }
+Frame Stream::frame() const { return impl_->timeline.frame(); }
+const State& Stream::agreed() const { return impl_->timeline.state(); }
+std::uint64_t Stream::hash() const { return impl_->timeline.hash(); }
+std::uint64_t Stream::last_input() const { return impl_->timeline.last_input(); }
+std::uint32_t Stream::bodies() const { return impl_->bodies; }
+std::size_t Stream::payload_bound() const { return impl_->timeline.payload_bound(); }
+std::size_t Stream::snapshot_bound() const { return impl_->timeline.snapshot_bound(); }
+
+}  // namespace tandem::host

@@ -1,0 +1,98 @@
+#include "services/lab/commands/bench.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <system_error>
+
+#include "sdk/core/tables/predictor_table.hpp"
+#include "services/tool/print_error.hpp"
+
+namespace tandem::lab {
+namespace {
+
+constexpr double kLeastThreshold = std::numeric_limits<double>::min(), kMostThreshold = 1e6;
+
+}  // namespace
+
+int report(const std::string& command, const Error& error) {
+  tool::print_error(fmt::format("tandem {}: {}\n", command, error.message));
+  return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
+}
+
+std::vector<std::string> paper_scenes() {
+  return {"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"};
+}
+
+Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names) {
+  std::vector<scenes::Scene> loaded;
+  for (const std::string& name : names == std::vector<std::string>{"all"} ? paper_scenes() : names) {
+    auto scene = scenes::load_scene(name);
+    if (!scene) return tl::unexpected(scene.error());
+    loaded.push_back(std::move(*scene));
+  }
+  return loaded;
+}
+
+std::vector<std::string> predictor_choices() {
+  std::vector<std::string> names = predictor_names();
+  names.insert(names.begin(), std::string(sessions::kAutomaticPredictor));
+  return names;
+}
+
+void add_scene_option(commandline::Command command, std::vector<std::string>& scenes) {
+  command.add_option("--scene", scenes, "Scenes by name or file, separated by commas; all: the paper's five")
+      .separated_by(',')
+      .required();
+}
+
+void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>& bodies) {
+  command.add_option("--bodies", bodies, "Numbers of bodies, separated by commas")
+      .separated_by(',')
+      .range(1U, engine::kMaxBodies)
+      .show_default();
+}
+
+commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
+                                    const std::string& help) {
+  // The parser reads -1 as 2^64 - 1, and what is too large as that.
+  return command.add_option("--seed", seed, help)
+      .check([](const std::string& text) {
+        std::uint64_t value = 0;
+        const char* const end = text.data() + text.size();
+        const auto read = std::from_chars(text.data(), end, value);
+        return read.ec == std::errc() && read.ptr == end ? "" : "a whole number below 2^64";
+      })
+      .show_default();
+}
+
+commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice) {
+  return command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
+      .range(kLeastThreshold, kMostThreshold);
+}
+
+void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice) {
+  const commandline::Option scale = add_threshold_scale(command, choice);
+  command.add_option("--threshold", choice.threshold_m, "Error threshold, scene units (default: the scene's)")
+      .range(kLeastThreshold, kMostThreshold)
+      .excludes(scale);
+}
+
+}  // namespace tandem::lab
+
+void tandem::tool::add_bench(commandline::Command app, Run& run) {
+  using namespace tandem::lab;
+  commandline::Command bench = app.add_subcommand(
+      "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine, clients.");
+  bench.require_subcommand();
+  add_bandwidth(bench, run);
+  add_train(bench, run);
+  add_memory(bench, run);
+  add_engine(bench, run);
+  add_framerate(bench, run);
+  add_client(bench, run);
+  add_smoothing(bench, run);
+}

@@ -1,0 +1,48 @@
+#pragma once
+// The subcommands of `tandem bench` and what they share with `tandem export`.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "services/tool/commands.hpp"
+#include "services/workers/workers.hpp"
+
+namespace tandem::lab {
+
+using tool::Run;
+
+void add_bandwidth(commandline::Command bench, Run& run);
+void add_train(commandline::Command bench, Run& run);
+void add_memory(commandline::Command bench, Run& run);
+void add_engine(commandline::Command bench, Run& run);
+void add_client(commandline::Command bench, Run& run);
+void add_framerate(commandline::Command bench, Run& run);
+void add_smoothing(commandline::Command bench, Run& run);
+
+/// Prints the error to stderr; the exit code: 2 when the caller named something that does not exist or is out
+/// of range, else 1.
+int report(const std::string& command, const Error& error);
+
+/// The scenes of the paper, in the order of their numbers.
+[[nodiscard]] std::vector<std::string> paper_scenes();
+/// Loads the scenes of a --scene flag: names, files, or "all" for the paper's. Errors: those of load_scene().
+[[nodiscard]] Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names);
+
+inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
+
+/// What --predictor takes where it may be chosen automatically.
+[[nodiscard]] std::vector<std::string> predictor_choices();
+
+/// Flags that several subcommands have.
+void add_scene_option(commandline::Command command, std::vector<std::string>& scenes);
+void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>& bodies);
+void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice);
+commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
+                                    const std::string& help);
+commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice);
+
+}  // namespace tandem::lab

@@ -1,0 +1,337 @@
+// `tandem bench bandwidth`: the paper's table 5.3 and everything like it.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
+#include "services/lab/bandwidth/bandwidth.hpp"
+#include "services/lab/bandwidth/bandwidth_columns.hpp"
+#include "services/lab/bandwidth/bandwidth_report.hpp"
+#include "services/lab/commands/bench.hpp"
+#include "services/lab/measures/train.hpp"
+#include "services/lab/trajectories/trajectory.hpp"
+#include "services/tool/progress.hpp"
+
+namespace tandem::lab {
+namespace {
+
+struct BandwidthOptions {
+  std::vector<std::string> scenes;
+  std::vector<std::uint32_t> bodies{10000};
+  std::uint64_t frames = 1000;
+  std::vector<std::string> codecs;
+  std::string trajectory;
+  sessions::SessionChoice choice;
+  SceneRun run;
+  bool json = false;
+  bool peers = false;
+  std::string report;
+  unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
+};
+
+/// One scene at one size.
+struct Job {
+  const scenes::Scene* scene;
+  std::uint32_t bodies;
+};
+
+/// All codecs over one source; the rows lack only what the scene does not know.
+Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& source,
+                                          const BandwidthOptions& options, std::uint64_t frames,
+                                          const std::function<void(Frame)>& progress) {
+  sessions::SessionChoice choice = options.choice;
+  choice.bodies = source.simulation->capacity();
+  choice.threads = options.run.threads;
+  std::vector<host::StreamConfig> streams;
+  for (const std::string& codec : options.codecs) {
+    choice.codec = codec;
+    const auto traits = codec_traits(codec);
+    if (!traits) return tl::unexpected(traits.error());
+    choice.predictor = traits->is_baseline ? std::string(basic_predictor().name) : options.choice.predictor;
+    auto stream = sessions::plan_stream(scene, choice);
+    if (!stream) return tl::unexpected(stream.error());
+    if (!traits->reads_threshold) stream->quality.reset();
+    streams.push_back(std::move(*stream));
+  }
+  auto replay = Replay::create(*source.simulation, std::move(source.script), streams[0].lattice);
+  if (!replay) return tl::unexpected(replay.error());
+  const double threshold = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
+  auto rows = measure_bandwidth(*replay, streams, frames, progress,
+                                options.peers ? std::optional(threshold) : std::nullopt);
+  if (!rows) return rows;
+  for (BandwidthRow& row : *rows) {
+    row.scene = scene.name;
+    row.threshold = threshold;
+    if (choice.automatic && !row.predictor.empty())
+      row.threshold = row.parameters.codec.threshold * row.lattice_unit;
+  }
+  return rows;
+}
+
+Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, const BandwidthOptions& options,
+                                                std::uint32_t bodies,
+                                                const std::function<void(Frame)>& progress) {
+  SceneRun run = options.run;
+  run.bodies = bodies;
+  run.frames = options.frames;
+  auto source = make_source(scene, run);
+  if (!source) return tl::unexpected(source.error());
+  auto rows = measure(scene, *source, options, options.frames, progress);
+  if (!rows) return rows;
+  // With another number of users it is not the scene of the paper's table.
+  const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
+  for (BandwidthRow& row : *rows) {
+    if (as_in_paper) row.number = static_cast<int>(scene.number);
+    row.threads = run.threads;
+    row.seed = run.seed;
+  }
+  return rows;
+}
+
+/// What a session needs to know about a trajectory, in the shape of a scene. Errors: kMalformed where
+/// the scene that it names is none.
+Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
+  scenes::Scene scene;
+  scene.name = path;
+  scene.dt_s = trajectory.dt_s();
+  scene.threshold_m = trajectory.info().threshold;
+  // A file without any motion has no extent of its own.
+  scene.extent_m = std::max(trajectory.position_bound(), trajectory.info().threshold);
+  scene.turns = !trajectory.bodies().orientation[0].empty();
+  scene.types.resize(1);
+  scene.types.front().bounding_radius_m = trajectory.info().radius;
+  const std::vector<engine::Shape>& shapes = trajectory.info().shapes;
+  if (!shapes.empty()) scene.types.clear();
+  for (const engine::Shape& shape : shapes) {
+    scenes::BodyType& type = scene.types.emplace_back();
+    type.radius_m = engine::inner_radius(shape);
+    type.bounding_radius_m = engine::bounding_radius(shape);
+    type.shape = shape;
+  }
+  if (trajectory.info().scene.empty()) return scene;
+  auto named = scenes::load_scene(trajectory.info().scene);
+  if (!named) {
+    return fail(ErrorCode::kMalformed,
+                fmt::format("{}: \"scene\": {}", sidecar_path(path).value(), named.error().message));
+  }
+  scene.extent_m = std::max(scene.extent_m, named->extent_m);
+  scene.world = std::move(named->world);
+  // A recording does not say which body is of which of the scene's types.
+  scene.world.types.resize(1);
+  if (shapes.empty()) return scene;
+  const engine::ParticleType first = scene.world.types.front();
+  scene.world.types.clear();
+  for (const scenes::BodyType& type : scene.types)
+    scene.world.types.push_back({static_cast<float>(type.radius_m), first.mass});
+  return scene;
+}
+
+/// The tiers that compute contacts need to know what the bodies are and where the walls stand.
+Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const BandwidthOptions& options) {
+  const std::string& predictor = options.choice.predictor;
+  const auto is_ours = [](const std::string& codec) {
+    const auto traits = codec_traits(codec);
+    return traits && !traits->is_baseline;
+  };
+  const auto named = find_predictor(predictor);  // none where it is chosen automatically
+  const bool asked = named && (*named)->reads_world && std::ranges::any_of(options.codecs, is_ours);
+  if (!asked || !trajectory.info().scene.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("{}: no \"scene\"; --predictor {} needs one for radius, materials and walls (see "
+                          "`tandem export --help`)",
+                          sidecar_path(options.trajectory).value(), predictor));
+}
+
+/// There is no other run to train on, so a trajectory trains the paper's codecs itself, in their favour.
+Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& options) {
+  const auto make = [&] {
+    return RecordedTrajectory::open(options.trajectory)
+        .map([](std::unique_ptr<RecordedTrajectory>&& trajectory) {
+          return Source{std::move(trajectory), {}};
+        });
+  };
+  const auto opened = RecordedTrajectory::open(options.trajectory);
+  if (!opened) return tl::unexpected(opened.error());
+  if (auto known = check_world_is_known(**opened, options); !known) return tl::unexpected(known.error());
+  auto scene_or = scene_of(**opened, options.trajectory);
+  if (!scene_or) return tl::unexpected(scene_or.error());
+  scenes::Scene& scene = *scene_or;
+  const std::uint64_t frames = std::min(options.frames, (*opened)->frames());
+  sessions::SessionChoice choice = options.choice;
+  choice.bodies = (*opened)->capacity();
+  const auto is_trained = [](const std::string& codec) { return codec_traits(codec)->reads_steps; };
+  if (std::ranges::any_of(options.codecs, is_trained)) {
+    tool::Progress progress(fmt::format("{}: training, frame", options.trajectory), kTrainingPasses * frames);
+    auto table = train(scene, choice, make, frames, [&](Frame frame) { progress.at(frame); });
+    if (!table) return fail(table.error().code, options.trajectory + ": " + table.error().message);
+    scene.trained = {std::move(*table)};
+  }
+  auto source = make();
+  if (!source) return tl::unexpected(source.error());
+  tool::Progress progress(fmt::format("{}: frame", options.trajectory), frames);
+  auto rows = measure(scene, *source, options, frames, [&](Frame frame) { progress.at(frame); });
+  if (!rows) return rows;
+  for (BandwidthRow& row : *rows) row.colliding_per_frame.reset();
+  return rows;
+}
+
+/// Jobs run beside each other; their rows come in the order of the jobs.
+Result<std::vector<BandwidthRow>> measure_jobs(std::span<const Job> jobs, const BandwidthOptions& options) {
+  std::vector<Result<std::vector<BandwidthRow>>> results(jobs.size());
+  std::atomic<std::size_t> next = 0;
+  std::atomic<bool> failed = false;
+  std::mutex mutex;
+  std::uint64_t done = 0;
+  tool::Progress progress(fmt::format("{} runs: frame", jobs.size()), jobs.size() * options.frames);
+  const auto one_frame = [&](Frame) {
+    const std::lock_guard lock(mutex);
+    progress.at(++done);
+  };
+  const auto work = [&] {
+    for (std::size_t job = next++; job < jobs.size() && !failed; job = next++) {
+      results[job] = measure_scene(*jobs[job].scene, options, jobs[job].bodies, one_frame);
+      if (!results[job]) failed = true;
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t i = 1; i < std::min<std::size_t>(options.jobs, jobs.size()); ++i)
+      workers.emplace_back(work);
+    work();
+  }
+  std::vector<BandwidthRow> rows;
+  for (auto& result : results) {
+    if (!result) return result;
+    std::move(result->begin(), result->end(), std::back_inserter(rows));
+  }
+  return rows;
+}
+
+Result<std::vector<BandwidthRow>> measure_all(const BandwidthOptions& options) {
+  if (!options.trajectory.empty()) return measure_trajectory(options);
+  auto scenes = load_scenes(options.scenes);
+  if (!scenes) return tl::unexpected(scenes.error());
+  std::vector<Job> jobs;
+  for (const scenes::Scene& scene : *scenes) {
+    for (const std::uint32_t bodies : options.bodies) jobs.push_back({&scene, bodies});
+  }
+  return measure_jobs(jobs, options);
+}
+
+int run_bandwidth(const BandwidthOptions& options) {
+  const auto rows = measure_all(options);
+  if (!rows) return report("bench bandwidth", rows.error());
+  if (!options.report.empty()) {
+    if (const auto written = write_report(options.report, *rows); !written)
+      return report("bench bandwidth", written.error());
+  }
+  fmt::print("{}{}", options.json ? to_json(*rows) : to_table(*rows), options.json ? "\n" : "");
+  return 0;
+}
+
+}  // namespace
+
+namespace {
+
+/// As tandemd has them.
+void add_quality_options(commandline::Command command, sessions::SessionChoice& choice) {
+  const commandline::Option scale = add_threshold_scale(command, choice);
+  command
+      .add_option_function<std::string>(
+          "--threshold",
+          [&choice](const std::string& text) {
+            choice.automatic = text == "auto";
+            if (choice.automatic) return;
+            double length = 0;
+            const char* const end = text.data() + text.size();
+            const auto [rest, failure] = std::from_chars(text.data(), end, length);
+            if (failure != std::errc{} || rest != end || !(length > 0 && length <= 1e6))
+              commandline::refuse("--threshold", "a positive length, or auto");
+            choice.threshold_m = length;
+          },
+          "Error threshold, scene units, or auto: chosen at run time (default: the scene's)")
+      .type_name("FLOAT|auto")
+      .excludes(scale);
+  command
+      .add_option("--target-bandwidth", choice.target_mbit_per_s,
+                  "Mbit/s of payload that --threshold auto keeps to (default: none, only ranges follow)")
+      .range(0.001, 1e6);
+  command
+      .add_option("--max-error", choice.max_error_m,
+                  "Largest threshold of --threshold auto, scene units (default: four times the scene's)")
+      .range(1e-9, 1e9);
+}
+
+}  // namespace
+
+void add_bandwidth(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
+      "bandwidth", "Codecs side by side over the same trajectory; a decoder checks every frame's hash.");
+  const auto options = std::make_shared<BandwidthOptions>();
+  for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
+  add_scene_option(command, options->scenes);
+  add_bodies_option(command, options->bodies);
+  command.option("--scene").required(false);
+  command.add_option("--frames", options->frames, "Frames, from the start block on")
+      .range(std::uint64_t{1}, kMaxFrames)
+      .show_default();
+  command.add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
+      .separated_by(',')
+      .one_of(options->codecs);
+  command
+      .add_option("--predictor", options->choice.predictor,
+                  "Predicted step of `tracker`: ballistic, field, contact, or auto: field for spheres, else "
+                  "ballistic; the paper's codecs have ballistic")
+      .one_of(predictor_choices())
+      .show_default();
+  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");
+  add_quality_options(command, options->choice);
+  command.add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
+      .range(1U, kMaxThreads)
+      .show_default();
+  command.add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+      .range(1U, scenes::kMaxUsers);
+  command
+      .add_option(
+          "--budget", options->choice.budget_bytes,
+          "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
+      .range(sessions::kLeastBudgetBytes, std::size_t{1} << 30U);
+  command
+      .add_option("--trajectory", options->trajectory,
+                  "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
+      .excludes({"--scene", "--bodies", "--seed", "--users"});
+  command.add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
+      .range(1, 64)
+      .show_default();
+  command.add_flag("--peers", options->peers,
+                   "Also Draco, zfp, zstd and dead reckoning (DIS), at the threshold as the largest error");
+  command.add_option("--report", options->report,
+                     "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
+  command.add_flag("--json", options->json, "One JSON object: rows[...]");
+  command.footer(
+      "Errors and the threshold are of centres; where a session has orientations the threshold is of surfaces:\n"
+      "max surf and rms surf, of the sphere around each body.\n"
+      "bound: Mbit/s of tracker's decisions at the best fixed probability of each context.\n"
+      "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.\n"
+      "Bits and errors are the same on any number of --threads and --jobs; times are quiet with --jobs 1.");
+  command.on_chosen([options, &run] {
+    if (options->scenes.empty() && options->trajectory.empty())
+      commandline::refuse_missing("--scene or --trajectory");
+    const sessions::SessionChoice& choice = options->choice;
+    if (!choice.automatic && choice.target_mbit_per_s > 0)
+      commandline::refuse_without("--target-bandwidth", "--threshold auto");
+    if (!choice.automatic && choice.max_error_m)
+      commandline::refuse_without("--max-error", "--threshold auto");
+    run = [options] { return run_bandwidth(*options); };
+  });
+}
+
+}  // namespace tandem::lab

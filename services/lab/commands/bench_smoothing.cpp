@@ -1,0 +1,114 @@
+// `tandem bench smoothing`: how far what is drawn jumps, with and without smoothing.
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
+#include "services/json/json.hpp"
+#include "services/lab/commands/bench.hpp"
+#include "services/lab/measures/smoothing.hpp"
+
+namespace tandem::lab {
+namespace {
+
+constexpr const char* kCommand = "bench smoothing";
+
+struct SmoothingOptions {
+  std::vector<std::string> scenes{"all"};
+  std::vector<std::string> predictors = predictor_names();
+  SmoothingSetup setup;
+  bool json = false;
+};
+
+Json to_json(const Seen& seen) {
+  return {{"jump_p999", seen.jump}, {"mean_error", seen.mean_error}, {"p999_error", seen.p999_error}};
+}
+
+int run_smoothing(const SmoothingOptions& options) {
+  const auto scenes = load_scenes(options.scenes);
+  if (!scenes) return report(kCommand, scenes.error());
+  Json rows = Json::array();
+  if (!options.json) {
+    fmt::print("{:<12} {:<10} {:>9}   {:>10} {:>10} {:>6}   {:>10} {:>10} {:>10}\n", "scene", "predictor",
+               "threshold", "jump p99.9", "unsmoothed", "ratio", "mean error", "unsmoothed", "p99.9");
+  }
+  for (const scenes::Scene& scene : *scenes) {
+    for (const std::string& predictor : options.predictors) {
+      SmoothingSetup setup = options.setup;
+      setup.choice.predictor = predictor;
+      const auto row = measure_smoothing(scene, setup);
+      if (!row) return report(kCommand, row.error());
+      const double ratio = row->unsmoothed.jump / row->smoothed.jump;
+      rows.push_back({{"scene", row->scene},
+                      {"predictor", row->predictor},
+                      {"codec", row->codec},
+                      {"bodies", row->bodies},
+                      {"threshold", row->threshold},
+                      {"samples", row->samples},
+                      {"smoothed", to_json(row->smoothed)},
+                      {"unsmoothed", to_json(row->unsmoothed)}});
+      if (options.json) continue;
+      fmt::print("{:<12} {:<10} {:>9.4f}   {:>10.6f} {:>10.6f} {:>6.1f}   {:>10.6f} {:>10.6f} {:>10.6f}\n",
+                 row->scene, row->predictor, row->threshold, row->smoothed.jump, row->unsmoothed.jump, ratio,
+                 row->smoothed.mean_error, row->unsmoothed.mean_error, row->smoothed.p999_error);
+      std::fflush(stdout);
+    }
+  }
+  if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
+  return 0;
+}
+
+}  // namespace
+
+void add_smoothing(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
+      "smoothing", "What is seen of corrections: two clients sample one session, one of them smoothing.");
+  const auto options = std::make_shared<SmoothingOptions>();
+  SmoothingSetup& setup = options->setup;
+  setup.choice.bodies = 1000;
+  command
+      .add_option("--scene", options->scenes,
+                  "Scenes by name or file, separated by commas; all: the paper's five")
+      .separated_by(',')
+      .show_default();
+  command.add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
+      .separated_by(',')
+      .one_of(predictor_names())
+      .show_default();
+  std::vector<std::string> names;
+  for (const std::string_view name : codec_names()) names.emplace_back(name);
+  command.add_option("--codec", setup.choice.codec, "Codec").one_of(names).show_default();
+  command.add_option("--bodies", setup.choice.bodies, "Number of bodies")
+      .range(1U, engine::kMaxBodies)
+      .show_default();
+  add_threshold_options(command, setup.choice);
+  add_seed_option(command, setup.seed, "Of the start block, the scripted inputs and the network");
+  command.add_option("--seconds", setup.seconds, "Of simulated time, for each row")
+      .range(0.1, 3600.0)
+      .show_default();
+  command.add_option("--rate", setup.rate_hz, "Samples a second").range(1.0, 1000.0).show_default();
+  command
+      .add_option("--smoothing", setup.smoothing_s,
+                  "Time constant of the smoothed client, s (default: the client's own)")
+      .range(0.0, 10.0);
+  command.add_option("--delay", setup.delay_ms, "Of the network, ms each way")
+      .range(0.0, 1000.0)
+      .show_default();
+  command.add_option("--jitter", setup.jitter_ms, "Of the network, ms: evenly added up to that")
+      .range(0.0, 1000.0)
+      .show_default();
+  command.add_option("--outage", setup.outage_s, "Seconds that the link is cut for, every five")
+      .range(0.0, 4.0)
+      .show_default();
+  command.add_flag("--json", options->json,
+                   "One JSON object: rows[scene, predictor, codec, bodies, threshold, samples, smoothed, "
+                   "unsmoothed]");
+  command.footer(
+      "Jump: the 99.9th percentile over bodies and samples of how far the second difference of the place shown\n"
+      "goes beyond that of the full simulation's at the same moments; scene units. All is seeded.");
+  command.on_chosen([options, &run] { run = [options] { return run_smoothing(*options); }; });
+}
+
+}  // namespace tandem::lab

@@ -1,0 +1,90 @@
+// `tandem bench train`: what the paper's codecs need to know about a scene, written beside its file.
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "services/json/json.hpp"
+#include "services/lab/commands/bench.hpp"
+#include "services/lab/measures/train.hpp"
+#include "services/tool/progress.hpp"
+
+namespace tandem::lab {
+namespace {
+
+// Far from the seeds that measurements use, so that nobody measures on what was trained.
+constexpr std::uint64_t kTrainingSeed = 1001;
+
+struct TrainOptions {
+  std::vector<std::string> scenes;
+  std::vector<std::uint32_t> bodies{5000, 10000, 20000};
+  std::uint64_t frames = 1000;
+  sessions::SessionChoice choice;
+  SceneRun run;
+  bool json = false;
+};
+
+Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const TrainOptions& options,
+                                         std::uint32_t bodies) {
+  SceneRun run = options.run;
+  run.bodies = bodies;
+  run.frames = options.frames;
+  sessions::SessionChoice choice = options.choice;
+  choice.bodies = bodies;
+  tool::Progress progress(fmt::format("{}, {} bodies: training, frame", scene.name, bodies),
+                          kTrainingPasses * options.frames);
+  auto table = train(
+      scene, choice, [&] { return make_source(scene, run); }, options.frames,
+      [&](Frame frame) { progress.at(frame); });
+  if (!table) return table;
+  return scenes::save_trained(scene.path, *table).map([&] { return std::move(*table); });
+}
+
+int run_train(const TrainOptions& options) {
+  const auto scenes = load_scenes(options.scenes);
+  if (!scenes) return report("bench train", scenes.error());
+  Json rows = Json::array();
+  for (const scenes::Scene& scene : *scenes) {
+    for (const std::uint32_t bodies : options.bodies) {
+      const auto table = train_scene(scene, options, bodies);
+      if (!table) return report("bench train", table.error());
+      if (!options.json) {
+        fmt::print(
+            "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  -> {}\n",
+            scene.name, bodies, table->threshold_m, table->position_range_m, table->velocity_range_m_per_s,
+            scenes::trained_path(scene.path));
+      }
+      rows.push_back({{"scene", scene.name},
+                      {"bodies", bodies},
+                      {"threshold", table->threshold_m},
+                      {"position_range", table->position_range_m},
+                      {"velocity_range", table->velocity_range_m_per_s},
+                      {"file", scenes::trained_path(scene.path)}});
+    }
+  }
+  if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
+  return 0;
+}
+
+}  // namespace
+
+void add_train(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
+      "train", "Writes quantisation ranges and code lengths beside the scene file: NAME.trained.textproto.");
+  const auto options = std::make_shared<TrainOptions>();
+  options->run.seed = kTrainingSeed;
+  add_scene_option(command, options->scenes);
+  add_bodies_option(command, options->bodies);
+  command.add_option("--frames", options->frames, "Frames, from the start block on")
+      .range(std::uint64_t{1}, kMaxFrames)
+      .show_default();
+  add_seed_option(command, options->run.seed, "Of the training run");
+  add_threshold_options(command, options->choice);
+  command.add_option("--threads", options->run.threads, "Of the engine")
+      .range(1U, kMaxThreads)
+      .show_default();
+  command.add_flag("--json", options->json, "One JSON object: rows[scene, bodies, threshold, ranges, file]");
+  command.on_chosen([options, &run] { run = [options] { return run_train(*options); }; });
+}
+
+}  // namespace tandem::lab

@@ -1,0 +1,54 @@
+#pragma once
+// A program that this one starts, somewhere, and never leaves behind.
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "services/lab/measures/enclave.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// Of the program that runs.
+[[nodiscard]] std::string own_path();
+/// `tandemd` beside this program, as installed and as built, or else in PATH; empty: nowhere.
+[[nodiscard]] std::string find_server();
+
+struct ChildPlace {
+  const Enclave* enclave = nullptr;  ///< network namespace; null: this one's
+  std::string cgroup_procs;          ///< file to write the new process to; empty: none
+  std::string dds_config;            ///< CYCLONEDDS_URI; empty: inherited
+};
+
+/// Killed at its end, and when this program dies. Not thread-safe.
+class Child {
+ public:
+  /// Runs `arguments[0]`; its stdout is kept, its stderr thrown away. Errors: kIo.
+  static Result<Child> start(const std::vector<std::string>& arguments, const ChildPlace& place);
+  Child(Child&& other) noexcept;
+  Child& operator=(Child&&) = delete;
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  ~Child();
+
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  /// Processor time of all its threads, after finish().
+  [[nodiscard]] double cpu_ms() const { return cpu_ms_; }
+  /// Waits for its end; what it printed. Errors: kIo, when it takes longer than that, exits with an error, or
+  /// `stop` is set meanwhile.
+  Result<std::string> finish(std::chrono::seconds at_most, const std::atomic<bool>& stop);
+
+ private:
+  Child(pid_t pid, Descriptor out) : pid_(pid), out_(std::move(out)) {}
+  void kill_it();
+
+  pid_t pid_;
+  Descriptor out_;
+  double cpu_ms_ = 0;
+};
+
+}  // namespace tandem::lab

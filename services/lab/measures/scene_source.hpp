@@ -1,0 +1,33 @@
+#pragma once
+// What a measurement runs on: a scene's simulation with what its scripted users do.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "services/lab/measures/replay.hpp"
+#include "services/scenes/scene.hpp"
+#include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
+
+namespace tandem::lab {
+
+/// How a scene is run. Zero `users`: as many as the scene says.
+struct SceneRun {
+  std::uint32_t bodies = 0;
+  std::uint64_t seed = 1;
+  std::uint32_t threads = 1;
+  std::uint32_t users = 0;
+  std::uint64_t frames = 0;
+};
+
+/// A simulation at frame 0, and its inputs.
+struct Source {
+  std::unique_ptr<engine::Simulation> simulation;
+  std::vector<TimedInput> script;
+};
+
+/// Errors: as scenes::make_simulation().
+[[nodiscard]] Result<Source> make_source(const scenes::Scene& scene, const SceneRun& run);
+
+}  // namespace tandem::lab

@@ -1,0 +1,109 @@
+#include "services/process/signal_watch.hpp"
+
+#include <poll.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <optional>
+#include <utility>
+
+namespace tandem {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+/// False for a wake-up of our own, which has `mark`; a stop that is over; and at `deadline`.
+bool wait_for_signal(const sigset_t& signals, const void* mark,
+                     const std::optional<Clock::time_point>& deadline) {
+  siginfo_t info{};
+  int signal = -1;
+  if (deadline) {
+    const std::chrono::nanoseconds left = std::max<std::chrono::nanoseconds>(0ns, *deadline - Clock::now());
+    timespec timeout{};
+    timeout.tv_sec = static_cast<std::time_t>(left / 1s);
+    timeout.tv_nsec = static_cast<long>((left % 1s).count());
+    signal = sigtimedwait(&signals, &info, &timeout);
+  } else {
+    signal = sigwaitinfo(&signals, &info);
+  }
+  const bool own = info.si_code == SI_QUEUE && info.si_value.sival_ptr == mark;
+  return signal > 0 && !own;
+}
+
+/// Seconds, with a decimal only where there is one.
+std::string seconds_text(std::chrono::milliseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g s", std::chrono::duration<double>(time).count());
+  return text;
+}
+
+}  // namespace
+
+SignalWatch::SignalWatch(std::string program, Limits limits) : program_(std::move(program)), limits_(limits) {
+  sigemptyset(&signals_);
+  sigaddset(&signals_, SIGINT);
+  sigaddset(&signals_, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // inherited by all threads started from here on
+  thread_ = std::thread([this] { run(); });
+}
+
+SignalWatch::~SignalWatch() {
+  done_ = true;
+  wake();
+  thread_.join();
+}
+
+int SignalWatch::finish(int exit_code) {
+  if ((std::fflush(stdout) != 0 || std::ferror(stdout) != 0) && exit_code == 0) exit_code = 1;
+  exit_code_ = exit_code;
+  wake();
+  return exit_code;
+}
+
+void SignalWatch::wake() {
+  sigval mark{};
+  mark.sival_ptr = this;
+  pthread_sigqueue(thread_.native_handle(), SIGTERM, mark);  // blocked in every thread: it ends the wait only
+}
+
+void SignalWatch::run() {
+  std::optional<Clock::time_point> signalled, deadline;
+  for (;;) {
+    const bool asked = wait_for_signal(signals_, this, deadline);
+    if (done_) return;
+    const Clock::time_point now = Clock::now();
+    if (asked && signalled && now - *signalled >= limits_.repeat) give_up("when a further signal came");
+    if (asked && !signalled) signalled = now;
+    if (asked) stop_.store(true, std::memory_order_relaxed);
+    if (deadline && now >= *deadline)
+      give_up(seconds_text(limits_.end) + (signalled ? " after the signal" : " after the work was done"));
+    if (!deadline && (signalled || exit_code_ != kAtWork)) deadline = now + limits_.end;
+  }
+}
+
+void SignalWatch::give_up(const std::string& when) const {
+  const int code = exit_code_;
+  std::string line = program_;
+  if (code == kAtWork) {
+    line += ": the work had not ended " + when +
+            ". The program broke it off: reports are missing, and files may lack their end.\n";
+  } else {
+    line += ": DDS had not ended " + when +
+            " (is the network interface gone?). The program ended without it, with exit code " +
+            std::to_string(code) +
+            ". Reports and files were finished before; other programs may not have heard that it left, until "
+            "its lease runs out.\n";
+  }
+  // Neither a lock that somebody holds nor a reader that is stuck may keep the process.
+  pollfd out{STDERR_FILENO, POLLOUT, 0};
+  if (poll(&out, 1, 0) == 1 && (out.revents & POLLOUT) != 0) {
+    [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, line.data(), line.size());
+  }
+  _exit(code == kAtWork ? 1 : code);
+}
+
+}  // namespace tandem

@@ -1,0 +1,167 @@
+#include "services/process/signal_watch.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <functional>
+#include <string>
+
+namespace tandem {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// How a child ended that has `stuck` in it, and what it wrote.
+struct Ended {
+  int exit_code = -1;  ///< negative: not by an exit
+  std::string out, err;
+};
+
+Ended run_child(const std::function<void()>& stuck) {
+  int out[2];
+  int err[2];
+  if (pipe(out) != 0 || pipe(err) != 0) return {};
+  const pid_t child = fork();
+  if (child == 0) {
+    dup2(out[1], STDOUT_FILENO);
+    dup2(err[1], STDERR_FILENO);
+    for (const int end : {out[0], out[1], err[0], err[1]}) close(end);
+    stuck();
+    for (;;) pause();  // as DDS does
+  }
+  const auto read_all = [](const int(&ends)[2]) {
+    close(ends[1]);
+    std::string all;
+    char part[256];
+    for (ssize_t size = 0; (size = read(ends[0], part, sizeof part)) > 0;)
+      all.append(part, static_cast<std::size_t>(size));
+    close(ends[0]);
+    return all;
+  };
+  Ended ended;
+  ended.out = read_all(out);
+  ended.err = read_all(err);
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WIFEXITED(status)) ended.exit_code = WEXITSTATUS(status);
+  return ended;
+}
+
+TEST(SignalWatch, ASignalIsSeenAsAFlag) {
+  const SignalWatch watch("test");
+  EXPECT_FALSE(watch.stop());
+  kill(getpid(), SIGINT);
+  while (!watch.stop()) usleep(1000);
+}
+
+TEST(SignalWatch, GoingOnAfterAStopIsNoSignal) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const SignalWatch watch("test");
+    raise(SIGSTOP);
+    usleep(100'000);
+    _exit(watch.stop() ? 1 : 0);
+  }
+  int status = 0;
+  waitpid(child, &status, WUNTRACED);
+  ASSERT_TRUE(WIFSTOPPED(status));
+  usleep(10'000);
+  kill(child, SIGCONT);
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+TEST(SignalWatch, ItEndsWithoutASignal) {
+  for (int i = 0; i < 100; ++i) {
+    const SignalWatch watch("test");
+    EXPECT_FALSE(watch.stop());
+  }
+}
+
+TEST(SignalWatch, AProgramThatIsDoneMayEndOrderly) {
+  for (int i = 0; i < 100; ++i) {
+    SignalWatch watch("test", {1h, 1h});
+    EXPECT_EQ(watch.finish(3), 3);
+  }
+}
+
+TEST(SignalWatch, WhoIsStuckAtWorkAfterASignalFails) {
+  const Ended ended = run_child([] {
+    const SignalWatch watch("test", {50ms, 1h});
+    kill(getpid(), SIGTERM);
+    for (;;) pause();
+  });
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_EQ(
+      ended.err,
+      "test: the work had not ended 0.05 s after the signal. The program broke it off: reports are missing, "
+      "and files may lack their end.\n");
+}
+
+TEST(SignalWatch, WhoIsStuckInTheEndEndsWithTheExitCodeOfItsWork) {
+  for (const int exit_code : {0, 2}) {
+    const Ended ended = run_child([exit_code] {
+      SignalWatch watch("test", {50ms, 1h});
+      kill(getpid(), SIGTERM);
+      while (!watch.stop()) usleep(1000);
+      std::fputs("the report", stdout);  // without its end, so that it stays in the buffer
+      static_cast<void>(watch.finish(exit_code));
+      for (;;) pause();
+    });
+    EXPECT_EQ(ended.exit_code, exit_code);
+    EXPECT_EQ(ended.out, "the report");
+    EXPECT_NE(ended.err.find("test: DDS had not ended 0.05 s after the signal"), std::string::npos)
+        << ended.err;
+  }
+}
+
+TEST(SignalWatch, TheEndIsLimitedWithoutASignalToo) {
+  const Ended ended = run_child([] {
+    SignalWatch watch("test", {50ms, 1h});
+    static_cast<void>(watch.finish(0));
+    for (;;) pause();
+  });
+  EXPECT_EQ(ended.exit_code, 0);
+  EXPECT_NE(ended.err.find("had not ended 0.05 s after the work was done"), std::string::npos) << ended.err;
+}
+
+TEST(SignalWatch, AFurtherSignalEndsTheProcessAtOnce) {
+  const Ended ended = run_child([] {
+    const SignalWatch watch("test", {1h, 1ms});
+    kill(getpid(), SIGINT);
+    while (!watch.stop()) usleep(1000);
+    usleep(10'000);
+    kill(getpid(), SIGINT);
+    for (;;) pause();
+  });
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_NE(ended.err.find("had not ended when a further signal came"), std::string::npos) << ended.err;
+}
+
+TEST(SignalWatch, TheSameWishSentTwiceIsOne) {
+  const SignalWatch watch("test", {1h, 1h});
+  kill(getpid(), SIGINT);
+  while (!watch.stop()) usleep(1000);
+  kill(getpid(), SIGTERM);  // would end this test
+  usleep(10'000);
+}
+
+TEST(SignalWatch, AFullStderrKeepsNobody) {
+  const Ended ended = run_child([] {
+    int full[2];
+    if (pipe(full) != 0) return;
+    dup2(full[1], STDERR_FILENO);
+    const std::string page(4096, 'x');
+    for (int i = 0; i < 16; ++i) static_cast<void>(!write(STDERR_FILENO, page.data(), page.size()));
+    SignalWatch watch("test", {50ms, 1h});
+    static_cast<void>(watch.finish(0));
+    for (;;) pause();
+  });
+  EXPECT_EQ(ended.exit_code, 0);
+}
+
+}  // namespace
+}  // namespace tandem
