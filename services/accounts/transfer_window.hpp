@@ -127,8 +127,8 @@ class TransferWindow {
     const auto least_s = static_cast<double>(least_ns_) * 1e-9;
     const double full = rate() * (least_s + static_cast<double>(kQueueNs) * 1e-9);
     const double wanted = starting_ ? std::max(full, kStartGain * rate() * least_s) : full;
-    bytes_ =
-        static_cast<std::size_t>(std::clamp(wanted, static_cast<double>(kLeast), static_cast<double>(kMost)));
+    const auto least = static_cast<double>(starting_ ? kFirst : kLeast);
+    bytes_ = static_cast<std::size_t>(std::clamp(wanted, least, static_cast<double>(kMost)));
     pace_ = static_cast<double>(bytes_) / least_s;
   }
 

@@ -16,6 +16,8 @@ constexpr std::int64_t kFirstProbeNs = kSecond;  // at most
 constexpr std::int64_t kMostProbeNs = 2 * kSecond;
 // After so long without an arrival the rate of the link is measured anew.
 constexpr std::int64_t kForgetRateNs = 2 * kSecond;
+// DDS repeats no part for longer: the lifespan of the writer.
+constexpr std::int64_t kRepeatedNs = 3 * kSecond / 10;
 // No receiver is sent more than so many times what there is.
 constexpr std::size_t kMostTimes = 4;
 constexpr std::size_t kSlackBytes = 64U << 10U;
@@ -94,7 +96,7 @@ void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
   std::size_t bytes = 0;
   std::size_t settled = 0;  // entries up to the last one that arrived
   std::vector<bool> is_new(holds_.size()), counts(flying_.size());
-  const bool was_silent = now_ns - progress_ns_ >= kForgetRateNs;
+  const auto given_up = [now_ns](const Flying& entry) { return now_ns - entry.sent.at_ns >= kRepeatedNs; };
   for (std::size_t i = 0; i < flying_.size(); ++i) {
     const Flying& entry = flying_[i];
     if (!held[entry.part]) continue;
@@ -103,9 +105,11 @@ void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
       holds_[entry.part] = is_new[entry.part] = counts[i] = true;
       bytes += entry.sent.bytes;
     }
-    // After a silence a part that was sent twice is taken to have come by its last copy: DDS has given up
-    // what was sent before.
-    if (is_first || (was_silent && is_new[entry.part])) settled = i + 1;
+    // A part that was sent twice is taken to have come by the last copy for which there was time, once DDS has
+    // given up the first.
+    const bool by_copy = is_new[entry.part] && given_up(flying_.front()) &&
+                         now_ns - entry.sent.at_ns >= window_.least_ns();
+    if (is_first || by_copy) settled = i + 1;
   }
   std::erase_if(again_, [this, &held](std::size_t part) {  // it was on its way after all
     if (held[part]) holds_[part] = true;

@@ -269,6 +269,18 @@ TEST_F(SnapshotTransferTest, WhatDdsRepeatsNoLongerIsSentAgainSoonAfterALossOfSe
   }
 }
 
+TEST_F(SnapshotTransferTest, ALossOfAllFirstPartsCostsSomeRoundTrips) {
+  // A burst takes them, and DDS gives them up before the link is good again.
+  start(7, 60'000, {1});
+  Receiver& receiver = receivers[1];
+  receiver.link.delay_ns = 100 * kMillisecond;
+  receiver.link.lifespan_ns = 0;
+  receiver.link.is_cut = true;
+  run_ms(150);
+  receiver.link.is_cut = false;
+  EXPECT_LT(run_until_whole(1, 20'000), 2'500);
+}
+
 TEST_F(SnapshotTransferTest, AServerWhoseFramesTakeLongStillFillsALink) {
   start(7, 15'000'000, {1});  // a million bodies
   receivers[1].link.bytes_per_s = 1e8;
