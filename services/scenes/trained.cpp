@@ -19,9 +19,6 @@ constexpr double kSameThreshold = 1e-6;
 
 bool same_threshold(double a, double b) { return std::fabs(a - b) <= kSameThreshold * std::fabs(b); }
 
-// How far two sizes are apart, 1 when equal.
-double ratio(double a, double b) { return a > b ? a / b : b / a; }
-
 std::vector<std::uint8_t> narrowed(const google::protobuf::RepeatedField<std::uint32_t>& lengths) {
   std::vector<std::uint8_t> result;
   result.reserve(static_cast<std::size_t>(lengths.size()));
@@ -87,17 +84,6 @@ const TrainedTable* find_table(const std::vector<TrainedTable>& tables, std::uin
   const auto found = std::find_if(tables.begin(), tables.end(), [&](const TrainedTable& table) {
     return table.bodies == bodies && same_threshold(table.threshold_m, threshold_m);
   });
-  return found == tables.end() ? nullptr : &*found;
-}
-
-const TrainedTable* nearest_table(const std::vector<TrainedTable>& tables, std::uint32_t bodies,
-                                  double threshold_m) {
-  const auto distance = [&](const TrainedTable& table) {
-    return std::pair(ratio(table.threshold_m, threshold_m), ratio(table.bodies, bodies));
-  };
-  const auto found = std::min_element(
-      tables.begin(), tables.end(),
-      [&](const TrainedTable& a, const TrainedTable& b) { return distance(a) < distance(b); });
   return found == tables.end() ? nullptr : &*found;
 }
 

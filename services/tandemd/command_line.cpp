@@ -12,8 +12,8 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "services/commandline/commandline.hpp"
+#include "services/planning/number.hpp"
 #include "services/tandemd/config.hpp"
-#include "services/tandemd/number.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -29,7 +29,7 @@ class Flags {
         flag, [config = config_, set](T value) { (config->*set)(value); }, help);
     // The parser reads -1 as the largest number, and what is too large as that.
     if constexpr (std::is_unsigned_v<T>)
-      option.check([](const std::string& text) { return number<T>(text) ? "" : "a whole number"; });
+      option.check([](const std::string& text) { return planning::number<T>(text) ? "" : "a whole number"; });
   }
   void add(const char* flag, std::string* (idl::ServerConfig::*field)(), const std::string& help) {
     app_.add_option_function<std::string>(
@@ -47,7 +47,7 @@ void print_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
 void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
   if (config.threshold_auto()) return;
-  const auto length = number<double>(text);
+  const auto length = planning::number<double>(text);
   if (!length) commandline::refuse("--threshold", "a length in metres, or auto");
   config.set_threshold(*length);
 }
@@ -59,6 +59,12 @@ void add_streams(idl::ServerConfig& config, const std::vector<std::string>& text
     if (!stream) commandline::refuse("--stream", stream.error().message);
     *config.add_stream() = std::move(*stream);
   }
+}
+
+std::string stream_keys() {
+  std::vector<std::string_view> keys;
+  for (const planning::StreamOption& option : planning::kStreamOptions) keys.push_back(option.key);
+  return fmt::format("{}", fmt::join(keys, ", "));
 }
 
 void add_flags(commandline::Command app, idl::ServerConfig& config) {
@@ -84,9 +90,10 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   app.add_option_function<std::vector<std::string>>(
          "--stream", [&config](const std::vector<std::string>& texts) { add_streams(config, texts); },
          "One of up to 8 ways of telling the world, each for clients of other means; made while somebody plays "
-         "it. NAME:PREDICTOR, or NAME:key=value,... with codec, predictor, threshold, target-bandwidth, "
-         "max-error, budget; the rest as the flags of these names say. Clients choose by themselves; one that "
-         "chooses nothing plays the first [thin:ballistic and rich:field where --predictor auto is field]")
+         "it. NAME:PREDICTOR, or NAME:key=value,... with " +
+             stream_keys() +
+             "; the rest as the flags of these names say. Clients choose by themselves; one that chooses "
+             "nothing plays the first [thin:ballistic and rich:field where --predictor auto is field]")
       .type_name("NAME:SPEC")
       .one_value_each();
   app.add_option_function<std::string>(

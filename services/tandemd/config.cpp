@@ -1,6 +1,7 @@
 #include "services/tandemd/config.hpp"
 
 #include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/text_format.h>
 
@@ -12,7 +13,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
-#include "services/tandemd/number.hpp"
+#include "services/planning/number.hpp"
 #include "services/workers/workers.hpp"
 #include "tandem/simulation.hpp"
 
@@ -20,6 +21,7 @@ namespace tandem::daemon {
 namespace {
 
 using idl::ServerConfig;
+using planning::number;
 
 constexpr std::uint32_t kMostClients = 65536;
 
@@ -48,7 +50,7 @@ CodecTraits traits_of(const std::string& codec) {
 }
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 constexpr const char* kLength = "a length from 1e-9 to 1e9 metres";
-bool is_length(double metres) { return within(metres, 1e-9, 1e9); }
+bool is_length(double metres) { return within(metres, planning::kLeastLength, planning::kMostLength); }
 
 /// Numbers that may be words.
 Result<void> check_words(const ServerConfig& config, Options& options) {
@@ -110,59 +112,67 @@ Result<void> check_quality(const ServerConfig& config, const sessions::SessionCh
   if (choice.max_error_m && !is_length(*choice.max_error_m)) return refuse("max-error", kLength);
   if (choice.budget_bytes && !traits.takes_budget)
     return refuse("budget", "only with --codec limited or tracker");
-  if (choice.budget_bytes && *choice.budget_bytes < sessions::kLeastBudgetBytes)
-    return refuse("budget", fmt::format("at least {} bytes", sessions::kLeastBudgetBytes));
+  if (choice.budget_bytes && *choice.budget_bytes < planning::kLeastBudgetBytes)
+    return refuse("budget", fmt::format("at least {} bytes", planning::kLeastBudgetBytes));
   return {};
 }
 
-sessions::StreamChoice choice_of(const idl::Stream& stream) {
-  sessions::StreamChoice choice;
-  choice.name = stream.name();
-  if (stream.has_codec()) choice.codec = stream.codec();
-  if (stream.has_predictor()) choice.predictor = stream.predictor();
-  if (stream.has_threshold()) choice.threshold_m = stream.threshold();
-  if (stream.has_target_bandwidth()) choice.target_mbit_per_s = stream.target_bandwidth();
-  if (stream.has_max_error()) choice.max_error_m = stream.max_error();
-  if (stream.has_budget_bytes()) choice.budget_bytes = stream.budget_bytes();
-  return choice;
+const google::protobuf::FieldDescriptor* field_of(const planning::StreamOption& option) {
+  return idl::Stream::descriptor()->FindFieldByName(std::string(option.file_field));
 }
 
-/// What a stream says for itself, and that it goes with what is said for all.
-Result<void> check_stream(const idl::Stream& stream, const ServerConfig& config,
-                          const sessions::SessionChoice& common) {
-  const auto wrong = [&stream](const std::string& what) {
-    return refuse("stream", fmt::format("{}: {}", stream.name(), what));
-  };
-  const sessions::SessionChoice choice = sessions::choice_of(common, choice_of(stream));
-  const CodecTraits traits = traits_of(choice.codec);
-  if (stream.has_predictor() && config.has_predictor() && stream.predictor() != config.predictor()) {
-    return refuse("predictor", fmt::format("{}, but --stream {} says {}: say it there alone",
-                                           config.predictor(), stream.name(), stream.predictor()));
+/// The value of a field that is set, as --stream has it.
+std::string text_of(const idl::Stream& stream, const google::protobuf::FieldDescriptor& field) {
+  using google::protobuf::FieldDescriptor;
+  const google::protobuf::Reflection& values = *stream.GetReflection();
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return fmt::format("{}", values.GetDouble(stream, &field));
+    case FieldDescriptor::CPPTYPE_UINT32:
+      return fmt::format("{}", values.GetUInt32(stream, &field));
+    default:
+      return values.GetString(stream, &field);
   }
-  if (stream.has_threshold() && !is_length(stream.threshold()))
-    return wrong(fmt::format("a threshold is {}", kLength));
-  if (stream.has_threshold() && (stream.has_target_bandwidth() || stream.has_max_error()))
-    return wrong("either a threshold, or one that is chosen at run time by target-bandwidth and max-error");
-  if (stream.has_target_bandwidth() && !within(stream.target_bandwidth(), 0.001, 1e6))
-    return wrong("target-bandwidth is in Mbit/s, at least 0.001");
-  if (stream.has_target_bandwidth() && !traits.reads_threshold)
-    return wrong(fmt::format("codec {} has no threshold to reach a target-bandwidth with", choice.codec));
-  if (stream.has_max_error() && !is_length(stream.max_error()))
-    return wrong(fmt::format("max-error is {}", kLength));
-  if (stream.has_max_error() && !choice.automatic)
-    return wrong("max-error needs target-bandwidth, or --threshold auto");
-  if (stream.has_budget_bytes() && !traits.takes_budget)
-    return wrong("a budget needs codec limited or tracker");
-  if (stream.has_budget_bytes() && stream.budget_bytes() < sessions::kLeastBudgetBytes)
-    return wrong(fmt::format("a budget has at least {} bytes", sessions::kLeastBudgetBytes));
-  return {};
+}
+
+/// False for a number that is none, or too large.
+bool set_text(const std::string& text, const google::protobuf::FieldDescriptor& field, idl::Stream& stream) {
+  using google::protobuf::FieldDescriptor;
+  const google::protobuf::Reflection& values = *stream.GetReflection();
+  if (field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
+    const auto read = number<double>(text);
+    if (read) values.SetDouble(&stream, &field, *read);
+    return read.has_value();
+  }
+  if (field.cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
+    const auto read = number<std::uint32_t>(text);
+    if (read) values.SetUInt32(&stream, &field, *read);
+    return read.has_value();
+  }
+  values.SetString(&stream, &field, text);
+  return true;
+}
+
+planning::StreamWishes wishes_of(const idl::Stream& stream) {
+  planning::StreamWishes wishes{.name = stream.name()};
+  for (const planning::StreamOption& option : planning::kStreamOptions) {
+    const google::protobuf::FieldDescriptor* const field = field_of(option);
+    if (stream.GetReflection()->HasField(stream, field))
+      wishes.settings.emplace_back(option.key, text_of(stream, *field));
+  }
+  return wishes;
 }
 
 Result<void> check_streams(const ServerConfig& config, const sessions::SessionChoice& choice) {
   if (config.stream_size() == 0) return {};
   std::vector<host::StreamConfig> names;
   for (const idl::Stream& stream : config.stream()) {
-    if (auto good = check_stream(stream, config, choice); !good) return good;
+    if (stream.has_predictor() && config.has_predictor() && stream.predictor() != config.predictor()) {
+      return refuse("predictor", fmt::format("{}, but --stream {} says {}: say it there alone",
+                                             config.predictor(), stream.name(), stream.predictor()));
+    }
+    if (auto good = planning::check_stream(choice, wishes_of(stream)); !good)
+      return refuse("stream", good.error().message);
     names.emplace_back();
     names.back().name = stream.name();
   }
@@ -183,7 +193,7 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
   if (config.has_max_error()) choice.max_error_m = config.max_error();
   if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
   if (config.has_threads()) choice.threads = config.threads();
-  for (const idl::Stream& stream : config.stream()) choice.streams.push_back(choice_of(stream));
+  for (const idl::Stream& stream : config.stream()) choice.streams.push_back(wishes_of(stream));
   return choice;
 }
 
@@ -207,47 +217,15 @@ Result<ServerConfig> load_config(const std::string& path) {
 }
 
 Result<idl::Stream> parse_stream(const std::string& text) {
-  const std::size_t colon = text.find(':');
+  const auto wishes = planning::read_stream(text);
+  if (!wishes) return tl::unexpected(wishes.error());
   idl::Stream stream;
-  stream.set_name(text.substr(0, colon));
-  const auto wrong = [&](const std::string& what) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("'{}': {}", text, what));
-  };
-  if (colon == std::string::npos || colon + 1 == text.size())
-    return wrong("NAME:PREDICTOR, or NAME:key=value,...");
-  const auto set_number = [](const std::string& value, auto* to, auto set) {
-    const auto read = number<double>(value);
-    if (read) (to->*set)(*read);
-    return read.has_value();
-  };
-  for (std::size_t begin = colon + 1; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string item = text.substr(begin, end - begin);
-    begin = end + 1;
-    const std::size_t equals = item.find('=');
-    const std::string key = equals == std::string::npos ? "predictor" : item.substr(0, equals);
-    const std::string value = equals == std::string::npos ? item : item.substr(equals + 1);
-    bool good = !value.empty();
-    if (key == "predictor") {
-      good = good && !stream.has_predictor();
-      stream.set_predictor(value);
-    } else if (key == "codec") {
-      stream.set_codec(value);
-    } else if (key == "threshold") {
-      good = set_number(value, &stream, &idl::Stream::set_threshold);
-    } else if (key == "target-bandwidth") {
-      good = set_number(value, &stream, &idl::Stream::set_target_bandwidth);
-    } else if (key == "max-error") {
-      good = set_number(value, &stream, &idl::Stream::set_max_error);
-    } else if (key == "budget") {
-      const auto bytes = number<std::uint32_t>(value);
-      good = bytes.has_value();
-      stream.set_budget_bytes(bytes.value_or(0));
-    } else {
-      return wrong(fmt::format(
-          "'{}' is none of codec, predictor, threshold, target-bandwidth, max-error, budget", key));
+  stream.set_name(wishes->name);
+  for (const planning::StreamOption& option : planning::kStreamOptions) {
+    for (const auto& [key, value] : wishes->settings) {
+      if (key == option.key && !set_text(value, *field_of(option), stream))
+        return fail(ErrorCode::kInvalidArgument, fmt::format("'{}': '{}' is no {}", text, value, key));
     }
-    if (!good) return wrong(fmt::format("what '{}' says of {} cannot be read", item, key));
   }
   return stream;
 }

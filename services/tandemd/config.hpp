@@ -15,8 +15,8 @@ namespace tandem::daemon {
 /// What flags say wins over what the file says; and what a flag excludes goes with it.
 [[nodiscard]] idl::ServerConfig merge(const idl::ServerConfig& flags, idl::ServerConfig file);
 
-/// Reads what --stream says: NAME:ITEM,ITEM..., where an item is key=value (codec, predictor, threshold,
-/// target-bandwidth, max-error, budget, as the flags of these names), or a predictor alone. Errors:
+/// Reads what --stream says: NAME:ITEM,ITEM..., where an item is key=value (planning::kStreamOptions), or a
+/// predictor alone. Errors:
 /// kInvalidArgument.
 [[nodiscard]] Result<idl::Stream> parse_stream(const std::string& text);
 

@@ -1,6 +1,7 @@
 #include "services/tandemd/console.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/host/host.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>

@@ -93,30 +93,6 @@ class ScriptSender {
   std::uint32_t lead_;
 };
 
-Result<host::HostConfig> configure(const scenes::Scene& scene, const Options& options) {
-  sessions::SessionChoice choice = options.choice;
-  if (choice.streams.empty()) {
-    auto usual = sessions::usual_streams(scene, choice);
-    if (!usual) return tl::unexpected(usual.error());
-    choice.streams = std::move(*usual);
-  }
-  return sessions::plan_session(scene, choice).map([&](host::HostConfig config) {
-    config.session = options.session;
-    config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
-    if (options.rate_hz) config.frame_rate_hz = *options.rate_hz;
-    config.free_rate = options.free_rate;
-    for (host::StreamConfig& stream : config.streams) stream.layout.lead = options.lead;
-    config.window = options.window;
-    config.stall_timeout_ns.reset();
-    if (options.stall_timeout_s)
-      config.stall_timeout_ns = static_cast<std::int64_t>(*options.stall_timeout_s * 1e9);
-    config.wait_for = options.wait_for;
-    config.client_limit = options.client_limit;
-    config.clock_ns = &steady_ns;
-    return config;
-  });
-}
-
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
                                                          const Options& options,
                                                          const std::atomic<bool>& stop) {
@@ -253,7 +229,8 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes,
 int run_daemon(const Options& options, SignalWatch& signals) {
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return report_error(scene.error(), 2);
-  auto config = configure(*scene, options);
+  auto config =
+      planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
   if (!config) return report_error(config.error(), 2);
   auto simulation =
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);

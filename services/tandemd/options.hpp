@@ -9,23 +9,15 @@
 
 namespace tandem::daemon {
 
-struct Options {
+struct Options : planning::ServiceWishes {
   std::string scene;               ///< name or file
   sessions::SessionChoice choice;  ///< its bodies and threads are the full simulation's, too
   std::uint64_t seed = 1;
   bool scripted = false;    ///< the server itself sends what the scene's users would
   std::uint32_t users = 0;  ///< of that script; 0: as many as the scene says
 
-  std::string session = "default";
   std::uint32_t domain = 0;
-  std::uint32_t lead = 1;
-  std::uint32_t client_limit = 256;
-  std::uint32_t wait_for = 0;                   ///< participants that must play before frame 1
-  std::optional<std::uint32_t> window;          ///< empty: automatic
-  std::optional<double> rate_hz;                ///< empty: the scene's
-  bool free_rate = false;                       ///< --rate max
-  std::optional<double> stall_timeout_s = 0.5;  ///< empty: off
-  std::optional<double> duration_s;             ///< empty: until stopped
+  std::optional<double> duration_s;  ///< empty: until stopped
 
   std::string hash_log;  ///< path; empty: none
   bool json = false;     ///< a report on stdout at the end

@@ -14,6 +14,7 @@
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/accounts/token_bucket.hpp"
+#include "services/host/host.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"

@@ -36,7 +36,7 @@ OF_LAB = (
     + CLIENT
     + HOST
     + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
-    + ["services/sessions", "services/tool", "services/workers"]
+    + ["services/planning", "services/sessions", "services/tool", "services/workers"]
 )
 EDGES = {
     "sdk/include": [],
@@ -68,24 +68,27 @@ EDGES = {
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp"],
+    "services/planning": OF_HOST
+    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
     "services/host/streams": OF_HOST,
     "services/host/outgoing": OF_HOST,
     "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],
     "services/host/clients": OF_HOST + ["services/host/frames", "services/host/outgoing"],
     "services/host": OF_HOST + HOST,
-    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds"] + HOST,
+    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
+    + ["services/planning/trained_table.hpp"]
     + SIMULATION,
-    "services/sessions": SIMULATION + TIMELINE + ["sdk/transport", "services/scenes"] + HOST,
+    "services/sessions": ["public", "services/planning", "services/scenes"],
     "services/recording": OF_CLIENT + CLIENT,
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd": SIMULATION
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
-    + ["services/process", "services/scenes", "services/sessions", "services/workers"]
+    + ["services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
     + HOST,
     "services/gateway": OF_CLIENT
     + CLIENT

@@ -6,14 +6,12 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/core/codec/paper/code_tables.hpp"
-#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/publisher.hpp"
-#include "services/host/streams/groups.hpp"
+#include "services/planning/plan.hpp"
 
 namespace tandem {
 namespace {
@@ -26,71 +24,65 @@ std::int64_t to_ns(double seconds, double most) {
   return seconds > 0 ? static_cast<std::int64_t>(std::min(seconds, most) * 1e9) : 0;
 }
 
-Result<void> choose_turns(const ServerOptions& options, bool turns, const CodecTraits& traits,
-                          host::StreamConfig& stream) {
-  std::vector<host::BodySize> sizes;
-  for (const ServedType& type : options.types) sizes.push_back({type.name, type.radius});
-  if (auto chosen = host::choose_groups(turns, sizes, stream.lattice, traits, stream.layout); !chosen)
-    return chosen;
-  const Groups groups = groups_of(stream.layout);
-  if (traits.takes_tables) stream.layout.codec_tables = default_code_tables(groups);
-  if (!traits.reads_steps || !groups.orientation) return {};
-  const double smallest = std::ranges::min(sizes, {}, &host::BodySize::radius).radius;
-  return host::set_turn_steps(stream.lattice, 0, 0, smallest, stream.layout.parameters.codec);
+planning::World world_of(const ServerOptions& options, const engine::Simulation& simulation) {
+  planning::World world{.name = options.scene,
+                        .description = options.scene_description,
+                        .capacity = simulation.capacity(),
+                        .dt_s = simulation.dt_s(),
+                        .extent = options.extent,
+                        .threshold = options.threshold,
+                        .turns = !simulation.bodies().orientation[0].empty(),
+                        .types = {},
+                        .scenery = options.scenery,
+                        .trained = {}};
+  for (const ServedType& type : options.types) {
+    world.types.push_back({.name = type.name,
+                           .bounding_radius = type.radius,
+                           .contact_radius = type.contact_radius != 0 ? type.contact_radius : type.radius,
+                           .mass = type.mass,
+                           .colour_rgba = type.colour_rgba,
+                           .shape = type.shape,
+                           .shape_values = type.shape_values});
+  }
+  return world;
 }
 
-Result<host::StreamConfig> plan(const ServerOptions& options, const engine::Simulation& simulation) {
-  const auto traits = codec_traits(options.codec);
-  if (!traits) return tl::unexpected(traits.error());
-  const bool automatic = options.target_mbit_per_s != 0;  // what is no number is refused with its goal
-  const double finest = automatic ? options.threshold * host::kFinestShare : options.threshold;
-  const auto lattice = host::choose_lattice(finest, options.extent, simulation.dt_s());
-  if (!lattice) return tl::unexpected(lattice.error());
-  const auto parameters = host::codec_parameters(*lattice, options.threshold, 0, 0);
-  if (!parameters) return tl::unexpected(parameters.error());
-  host::StreamConfig stream;
-  stream.lattice = *lattice;
-  stream.layout.capacity = simulation.capacity();
-  stream.layout.type_count = static_cast<TypeId>(options.types.size());
-  stream.layout.lead = options.lead;
-  stream.layout.codec = options.codec;
-  stream.layout.parameters.codec = *parameters;
-  if (automatic) {
-    stream.quality = host::quality_goal(*lattice, options.target_mbit_per_s, finest,
-                                        options.threshold * host::kCoarsestShare);
+Result<planning::Wishes> wishes_of(const ServerOptions& options) {
+  planning::Wishes wishes;
+  wishes.codec = options.codec;
+  wishes.predictor = options.predictor;
+  wishes.automatic = options.target_mbit_per_s != 0;  // what is no number is refused with its goal
+  wishes.target_mbit_per_s = options.target_mbit_per_s;
+  if (options.max_error != 0) wishes.max_error_m = options.max_error;
+  if (options.budget_bytes != 0) wishes.budget_bytes = options.budget_bytes;
+  wishes.threads = options.threads;
+  for (const std::string& text : options.streams) {
+    auto stream = planning::read_stream(text);
+    if (!stream) return tl::unexpected(stream.error());
+    if (auto good = planning::check_stream(wishes, *stream); !good) return tl::unexpected(good.error());
+    wishes.streams.push_back(std::move(*stream));
   }
-  const bool turns = !simulation.bodies().orientation[0].empty();
-  if (auto chosen = choose_turns(options, turns, *traits, stream); !chosen)
-    return tl::unexpected(chosen.error());
-  if (traits->takes_budget) stream.budget = traits->usual_budget;
-  if (traits->reads_gains) {
-    if (auto gained = host::choose_gains(stream); !gained) return tl::unexpected(gained.error());
-  }
-  return stream;
+  return wishes;
+}
+
+planning::ServiceWishes service_of(const ServerOptions& options) {
+  planning::ServiceWishes service;
+  service.session = options.session;
+  service.lead = options.lead;
+  service.client_limit = options.client_limit;
+  service.wait_for = options.wait_for;
+  service.window = options.window;
+  if (options.rate_hz != 0) service.rate_hz = options.rate_hz;
+  service.free_rate = options.free_rate;
+  service.stall_timeout_s = options.stall_timeout_s;
+  return service;
 }
 
 Result<host::HostConfig> configure(const ServerOptions& options, const engine::Simulation& simulation) {
   if (options.types.empty() || options.types.size() > transport::kMaxTypes)
     return fail(ErrorCode::kInvalidArgument, "a server needs 1 to 65535 body types");
-  return plan(options, simulation).map([&](host::StreamConfig&& stream) {
-    host::HostConfig config;
-    config.streams.push_back(std::move(stream));
-    config.session = options.session;
-    config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
-    config.frame_rate_hz = 1 / simulation.dt_s();
-    config.wait_for = options.wait_for;
-    config.clock_ns = &steady_ns;
-    config.scene = options.scene;
-    config.scene_description = options.scene_description;
-    config.types.clear();
-    for (const ServedType& type : options.types) {
-      config.types.push_back({.name = type.name,
-                              .radius = static_cast<float>(type.radius),
-                              .colour_rgba = type.colour_rgba,
-                              .shape = type.shape,
-                              .shape_values = type.shape_values});
-    }
-    return config;
+  return wishes_of(options).and_then([&](const planning::Wishes& wishes) {
+    return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
   });
 }
 

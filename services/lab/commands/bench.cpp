@@ -39,7 +39,7 @@ Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& n
 
 std::vector<std::string> predictor_choices() {
   std::vector<std::string> names = predictor_names();
-  names.insert(names.begin(), std::string(sessions::kAutomaticPredictor));
+  names.insert(names.begin(), std::string(planning::kAutomaticPredictor));
   return names;
 }
 

@@ -303,7 +303,7 @@ void add_bandwidth(commandline::Command bench, Run& run) {
       .add_option(
           "--budget", options->choice.budget_bytes,
           "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
-      .range(sessions::kLeastBudgetBytes, std::size_t{1} << 30U);
+      .range(planning::kLeastBudgetBytes, std::size_t{1} << 30U);
   command
       .add_option("--trajectory", options->trajectory,
                   "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")

@@ -6,6 +6,7 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
+#include "services/host/host.hpp"
 
 namespace tandem::lab {
 namespace {

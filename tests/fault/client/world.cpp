@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
+#include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 
 namespace tandem::client {

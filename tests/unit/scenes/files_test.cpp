@@ -231,9 +231,9 @@ TEST(TrainedTables, AreFoundExactlyOrNearest) {
   EXPECT_EQ(find_table(tables, 10000, 0.1)->position_range_m, 2);
   EXPECT_EQ(find_table(tables, 10000, 0.3), nullptr);
   EXPECT_EQ(find_table(tables, 5000, 0.1), nullptr);
-  EXPECT_EQ(nearest_table(tables, 5000, 0.11)->position_range_m, 2);
-  EXPECT_EQ(nearest_table(tables, 1, 0.5)->position_range_m, 3);
-  EXPECT_EQ(nearest_table({}, 1, 0.5), nullptr);
+  EXPECT_EQ(planning::nearest_table(tables, 5000, 0.11)->position_range_m, 2);
+  EXPECT_EQ(planning::nearest_table(tables, 1, 0.5)->position_range_m, 3);
+  EXPECT_EQ(planning::nearest_table({}, 1, 0.5), nullptr);
 }
 
 TEST(TrainedTables, ThatAreMalformedNameFileLineAndField) {

@@ -368,13 +368,11 @@ TEST(SessionPlan, StreamsShareTheLatticeOfTheFinestThreshold) {
   ASSERT_TRUE(scene);
   sessions::SessionChoice choice;
   choice.bodies = 1000;
-  choice.streams.resize(2);
-  choice.streams[0].name = "coarse";
-  choice.streams[0].codec = "entropy";
-  choice.streams[0].threshold_m = 4 * scene->threshold_m;
-  choice.streams[0].predictor = "ballistic";
-  choice.streams[1].name = "fine";
-  choice.streams[1].predictor = "field";
+  const auto length = [](double metres) { return std::to_string(metres); };
+  choice.streams = {
+      {"coarse",
+       {{"codec", "entropy"}, {"predictor", "ballistic"}, {"threshold", length(4 * scene->threshold_m)}}},
+      {"fine", {{"predictor", "field"}}}};
   const auto config = sessions::plan_session(*scene, choice);
   ASSERT_TRUE(config) << config.error().message;
   ASSERT_EQ(config->streams.size(), 2U);
@@ -387,17 +385,18 @@ TEST(SessionPlan, StreamsShareTheLatticeOfTheFinestThreshold) {
     const auto planned = sessions::plan_session(*scene, choice);
     return planned ? std::string("accepted") : planned.error().message;
   };
-  choice.streams[1].threshold_m = 1e-12;
+  choice.streams[1].settings.emplace_back("threshold", "1e-12");
   EXPECT_EQ(refused().find("stream fine: threshold 1e-12 is too fine"), 0U) << refused();
-  choice.streams[1].threshold_m = scene->threshold_m;
-  choice.streams[0].threshold_m = 1e9;
+  choice.streams[1].settings.back().second = length(scene->threshold_m);
+  choice.streams[0].settings.back().second = "1e9";
   EXPECT_EQ(refused().find("stream coarse: threshold"), 0U) << refused();
-  choice.streams[0].threshold_m.reset();
-  choice.streams[1].predictor = "oracle";
+  choice.streams[0].settings.pop_back();
+  choice.streams[1].settings.front().second = "oracle";
   EXPECT_EQ(refused().find("stream fine: "), 0U) << refused();
 }
 
 TEST(SessionPlan, TheUsualStreamsAreThinAndRichWhereFieldPays) {
+  using Settings = decltype(planning::StreamWishes::settings);
   const auto scene = scenes::load_scene("cube");
   ASSERT_TRUE(scene);
   sessions::SessionChoice choice;
@@ -405,9 +404,9 @@ TEST(SessionPlan, TheUsualStreamsAreThinAndRichWhereFieldPays) {
   const auto usual = [&] { return sessions::usual_streams(*scene, choice).value(); };
   ASSERT_EQ(usual().size(), 2U);
   EXPECT_EQ(usual()[0].name, "thin");
-  EXPECT_EQ(usual()[0].predictor, "ballistic");
+  EXPECT_EQ(usual()[0].settings, Settings({{"predictor", "ballistic"}}));
   EXPECT_EQ(usual()[1].name, "rich");
-  EXPECT_EQ(usual()[1].predictor, "field");
+  EXPECT_EQ(usual()[1].settings, Settings({{"predictor", "field"}}));
   choice.codec = "entropy";
   EXPECT_TRUE(usual().empty());
   choice.codec = "tracker";

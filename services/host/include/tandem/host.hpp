@@ -12,12 +12,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "tandem/body_shape.hpp"
 #include "tandem/result.hpp"
+#include "tandem/scenery.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem {
@@ -29,6 +31,9 @@ struct ServedType {
   std::uint32_t colour_rgba = 0xC0C0C0FF;
   BodyShape shape = BodyShape::kSphere;
   std::vector<float> shape_values = {};  ///< as the shape says
+  double mass = 1;                       ///< > 0; matters beside other types, and with Scenery's laws
+  /// Of the sphere that `contact` and `field` take a body for; 0: `radius`.
+  double contact_radius = 0;
 };
 
 struct ServerOptions {
@@ -40,17 +45,39 @@ struct ServerOptions {
   /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears until it is back. At
   /// most about a million thresholds.
   double extent = 100;
-  /// Payload that the server keeps to by itself, Mbit/s (2^20 bits), with errors of up to four thresholds; 0:
+  /// Payload that the server keeps to by itself, Mbit/s (2^20 bits), with errors of up to `max_error`; 0:
   /// `threshold` alone decides.
   double target_mbit_per_s = 0;
+  double max_error = 0;           ///< with `target_mbit_per_s`; scene units; 0: four thresholds
   std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
-  std::uint32_t lead = 1;         ///< frames that clients may simulate beyond the last delta, 0 or 1
+  /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
+  /// field (they meet each other and the scenery), or auto: with codec tracker, scenery, and at most 50,000
+  /// spheres of about one size a stream `thin` of ballistic and one, `rich`, of field, else ballistic.
+  std::string predictor = "auto";
+  std::optional<Scenery> scenery = {};  ///< what contact and field compute with; empty: they are not there
+  std::size_t budget_bytes =
+      0;  ///< of corrections a frame, with codec limited or tracker; 0: the codec's usual
+  /// Up to 8 ways of telling the world, each for clients of other means, as tandemd's --stream says them:
+  /// NAME:PREDICTOR, or NAME:key=value,... with codec, predictor, threshold, target-bandwidth, max-error,
+  /// budget. What is left out comes from the options above. Each is made while somebody plays it. Empty: as
+  /// `predictor` says.
+  std::vector<std::string> streams = {};
+  std::uint32_t lead = 1;     ///< frames that clients may simulate beyond the last delta, 0 or 1
+  std::uint32_t threads = 1;  ///< of the codec, 1..64; more help with tens of thousands of bodies
   /// By what Simulation::bodies() calls type; at least one, at most 65,535.
   std::vector<ServedType> types{ServedType{}};
   std::string scene = "";  ///< a name to show, at most 64 bytes
   /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
   std::string scene_description = "";
-  std::uint32_t wait_for = 0;  ///< participants that must play before frame 1
+  std::uint32_t wait_for = 0;        ///< participants that must play before frame 1
+  std::uint32_t client_limit = 256;  ///< clients at once
+  /// Frames the server may run ahead of its slowest participant, 1..24; empty: from measured round trips.
+  std::optional<std::uint32_t> window = {};
+  /// Seconds that a participant may hold up the others within 10 s, 0.01..10, before it only watches; empty:
+  /// for ever.
+  std::optional<double> stall_timeout_s = 0.5;
+  double rate_hz = 0;      ///< frames a second, 1..1000; 0: the simulation's own, 1 / dt_s
+  bool free_rate = false;  ///< as fast as participants and network allow, instead
   /// One line for a human: who joined, was demoted, refused. Called by poll(); must not call the server.
   std::function<void(std::string_view)> log = {};
 };
@@ -65,14 +92,14 @@ struct ServerStatus {
   double frame_ms_p50 = 0, frame_ms_p99 = 0;  ///< step, predict, encode, apply
 };
 
-/// One server of one session, at the simulation's rate (1 / dt_s). Movable; what it was moved from has ended
-/// (kOutOfOrder). All members from one thread, which is the one that calls the simulation; a thread of the
-/// server's own does the sending.
+/// One server of one session, at the simulation's rate (1 / dt_s) or the one that options say. Movable; what
+/// it was moved from has ended (kOutOfOrder). All members from one thread, which is the one that calls the
+/// simulation; a thread of the server's own does the sending.
 class __attribute__((visibility("default"))) Server {
  public:
   /// `simulation` must outlive the server; it was not stepped yet, and its bodies now are the start frame.
-  /// Errors: kInvalidArgument (options, or body columns not `capacity` long), kUnsupported (codec),
-  /// kTransport (DDS could not start).
+  /// Errors: kInvalidArgument (options, or body columns not `capacity` long), kUnsupported (codec,
+  /// predictor), kTransport (DDS could not start).
   [[nodiscard]] static Result<Server> start(const ServerOptions& options, engine::Simulation& simulation);
   Server(Server&&) noexcept;
   Server& operator=(Server&&) noexcept;

@@ -1,11 +1,12 @@
 #pragma once
+// Numbers from text.
 
 #include <charconv>
 #include <optional>
 #include <string_view>
 #include <system_error>
 
-namespace tandem::daemon {
+namespace tandem::planning {
 
 /// The number that the whole of `text` is.
 template <class T>
@@ -17,4 +18,4 @@ template <class T>
   return value;
 }
 
-}  // namespace tandem::daemon
+}  // namespace tandem::planning

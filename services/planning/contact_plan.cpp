@@ -1,0 +1,86 @@
+#include "services/planning/contact_plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "sdk/core/predict/contact/constants.hpp"
+
+namespace tandem::planning {
+namespace {
+
+using engine::Vec3;
+
+// What does not fit, or is no number, ends at a value beyond every limit, which the check at the end refuses.
+std::int32_t rounded(double value) {
+  if (std::isnan(value)) return INT32_MAX;
+  return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), double{INT32_MIN}, double{INT32_MAX}));
+}
+
+Vec3i scaled(const Vec3& v, double scale) {
+  return {rounded(v[0] * scale), rounded(v[1] * scale), rounded(v[2] * scale)};
+}
+
+// Gains of one sub-step for a body of type 0.
+ContactMaterial material_of(const Scenery::Law& law, double mass, double dt_s, double substeps) {
+  const double share = dt_s / (mass * substeps);
+  return {rounded(16384.0 * law.spring * dt_s * share), rounded(8192.0 * law.damping * share),
+          rounded(8192.0 * law.shear * share)};
+}
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+bool is_unit(const Vec3& v) { return std::fabs(dot(v, v) - 1) < 1e-3; }  // false for what is no number
+bool is_orthonormal(const std::array<Vec3, 3>& axes) {
+  for (std::size_t i = 0; i < 3; ++i)
+    if (!is_unit(axes[i]) || !(std::fabs(dot(axes[i], axes[(i + 1) % 3])) < 1e-3)) return false;
+  return true;
+}
+
+// What is wrong; empty: nothing.
+std::string fault(const World& world) {
+  if (!world.scenery || world.types.empty()) return "needs a world with body types and scenery";
+  if (!std::ranges::all_of(world.types, [](const BodyType& type) { return type.mass > 0; }))
+    return "needs body types with a mass above 0";
+  const Scenery& scenery = *world.scenery;
+  if (!std::ranges::all_of(scenery.planes, [](const auto& plane) { return is_unit(plane.normal); }))
+    return "a plane's normal has length 1";
+  if (!std::ranges::all_of(scenery.boxes, [](const auto& box) { return is_orthonormal(box.axes); }))
+    return "a box's axes are orthonormal";
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<std::int32_t>> contact_constants(const World& world, const host::Lattice& lattice,
+                                                    std::string_view predictor) {
+  const auto wrong = [predictor](const std::string& what) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("predictor '{}': {}", predictor, what));
+  };
+  if (const std::string what = fault(world); !what.empty()) return wrong(what);
+  const Scenery& scenery = *world.scenery;
+  const double scale = lattice.position_scale();
+  const double one = ContactConstants::kOne;
+  const double mass = world.types.front().mass;
+  ContactConstants constants;
+  constants.substeps = rounded(scenery.substeps);
+  constants.pair = material_of(scenery.between_bodies, mass, lattice.dt_s, scenery.substeps);
+  constants.wall = material_of(scenery.with_scenery, mass, lattice.dt_s, scenery.substeps);
+  for (const BodyType& type : world.types)
+    constants.types.push_back({rounded(type.contact_radius * scale), rounded(65536.0 * mass / type.mass)});
+  for (const auto& plane : scenery.planes)
+    constants.planes.push_back({scaled(plane.normal, one), rounded(plane.offset * scale)});
+  for (const auto& box : scenery.boxes) {
+    constants.boxes.push_back(
+        {scaled(box.centre, scale),
+         scaled(box.half, scale),
+         {scaled(box.axes[0], one), scaled(box.axes[1], one), scaled(box.axes[2], one)}});
+  }
+  for (const auto& ball : scenery.balls)
+    constants.balls.push_back({scaled(ball.centre, scale), rounded(ball.radius * scale)});
+  std::vector<std::int32_t> values = write_contact_constants(constants);
+  if (!read_contact_constants(values)) return wrong("the world does not fit the lattice");
+  return values;
+}
+
+}  // namespace tandem::planning
