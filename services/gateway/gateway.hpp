@@ -14,11 +14,11 @@
 #include "sdk/transport/messages.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/gateway/counts.hpp"
-#include "services/gateway/input_merger.hpp"
-#include "services/gateway/live_log.hpp"
-#include "services/gateway/outgoing.hpp"
-#include "services/gateway/viewer.hpp"
-#include "services/gateway/world.hpp"
+#include "services/gateway/viewing/input_merger.hpp"
+#include "services/gateway/viewing/live_log.hpp"
+#include "services/gateway/viewing/outgoing.hpp"
+#include "services/gateway/viewing/viewer.hpp"
+#include "services/gateway/viewing/world.hpp"
 
 namespace tandem::gateway {
 

@@ -8,7 +8,7 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/gateway/gateway.hpp"
-#include "services/gateway/world.hpp"
+#include "services/gateway/viewing/world.hpp"
 
 namespace tandem::gateway {
 

@@ -107,8 +107,8 @@ struct ServiceWishes {
   std::uint32_t lead = 1;  ///< frames clients may simulate beyond the last delta, 0 or 1
   std::uint32_t client_limit = 256;
   std::uint32_t wait_for = 0;                   ///< participants that must play before frame 1
-  std::optional<std::uint32_t> window;          ///< empty: automatic
-  std::optional<double> rate_hz;                ///< empty: the world's
+  std::optional<std::uint32_t> window = {};     ///< empty: automatic
+  std::optional<double> rate_hz = {};           ///< empty: the world's
   bool free_rate = false;                       ///< as fast as window and queue allow
   std::optional<double> stall_timeout_s = 0.5;  ///< empty: off
 };

@@ -90,8 +90,10 @@ EDGES = {
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
     + ["services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
     + HOST,
+    "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
     "services/gateway": OF_CLIENT
     + CLIENT
+    + ["services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json", "services/process"],
     "services/tool": OF_CLIENT
     + CLIENT

@@ -1,4 +1,4 @@
-#include "services/gateway/input_merger.hpp"
+#include "services/gateway/viewing/input_merger.hpp"
 
 #include "fake_world.hpp"
 

@@ -69,6 +69,40 @@ TEST_F(ServerApi, OptionsOutOfRangeAreRefused) {
   EXPECT_EQ(with([](ServerOptions& o) { o.codec = "zip"; }), ErrorCode::kUnsupported);
 }
 
+TEST_F(ServerApi, WishesThatMakeNoStreamAreRefused) {
+  const auto with = [&](auto change) {
+    options = {};
+    change(options);
+    return refusal();
+  };
+  EXPECT_EQ(with([](ServerOptions& o) { o.predictor = "oracle"; }), ErrorCode::kUnsupported);
+  EXPECT_EQ(with([](ServerOptions& o) { o.predictor = "field"; }), ErrorCode::kInvalidArgument)
+      << "no scenery";
+  EXPECT_EQ(with([](ServerOptions& o) { o.streams = {"thin"}; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.streams = {"a:oracle"}; }), ErrorCode::kUnsupported);
+  EXPECT_EQ(with([](ServerOptions& o) {
+              o.streams = {"a:ballistic", "a:ballistic"};
+            }),
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.streams = {"a:threshold=-1"}; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.max_error = kNan; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.stall_timeout_s = kNan; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.rate_hz = kNan; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.threads = 0; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.window = 0; }), ErrorCode::kInvalidArgument);
+}
+
+TEST_F(ServerApi, StreamsOfDifferentPredictorsAreServedAtTheRateThatIsWished) {
+  options.session = "streams";
+  options.scenery.emplace();
+  options.streams = {"thin:ballistic", "rich:field,threshold=0.02"};
+  options.rate_hz = 200;
+  auto started = Server::start(options, standing);
+  ASSERT_TRUE(started.has_value()) << started.error().message;
+  ASSERT_TRUE(started->run_for(1.5)) << started->error().message;
+  EXPECT_GT(started->status().frame, 120U) << "100 a second is the simulation's own rate";
+}
+
 TEST_F(ServerApi, ColumnsThatAreNotOfTheCapacityAreRefused) {
   standing.zeros.resize(1);
   EXPECT_EQ(refusal(), ErrorCode::kInvalidArgument);

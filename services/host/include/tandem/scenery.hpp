@@ -36,7 +36,7 @@ struct Scenery {
     double radius = 1;
   };
 
-  Law between_bodies, with_scenery;
+  Law between_bodies = {}, with_scenery = {};
   std::uint32_t substeps = 1;  ///< of contacts in a step, 1..16
   std::vector<Plane> planes = {};
   std::vector<Box> boxes = {};

@@ -35,7 +35,7 @@ struct Input {
 struct Classification {
   enum class Effect : std::uint8_t { kScheduled, kImmediate, kRefused };
   Effect effect = Effect::kRefused;
-  std::string reason;        ///< kRefused: one line
+  std::string reason = {};   ///< kRefused: one line
   Vec3 gravity{};            ///< kScheduled: scene units / s^2, in force from the frame the input acts on
   double damping_per_s = 0;  ///< kScheduled
 };

@@ -1,4 +1,4 @@
-#include "services/gateway/live_log.hpp"
+#include "services/gateway/viewing/live_log.hpp"
 
 #include <utility>
 

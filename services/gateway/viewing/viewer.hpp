@@ -9,9 +9,9 @@
 #include "services/accounts/outcomes.hpp"
 #include "services/accounts/reply_schedule.hpp"
 #include "services/accounts/token_bucket.hpp"
-#include "services/gateway/input_merger.hpp"
-#include "services/gateway/live_log.hpp"
-#include "services/gateway/snapshot_parts.hpp"
+#include "services/gateway/viewing/input_merger.hpp"
+#include "services/gateway/viewing/live_log.hpp"
+#include "services/gateway/viewing/snapshot_parts.hpp"
 
 namespace tandem::gateway {
 

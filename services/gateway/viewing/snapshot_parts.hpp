@@ -8,8 +8,8 @@
 
 #include "sdk/transport/messages.hpp"
 #include "services/accounts/transfer_window.hpp"
-#include "services/gateway/outgoing.hpp"
-#include "services/gateway/world.hpp"
+#include "services/gateway/viewing/outgoing.hpp"
+#include "services/gateway/viewing/world.hpp"
 
 namespace tandem::gateway {
 

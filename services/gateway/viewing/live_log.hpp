@@ -6,7 +6,7 @@
 #include <deque>
 
 #include "sdk/transport/units.hpp"
-#include "services/gateway/outgoing.hpp"
+#include "services/gateway/viewing/outgoing.hpp"
 
 namespace tandem::gateway {
 

@@ -9,7 +9,7 @@
 #include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/transport/messages.hpp"
 #include "services/accounts/token_bucket.hpp"
-#include "services/gateway/world.hpp"
+#include "services/gateway/viewing/world.hpp"
 
 namespace tandem::gateway {
 

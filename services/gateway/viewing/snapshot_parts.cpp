@@ -1,4 +1,4 @@
-#include "services/gateway/snapshot_parts.hpp"
+#include "services/gateway/viewing/snapshot_parts.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -1,0 +1,78 @@
+"""Fails on a folder with more than 25 sources, and on folders whose includes run in a circle.
+
+    python3 rooms.py [ROOT]
+
+An include that runs up, from a folder into one that includes it, directly or by way of others, makes one thing of
+what the folders say are several. Prints one line per finding. Exit 0 none, 1 some.
+"""
+
+import collections
+import pathlib
+import re
+import sys
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*"((?:sdk|services)/[^"]+)"', re.MULTILINE)
+SOURCES = {".cpp", ".hpp", ".c", ".h", ".py", ".ts"}
+SKIPPED = {"build", ".git", "node_modules"}
+MOST = 25
+
+
+def sources(root):
+    for file in sorted(pathlib.Path(root).rglob("*")):
+        path = file.relative_to(root)
+        if file.suffix in SOURCES and not SKIPPED & set(path.parts) and not path.parts[0].startswith("build-"):
+            yield file, path
+
+
+def full_folders(root):
+    counts = collections.Counter(path.parent.as_posix() for _, path in sources(root) if path.name != "__init__.py")
+    return [f"{folder}: {count} sources, at most {MOST}" for folder, count in sorted(counts.items()) if count > MOST]
+
+
+def edges(root):
+    """Folder to the folders that it includes, each with one line that does."""
+    found = collections.defaultdict(dict)
+    for file, path in sources(root):
+        if path.parts[0] == "tests":
+            continue
+        folder = path.parent.as_posix()
+        for target in INCLUDE.findall(file.read_text(encoding="utf-8", errors="replace")):
+            to = pathlib.PurePosixPath(target).parent.as_posix()
+            if to != folder:
+                found[folder].setdefault(to, f"{path.as_posix()} includes {target}")
+    return found
+
+
+def circles(root):
+    """One line for each include that leads back to where it came from."""
+    graph = edges(root)
+    reached = {}
+
+    def below(folder):
+        if folder not in reached:
+            reached[folder] = set()  # while it is being filled
+            pending = list(graph.get(folder, ()))
+            while pending:
+                to = pending.pop()
+                if to not in reached[folder]:
+                    reached[folder].add(to)
+                    pending.extend(graph.get(to, ()))
+        return reached[folder]
+
+    return [
+        f"{line}, and {to} includes {folder}"
+        for folder in sorted(graph)
+        for to, line in sorted(graph[folder].items())
+        if folder in below(to)
+    ]
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).resolve().parents[2]
+    found = full_folders(root) + circles(root)
+    print("\n".join(found) if found else "no folder is too full, no include runs up")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,113 @@
+#include "services/planning/plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "sdk/core/predict/contact/constants.hpp"
+#include "services/sessions/session_plan.hpp"
+
+namespace tandem::planning {
+namespace {
+
+World balls_in_a_box() {
+  World world{.name = "balls", .capacity = 1000, .dt_s = 1.0 / 60, .extent = 20, .threshold = 0.02};
+  world.types.push_back({.name = "ball", .bounding_radius = 0.5, .contact_radius = 0.5});
+  world.scenery.emplace();
+  world.scenery->planes.push_back({.normal = {0, 1, 0}, .offset = -5});
+  return world;
+}
+
+std::string refusal(const World& world, const Wishes& wishes = {}, const ServiceWishes& service = {}) {
+  const auto planned = plan_server(world, wishes, service);
+  return planned ? "accepted" : planned.error().message;
+}
+
+TEST(Plan, AWorldWithSceneryIsToldThinAndRich) {
+  const auto config = plan_server(balls_in_a_box(), {}, {});
+  ASSERT_TRUE(config) << config.error().message;
+  ASSERT_EQ(config->streams.size(), 2U);
+  EXPECT_EQ(config->streams[0].name, "thin");
+  EXPECT_EQ(config->streams[0].layout.predictor, "ballistic");
+  EXPECT_EQ(config->streams[1].name, "rich");
+  EXPECT_EQ(config->streams[1].layout.predictor, "field");
+  const auto constants = read_contact_constants(config->streams[1].layout.predictor_constants);
+  ASSERT_TRUE(constants);
+  EXPECT_EQ(constants->planes.size(), 1U);
+  EXPECT_NEAR(constants->types[0].radius * config->streams[1].lattice.unit, 0.5, 0.001);
+}
+
+TEST(Plan, WithoutSceneryBodiesFlyUntilTheyAreCorrected) {
+  World world = balls_in_a_box();
+  world.scenery.reset();
+  const auto config = plan_server(world, {}, {});
+  ASSERT_TRUE(config) << config.error().message;
+  ASSERT_EQ(config->streams.size(), 1U);
+  EXPECT_EQ(config->streams[0].layout.predictor, "ballistic");
+  Wishes wishes;
+  wishes.predictor = "field";
+  EXPECT_NE(refusal(world, wishes).find("'field': needs a world with body types and scenery"),
+            std::string::npos)
+      << refusal(world, wishes);
+}
+
+TEST(Plan, SceneryThatIsNoGeometryIsRefusedWhereItIsNeeded) {
+  Wishes wishes;
+  wishes.predictor = "contact";
+  const auto with = [&wishes](auto change) {
+    World world = balls_in_a_box();
+    change(world);
+    return refusal(world, wishes);
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(with([](World&) {}), "accepted");
+  EXPECT_NE(with([](World& w) { w.scenery->planes[0].normal = {0, 2, 0}; }), "accepted");
+  EXPECT_NE(with([](World& w) { w.scenery->planes[0].offset = kNan; }), "accepted");
+  EXPECT_NE(with([](World& w) { w.scenery->boxes.push_back({.axes = {}}); }), "accepted");
+  EXPECT_NE(with([](World& w) { w.scenery->balls.push_back({.radius = 1e30}); }), "accepted");
+  EXPECT_NE(with([](World& w) { w.scenery->between_bodies.spring = kNan; }), "accepted");
+  EXPECT_NE(with([](World& w) { w.scenery->substeps = 0; }), "accepted");
+  EXPECT_NE(with([](World& w) { w.types[0].mass = 0; }), "accepted");
+  EXPECT_NE(with([](World& w) { w.types[0].contact_radius = 0; }), "accepted");
+}
+
+TEST(Plan, AnApplicationsWorldIsPlannedAsTheSameScene) {
+  const auto scene = scenes::load_scene("half_pipe").value();
+  const World world = sessions::world_of(scene, 1000);
+  sessions::SessionChoice choice;
+  choice.bodies = 1000;
+  const auto config = sessions::plan_session(scene, choice).value();
+  const auto planned = plan_session(world, {}).value();
+  ASSERT_EQ(planned.streams.size(), config.streams.size());
+  EXPECT_EQ(planned.streams[0].lattice, config.streams[0].lattice);
+  EXPECT_EQ(planned.streams[0].layout.predictor_constants, config.streams[0].layout.predictor_constants);
+  EXPECT_EQ(planned.types.size(), scene.types.size());
+}
+
+TEST(Plan, EveryStreamOptionIsReadAndReachesItsStream) {
+  Wishes wishes;
+  wishes.streams = {read_stream("a:ballistic,codec=limited,threshold=0.04,budget=500").value(),
+                    read_stream("b:field,target-bandwidth=0.5,max-error=0.1").value()};
+  const auto config = plan_server(balls_in_a_box(), wishes, {.session = "s", .lead = 0, .window = 3});
+  ASSERT_TRUE(config) << config.error().message;
+  const host::StreamConfig &a = config->streams[0], &b = config->streams[1];
+  EXPECT_EQ(a.layout.codec, "limited");
+  EXPECT_EQ(a.budget, 500U);
+  EXPECT_NEAR(a.layout.parameters.codec.threshold * a.lattice.unit, 0.04, 1e-6);
+  ASSERT_TRUE(b.quality);
+  EXPECT_EQ(b.quality->target_mbit_per_s, 0.5);
+  EXPECT_NEAR(b.quality->largest_threshold * b.lattice.unit, 0.1, 1e-3);
+  EXPECT_EQ(b.layout.lead, 0U);
+  EXPECT_EQ(config->session, "s");
+  EXPECT_EQ(config->window, 3U);
+}
+
+TEST(Plan, AStreamOptionThatIsNoneIsSaidInOneLine) {
+  EXPECT_NE(read_stream("a:speed=3").error().message.find("'speed' is none of codec, predictor"),
+            std::string::npos);
+  EXPECT_FALSE(read_stream("a:field,predictor=ballistic")) << "said twice";
+  EXPECT_FALSE(read_stream("a:budget=1.5"));
+}
+
+}  // namespace
+}  // namespace tandem::planning
