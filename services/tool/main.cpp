@@ -25,7 +25,9 @@ int main(int argc, char** argv) {
   tandem::tool::add_doctor(app, run);
 #ifndef TANDEM_LAB
   if (argc > 1 && (argv[1] == std::string("bench") || argv[1] == std::string("export"))) {
-    std::fprintf(stderr, "tandem: %s is not in this build; build from source with TANDEM_BUILD_LAB=ON\n",
+    std::fprintf(stderr,
+                 "tandem: %s is not in this build; build from source: cmake --preset release "
+                 "-DTANDEM_BUILD_LAB=ON && cmake --build build/release\n",
                  argv[1]);
     return 2;
   }
