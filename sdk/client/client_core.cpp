@@ -62,7 +62,8 @@ std::int64_t ClientCore::poll(Now now) {
   last_poll_ns_ = now.steady_ns;
   poll_began_ns_ = measure();
   server_alive_ = port_.server_alive();
-  if (epoch_ != nullptr && epoch_->played.joining && (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
+  if (epoch_ != nullptr && epoch_->played->joining() &&
+      (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
     epoch_->silence_ns = 0;
     port_.pass_over_session(transport::PassOver::kWhileThereIsAnother);
   }
@@ -71,9 +72,9 @@ std::int64_t ClientCore::poll(Now now) {
     take_stream(now);
     take_replies(now);
     if (statistics_.frames_applied > 0) statistics_.costs.receive_ns += measure() - poll_began_ns_;
-    if (epoch_->played.joining) begin(now);
-    if (!epoch_->played.joining) play(now, since_ns);
-    if (epoch_->played.joining) begin(now);
+    if (epoch_->played->joining()) begin(now);
+    if (!epoch_->played->joining()) play(now, since_ns);
+    if (epoch_->played->joining()) begin(now);
     consider_streams(now);
     show_clock();
     if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
@@ -86,19 +87,20 @@ std::int64_t ClientCore::poll(Now now) {
 
 std::int64_t ClientCore::next_due_ns(Now now) const {
   const bool calm =
-      epoch_ != nullptr && !epoch_->next && !epoch_->played.joining && !epoch_->played.input_missing_ns;
+      epoch_ != nullptr && !epoch_->change && !epoch_->played->joining() && !epoch_->played->misses_input();
   std::int64_t due =
       std::min(now.steady_ns + (calm ? kMaxPlayingSleepNs : kMaxSleepNs), status_report_.due_ns());
   if (epoch_ != nullptr) {
     due = std::min(due, next_ack_ns());
-    if (epoch_->next && epoch_->next->joining) due = std::min(due, epoch_->next->joiner.next_due_ns());
-    if (epoch_->played.joining) {
-      due = std::min(due, epoch_->played.joiner.next_due_ns());
-    } else if (epoch_->played.assembly.front() != nullptr && !epoch_->played.input_missing_ns) {
+    if (epoch_->change && epoch_->change->to().joining())
+      due = std::min(due, epoch_->change->to().next_due_ns());
+    if (epoch_->played->joining()) {
+      due = std::min(due, epoch_->played->next_due_ns());
+    } else if (epoch_->played->front() != nullptr && !epoch_->played->misses_input()) {
       due = now.steady_ns;  // more than one poll applies
     } else if (pictures_.wanted() && epoch_->pacer.known() &&
-               epoch_->played.timeline.now() < epoch_->played.timeline.applied() + epoch_->lead) {
-      due = std::min(due, epoch_->pacer.due_ns(epoch_->played.timeline.now() + 1));
+               epoch_->played->timeline().now() < epoch_->played->timeline().applied() + epoch_->lead) {
+      due = std::min(due, epoch_->pacer.due_ns(epoch_->played->timeline().now() + 1));
     }
   }
   // Never in the past and never a busy loop, whatever the estimates say.
@@ -109,18 +111,15 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
 // bytes than many a delta.
 std::int64_t ClientCore::next_ack_ns() const {
   const EpochState& e = *epoch_;
-  const auto repeat_joining_ns = [this](const FollowedStream& joined) {
-    return last_ack_ns_ + (joined.part_unacknowledged ? EpochState::kPartAckNs : joined.repeat_ns);
-  };
-  if (e.played.joining) return repeat_joining_ns(e.played);
-  const std::int64_t changing_ns = e.next ? repeat_joining_ns(*e.next) : INT64_MAX;
+  if (e.played->joining()) return last_ack_ns_ + e.played->repeat_ns();
+  const std::int64_t changing_ns = e.change ? last_ack_ns_ + e.change->to().repeat_ns() : INT64_MAX;
   if (options_.role == transport::Role::kObserver)
     return std::min(changing_ns, last_ack_ns_ + 2 * kPlayingRepeatNs);
   const std::int64_t repeat_ns =
       std::min(changing_ns, last_ack_ns_ + (server_alive_ ? kPlayingRepeatNs : kDeafRepeatNs));
-  if (e.played.timeline.applied() == acknowledged_) return repeat_ns;
+  if (e.played->timeline().applied() == acknowledged_) return repeat_ns;
   const double period_ns = 1e9 / e.session.frame_rate_hz;
-  if (e.played.timeline.applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))
+  if (e.played->timeline().applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))
     return last_ack_ns_;
   // Without a further delta the server may be waiting.
   const auto quiet_ns = statistics_.last_applied_ns + static_cast<std::int64_t>(1.25 * period_ns);
@@ -158,7 +157,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   session_from_ = announcement.from;
   refusal_.clear();
   listener_.on_session(*session_);
-  auto chosen = choose_stream(*session_);
+  auto chosen = choose_stream(*session_, now);
   if (!chosen) {
     refuse(chosen.error());
     return;
@@ -166,7 +165,6 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*chosen), options_.lead,
                                         pictures_);
   epoch_->join_began_ns = now.steady_ns;
-  start_join(epoch_->played, now);
   ++statistics_.epochs;
   if (epoch_->lead < options_.lead) {
     log(LogLevel::kWarning, "lead " + std::to_string(options_.lead) + " asked for, the session allows " +
@@ -226,30 +224,24 @@ void ClientCore::report_outcomes() {
 
 void ClientCore::send_ack(Now now) {
   EpochState& e = *epoch_;
-  const bool changes = e.next && e.next->joiner.asked();
-  FollowedStream& joined = changes ? *e.next : e.played;
-  if (!joined.joiner.asked()) return;
+  const bool changes = e.change && e.change->to().asked();
+  Follower& joined = changes ? e.change->to() : *e.played;
+  if (!joined.asked()) return;
   transport::AckMessage ack;
   ack.client = options_.id;
   ack.epoch = e.session.epoch;
-  ack.stream = joined.stream.id;
-  const bool joins = changes || e.played.joining;
+  ack.stream = joined.stream().id;
+  const bool joins = changes || e.played->joining();
   ack.phase = joins ? transport::Phase::kJoining : transport::Phase::kPlaying;
-  if (joins) {
-    joined.part_unacknowledged = false;
-    joined.repeat_ns = std::min(2 * joined.repeat_ns, FollowedStream::kMostRepeatNs);
-    ack.snapshot_frame = joined.snapshot.frame();
-    ack.snapshot_parts = joined.snapshot.parts();
-    ack.missing = joined.snapshot.missing();
-  }
+  if (joins) joined.tell_progress(ack);
   // Who changes the stream says both: the snapshot that comes in, and how far it plays.
-  if (!e.played.joining) {
-    ack.applied = acknowledged_ = e.played.timeline.applied();
-    ack.simulated = e.played.timeline.now();
+  if (!e.played->joining()) {
+    ack.applied = acknowledged_ = e.played->timeline().applied();
+    ack.simulated = e.played->timeline().now();
   }
   ack.role_wanted = options_.role;
   ack.clock_ns = now.steady_ns;
-  ack.join_attempt = joined.joiner.attempt();
+  ack.join_attempt = joined.join_attempt();
   const std::int64_t began_ns = measure();
   // A failed write is tried again at the next poll, as the acknowledgement stays due.
   ack_due_ = !port_.write(ack).has_value();
@@ -272,19 +264,19 @@ void ClientCore::send_status(Now now) {
                                   std::to_string(std::lround(period_ms)) + " ms");
     }
     status.epoch = epoch_->session.epoch;
-    status.stream = epoch_->played.stream.id;
-    status.applied = epoch_->played.joining ? 0 : epoch_->played.timeline.applied();
+    status.stream = epoch_->played->stream().id;
+    status.applied = epoch_->played->joining() ? 0 : epoch_->played->timeline().applied();
     status.role =
         static_cast<std::uint32_t>(epoch_->reply ? epoch_->reply->role : transport::Role::kObserver);
-    status.phase = static_cast<std::uint32_t>(epoch_->played.joining ? transport::Phase::kJoining
-                                                                     : transport::Phase::kPlaying);
+    status.phase = static_cast<std::uint32_t>(epoch_->played->joining() ? transport::Phase::kJoining
+                                                                        : transport::Phase::kPlaying);
   }
   // Best effort: one lost second of figures is made good by the next.
   static_cast<void>(port_.write(status));
 }
 
 ClientPhase ClientCore::phase() const {
-  if (epoch_) return epoch_->played.joining ? ClientPhase::kJoining : ClientPhase::kPlaying;
+  if (epoch_) return epoch_->played->joining() ? ClientPhase::kJoining : ClientPhase::kPlaying;
   return session_ ? ClientPhase::kRefused : ClientPhase::kSearching;
 }
 
@@ -305,7 +297,7 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
   input.client = options_.id;
   input.epoch = epoch_->session.epoch;
   input.number = sent_.next_number();
-  input.client_frame = epoch_->played.timeline.now();
+  input.client_frame = epoch_->played->timeline().now();
   input.kind = static_cast<std::uint32_t>(kind);
   input.values = std::move(values);
   input.bytes = std::move(bytes);
@@ -332,17 +324,17 @@ void ClientCore::echo(const transport::InputMessage& gravity, Now now) {
 
 void ClientCore::show_clock() {
   EpochState& e = *epoch_;
-  if (!e.played.joining) e.echo.on_simulated(e.played.timeline.now());
+  if (!e.played->joining()) e.echo.on_simulated(e.played->timeline().now());
   e.pictures.on_echo(e.echo.shown());
   e.pictures.on_clock(e.pacer);
 }
 
 const transport::SessionMessage* ClientCore::session() const { return session_ ? &*session_ : nullptr; }
 const transport::StreamMessage* ClientCore::stream() const {
-  return epoch_ ? &epoch_->played.stream : nullptr;
+  return epoch_ ? &epoch_->played->stream() : nullptr;
 }
 const ClientTimeline* ClientCore::timeline() const {
-  return phase() == ClientPhase::kPlaying ? &epoch_->played.timeline : nullptr;
+  return phase() == ClientPhase::kPlaying ? &epoch_->played->timeline() : nullptr;
 }
 const transport::ReplyMessage* ClientCore::reply() const {
   return epoch_ && epoch_->reply ? &*epoch_->reply : nullptr;
@@ -352,7 +344,7 @@ std::optional<std::int64_t> ClientCore::server_wall_ns(std::int64_t steady_ns) c
   return steady_ns + epoch_->pacer.clock().offset_ns();
 }
 std::uint32_t ClientCore::join_attempt() const {
-  return epoch_ ? epoch_->played.joiner.attempt() : join_attempts_;
+  return epoch_ ? epoch_->played->join_attempt() : join_attempts_;
 }
 
 ClientStatus ClientCore::status() const {
@@ -376,9 +368,9 @@ ClientStatus ClientCore::status() const {
   out.lead = epoch_->lead;
   out.stream = chooser_->chosen().name;
   out.stream_reason = chooser_->reason();
-  if (!epoch_->played.joining) {
-    out.frame = epoch_->played.timeline.applied();
-    out.state_hash = epoch_->played.timeline.hash();
+  if (!epoch_->played->joining()) {
+    out.frame = epoch_->played->timeline().applied();
+    out.state_hash = epoch_->played->timeline().hash();
   }
   out.round_trip_ms = static_cast<double>(epoch_->pacer.clock().round_trip_ns()) / 1e6;
   out.jitter_ms = epoch_->pacer.jitter_ms();
@@ -388,7 +380,7 @@ ClientStatus ClientCore::status() const {
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
   if (epoch_ && epoch_->has_played)
-    epoch_->pictures.on_loaded(epoch_->played.timeline, epoch_->pacer, last_poll_ns_);
+    epoch_->pictures.on_loaded(epoch_->played->timeline(), epoch_->pacer, last_poll_ns_);
   pictures_.want();  // last: without memory for a first picture, the next call tries again
 }
 
@@ -401,7 +393,7 @@ std::optional<Drawable> ClientCore::drawable() {
 void ClientCore::show_uncorrected(bool on) {
   if (on == shows_uncorrected_) return;
   shows_uncorrected_ = on;
-  if (epoch_ && !epoch_->played.joining) follow_uncorrected();
+  if (epoch_ && !epoch_->played->joining()) follow_uncorrected();
 }
 
 std::optional<Drift> ClientCore::drift() const {

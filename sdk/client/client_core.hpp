@@ -89,11 +89,11 @@ class ClientCore {
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   /// Last announcement that was accepted or refused; null before the first.
   [[nodiscard]] const transport::SessionMessage* session() const;
-  /// The one of its streams that is played or joined; null while there is none.
+  /// The one of its streams that is played or joined; null while there is none. Valid until the next poll().
   [[nodiscard]] const transport::StreamMessage* stream() const;
   /// The writer of the session's announcement lives, as the last poll() saw it.
   [[nodiscard]] bool server_alive() const { return server_alive_; }
-  /// Null unless playing.
+  /// Null unless playing. Valid until the next poll().
   [[nodiscard]] const ClientTimeline* timeline() const;
   /// Wall clock of the server at a steady time of this client's, as far as known.
   [[nodiscard]] std::optional<std::int64_t> server_wall_ns(std::int64_t steady_ns) const;
@@ -146,37 +146,38 @@ class ClientCore {
   // client_stream.cpp: take in, play
   void take_stream(Now now);
   /// Null, and counted, where it is none that is followed.
-  [[nodiscard]] FollowedStream* followed(const StreamId& stream);
+  [[nodiscard]] Follower* followed(const StreamId& stream);
   void take_deltas(Now now);
   void take_scheduled();
   void take_snapshots(Now now);
-  /// False when there is nothing to apply, or not yet, or it was lost. The delta stays at the front.
-  bool apply_front(FollowedStream& to, Now now, std::int64_t since_last_poll_ns);
   void play(Now now, std::int64_t since_last_poll_ns);
+  void on_applied(const CompleteDelta& delta, std::int64_t cost_ns, Now now);
   void simulate_ahead(Now now);
   void play_ahead(Now now);
   void prepare_next();
 
   // client_join.cpp: join, join again
-  /// The one that a snapshot is wanted of; null: none.
-  [[nodiscard]] FollowedStream* joined_stream();
-  void start_join(FollowedStream& to, Now now);
   /// Returns the snapshot once it is loaded.
-  [[nodiscard]] std::optional<transport::SnapshotMessage> join(FollowedStream& to, Now now);
-  [[nodiscard]] bool load(FollowedStream& to, const transport::SnapshotMessage& snapshot, Now now);
+  [[nodiscard]] std::optional<transport::SnapshotMessage> join(Follower& to, Now now);
   void begin(Now now);
   void follow_uncorrected();
-  void lose(FollowedStream& from, ResyncReason reason, const std::string& why, Now now);
+  void count(const Follower::Loss& loss);
+  /// By the stream that is played or joined.
+  void on_loss(const Follower::Loss& loss, Now now);
 
   // client_change.cpp: choose, change
-  [[nodiscard]] Result<FollowedStream> choose_stream(const transport::SessionMessage& session);
-  [[nodiscard]] Result<FollowedStream> follow(const transport::SessionMessage& session) const;
+  [[nodiscard]] Result<std::unique_ptr<Follower>> choose_stream(const transport::SessionMessage& session,
+                                                                Now now);
+  [[nodiscard]] Result<std::unique_ptr<Follower>> follow(const transport::SessionMessage& session,
+                                                         Now now) const;
   void tell_stream();
   void consider_streams(Now now);
   void change_stream(Now now);
   /// In the place of the one that is played or joined.
-  void join_instead(FollowedStream other, Now now);
-  void follow_next(Now now);
+  void join_instead(std::unique_ptr<Follower> other, Now now);
+  void follow_change(Now now);
+  /// By the stream that is on its way.
+  void on_loss_in_change(const Follower::Loss& loss, Now now);
   void move_over(Now now);
   void show_other(Frame left_at, Now now);
   void give_up_change(const std::string& why, Now now);

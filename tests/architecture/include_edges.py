@@ -55,7 +55,7 @@ EDGES = {
     "sdk/transport/dds": LAYOUT + ["sdk/transport"],
     "sdk/statistics": [],
     "sdk/client/drawing": OF_CLIENT,
-    "sdk/client/following": OF_CLIENT,
+    "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
     "sdk/client/session": OF_CLIENT,
     "sdk/client": OF_CLIENT + CLIENT,
     "sdk/client/api": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds"] + CLIENT,

@@ -3,29 +3,6 @@
 #include <utility>
 
 namespace tandem::api {
-namespace {
-
-const char* describe(client::ResyncReason reason) {
-  switch (reason) {
-    case client::ResyncReason::kGap:
-      return "a frame was missing";
-    case client::ResyncReason::kLostPart:
-      return "a part of a frame was missing";
-    case client::ResyncReason::kMissingInput:
-      return "a scheduled input did not come in time";
-    case client::ResyncReason::kMismatch:
-      return "the state differed from the server's";
-    case client::ResyncReason::kRefused:
-      return "what came broke a rule of the protocol";
-    case client::ResyncReason::kOverflow:
-      return "more frames waited than there is room for";
-    case client::ResyncReason::kLag:
-      return "too far behind for too long";
-  }
-  return "";
-}
-
-}  // namespace
 
 EventLog::EventLog() : ring_(kMost) {}
 

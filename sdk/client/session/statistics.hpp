@@ -5,23 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "sdk/client/session/resync_reason.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/units.hpp"
 #include "tandem/client_types.hpp"
 
 namespace tandem::client {
-
-/// Why a client had to join again.
-enum class ResyncReason : std::uint8_t {
-  kGap = 0,           ///< a frame was missing
-  kLostPart = 1,      ///< a new frame began while one was incomplete
-  kMissingInput = 2,  ///< a scheduled input did not come in time
-  kMismatch = 3,      ///< the state hash differed from the server's
-  kRefused = 4,       ///< bytes that broke a rule of the format
-  kOverflow = 5,      ///< more deltas waited than the buffer holds
-  kLag = 6,           ///< too far behind for too long
-};
-inline constexpr std::size_t kResyncReasons = 7;
 
 /// What playing took since the first applied frame, by kind. Zero without CoreOptions::measure_ns.
 struct CostTotals {

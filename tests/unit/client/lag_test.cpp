@@ -63,7 +63,7 @@ TEST_F(LagTest, AClientThatIsTooSlowJoinsAgainAndSaysSoOnce) {
     EXPECT_EQ(core->timeline()->applied(), server.frame());
   }
   const auto told = std::ranges::count_if(
-      log, [](const std::string& line) { return line.find("not catching up") != std::string::npos; });
+      log, [](const std::string& line) { return line.find("too far behind") != std::string::npos; });
   EXPECT_EQ(told, 1);
   for (int i = 0; i < 5; ++i) frame();
   EXPECT_EQ(figures().resyncs, 2U);

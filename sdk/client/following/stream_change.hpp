@@ -1,0 +1,42 @@
+#pragma once
+// The way from one stream into another while the first is played: idl/STATES.md, "Changing the stream".
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "sdk/client/following/follower.hpp"
+#include "sdk/transport/units.hpp"
+
+namespace tandem::client {
+
+/// Holds the other stream until both are at the same frame. The one that is played is only looked at:
+/// whatever becomes of the change, it goes on. Not thread-safe.
+class StreamChange {
+ public:
+  /// A change that gets nowhere for so long is given up.
+  static constexpr std::int64_t kPatienceNs = 10 * kSecond;
+  /// Frames of the other stream that one poll applies, beside those of the one that is played.
+  static constexpr int kFramesPerPoll = 16;
+
+  /// `to`: not null.
+  StreamChange(std::unique_ptr<Follower> to, double frame_rate_hz)
+      : to_(std::move(to)), frame_rate_hz_(frame_rate_hz) {}
+
+  [[nodiscard]] Follower& to() { return *to_; }
+  [[nodiscard]] const Follower& to() const { return *to_; }
+  /// Takes to() out, which ends the change.
+  [[nodiscard]] std::unique_ptr<Follower> take() { return std::move(to_); }
+
+  /// While it joins, with no snapshot loaded: true when it is to be given up. `last_applied_ns`: when the
+  /// stream that is played had its last frame.
+  [[nodiscard]] bool gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_ns);
+  /// Once it plays: frame by frame behind the one that is played. Done: to() can take its place.
+  [[nodiscard]] Follower::Step catch_up(const Follower& played, const ScheduledInputs& scheduled);
+
+ private:
+  std::unique_ptr<Follower> to_;
+  double frame_rate_hz_;
+};
+
+}  // namespace tandem::client
