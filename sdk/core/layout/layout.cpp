@@ -1,5 +1,7 @@
 #include "sdk/core/layout/layout.hpp"
 
+#include <algorithm>
+
 #include "sdk/core/lattice/hash.hpp"
 
 namespace tandem {
@@ -8,16 +10,23 @@ namespace {
 
 Result<void> check_groups(const Layout& layout) {
   const auto refuse = [](std::string reason) { return fail(ErrorCode::kInvalidArgument, std::move(reason)); };
-  for (const std::string& group : layout.groups) {
-    if (group != kPositionGroup && group != kOrientationGroup)
-      return fail(ErrorCode::kUnsupported, "unknown channel group '" + group + "'");
+  for (const std::string& name : layout.groups) {
+    if (std::none_of(kChannelGroups.begin(), kChannelGroups.end(),
+                     [&name](const ChannelGroup& each) { return each.name == name; }))
+      return fail(ErrorCode::kUnsupported, "unknown channel group '" + name + "'");
   }
-  if (layout.groups.empty() || layout.groups.size() > 2 || layout.groups.front() != kPositionGroup ||
-      (layout.groups.size() == 2 && layout.groups.back() != kOrientationGroup)) {
-    return refuse("channel groups other than position, or position and orientation");
-  }
-  if (layout.groups.size() == 1 && !layout.radii.empty()) return refuse("radii that no channel group needs");
-  if (layout.groups.size() == 1) return {};
+  std::size_t known = 0;
+  bool needs_radii = false;
+  bool in_order = true;
+  for_each_group(groups_of(layout), [&](const ChannelGroup& each) {
+    in_order = in_order && known < layout.groups.size() && layout.groups[known] == each.name;
+    needs_radii |= each.needs_radii;
+    ++known;
+  });
+  if (!in_order || known != layout.groups.size())
+    return refuse("channel groups without position, out of order or repeated");
+  if (!needs_radii && !layout.radii.empty()) return refuse("radii that no channel group needs");
+  if (!needs_radii) return {};
   if (layout.radii.size() != layout.type_count) return refuse("orientations need a radius for each type");
   for (const std::int32_t radius : layout.radii) {
     if (radius < 1 || radius > kPositionLimit)
@@ -42,7 +51,15 @@ Result<void> check_layout(const Layout& layout) {
   return check_groups(layout);
 }
 
-Groups groups_of(const Layout& layout) { return {.orientation = layout.groups.size() > 1}; }
+Groups groups_of(const Layout& layout) {
+  Groups groups;
+  for (const ChannelGroup& each : kChannelGroups) {
+    if (each.listed == nullptr) continue;
+    groups.*each.listed =
+        std::find(layout.groups.begin(), layout.groups.end(), each.name) != layout.groups.end();
+  }
+  return groups;
+}
 
 std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
                           std::uint64_t lattice_unit_bits) {

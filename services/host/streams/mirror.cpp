@@ -194,7 +194,7 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
                           .reuse = 0,
                           .type = 0,
                           .body = target_.body(slot),
-                          .groups = moves_all(target_.groups())});
+                          .groups = bits_of(target_.groups())});
   } else if (shown && target_.type()[slot] != type) {
     target_.type()[slot] = type;
     lifecycle_.push_back(

@@ -178,7 +178,7 @@ Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::
     if (stream.lattice != first.lattice || stream.layout.capacity != first.layout.capacity ||
         stream.layout.type_count != first.layout.type_count)
       return fail(ErrorCode::kInvalidArgument, "streams of another lattice, capacity or number of types");
-    groups.orientation = groups.orientation || groups_of(stream.layout).orientation;
+    groups.orientation |= groups_of(stream.layout).orientation;
   }
   if (groups.orientation && bodies.orientation[0].empty()) {
     return fail(ErrorCode::kInvalidArgument,
@@ -219,7 +219,7 @@ std::span<const LifecycleRecord> Stream::Impl::records_of(const Mirror& mirror) 
   const Groups groups = groups_of(config.layout);
   if (mirror.target().groups() == groups) return mirror.lifecycle();
   records.assign(mirror.lifecycle().begin(), mirror.lifecycle().end());
-  for (LifecycleRecord& record : records) record.groups &= moves_all(groups);
+  for (LifecycleRecord& record : records) record.groups &= bits_of(groups);
   return records;
 }
 
