@@ -94,7 +94,8 @@ struct Host::Impl {
         inputs(config.epoch, *source, outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
-        pacing(config.frame_rate_hz, config.free_rate) {
+        pacing(config.frame_rate_hz, config.free_rate),
+        overrun(config.frame_rate_hz) {
     const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
     for (std::uint32_t id = 0; id < streams; ++id) {
       lanes.emplace_back(id, config, outbox);
@@ -173,6 +174,7 @@ struct Host::Impl {
   ReplyDesk replies;
   Claim claim;
   Pacing pacing;
+  Overrun overrun;
   PublishTimes times;
 
   State state = State::kClaiming;
@@ -378,6 +380,10 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   for (std::string& line : source->take_notices(now_ns)) note(std::move(line));
   ++totals.frames;
   frame_durations.add(produced - start);
+  if (!config.free_rate) {
+    if (auto line = overrun.frame_took(frame->step_ns, produced - start, now_ns); !line.empty())
+      note(std::move(line));
+  }
   for (Lane& lane : lanes) lane.status.frame_took(produced - start);
   return true;
 }
