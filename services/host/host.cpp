@@ -9,6 +9,7 @@
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/text_message.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/clients/audience.hpp"
 #include "services/host/clients/claim.hpp"
@@ -67,6 +68,9 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   const std::uint32_t capacity = simulation.capacity();
   if (capacity != layout.capacity)
     return refuse(fmt::format("{} slots for a simulation of {}", layout.capacity, capacity));
+  // As clients read it, who would stumble over it one by one.
+  if (const auto text = transport::read_text_message(config.scene_description); !text)
+    return refuse(text.error().message);
   return {};
 }
 

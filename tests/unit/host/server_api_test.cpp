@@ -69,6 +69,14 @@ TEST_F(ServerApi, OptionsOutOfRangeAreRefused) {
   EXPECT_EQ(with([](ServerOptions& o) { o.codec = "zip"; }), ErrorCode::kUnsupported);
 }
 
+TEST_F(ServerApi, ASceneThatClientsCouldNotReadIsRefusedWithItsLine) {
+  options.scene_description = "gravity { y: -9.81 }\nboxes { centre { x: 1 }\n";
+  auto server = Server::start(options, standing);
+  ASSERT_FALSE(server.has_value());
+  EXPECT_EQ(server.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(server.error().message, "the scene's text, line 3: a message does not end");
+}
+
 TEST_F(ServerApi, ColumnsThatAreNotOfTheCapacityAreRefused) {
   standing.zeros.resize(1);
   EXPECT_EQ(refusal(), ErrorCode::kInvalidArgument);

@@ -48,7 +48,8 @@ struct ServerOptions {
   /// By what Simulation::bodies() calls type; at least one, at most 65,535.
   std::vector<ServedType> types{ServedType{}};
   std::string scene = "";  ///< a name to show, at most 64 bytes
-  /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
+  /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds. What
+  /// clients could not read is refused, with its line.
   std::string scene_description = "";
   std::uint32_t wait_for = 0;  ///< participants that must play before frame 1
   /// One line for a human: who joined, was demoted, refused. Called by poll(); must not call the server.
