@@ -75,6 +75,7 @@ Result<host::HostConfig> configure(const ServerOptions& options, const engine::S
   return plan(options, simulation).map([&](host::StreamConfig&& stream) {
     host::HostConfig config;
     config.streams.push_back(std::move(stream));
+    config.extent = options.extent;
     config.session = options.session;
     config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
     config.frame_rate_hz = 1 / simulation.dt_s();

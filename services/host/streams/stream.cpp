@@ -171,7 +171,8 @@ Result<void> choose_gains(StreamConfig& config) {
   return {};
 }
 
-Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies) {
+Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies,
+                           double extent) {
   const StreamConfig& first = streams.front();
   Groups groups;
   for (const StreamConfig& stream : streams) {
@@ -184,7 +185,7 @@ Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::
     return fail(ErrorCode::kInvalidArgument,
                 "the stream has orientations, which the simulation's bodies do not have");
   }
-  Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups);
+  Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups, extent);
   if (auto good = mirror.check(bodies); !good) return tl::unexpected(good.error());
   mirror.start(bodies);
   return mirror;

@@ -95,6 +95,18 @@ TEST_F(ServerApi, ItStepsAtTheSimulationsRateAndRefusesWhatTheSimulationDoes) {
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST_F(ServerApi, ABodyBeyondTheExtentDisappearsAndTheLogSaysSo) {
+  std::string told;
+  options.session = "extent";
+  options.extent = 5;
+  options.log = [&](std::string_view line) { told += line; };
+  standing.on_step = [&] { standing.zeros[1] = 18.8F; };
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  for (int i = 0; i < 1000 && told.empty(); ++i) ASSERT_TRUE(server->poll());
+  EXPECT_NE(told.find("slot 1 (its x is 18.8, beyond 5)"), std::string::npos) << told;
+}
+
 TEST_F(ServerApi, ColumnsThatShrinkEndTheSessionAndSayWhy) {
   options.session = "shrinking";
   standing.shrinks_at = 3;

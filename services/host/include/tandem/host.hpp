@@ -37,8 +37,8 @@ struct ServerOptions {
   /// Largest distance between where the simulation and where the clients have a body, or a point of its
   /// surface where bodies turn; scene units. The price of a frame grows as it shrinks.
   double threshold = 0.01;
-  /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears until it is back. At
-  /// most about a million thresholds.
+  /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears, which the log tells,
+  /// until the simulation despawns, spawns or teleports it (engine::Event). At most about a million thresholds.
   double extent = 100;
   /// Payload that the server keeps to by itself, Mbit/s (2^20 bits), with errors of up to four thresholds; 0:
   /// `threshold` alone decides.
