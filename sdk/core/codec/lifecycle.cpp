@@ -21,8 +21,7 @@ bool carries_type(LifecycleKind kind) {
 // rest and c of the whole body begin anew.
 void teleport(const LifecycleRecord& record, State& state) {
   BodyState body = state.body(record.slot);
-  for_each_vector(
-      record.groups, [](const auto& from, auto& to) { to = from; }, record.body, body);
+  move_body(record.groups, record.body, body);
   state.set_body(record.slot, body);
 }
 
@@ -60,8 +59,7 @@ void write_lifecycle(std::span<const LifecycleRecord> records, const Groups& gro
     if (record.kind == LifecycleKind::kSpawn) out.put(record.reuse);
     if (carries_type(record.kind)) out.put_leb128(record.type);
     if (record.kind == LifecycleKind::kTeleport) out.put(record.groups);
-    if (!carries_body(record.kind)) continue;
-    for_each_number(named(record, groups), record.body, [&out](std::int32_t value) { out.put(value); });
+    if (carries_body(record.kind)) put_body(named(record, groups), record.body, out);
   }
 }
 
@@ -90,9 +88,7 @@ Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& gr
       if (in.ok() && (record.groups == 0 || (record.groups & ~unsigned{bits_of(groups)}) != 0))
         return fail(ErrorCode::kMalformed, "teleport of groups that the stream does not list");
     }
-    if (carries_body(record.kind))
-      for_each_number(named(record, groups), record.body,
-                      [&in](std::int32_t& value) { value = in.get<std::int32_t>(); });
+    if (carries_body(record.kind)) get_body(named(record, groups), in, record.body);
     records.push_back(record);
   }
   if (!in.ok())

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/state.hpp"
 
@@ -16,6 +17,20 @@ static_assert([] {
   }
   return columns == kColumns;
 }());
+
+// Calls visit() for each vector that a lifecycle record says of a body with these groups (bits), in their
+// order there; for the same one of several bodies at once.
+template <class Visit, class... Bodies>
+constexpr void for_each_vector(unsigned groups, const Visit& visit, Bodies&... bodies) {
+  if ((groups & kMovesPosition) != 0) {
+    visit(bodies.p...);
+    visit(bodies.v...);
+  }
+  if ((groups & kMovesOrientation) != 0) {
+    visit(bodies.q...);
+    visit(bodies.w...);
+  }
+}
 
 bool within(const Vec3i& values, std::int32_t limit) {
   return std::all_of(values.begin(), values.end(),
@@ -60,6 +75,39 @@ void step_groups(const State& from, State& to, std::span<const Slot> slots) {
     to.set_quaternion(slot, to.rest()[slot] != 0 ? q : turned(q, w));
     for (std::size_t i = 0; i < kSpinChannels; ++i) to.w(i)[slot] = w[i];
   }
+}
+
+std::uint8_t bits_of(const Groups& groups) {
+  unsigned bits = 0;
+  for_each_group(groups, [&bits](const ChannelGroup& each) { bits |= each.bit; });
+  return static_cast<std::uint8_t>(bits);
+}
+
+void put_body(unsigned groups, const BodyState& body, ByteWriter& out) {
+  const auto put = [&out](const auto& vector) {
+    for (const std::int32_t number : vector) out.put(number);
+  };
+  for_each_vector(groups, put, body);
+}
+
+void get_body(unsigned groups, ByteReader& in, BodyState& body) {
+  const auto get = [&in](auto& vector) {
+    for (std::int32_t& number : vector) number = in.get<std::int32_t>();
+  };
+  for_each_vector(groups, get, body);
+}
+
+std::size_t body_bytes(unsigned groups) {
+  std::size_t bytes = 0;
+  const BodyState body;
+  for_each_vector(
+      groups, [&bytes](const auto& vector) { bytes += sizeof vector; }, body);
+  return bytes;
+}
+
+void move_body(unsigned groups, const BodyState& from, BodyState& to) {
+  for_each_vector(
+      groups, [](const auto& a, auto& b) { b = a; }, from, to);
 }
 
 }  // namespace tandem

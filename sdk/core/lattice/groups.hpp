@@ -12,6 +12,8 @@
 
 namespace tandem {
 
+class ByteReader;
+class ByteWriter;
 class State;
 using Slot = std::uint32_t;
 using Vec3i = std::array<std::int32_t, 3>;
@@ -81,20 +83,6 @@ inline constexpr std::array<ChannelGroup, 2> kChannelGroups{{
 }};
 inline constexpr std::size_t kColumns = 16;  ///< of all groups
 
-/// Calls visit() for each vector that a lifecycle record says of a body with these groups (bits), in their
-/// order there; for the same one of several bodies at once.
-template <class Visit, class... Bodies>
-constexpr void for_each_vector(unsigned groups, const Visit& visit, Bodies&... bodies) {
-  if ((groups & kMovesPosition) != 0) {
-    visit(bodies.p...);
-    visit(bodies.v...);
-  }
-  if ((groups & kMovesOrientation) != 0) {
-    visit(bodies.q...);
-    visit(bodies.w...);
-  }
-}
-
 /// Whether all values may be in a delta or a snapshot; those of groups that a stream has not are, as they are
 /// made.
 [[nodiscard]] bool valid_body(const BodyState& body);
@@ -129,29 +117,14 @@ constexpr void for_each_column(const ChannelGroup& group, const Visit& visit) {
   }
 }
 
-/// Calls visit() for each number that a lifecycle record says of a body with these groups (bits).
-template <class Body, class Visit>
-constexpr void for_each_number(unsigned groups, Body& body, const Visit& visit) {
-  const auto each = [&visit](auto& vector) {
-    for (auto& number : vector) visit(number);
-  };
-  for_each_vector(groups, each, body);
-}
-
 /// Of all that a stream has, as bits.
-[[nodiscard]] constexpr std::uint8_t bits_of(const Groups& groups) {
-  unsigned bits = 0;
-  for_each_group(groups, [&bits](const ChannelGroup& each) { bits |= each.bit; });
-  return static_cast<std::uint8_t>(bits);
-}
+[[nodiscard]] std::uint8_t bits_of(const Groups& groups);
 
-/// Bytes of a body in a lifecycle record.
-[[nodiscard]] constexpr std::size_t body_bytes(const Groups& groups) {
-  std::size_t bytes = 0;
-  const BodyState body;
-  for_each_vector(
-      bits_of(groups), [&bytes](const auto& vector) { bytes += sizeof vector; }, body);
-  return bytes;
-}
+/// What a lifecycle record says of a body with these groups (bits): p and v, q and w. As bytes; how many; and
+/// from one body to another.
+void put_body(unsigned groups, const BodyState& body, ByteWriter& out);
+void get_body(unsigned groups, ByteReader& in, BodyState& body);
+[[nodiscard]] std::size_t body_bytes(unsigned groups);
+void move_body(unsigned groups, const BodyState& from, BodyState& to);
 
 }  // namespace tandem

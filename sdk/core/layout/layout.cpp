@@ -10,21 +10,16 @@ namespace {
 
 Result<void> check_groups(const Layout& layout) {
   const auto refuse = [](std::string reason) { return fail(ErrorCode::kInvalidArgument, std::move(reason)); };
-  for (const std::string& name : layout.groups) {
-    if (std::none_of(kChannelGroups.begin(), kChannelGroups.end(),
-                     [&name](const ChannelGroup& each) { return each.name == name; }))
-      return fail(ErrorCode::kUnsupported, "unknown channel group '" + name + "'");
-  }
-  std::size_t known = 0;
   bool needs_radii = false;
-  bool in_order = true;
-  for_each_group(groups_of(layout), [&](const ChannelGroup& each) {
-    in_order = in_order && known < layout.groups.size() && layout.groups[known] == each.name;
-    needs_radii |= each.needs_radii;
-    ++known;
-  });
-  if (!in_order || known != layout.groups.size())
-    return refuse("channel groups without position, out of order or repeated");
+  auto name = layout.groups.begin();
+  for (const ChannelGroup& each : kChannelGroups) {
+    const bool listed = name != layout.groups.end() && *name == each.name;
+    if (!listed && each.listed == nullptr) return refuse("channel groups that do not begin with position");
+    if (listed) ++name;
+    needs_radii |= listed && each.needs_radii;
+  }
+  if (name != layout.groups.end())
+    return fail(ErrorCode::kUnsupported, "channel group '" + *name + "', unknown, repeated or out of order");
   if (!needs_radii && !layout.radii.empty()) return refuse("radii that no channel group needs");
   if (!needs_radii) return {};
   if (layout.radii.size() != layout.type_count) return refuse("orientations need a radius for each type");

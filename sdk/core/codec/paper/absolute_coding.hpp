@@ -17,7 +17,7 @@ class AbsoluteCoding {
   static constexpr bool kEveryBody = EveryBody;
 
   AbsoluteCoding(std::uint32_t capacity, const Groups& groups)
-      : groups_(bits_of(groups)), body_bytes_(body_bytes(groups)) {
+      : groups_(bits_of(groups)), body_bytes_(body_bytes(groups_)) {
     sections_.reserve(block_count(capacity));
   }
   [[nodiscard]] unsigned most_bits() const { return static_cast<unsigned>(8 * body_bytes_); }
@@ -32,7 +32,7 @@ class AbsoluteCoding {
     for (const Candidate& candidate : chosen) {
       const BodyState body = clamped(target.body(candidate.slot));
       TANDEM_ASSERT(valid_body(body));
-      for_each_number(groups_, body, [&out](std::int32_t value) { out.put(value); });
+      put_body(groups_, body, out);
     }
     sections_.push_back({to, first});
   }
@@ -68,7 +68,7 @@ class AbsoluteCoding {
   [[nodiscard]] BodyState read(std::span<const std::byte> bytes) const {
     ByteReader in(bytes);
     BodyState body;
-    for_each_number(groups_, body, [&in](std::int32_t& value) { value = in.get<std::int32_t>(); });
+    get_body(groups_, in, body);
     return body;
   }
 
