@@ -9,6 +9,7 @@
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/text_message.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/clients/audience.hpp"
 #include "services/host/clients/claim.hpp"
@@ -67,6 +68,9 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   const std::uint32_t capacity = simulation.capacity();
   if (capacity != layout.capacity)
     return refuse(fmt::format("{} slots for a simulation of {}", layout.capacity, capacity));
+  // As clients read it, who would stumble over it one by one.
+  if (const auto text = transport::read_text_message(config.scene_description); !text)
+    return refuse(text.error().message);
   return {};
 }
 
@@ -94,7 +98,8 @@ struct Host::Impl {
         inputs(config.epoch, *source, outbox),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
-        pacing(config.frame_rate_hz, config.free_rate) {
+        pacing(config.frame_rate_hz, config.free_rate),
+        overrun(config.frame_rate_hz) {
     const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
     for (std::uint32_t id = 0; id < streams; ++id) {
       lanes.emplace_back(id, config, outbox);
@@ -173,6 +178,7 @@ struct Host::Impl {
   ReplyDesk replies;
   Claim claim;
   Pacing pacing;
+  Overrun overrun;
   PublishTimes times;
 
   State state = State::kClaiming;
@@ -378,6 +384,10 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   for (std::string& line : source->take_notices(now_ns)) note(std::move(line));
   ++totals.frames;
   frame_durations.add(produced - start);
+  if (!config.free_rate) {
+    if (auto line = overrun.frame_took(frame->step_ns, produced - start, now_ns); !line.empty())
+      note(std::move(line));
+  }
   for (Lane& lane : lanes) lane.status.frame_took(produced - start);
   return true;
 }

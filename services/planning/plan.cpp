@@ -193,6 +193,7 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
     config.streams.push_back(std::move(*planned));
   }
   if (auto named = host::check_stream_names(config.streams); !named) return tl::unexpected(named.error());
+  config.extent = world.extent;
   config.frame_rate_hz = 1 / world.dt_s;
   config.scene = world.name;
   config.scene_description = world.description;

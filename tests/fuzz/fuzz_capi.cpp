@@ -125,6 +125,7 @@ class Run {
       }
       case 13: {
         const transport::Bytes bytes = program_.bytes(1100);
+        if (bytes.empty()) return tandem_send_seek(handle(), real(), nullptr);
         return tandem_send_bytes(handle(), bytes.data(), bytes.size(), nullptr);
       }
       case 14:

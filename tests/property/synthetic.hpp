@@ -108,7 +108,7 @@ inline std::vector<LifecycleRecord> random_lifecycle(Random& random, const State
         break;
       case 2:
         record.kind = LifecycleKind::kTeleport;
-        record.groups = moves_all(state.groups());
+        record.groups = bits_of(state.groups());
         if (state.groups().orientation) record.groups = static_cast<std::uint8_t>(1 + random.below(3));
         target.set_body(slot, teleported(target.body(slot), record));
         records.push_back(record);

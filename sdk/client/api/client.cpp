@@ -243,6 +243,10 @@ tandem_result tandem_send_push(tandem_client client, const double centre[3], dou
   });
 }
 
+tandem_result tandem_send_seek(tandem_client client, double seconds, uint64_t* number) noexcept {
+  return call([&] { return send(client, transport::InputKind::kSeek, {seconds}, {}, number); });
+}
+
 tandem_result tandem_send_bytes(tandem_client client, const void* bytes, size_t count,
                                 uint64_t* number) noexcept {
   if (bytes == nullptr && count != 0) return null_pointer("`bytes` is null");

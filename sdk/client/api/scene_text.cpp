@@ -6,15 +6,15 @@
 #include <cstdint>
 #include <string>
 
-#include "sdk/client/session/text_message.hpp"
+#include "sdk/transport/text_message.hpp"
 
 namespace tandem::api {
 namespace {
 
-using client::child;
-using client::scalar;
-using Message = client::TextMessage;
-using Field = client::TextField;
+using transport::child;
+using transport::scalar;
+using Message = transport::TextMessage;
+using Field = transport::TextField;
 
 /// Far from where a float would overflow, so that what is computed with it stays finite.
 constexpr double kLargest = 1e30;
@@ -93,7 +93,7 @@ bool add_solids(const Message& scene, std::string_view name, Solid (*make)(const
 }  // namespace
 
 Result<SceneText> read_scene_text(std::string_view text) {
-  const auto scene = client::read_text_message(text);
+  const auto scene = transport::read_text_message(text);
   if (!scene) return tl::unexpected<Error>(scene.error());
   SceneText out;
   out.gravity = vector(child(&*scene, "gravity"));

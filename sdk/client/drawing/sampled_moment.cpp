@@ -56,6 +56,8 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
     moment.from = moment.at == picture.agreed ? first : picture.agreed;
     moment.span.after = bounded(moment.frame - number(moment.at));
     since_last(moment, number(moment.from), last_frame, elapsed);
+    if (moment.from == moment.at)
+      moment.from = nullptr;  // no way leads to it, and bodies have their own speed
     if (picture.echo && mode == SampleMode::kExtrapolate) add_echo(*picture.echo, rate_hz, moment);
     return moment;
   }

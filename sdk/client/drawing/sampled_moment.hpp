@@ -24,7 +24,7 @@ struct SampledMoment {
   static constexpr double kEchoS = 0.25;
 
   double frame = 0;                  ///< the moment
-  const DrawnFrame* from = nullptr;  ///< the frame before it; null beyond the last one
+  const DrawnFrame* from = nullptr;  ///< the frame before it; null beyond the last one, and at the first
   const DrawnFrame* at = nullptr;    ///< the frame at it or after it; the last one beyond that
   Span span;
   Acceleration fall;  ///< by gravity, beyond the first frame

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/client/session/text_message.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
+#include "sdk/transport/text_message.hpp"
 
 namespace tandem::client {
 namespace {
@@ -27,10 +27,10 @@ std::string milliseconds(double ns) {
 std::vector<std::string> names_of(const transport::SessionMessage& session) {
   std::vector<std::string> names;
   // One stream needs no name, and most scenes are long.
-  const auto scene =
-      session.streams.size() > 1 ? read_text_message(session.scene_description) : TextMessage{};
+  const auto scene = session.streams.size() > 1 ? transport::read_text_message(session.scene_description)
+                                                : transport::TextMessage{};
   if (scene) {
-    for (const TextField& field : *scene) {
+    for (const transport::TextField& field : *scene) {
       if (field.name == "stream_names" && !field.is_message) names.emplace_back(field.scalar);
     }
   }

@@ -16,13 +16,6 @@ namespace tandem {
 
 enum class LifecycleKind : std::uint8_t { kDespawn = 0, kSpawn = 1, kTeleport = 2, kTypeChange = 3 };
 
-/// Groups that a teleport names: bit i for the i-th that the stream lists.
-inline constexpr std::uint8_t kMovesPosition = 1, kMovesOrientation = 2;
-/// All of a stream.
-[[nodiscard]] constexpr std::uint8_t moves_all(const Groups& groups) {
-  return groups.orientation ? kMovesPosition | kMovesOrientation : kMovesPosition;
-}
-
 /// One explicit change of a slot. Within a delta: ascending by slot; for one slot the only pair allowed is
 /// despawn then spawn (reuse within a frame).
 struct LifecycleRecord {

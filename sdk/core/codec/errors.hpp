@@ -27,10 +27,6 @@ namespace tandem {
   return sum;
 }
 
-/// How far a point of the surface of a body may be off: the distance of the centres and 2 r sin(angle / 2),
-/// lattice units, rounded up; at most a lattice unit more than it is. States with orientations.
-[[nodiscard]] std::uint64_t surface_error(const BodyState& body, const BodyState& target,
-                                          std::int32_t radius);
 /// Calls f(slot, surface error) for every alive body of the block whose surface may be off by more than
 /// `threshold`, ascending. `radii` by type.
 template <class F>
@@ -43,10 +39,6 @@ void for_each_surface_beyond(const State& state, const State& target, const Bloc
     if (error > static_cast<std::uint64_t>(threshold)) f(slot, error);
   }
 }
-
-/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes
-/// more than 2 rad, 2 rad of it.
-[[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
 
 /// Marks (1) the slots of a block that may be off by more than `threshold`, and none of the others (0) is.
 /// `marks` holds kBlockSlots bytes; the last eight are padded with zeros. Plain loop over columns,

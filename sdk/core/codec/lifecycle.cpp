@@ -3,17 +3,6 @@
 namespace tandem {
 namespace {
 
-bool within(const Vec3i& values, std::int32_t limit) {
-  return std::all_of(values.begin(), values.end(),
-                     [limit](std::int32_t x) { return -limit <= x && x <= limit; });
-}
-
-// Also of what a record does not say, which is valid as it is.
-bool is_on_lattice(const BodyState& body) {
-  return within(body.p, kPositionLimit) && within(body.v, kVelocityLimit) && valid_quaternion(body.q) &&
-         valid_spin(body.w);
-}
-
 constexpr std::uint32_t kKinds = 4;
 constexpr std::size_t kMostHeadBytes = 4;
 constexpr std::size_t kMostTypeBytes = 3;
@@ -21,17 +10,9 @@ constexpr std::size_t kMostTypeBytes = 3;
 bool carries_body(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport;
 }
-// The content of a record, of a spawn and a teleport: each number of the groups that it names.
-template <class Visit>
-void visit_body(const LifecycleRecord& record, const Groups& groups, BodyState& body, const Visit& visit) {
-  const unsigned named = record.kind == LifecycleKind::kSpawn ? moves_all(groups) : record.groups;
-  if ((named & kMovesPosition) != 0) {
-    for (auto* values : {&body.p, &body.v}) std::for_each(values->begin(), values->end(), visit);
-  }
-  if ((named & kMovesOrientation) != 0) {
-    std::for_each(body.q.begin(), body.q.end(), visit);
-    std::for_each(body.w.begin(), body.w.end(), visit);
-  }
+// Whose content a record holds, of a spawn and a teleport.
+unsigned named(const LifecycleRecord& record, const Groups& groups) {
+  return record.kind == LifecycleKind::kSpawn ? bits_of(groups) : record.groups;
 }
 bool carries_type(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTypeChange;
@@ -40,14 +21,7 @@ bool carries_type(LifecycleKind kind) {
 // rest and c of the whole body begin anew.
 void teleport(const LifecycleRecord& record, State& state) {
   BodyState body = state.body(record.slot);
-  if ((record.groups & kMovesPosition) != 0) {
-    body.p = record.body.p;
-    body.v = record.body.v;
-  }
-  if ((record.groups & kMovesOrientation) != 0) {
-    body.q = record.body.q;
-    body.w = record.body.w;
-  }
+  move_body(record.groups, record.body, body);
   state.set_body(record.slot, body);
 }
 
@@ -70,8 +44,7 @@ const char* check_lifecycle(std::span<const LifecycleRecord> records, std::span<
       return "despawn, teleport or type change of a dead slot";
     }
     if (carries_type(record.kind) && record.type >= type_count) return "type that the session does not list";
-    if (carries_body(record.kind) && !is_on_lattice(record.body))
-      return "spawn or teleport beyond the lattice";
+    if (carries_body(record.kind) && !valid_body(record.body)) return "spawn or teleport beyond the lattice";
     if (record.kind == LifecycleKind::kSpawn) alive[record.slot] = 1;
     if (record.kind == LifecycleKind::kDespawn) alive[record.slot] = 0;
   }
@@ -86,9 +59,7 @@ void write_lifecycle(std::span<const LifecycleRecord> records, const Groups& gro
     if (record.kind == LifecycleKind::kSpawn) out.put(record.reuse);
     if (carries_type(record.kind)) out.put_leb128(record.type);
     if (record.kind == LifecycleKind::kTeleport) out.put(record.groups);
-    if (!carries_body(record.kind)) continue;
-    BodyState body = record.body;
-    visit_body(record, groups, body, [&out](std::int32_t& value) { out.put(value); });
+    if (carries_body(record.kind)) put_body(named(record, groups), record.body, out);
   }
 }
 
@@ -114,11 +85,10 @@ Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& gr
     }
     if (record.kind == LifecycleKind::kTeleport) {
       record.groups = in.get<std::uint8_t>();
-      if (in.ok() && (record.groups == 0 || (record.groups & ~unsigned{moves_all(groups)}) != 0))
+      if (in.ok() && (record.groups == 0 || (record.groups & ~unsigned{bits_of(groups)}) != 0))
         return fail(ErrorCode::kMalformed, "teleport of groups that the stream does not list");
     }
-    if (carries_body(record.kind))
-      visit_body(record, groups, record.body, [&in](std::int32_t& value) { value = in.get<std::int32_t>(); });
+    if (carries_body(record.kind)) get_body(named(record, groups), in, record.body);
     records.push_back(record);
   }
   if (!in.ok())

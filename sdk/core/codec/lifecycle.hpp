@@ -11,8 +11,8 @@
 namespace tandem {
 
 /// Despawn and spawn of one slot: the most that a slot can cost.
-[[nodiscard]] constexpr std::size_t most_lifecycle_bytes_per_slot(const Groups& groups) {
-  return 4 + 4 + 1 + 3 + 24 + (groups.orientation ? 28 : 0);
+[[nodiscard]] inline std::size_t most_lifecycle_bytes_per_slot(const Groups& groups) {
+  return 4 + 4 + 1 + 3 + body_bytes(bits_of(groups));
 }
 
 /// Why `records` break the rules (order, alive and dead slots, ranges) on top of the `alive` column; null if

@@ -27,9 +27,11 @@ Update fastest_update() {
 
 struct StateHasher::Impl {
   using Working = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
-  // Of a block: what all groups share, positions, orientations.
+  // Of a block: what all groups share, and each group.
   [[nodiscard]] static std::size_t leaves_of(const State& state) {
-    return state.groups().orientation ? 3 : 2;
+    std::size_t count = 1;
+    for_each_group(state.groups(), [&count](const ChannelGroup&) { ++count; });
+    return count;
   }
 
   // The part of a column, or of several one after another, that belongs to a block.
@@ -56,16 +58,12 @@ struct StateHasher::Impl {
     add_all(h, extra.predictor, state, first, slots);
     std::uint64_t* leaf = leaves.data() + block * leaves_of(state);
     *leaf++ = XXH3_64bits_digest(h);
-    XXH3_64bits_reset(h);
-    for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.p(i), first, slots);
-    for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.v(i), first, slots);
-    for (std::size_t i = 0; i < kPositionChannels; ++i) add(h, state.c(i), first, slots);
-    *leaf++ = XXH3_64bits_digest(h);
-    if (!state.groups().orientation) return;
-    XXH3_64bits_reset(h);
-    for (std::size_t i = 0; i < kQuaternionChannels; ++i) add(h, state.q(i), first, slots);
-    for (std::size_t i = 0; i < kSpinChannels; ++i) add(h, state.w(i), first, slots);
-    *leaf = XXH3_64bits_digest(h);
+    for_each_group(state.groups(), [&](const ChannelGroup& group) {
+      XXH3_64bits_reset(h);
+      for_each_column(
+          group, [&](std::size_t column, const ColumnRun&) { add(h, state.column(column), first, slots); });
+      *leaf++ = XXH3_64bits_digest(h);
+    });
   }
 
   Update update = fastest_update();

@@ -6,36 +6,34 @@ namespace tandem {
 
 State::State(std::uint32_t capacity, const Groups& groups)
     : alive_(capacity), reuse_(capacity), type_(capacity), rest_(capacity) {
-  for (auto* columns : {&p_, &v_, &c_}) {
-    for (auto& column : *columns) column.assign(capacity, 0);
-  }
-  if (!groups.orientation) return;
-  for (auto& column : q_) column.assign(capacity, 0);
-  for (auto& column : w_) column.assign(capacity, 0);
+  for_each_group(groups, [&](const ChannelGroup& group) {
+    for_each_column(group,
+                    [&](std::size_t column, const ColumnRun&) { columns_[column].assign(capacity, 0); });
+  });
 }
 
 BodyState State::body(Slot slot) const {
   BodyState body;
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    body.p[i] = p_[i][slot];
-    body.v[i] = v_[i][slot];
+    body.p[i] = p(i)[slot];
+    body.v[i] = v(i)[slot];
   }
   if (!groups().orientation) return body;
   body.q = quaternion(slot);
-  for (std::size_t i = 0; i < kSpinChannels; ++i) body.w[i] = w_[i][slot];
+  for (std::size_t i = 0; i < kSpinChannels; ++i) body.w[i] = w(i)[slot];
   return body;
 }
 
 void State::set_body(Slot slot, const BodyState& body) {
   rest_[slot] = 0;
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    p_[i][slot] = std::clamp(body.p[i], -kPositionLimit, kPositionLimit);
-    v_[i][slot] = std::clamp(body.v[i], -kVelocityLimit, kVelocityLimit);
-    c_[i][slot] = 0;
+    p(i)[slot] = std::clamp(body.p[i], -kPositionLimit, kPositionLimit);
+    v(i)[slot] = std::clamp(body.v[i], -kVelocityLimit, kVelocityLimit);
+    c(i)[slot] = 0;
   }
   if (!groups().orientation) return;
   set_quaternion(slot, body.q);
-  for (std::size_t i = 0; i < kSpinChannels; ++i) w_[i][slot] = body.w[i];
+  for (std::size_t i = 0; i < kSpinChannels; ++i) w(i)[slot] = body.w[i];
 }
 
 void State::spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& body) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
@@ -80,6 +81,51 @@ TANDEM_VECTOR_CLONES void turn_all(const std::int32_t* wx, const std::int32_t* w
 
 Wide length_squared(Wide x, Wide y, Wide z) { return x * x + y * y + z * z; }
 
+// to * conjugate(from), of a sign that makes it the shorter turn.
+Quaternion difference(const Quaternion& from, const Quaternion& to) {
+  const auto [ax, ay, az, aw] = std::array<std::int64_t, 4>{-from[0], -from[1], -from[2], from[3]};
+  const auto [bx, by, bz, bw] = std::array<std::int64_t, 4>{to[0], to[1], to[2], to[3]};
+  const std::array<std::int64_t, 4> d{
+      bw * ax + bx * aw + by * az - bz * ay, bw * ay - bx * az + by * aw + bz * ax,
+      bw * az + bx * ay - by * ax + bz * aw, bw * aw - bx * ax - by * ay - bz * az};
+  const std::int64_t sign = d[3] < 0 ? -1 : 1;
+  Quaternion result{};
+  for (std::size_t i = 0; i < 4; ++i) result[i] = static_cast<std::int32_t>((sign * d[i] + (1 << 29)) >> 30);
+  return result;
+}
+
+// sin(angle / 2)^2 of a difference, in 2^-60.
+std::uint64_t half_sine_squared(const Quaternion& difference) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    sum += static_cast<std::uint64_t>(std::int64_t{difference[i]} * difference[i]);
+  return sum;
+}
+
+// Of the half angle h: h / sin h by the series of the arc sine in sin^2; up to 1 rad it is off by 1/200.
+std::array<std::int64_t, 3> rough_turn_between(const Quaternion& from, const Quaternion& to) {
+  const Quaternion d = difference(from, to);
+  const auto x = static_cast<std::int64_t>(half_sine_squared(d) >> 32U);  // 2^-28
+  std::int64_t ratio = 0;                                                 // 2^-28
+  // 63/2816, 35/1152, 5/112, 3/40, 1/6, 1
+  for (const std::int64_t term : {6005481, 8155591, 11983726, 20132659, 44739243, 268435456})
+    ratio = ((ratio * x) >> 28) + term;
+  std::array<std::int64_t, 3> spin{};
+  for (std::size_t i = 0; i < 3; ++i) spin[i] = (d[i] * ratio) >> 29;
+  return spin;
+}
+
+// The same direction, at most 2 rad long.
+Spin shortened(std::array<std::int64_t, 3> spin) {
+  std::uint64_t squared = 0;
+  for (const std::int64_t a : spin) squared += static_cast<std::uint64_t>(a * a);
+  const auto length = static_cast<std::int64_t>(square_root(squared)) + 1;
+  if (length > kSpinLimit) {
+    for (std::int64_t& a : spin) a = a * kSpinLimit / length;
+  }
+  return limited_spin(spin);
+}
+
 }  // namespace
 
 bool valid_quaternion(const Quaternion& q) {
@@ -117,6 +163,18 @@ Quaternion turned(const Quaternion& q, const Spin& spin) {
   std::int32_t r[4] = {q[0], q[1], q[2], q[3]};
   turn(w, r);
   return {r[0], r[1], r[2], r[3]};
+}
+
+std::uint64_t half_sine(const Quaternion& from, const Quaternion& to) {
+  return square_root(half_sine_squared(difference(from, to))) + 1;
+}
+
+Spin turn_between(const Quaternion& from, const Quaternion& to) {
+  const Spin rough = shortened(rough_turn_between(from, to));
+  // What it is off by turns about the same axis.
+  std::array<std::int64_t, 3> spin = rough_turn_between(turned(from, rough), to);
+  for (std::size_t i = 0; i < 3; ++i) spin[i] += rough[i];
+  return shortened(spin);
 }
 
 void turn_all(const TurnColumns& columns, std::span<const std::uint8_t> still) {

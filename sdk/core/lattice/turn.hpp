@@ -29,6 +29,12 @@ inline constexpr Quaternion kNoTurn{0, 0, 0, kQuaternionOne};
 /// `q` turned by a valid `spin`. The norm stays within 1e-8 of 1, from an inexact one it moves there.
 [[nodiscard]] Quaternion turned(const Quaternion& q, const Spin& spin);
 
+/// sin(angle / 2) of the turn from one to the other, 2^-30, rounded up or one above.
+[[nodiscard]] std::uint64_t half_sine(const Quaternion& from, const Quaternion& to);
+/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes
+/// more than 2 rad, 2 rad of it.
+[[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
+
 /// Columns of many bodies, each as long as `still`.
 struct TurnColumns {
   std::array<const std::int32_t*, kQuaternionChannels> from;

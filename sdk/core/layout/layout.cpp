@@ -1,5 +1,7 @@
 #include "sdk/core/layout/layout.hpp"
 
+#include <algorithm>
+
 #include "sdk/core/lattice/hash.hpp"
 
 namespace tandem {
@@ -8,16 +10,18 @@ namespace {
 
 Result<void> check_groups(const Layout& layout) {
   const auto refuse = [](std::string reason) { return fail(ErrorCode::kInvalidArgument, std::move(reason)); };
-  for (const std::string& group : layout.groups) {
-    if (group != kPositionGroup && group != kOrientationGroup)
-      return fail(ErrorCode::kUnsupported, "unknown channel group '" + group + "'");
+  bool needs_radii = false;
+  auto name = layout.groups.begin();
+  for (const ChannelGroup& each : kChannelGroups) {
+    const bool listed = name != layout.groups.end() && *name == each.name;
+    if (!listed && each.listed == nullptr) return refuse("channel groups that do not begin with position");
+    if (listed) ++name;
+    needs_radii |= listed && each.needs_radii;
   }
-  if (layout.groups.empty() || layout.groups.size() > 2 || layout.groups.front() != kPositionGroup ||
-      (layout.groups.size() == 2 && layout.groups.back() != kOrientationGroup)) {
-    return refuse("channel groups other than position, or position and orientation");
-  }
-  if (layout.groups.size() == 1 && !layout.radii.empty()) return refuse("radii that no channel group needs");
-  if (layout.groups.size() == 1) return {};
+  if (name != layout.groups.end())
+    return fail(ErrorCode::kUnsupported, "channel group '" + *name + "', unknown, repeated or out of order");
+  if (!needs_radii && !layout.radii.empty()) return refuse("radii that no channel group needs");
+  if (!needs_radii) return {};
   if (layout.radii.size() != layout.type_count) return refuse("orientations need a radius for each type");
   for (const std::int32_t radius : layout.radii) {
     if (radius < 1 || radius > kPositionLimit)
@@ -42,7 +46,15 @@ Result<void> check_layout(const Layout& layout) {
   return check_groups(layout);
 }
 
-Groups groups_of(const Layout& layout) { return {.orientation = layout.groups.size() > 1}; }
+Groups groups_of(const Layout& layout) {
+  Groups groups;
+  for (const ChannelGroup& each : kChannelGroups) {
+    if (each.listed == nullptr) continue;
+    groups.*each.listed =
+        std::find(layout.groups.begin(), layout.groups.end(), each.name) != layout.groups.end();
+  }
+  return groups;
+}
 
 std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
                           std::uint64_t lattice_unit_bits) {

@@ -22,10 +22,6 @@ struct StreamId {
   friend bool operator==(const StreamId&, const StreamId&) = default;
 };
 
-/// Channel groups: p, v and c; the quaternion and the angular velocity.
-inline constexpr const char* kPositionGroup = "position";
-inline constexpr const char* kOrientationGroup = "orientation";
-
 /// Decides how the bytes of a stream are read and how its predicted step is taken. The server chooses it, the
 /// session announces it, and a client builds its timeline from it; it never changes within a generation.
 struct Layout {

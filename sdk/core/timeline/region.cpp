@@ -10,13 +10,6 @@
 namespace tandem {
 namespace {
 
-// What a body's number is expected to be.
-enum class Guess : std::uint8_t {
-  kZero,
-  kBefore,  // that of the body before: slots were filled side by side
-  kHalf,    // half way from the guess before to that number
-};
-
 // Coding one column. Bodies at rest are a kind of their own: most have v = 0 and the same c.
 class ColumnCoder {
  public:
@@ -122,27 +115,19 @@ void code_columns(Columns& columns, TheState& state, CodecColumns codec_columns,
   columns.know_rest(state.rest());
   columns.column(state.reuse(), Guess::kZero, 0, UINT8_MAX);
   columns.column(state.type(), Guess::kZero, 0, most_type);
-  for (std::size_t i = 0; i < kPositionChannels; ++i)
-    columns.column(state.p(i), Guess::kBefore, -kPositionLimit, kPositionLimit);
-  for (std::size_t i = 0; i < kPositionChannels; ++i)
-    columns.column(state.v(i), Guess::kHalf, -kVelocityLimit, kVelocityLimit);
-  for (std::size_t i = 0; i < kPositionChannels; ++i)
-    columns.column(state.c(i), Guess::kHalf, -kVelocityLimit, kVelocityLimit);
-  if (state.groups().orientation) {
-    for (std::size_t i = 0; i < kQuaternionChannels; ++i)
-      columns.column(state.q(i), Guess::kZero, -kQuaternionOne, kQuaternionOne);
-    for (std::size_t i = 0; i < kSpinChannels; ++i)
-      columns.column(state.w(i), Guess::kZero, -kSpinLimit, kSpinLimit);
-  }
+  for_each_group(state.groups(), [&](const ChannelGroup& group) {
+    for_each_column(group, [&](std::size_t column, const ColumnRun& run) {
+      columns.column(state.column(column), run.guess, -run.limit, run.limit);
+    });
+  });
   for (std::size_t at = 0; at < codec_columns.size(); at += state.capacity())
     columns.column(codec_columns.subspan(at, state.capacity()), Guess::kZero, INT8_MIN, INT8_MAX);
 }
 
-// Whether all orientations are some.
-bool are_turns(const State& state) {
-  for (Slot slot = 0; state.groups().orientation && slot < state.capacity(); ++slot) {
-    const BodyState body = state.body(slot);
-    if (state.alive()[slot] != 0 && !(valid_quaternion(body.q) && valid_spin(body.w))) return false;
+// What the limits of columns do not say.
+bool bodies_are_valid(const State& state) {
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.alive()[slot] != 0 && !valid_body(state.body(slot))) return false;
   }
   return true;
 }
@@ -159,14 +144,13 @@ std::span<std::int8_t> numbers(std::span<std::byte> columns) {
 std::size_t region_bytes_bound(const State& state, const Codec& codec) {
   const std::uint32_t capacity = state.capacity();
   // Differences of two numbers have a bit more than the numbers.
-  const std::size_t slot_bits =
-      1 + most_number_bits(1) + most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX) +
-      kPositionChannels *
-          (most_number_bits(2U * kPositionLimit) + 2 * most_number_bits(2U * kVelocityLimit)) +
-      (state.groups().orientation ? kQuaternionChannels * most_number_bits(2U * kQuaternionOne) +
-                                        kSpinChannels * most_number_bits(2U * kSpinLimit)
-                                  : 0) +
-      codec.columns().size() / capacity * most_number_bits(UINT8_MAX);
+  std::size_t slot_bits = 1 + most_number_bits(1) + most_number_bits(UINT8_MAX) +
+                          most_number_bits(UINT16_MAX) +
+                          codec.columns().size() / capacity * most_number_bits(UINT8_MAX);
+  for_each_group(state.groups(), [&](const ChannelGroup& group) {
+    for (const ColumnRun& run : group.runs)
+      slot_bits += run.columns * most_number_bits(2 * static_cast<std::uint32_t>(run.limit));
+  });
   const std::size_t bits = capacity * slot_bits + codec.models_bits_bound();
   constexpr std::size_t kFixedBytes = 256;  // region, hash, shifts; what models lose before they have learnt
   return kFixedBytes + bits / 8 + bits / 256;
@@ -194,7 +178,8 @@ Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId typ
   RegionReader region(state, in.get_bytes(in.remaining()));
   std::vector<std::byte> columns(codec.columns().size());
   code_columns(region, state, numbers(std::span(columns)), type_count - 1);
-  if (!region.good() || !are_turns(state)) return fail(ErrorCode::kMalformed, "snapshot value out of range");
+  if (!region.good() || !bodies_are_valid(state))
+    return fail(ErrorCode::kMalformed, "snapshot value out of range");
   if (auto loaded = codec.load(columns, region.coder()); !loaded)
     return tl::unexpected<Error>(loaded.error());
   return hash;

@@ -213,6 +213,14 @@ class Client {
     return numbered(tandem_send_bytes(handle_, bytes.data(), bytes.size(), &number), number);
   }
 
+  /// EXPERIMENTAL. Of a session that replays a recording: goes on at so many seconds after its first message,
+  /// for everybody, under another epoch; TANDEM_EVENT_NEW_EPOCH tells that it does. Refused beyond the
+  /// recording, in a session that is no replay, and less than a second after another.
+  [[nodiscard]] Result<std::uint64_t> send_seek(double seconds) {
+    std::uint64_t number = 0;
+    return numbered(tandem_send_seek(handle_, seconds, &number), number);
+  }
+
   /// The bodies as they should be drawn, straight into the application's memory. Errors: kNotReady (nothing
   /// to draw yet), kCapacity (the session has more slots), kInvalidArgument.
   Result<tandem_frame> sample(const Columns& columns, const SampleOptions& options = {}) {

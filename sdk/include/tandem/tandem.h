@@ -555,6 +555,18 @@ TANDEM_API tandem_result tandem_browser_list(tandem_browser browser, tandem_sess
 TANDEM_API tandem_result tandem_browser_close(tandem_browser browser) TANDEM_NOEXCEPT;
 /** @} */
 
+/** @name Replays
+ * @{ */
+/** EXPERIMENTAL. An input, as those of "Acting" and with their results: the replay of a recording goes on at
+ * another time, for everybody, under another epoch. TANDEM_EVENT_NEW_EPOCH tells that it does; as that ends
+ * the epoch of the input, its own event may be TANDEM_EVENT_INPUT_UNKNOWN. It is refused with reason 3 beyond
+ * the recording, or where the session is no replay; with 4 less than a second after another seek.
+ * @param seconds  since the first message of the recording, 0 up to its length
+ * @param number   the input's; may be null */
+TANDEM_API tandem_result tandem_send_seek(tandem_client client, double seconds,
+                                          uint64_t* number) TANDEM_NOEXCEPT;
+/** @} */
+
 #ifdef __cplusplus
 }
 #endif

@@ -175,6 +175,11 @@ class Connection {
         unlocked([&] { return tandem_send_push(client_, centre.data(), radius, velocity.data(), &number); }));
     return number;
   }
+  [[nodiscard]] std::uint64_t send_seek(double seconds) const {
+    std::uint64_t number = 0;
+    check(unlocked([&] { return tandem_send_seek(client_, seconds, &number); }));
+    return number;
+  }
   [[nodiscard]] std::uint64_t send_bytes(const py::bytes& bytes) const {
     const auto view = static_cast<std::string_view>(bytes);
     std::uint64_t number = 0;
@@ -307,6 +312,7 @@ PYBIND11_MODULE(_client, m) {
       .def("next_event", &Connection::next_event)
       .def("send_gravity", &Connection::send_gravity)
       .def("send_push", &Connection::send_push)
+      .def("send_seek", &Connection::send_seek)
       .def("send_bytes", &Connection::send_bytes)
       .def("scene", &Connection::scene)
       .def("geometry", &Connection::geometry)

@@ -210,6 +210,12 @@ class Client:
         the input's number."""
         return self._connection.send_push(centre, radius, velocity)
 
+    def send_seek(self, seconds: float) -> int:
+        """EXPERIMENTAL. Of a session that replays a recording: goes on at so many seconds after its first message, 0 up
+        to its length, for everybody, under another epoch; EventKind.NEW_EPOCH tells that it does. Refused beyond the
+        recording, in a session that is no replay, and less than a second after another. Returns the input's number."""
+        return self._connection.send_seek(seconds)
+
     def send_bytes(self, data: Union[bytes, bytearray, memoryview]) -> int:
         """At most 1,024 bytes for the server's simulation, which knows what they mean. Returns the input's
         number."""

@@ -2,6 +2,7 @@
 // When the next frame is due.
 
 #include <cstdint>
+#include <string>
 
 namespace tandem::host {
 
@@ -29,6 +30,23 @@ class Pacing {
   std::int64_t last_ns_ = 0;
   std::int64_t deadline_ns_ = 0;
   std::int64_t suspended_from_ns_ = 0;
+};
+
+/// Tells when frames take longer than their period, second by second, and when that is over.
+class Overrun {
+ public:
+  static constexpr std::int64_t kTellNs = 10'000'000'000;  ///< between two lines that tell that they do
+
+  explicit Overrun(double frame_rate_hz) : rate_hz_(frame_rate_hz) {}
+  /// After a frame that took so long, in the step of the simulation and in all. A line for a log, mostly
+  /// empty.
+  [[nodiscard]] std::string frame_took(std::int64_t step_ns, std::int64_t frame_ns, std::int64_t now_ns);
+
+ private:
+  double rate_hz_;
+  double step_ns_ = 0, frame_ns_ = 0, frames_ = 0;  // of this second, sums
+  std::int64_t since_ns_ = INT64_MIN, told_ns_ = INT64_MIN / 2;
+  bool told_ = false;  // and not yet that it is over
 };
 
 }  // namespace tandem::host

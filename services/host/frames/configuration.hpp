@@ -2,6 +2,7 @@
 // What a host is told at its start.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,9 +39,11 @@ struct ServiceConfig {
 struct HostConfig : ServiceConfig {
   Frame start_frame = 0;
   /// 1 to 8 ways of telling all bodies, of one lattice and one lead, 0 or 1; layout.capacity is the
-  /// simulation's. Several have names, each its own. Clients choose (sdk/client/session/stream_choice.hpp); one that
-  /// chooses nothing plays the first.
+  /// simulation's. Several have names, each its own. Clients choose (sdk/client/session/stream_choice.hpp);
+  /// one that chooses nothing plays the first.
   std::vector<StreamConfig> streams;
+  /// Largest |coordinate| that clients are told of, scene units; the lattice's own limit is at least that.
+  double extent = std::numeric_limits<double>::infinity();
 
   std::string scene;
   std::string scene_description;

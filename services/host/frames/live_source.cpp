@@ -40,7 +40,7 @@ Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
   const Lattice& lattice = config.streams.front().lattice;
   const auto drive = to_drive(lattice, simulation.gravity(), simulation.damping_per_s());
   if (!drive) return tl::unexpected(drive.error());
-  auto mirror = make_mirror(config.streams, simulation.bodies());
+  auto mirror = make_mirror(config.streams, simulation.bodies(), config.extent);
   if (!mirror) return tl::unexpected(mirror.error());
   std::unique_ptr<LiveSource> source(new LiveSource(config, simulation, std::move(*mirror), *drive));
   for (std::uint32_t id = 0; id < source->lanes_.size(); ++id) {

@@ -23,8 +23,10 @@ constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
 
 }  // namespace
 
-Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups)
+Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups,
+               double extent)
     : lattice_(lattice),
+      extent_(std::min(extent, kPositionLimit * lattice.unit)),
       type_count_(type_count),
       target_(capacity, groups),
       off_(capacity),
@@ -62,7 +64,7 @@ void Mirror::quantise(const engine::Bodies& bodies) {
   std::ranges::fill(off_, 0);
   const double position = lattice_.position_scale();
   const double velocity = lattice_.velocity_scale();
-  const auto world = static_cast<float>(kPositionLimit * lattice_.unit);
+  const auto world = static_cast<float>(extent_);
   constexpr float kFinite = std::numeric_limits<float>::max();
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     quantise_column(bodies.position[i], position, kPositionLimit, world, target_.p(i), off_);
@@ -108,7 +110,6 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
 // Says of a body that cannot be told what is wrong with it.
 void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
   ++mishaps_.removed;
-  const double world = kPositionLimit * lattice_.unit;
   constexpr std::string_view kAxes = "xyz";
   std::string why;
   if (bodies.type[slot] >= type_count_) {
@@ -124,8 +125,8 @@ void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
     if (!std::isfinite(v)) why = fmt::format("its velocity along {} is not a number", kAxes[i]);
     if (std::isnan(p)) {
       why = fmt::format("its {} is not a number", kAxes[i]);
-    } else if (std::abs(p) > world) {
-      why = fmt::format("its {} is {:.4g}, beyond {:.4g}", kAxes[i], p, world);
+    } else if (std::abs(p) > extent_) {
+      why = fmt::format("its {} is {:.4g}, beyond {:.4g}", kAxes[i], p, extent_);
     }
   }
   last_removed_ = fmt::format("slot {} ({})", slot, why);
@@ -194,7 +195,7 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
                           .reuse = 0,
                           .type = 0,
                           .body = target_.body(slot),
-                          .groups = moves_all(target_.groups())});
+                          .groups = bits_of(target_.groups())});
   } else if (shown && target_.type()[slot] != type) {
     target_.type()[slot] = type;
     lifecycle_.push_back(

@@ -3,6 +3,7 @@
 // the slots.
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,15 +22,19 @@ namespace tandem::host {
 void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
                      std::span<std::int32_t> out, std::span<std::int32_t> off);
 
-/// Follows a simulation. A body is shown to clients while it is alive, finite, on the lattice and of a listed
-/// type; one that stops being so is despawned and stays away until the engine despawns, spawns or teleports
-/// it. Velocities saturate, and what turns by more than kMaxTurn in a step is slowed. With orientations they
-/// must be some too: a quaternion that is not finite or far from norm 1 takes a body off. Allocates nothing
-/// after construction but the text of last_removed(). Not thread-safe.
+/// Follows a simulation. A body is shown to clients while it is alive, finite, within extent and lattice and
+/// of a listed type; one that stops being so is despawned and stays away until the engine despawns, spawns or
+/// teleports it. Velocities saturate, and what turns by more than kMaxTurn in a step is slowed. With
+/// orientations they must be some too: a quaternion that is not finite or far from norm 1 takes a body off.
+/// Allocates nothing after construction but the text of last_removed(). Not thread-safe.
 class Mirror {
  public:
-  /// `type_count`: types the session lists, 1 or more. `groups`: those of all its streams together.
-  Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {});
+  static constexpr double kNoExtent = std::numeric_limits<double>::infinity();
+
+  /// `type_count`: types the session lists, 1 or more. `groups`: those of all its streams together. `extent`:
+  /// beyond it, scene units, or beyond the lattice, whichever is nearer, a body is not shown.
+  Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {},
+         double extent = kNoExtent);
 
   /// That it can take these. Errors: kInvalidArgument (columns not as long as the capacity).
   [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
@@ -57,6 +62,7 @@ class Mirror {
   void spawn(Slot slot, TypeId type);
 
   Lattice lattice_;
+  double extent_;  // scene units
   TypeId type_count_;
   State target_;                           // p and v are written whole, the other columns by records
   std::vector<std::int32_t> off_;          // 1: not finite or off the lattice, this frame

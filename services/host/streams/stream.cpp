@@ -171,20 +171,21 @@ Result<void> choose_gains(StreamConfig& config) {
   return {};
 }
 
-Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies) {
+Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies,
+                           double extent) {
   const StreamConfig& first = streams.front();
   Groups groups;
   for (const StreamConfig& stream : streams) {
     if (stream.lattice != first.lattice || stream.layout.capacity != first.layout.capacity ||
         stream.layout.type_count != first.layout.type_count)
       return fail(ErrorCode::kInvalidArgument, "streams of another lattice, capacity or number of types");
-    groups.orientation = groups.orientation || groups_of(stream.layout).orientation;
+    groups.orientation |= groups_of(stream.layout).orientation;
   }
   if (groups.orientation && bodies.orientation[0].empty()) {
     return fail(ErrorCode::kInvalidArgument,
                 "the stream has orientations, which the simulation's bodies do not have");
   }
-  Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups);
+  Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups, extent);
   if (auto good = mirror.check(bodies); !good) return tl::unexpected(good.error());
   mirror.start(bodies);
   return mirror;
@@ -219,7 +220,7 @@ std::span<const LifecycleRecord> Stream::Impl::records_of(const Mirror& mirror) 
   const Groups groups = groups_of(config.layout);
   if (mirror.target().groups() == groups) return mirror.lifecycle();
   records.assign(mirror.lifecycle().begin(), mirror.lifecycle().end());
-  for (LifecycleRecord& record : records) record.groups &= moves_all(groups);
+  for (LifecycleRecord& record : records) record.groups &= bits_of(groups);
   return records;
 }
 

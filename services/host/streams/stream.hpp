@@ -43,10 +43,11 @@ struct StreamConfig {
 /// Errors: as Stream::create() for codec and predictor.
 [[nodiscard]] Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams);
 
-/// The bodies as all of `streams`, at least one, will show them; not stepped yet. Errors: kInvalidArgument
-/// (another lattice, capacity or number of types than the first stream's; body columns not `capacity` long;
-/// orientations that the bodies do not have).
-[[nodiscard]] Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies);
+/// The bodies as all of `streams`, at least one, will show them; not stepped yet. `extent`: as a Mirror's.
+/// Errors: kInvalidArgument (another lattice, capacity or number of types than the first stream's; body
+/// columns not `capacity` long; orientations that the bodies do not have).
+[[nodiscard]] Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies,
+                                         double extent = Mirror::kNoExtent);
 
 /// Where a stream begins: what `mirror` shows at `frame`.
 struct StreamStart {

@@ -253,8 +253,8 @@ void add_quality_options(commandline::Command command, sessions::SessionChoice& 
             double length = 0;
             const char* const end = text.data() + text.size();
             const auto [rest, failure] = std::from_chars(text.data(), end, length);
-            if (failure != std::errc{} || rest != end || !(length > 0 && length <= 1e6))
-              commandline::refuse("--threshold", "a positive length, or auto");
+            if (failure != std::errc{} || rest != end || !(length >= 1e-9 && length <= 1e9))
+              commandline::refuse("--threshold", "a length from 1e-9 to 1e9 scene units, or auto");
             choice.threshold_m = length;
           },
           "Error threshold, scene units, or auto: chosen at run time (default: the scene's)")
@@ -286,10 +286,13 @@ void add_bandwidth(commandline::Command bench, Run& run) {
   command.add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
       .separated_by(',')
       .one_of(options->codecs);
+  const std::string_view basic = basic_predictor().name;
   command
-      .add_option("--predictor", options->choice.predictor,
-                  "Predicted step of `tracker`: ballistic, field, contact, or auto: field for spheres, else "
-                  "ballistic; the paper's codecs have ballistic")
+      .add_option(
+          "--predictor", options->choice.predictor,
+          fmt::format("Predicted step of `tracker`: {}, or auto: {} for spheres, else {}; the paper's "
+                      "codecs have {}",
+                      fmt::join(predictor_names(), ", "), predictors().front().name, basic, basic))
       .one_of(predictor_choices())
       .show_default();
   add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");

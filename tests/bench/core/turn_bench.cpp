@@ -2,7 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "sdk/core/predict/turns.hpp"
+#include "sdk/core/lattice/state.hpp"
 #include "tests/property/random.hpp"
 
 namespace tandem {
@@ -23,7 +23,7 @@ void turn(benchmark::State& bench) {
     state.rest()[slot] = static_cast<std::uint8_t>(resting != 0 && slot % resting == 0);
   }
   for (auto _ : bench) {
-    turn_bodies(state, state);
+    step_groups(state, state);
     benchmark::ClobberMemory();
   }
   bench.SetItemsProcessed(static_cast<std::int64_t>(bench.iterations()) * kBodies);

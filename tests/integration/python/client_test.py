@@ -153,6 +153,10 @@ class Playing(unittest.TestCase):
         event_of(self.client, EventKind.INPUT_ACTED, pushed)
         refused = event_of(self.client, EventKind.INPUT_REFUSED, self.client.send_bytes(b"what is this?"))
         self.assertTrue(refused.reason and refused.text, "this scene takes no bytes")
+        sought = event_of(self.client, EventKind.INPUT_REFUSED, self.client.send_seek(1.5))
+        self.assertEqual(sought.reason, 3, "this session is no replay")
+        with self.refused(Result.INVALID_ARGUMENT):
+            self.client.send_seek(float("nan"))
         for what in ((float("nan"), 0, 0), (float("inf"), 0, 0)):
             with self.refused(Result.INVALID_ARGUMENT):
                 self.client.send_gravity(what)

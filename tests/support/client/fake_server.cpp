@@ -73,7 +73,7 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
     LifecycleRecord record;
     record.kind = LifecycleKind::kTeleport;
     record.slot = slot;
-    record.groups = moves_all(target_.groups());
+    record.groups = bits_of(target_.groups());
     record.body = {{900'000, 900'000, 900'000}, {}};
     target_.set_body(slot, record.body);
     records.push_back(record);

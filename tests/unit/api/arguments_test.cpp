@@ -46,6 +46,7 @@ std::vector<tandem_result> call_all(tandem_client client) {
           tandem_send_gravity(client, vector.data(), nullptr),
           tandem_send_push(client, vector.data(), 1, vector.data(), nullptr),
           tandem_send_bytes(client, nullptr, 0, nullptr),
+          tandem_send_seek(client, 0, nullptr),
           tandem_get_scene(client, &scene),
           tandem_get_geometry(client, nullptr, 0, &count),
           tandem_get_type(client, 0, &type),
@@ -124,6 +125,8 @@ TEST_F(Arguments, NumbersThatAreNoneAreRefused) {
   EXPECT_EQ(tandem_send_gravity(client, far.data(), nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_send_push(client, good.data(), kNan, good.data(), nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_send_push(client, good.data(), 1, bad.data(), nullptr), TANDEM_INVALID_ARGUMENT);
+  EXPECT_EQ(tandem_send_seek(client, kNan, nullptr), TANDEM_INVALID_ARGUMENT);
+  EXPECT_EQ(tandem_send_seek(client, kInfinity, nullptr), TANDEM_INVALID_ARGUMENT);
   const std::array<std::byte, 1025> bytes{};
   EXPECT_EQ(tandem_send_bytes(client, bytes.data(), bytes.size(), nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_send_bytes(client, bytes.data(), bytes.size() - 1, nullptr), TANDEM_OK);

@@ -81,6 +81,17 @@ TEST_F(Events, AnInputThatIsRefusedTellsWhy) {
   EXPECT_NE(std::string(events[0].text), "");
 }
 
+TEST_F(Events, ASeekIsRefusedWhereNothingIsReplayed) {
+  take();
+  std::uint64_t number = 0;
+  ASSERT_EQ(tandem_send_seek(client, 2.5, &number), TANDEM_OK);
+  run(1);
+  const auto events = take();
+  ASSERT_EQ(kinds(events), std::vector<int>{TANDEM_EVENT_INPUT_REFUSED});
+  EXPECT_EQ(events[0].number, number);
+  EXPECT_EQ(events[0].reason, 3U);
+}
+
 TEST_F(Events, TheEndOfASessionAndAnotherEpochAreTold) {
   take();
   playground.stop_server();

@@ -51,6 +51,7 @@ TEST_F(ClientApi, WithoutAServerItSearchesAndSaysNoToEverything) {
     EXPECT_EQ(client->send_gravity({0, -9, 0}).error().code, ErrorCode::kNotReady);
     EXPECT_FALSE(client->send_push({}, 1, {}).has_value());
     EXPECT_FALSE(client->send_bytes({}).has_value());
+    EXPECT_EQ(client->send_seek(1).error().code, ErrorCode::kNotReady);
     Sample sample;
     EXPECT_FALSE(client->sample(sample));
     EXPECT_TRUE(client->types().empty());

@@ -112,6 +112,19 @@ TEST_F(SampleColumnsTest, TheBodiesThatAreThereAreCounted) {
   EXPECT_NEAR(sample.since_delta_s, 0.02, 1e-9);
 }
 
+TEST_F(SampleColumnsTest, TheFirstInterpolatedSampleHasTheVelocitiesOfItsFrame) {
+  join();
+  core->start_sampling();
+  take({.mode = SampleMode::kInterpolate});
+  const State& state = core->timeline()->state(core->timeline()->applied());
+  const double metres_per_s = server.session.lattice_unit / 64 * server.session.frame_rate_hz;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_NE(state.v(axis)[5], 0);
+    EXPECT_NEAR(sample.velocities[15 + axis], state.v(axis)[5] * metres_per_s, 1e-3);
+    EXPECT_NEAR(sample.positions[15 + axis], agreed(5, axis), 1e-5);
+  }
+}
+
 TEST_F(SampleColumnsTest, OfAMomentLongAgoTheOldestFrameIsGiven) {
   join();
   core->start_sampling();

@@ -93,11 +93,11 @@ TEST(Lifecycle, ATeleportOfGroupsThatTheStreamDoesNotListIsRefused) {
   Records records;
   for (const Groups& groups : {kPositions, kBoth}) {
     for (unsigned mask = 0; mask < 256; ++mask) {
-      Bytes bytes = written({teleport(0, moves_all(groups))}, groups);
+      Bytes bytes = written({teleport(0, bits_of(groups))}, groups);
       bytes[1] = static_cast<std::byte>(mask);
       if (mask == 1) bytes.resize(2 + 24);
       if (mask == 2) bytes.resize(2 + 28);
-      const bool listed = mask != 0 && mask <= moves_all(groups);
+      const bool listed = mask != 0 && mask <= bits_of(groups);
       EXPECT_EQ(read_lifecycle(bytes, groups, records).has_value(), listed) << "groups " << mask;
     }
   }

@@ -248,5 +248,29 @@ TEST(Announcement, TheCostOfAClientIsMeasuredBeforeThereIsABody) {
   }
 }
 
+// Each frame takes 50 ms.
+std::int64_t slow_clock() {
+  static std::int64_t now_ns = 0;
+  return now_ns += 50 * kMillisecond;
+}
+
+TEST(Host, ASimulationTooSlowForItsRateIsLogged) {
+  const auto notices = [](std::int64_t (*clock_ns)(), bool free_rate) {
+    HostConfig config = test_config();
+    config.clock_ns = clock_ns;
+    config.free_rate = free_rate;
+    Bench bench(config);
+    bench.poll();
+    bench.run_to(90);
+    std::vector<std::string> about;
+    for (std::string& line : bench.host->take_notices())
+      if (line.starts_with("a frame takes")) about.push_back(std::move(line));
+    return about;
+  };
+  EXPECT_EQ(notices(slow_clock, false).size(), 1U) << "90 frames are three seconds";
+  EXPECT_EQ(notices(slow_clock, true).size(), 0U) << "no rate that it should keep";
+  EXPECT_EQ(notices(even_clock, false).size(), 0U);
+}
+
 }  // namespace
 }  // namespace tandem::host

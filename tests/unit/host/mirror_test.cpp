@@ -75,6 +75,19 @@ TEST_F(MirrorTest, ABodyThatLeavesTheLatticeIsDespawned) {
   EXPECT_EQ(mirror.mishaps().removed, 1U);
 }
 
+TEST_F(MirrorTest, ABodyBeyondTheExtentIsDespawnedAlthoughTheLatticeGoesOn) {
+  Mirror near{lattice, 4, 3, {}, 5};
+  near.start(simulation.bodies());
+  simulation.position[2][3] = -5;
+  near.update(simulation.bodies(), {});
+  EXPECT_TRUE(near.lifecycle().empty());
+  simulation.position[2][3] = -5.001F;
+  near.update(simulation.bodies(), {});
+  EXPECT_EQ(near.target().alive()[3], 0);
+  EXPECT_EQ(near.mishaps().removed, 1U);
+  EXPECT_EQ(near.last_removed(), "slot 3 (its z is -5.001, beyond 5)");
+}
+
 TEST_F(MirrorTest, NanAndInfinityDespawnTheBodyAndTouchNoOther) {
   simulation.position[0][0] = kNan;
   simulation.velocity[1][1] = kInfinity;

@@ -92,6 +92,29 @@ TEST(WindowFor, CoversTheRoundTripBetweenTwoAndTheCeiling) {
   EXPECT_EQ(window_for(5 * kSecond, 0, 24), 24U);
 }
 
+TEST(Overrun, TellsThatFramesTakeTooLongEveryTenSecondsAndThatItIsOver) {
+  Overrun overrun(30);
+  std::int64_t now = 0;
+  const auto seconds = [&](int count, std::int64_t frame_ms) {
+    std::vector<std::string> lines;
+    for (const std::int64_t end = now + count * kSecond; now < end; now += 40 * kMillisecond) {
+      const std::string line =
+          overrun.frame_took((frame_ms - 5) * kMillisecond, frame_ms * kMillisecond, now);
+      if (!line.empty()) lines.push_back(line);
+    }
+    return lines;
+  };
+  EXPECT_EQ(seconds(20, 33).size(), 0U);
+  const std::vector<std::string> slow = seconds(25, 41);
+  ASSERT_EQ(slow.size(), 3U);
+  EXPECT_EQ(slow[1],
+            "a frame takes 41 ms of 33.3 ms, the simulation 36 ms of them: the session runs at 24.4 of 30 "
+            "frames/s");
+  const std::vector<std::string> over = seconds(25, 20);
+  ASSERT_EQ(over.size(), 1U);
+  EXPECT_EQ(over[0], "a frame takes 20 ms of 33.3 ms again");
+}
+
 TEST(Pacing, DeadlinesAreAbsoluteSoThatLatenessDoesNotAddUp) {
   Pacing pacing(50, false);
   pacing.start(0);

@@ -103,6 +103,14 @@ TEST_F(ServerApi, StreamsOfDifferentPredictorsAreServedAtTheRateThatIsWished) {
   EXPECT_GT(started->status().frame, 120U) << "100 a second is the simulation's own rate";
 }
 
+TEST_F(ServerApi, ASceneThatClientsCouldNotReadIsRefusedWithItsLine) {
+  options.scene_description = "gravity { y: -9.81 }\nboxes { centre { x: 1 }\n";
+  auto server = Server::start(options, standing);
+  ASSERT_FALSE(server.has_value());
+  EXPECT_EQ(server.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(server.error().message, "the scene's text, line 3: a message does not end");
+}
+
 TEST_F(ServerApi, ColumnsThatAreNotOfTheCapacityAreRefused) {
   standing.zeros.resize(1);
   EXPECT_EQ(refusal(), ErrorCode::kInvalidArgument);
@@ -119,6 +127,18 @@ TEST_F(ServerApi, ItStepsAtTheSimulationsRateAndRefusesWhatTheSimulationDoes) {
   const auto refused = server.inject({.kind = 1, .values = {0, -9, 0}});
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(ServerApi, ABodyBeyondTheExtentDisappearsAndTheLogSaysSo) {
+  std::string told;
+  options.session = "extent";
+  options.extent = 5;
+  options.log = [&](std::string_view line) { told += line; };
+  standing.on_step = [&] { standing.zeros[1] = 18.8F; };
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  for (int i = 0; i < 1000 && told.empty(); ++i) ASSERT_TRUE(server->poll());
+  EXPECT_NE(told.find("slot 1 (its x is 18.8, beyond 5)"), std::string::npos) << told;
 }
 
 TEST_F(ServerApi, ColumnsThatShrinkEndTheSessionAndSayWhy) {

@@ -17,7 +17,7 @@ class AbsoluteCoding {
   static constexpr bool kEveryBody = EveryBody;
 
   AbsoluteCoding(std::uint32_t capacity, const Groups& groups)
-      : turns_(groups.orientation), body_bytes_(groups.orientation ? 52 : 24) {
+      : groups_(bits_of(groups)), body_bytes_(body_bytes(groups_)) {
     sections_.reserve(block_count(capacity));
   }
   [[nodiscard]] unsigned most_bits() const { return static_cast<unsigned>(8 * body_bytes_); }
@@ -31,12 +31,8 @@ class AbsoluteCoding {
     ByteWriter out(to);
     for (const Candidate& candidate : chosen) {
       const BodyState body = clamped(target.body(candidate.slot));
-      for (const std::int32_t value : body.p) out.put(value);
-      for (const std::int32_t value : body.v) out.put(value);
-      if (!turns_) continue;
-      TANDEM_ASSERT(valid_quaternion(body.q) && valid_spin(body.w));
-      for (const std::int32_t value : body.q) out.put(value);
-      for (const std::int32_t value : body.w) out.put(value);
+      TANDEM_ASSERT(valid_body(body));
+      put_body(groups_, body, out);
     }
     sections_.push_back({to, first});
   }
@@ -45,9 +41,8 @@ class AbsoluteCoding {
       return fail(ErrorCode::kMalformed, "corrections of wrong length");
     for (std::size_t i = 0; i < slots.size(); ++i) {
       const BodyState body = read(values.subspan(i * body_bytes_, body_bytes_));
-      if (body != clamped(body)) return fail(ErrorCode::kMalformed, "correction beyond the lattice");
-      if (!valid_quaternion(body.q) || !valid_spin(body.w))
-        return fail(ErrorCode::kMalformed, "correction that is no orientation or turns too fast");
+      if (!valid_body(body))
+        return fail(ErrorCode::kMalformed, "correction beyond the lattice, or of no orientation");
     }
     sections_.push_back({values, first});
     return {};
@@ -73,15 +68,11 @@ class AbsoluteCoding {
   [[nodiscard]] BodyState read(std::span<const std::byte> bytes) const {
     ByteReader in(bytes);
     BodyState body;
-    for (std::int32_t& value : body.p) value = in.get<std::int32_t>();
-    for (std::int32_t& value : body.v) value = in.get<std::int32_t>();
-    if (!turns_) return body;
-    for (std::int32_t& value : body.q) value = in.get<std::int32_t>();
-    for (std::int32_t& value : body.w) value = in.get<std::int32_t>();
+    get_body(groups_, in, body);
     return body;
   }
 
-  bool turns_;
+  unsigned groups_;  // bits
   std::size_t body_bytes_;
   std::vector<Section> sections_;
 };

@@ -8,7 +8,6 @@
 
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/rest.hpp"
-#include "sdk/core/predict/turns.hpp"
 
 namespace tandem {
 namespace {
@@ -103,7 +102,7 @@ void Ballistic::step(const State& from, State& to, const StepInput& input) {
   }
   keep_at_rest(from, to, input.drive);
   step_all(from, to, input);
-  turn_bodies(from, to);
+  step_groups(from, to);
 }
 
 void Ballistic::step_slots(const State& from, State& to, const StepInput& input,
@@ -132,7 +131,7 @@ void Ballistic::step_slots(const State& from, State& to, const StepInput& input,
       c_to[s] = m.c;
     }
   }
-  turn_bodies(from, to, slots);
+  step_groups(from, to, slots);
 }
 
 }  // namespace tandem

@@ -11,7 +11,6 @@
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/move.hpp"
 #include "sdk/core/predict/rest.hpp"
-#include "sdk/core/predict/turns.hpp"
 
 namespace tandem {
 namespace {
@@ -263,7 +262,7 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
       move_bodies(move, bodies_, forces_, place_, from, to);
     }
   }
-  turn_bodies(from, to);
+  step_groups(from, to);
 }
 
 void Contact::step_slots(const State& from, State& to, const StepInput& input,

@@ -42,8 +42,8 @@ struct ServerOptions {
   /// Largest distance between where the simulation and where the clients have a body, or a point of its
   /// surface where bodies turn; scene units. The price of a frame grows as it shrinks.
   double threshold = 0.01;
-  /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears until it is back. At
-  /// most about a million thresholds.
+  /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears, which the log tells,
+  /// until the simulation despawns, spawns or teleports it (engine::Event). At most about a million thresholds.
   double extent = 100;
   /// Payload that the server keeps to by itself, Mbit/s (2^20 bits), with errors of up to `max_error`; 0:
   /// `threshold` alone decides.
@@ -67,7 +67,8 @@ struct ServerOptions {
   /// By what Simulation::bodies() calls type; at least one, at most 65,535.
   std::vector<ServedType> types{ServedType{}};
   std::string scene = "";  ///< a name to show, at most 64 bytes
-  /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
+  /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds. What
+  /// clients could not read is refused, with its line.
   std::string scene_description = "";
   std::uint32_t wait_for = 0;        ///< participants that must play before frame 1
   std::uint32_t client_limit = 256;  ///< clients at once

@@ -1,10 +1,10 @@
-#include "sdk/client/session/text_message.hpp"
+#include "sdk/transport/text_message.hpp"
 
 #include <algorithm>
 #include <string>
 #include <utility>
 
-namespace tandem::client {
+namespace tandem::transport {
 namespace {
 
 constexpr std::size_t kMostBytes = 1U << 20U;
@@ -162,4 +162,4 @@ std::string_view scalar(const TextMessage* message, std::string_view name) {
   return field != nullptr && !field->is_message ? field->scalar : std::string_view();
 }
 
-}  // namespace tandem::client
+}  // namespace tandem::transport

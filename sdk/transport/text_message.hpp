@@ -8,7 +8,7 @@
 
 #include "tandem/result.hpp"
 
-namespace tandem::client {
+namespace tandem::transport {
 
 /// One value of a field: a message, or what stands in the text. Points into the text.
 struct TextField {
@@ -28,4 +28,4 @@ using TextMessage = std::vector<TextField>;
 [[nodiscard]] const TextMessage* child(const TextMessage* message, std::string_view name);
 [[nodiscard]] std::string_view scalar(const TextMessage* message, std::string_view name);
 
-}  // namespace tandem::client
+}  // namespace tandem::transport
