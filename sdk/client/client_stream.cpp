@@ -51,7 +51,8 @@ void ClientCore::take_deltas(Now now) {
     const std::int64_t server_time_ns = received.message.server_time_ns;
     const bool last_part = received.message.part + 1 == received.message.parts;
     const Outcome outcome = to->assembly.add(std::move(received.message));
-    statistics_.queue_high_water = std::max(statistics_.queue_high_water, to->assembly.high_water());
+    statistics_.queue_high_water =
+        std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->assembly.high_water()));
     if (outcome == Outcome::kStored && last_part && is_played)
       epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
     if (outcome == Outcome::kStored || outcome == Outcome::kIgnored) continue;

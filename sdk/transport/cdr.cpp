@@ -237,13 +237,16 @@ void fields(Visitor& visit, M& m) {
   numbers(visit, m.missing);
 }
 
+template <class Visitor>
+auto figure(Visitor& visit) {
+  return [&visit](const char* /*name*/, auto& value) { visit.primitive(value); };
+}
+
 template <class Visitor, Is<ServerStatusMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.frame, m.uptime_s, m.frame_rate_hz, m.mbit_per_s, m.raw_mbit_per_s,
-             m.frame_ms_p50, m.frame_ms_p99, m.corrected_per_frame, m.threshold, m.bodies, m.at_rest,
-             m.participants, m.observers, m.window, m.queue_high_water, m.delta_bytes, m.reply_bytes,
-             m.input_bytes, m.snapshot_bytes, m.stalls, m.suspended_ms, m.refused_inputs, m.refused_messages,
-             m.snapshots, m.stream);
+  primitives(visit, m.epoch, m.frame);
+  each_server_figure(figure(visit), m);
+  primitives(visit, m.stream);
   visit.text(m.session);
   visit.text(m.codec);
   visit.text(m.predictor);
@@ -252,8 +255,8 @@ void fields(Visitor& visit, M& m) {
 template <class Visitor, Is<ClientStatusMessage> M>
 void fields(Visitor& visit, M& m) {
   primitives(visit, m.client, m.epoch, m.applied, m.stream.id, m.stream.generation, m.role, m.phase,
-             m.too_slow, m.queue_high_water, m.lag_ms, m.client_ms_p50, m.mbit_per_s, m.frames_applied,
-             m.resyncs, m.hash_mismatches, m.inputs_sent, m.inputs_refused);
+             m.too_slow, m.queue_high_water, m.lag_ms);
+  each_reported_figure(figure(visit), m);
   visit.text(m.session);
 }
 

@@ -49,6 +49,23 @@ JsonWriter& JsonWriter::name(std::string_view name) {
   return *this;
 }
 
+// Figures are named by letters, digits and underscores.
+JsonWriter& JsonWriter::figure_name(const char* name) {
+  separate();
+  out_ += '"';
+  for (; *name != 0; ++name) {
+    const bool word = *name == '_';
+    if (word) ++name;
+    out_ += word && *name >= 'a' ? static_cast<char>(*name - 'a' + 'A') : *name;
+  }
+  out_ += "\":";
+  first_ = true;
+  return *this;
+}
+
+void JsonWriter::figure(const char* name, double number) { figure_name(name).value(number); }
+void JsonWriter::figure(const char* name, std::uint64_t number) { figure_name(name).value(number); }
+
 JsonWriter& JsonWriter::value(std::string_view text) {
   separate();
   out_ += '"';

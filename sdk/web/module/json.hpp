@@ -32,8 +32,12 @@ class JsonWriter {
   JsonWriter& member(std::string_view member_name, const T& content) {
     return name(member_name).value(content);
   }
+  /// A member that a list of figures names, in JavaScript's spelling: `frame_ms_p50` as `frameMsP50`.
+  void figure(const char* name, double number);
+  void figure(const char* name, std::uint64_t number);
 
  private:
+  JsonWriter& figure_name(const char* name);
   JsonWriter& open(char bracket);
   JsonWriter& close(char bracket);
   void separate();

@@ -156,10 +156,8 @@ inline AckMessage RandomMessages::make() {
 template <>
 inline ServerStatusMessage RandomMessages::make() {
   ServerStatusMessage m;
-  fill(m.stream, m.epoch, m.frame, m.uptime_s, m.frame_rate_hz, m.mbit_per_s, m.raw_mbit_per_s,
-       m.frame_ms_p50, m.frame_ms_p99, m.corrected_per_frame, m.threshold, m.bodies, m.at_rest,
-       m.participants, m.observers, m.window, m.queue_high_water, m.delta_bytes, m.reply_bytes, m.input_bytes,
-       m.snapshot_bytes, m.stalls, m.suspended_ms, m.refused_inputs, m.refused_messages, m.snapshots);
+  fill(m.stream, m.epoch, m.frame);
+  each_server_figure([this](const char*, auto& value) { fill(value); }, m);
   m.session = text();
   m.codec = text();
   m.predictor = text();
@@ -170,8 +168,8 @@ template <>
 inline ClientStatusMessage RandomMessages::make() {
   ClientStatusMessage m;
   fill(m.client, m.epoch, m.applied, m.stream.id, m.stream.generation, m.role, m.phase, m.too_slow,
-       m.queue_high_water, m.lag_ms, m.client_ms_p50, m.mbit_per_s, m.frames_applied, m.resyncs,
-       m.hash_mismatches, m.inputs_sent, m.inputs_refused);
+       m.queue_high_water, m.lag_ms);
+  each_reported_figure([this](const char*, auto& value) { fill(value); }, m);
   m.session = text();
   return m;
 }
