@@ -42,29 +42,19 @@ JsonWriter& JsonWriter::close(char bracket) {
   return *this;
 }
 
-JsonWriter& JsonWriter::name(std::string_view name) {
-  value(name);
-  out_ += ':';
-  first_ = true;
-  return *this;
-}
-
-// Figures are named by letters, digits and underscores.
-JsonWriter& JsonWriter::figure_name(const char* name) {
+JsonWriter& JsonWriter::name(const char* name) {
   separate();
   out_ += '"';
-  for (; *name != 0; ++name) {
-    const bool word = *name == '_';
-    if (word) ++name;
-    out_ += word && *name >= 'a' ? static_cast<char>(*name - 'a' + 'A') : *name;
+  for (bool capital = false; *name != 0; ++name) {
+    if (*name != '_') out_ += capital && *name >= 'a' ? static_cast<char>(*name - 'a' + 'A') : *name;
+    capital = *name == '_';
   }
   out_ += "\":";
   first_ = true;
   return *this;
 }
 
-void JsonWriter::figure(const char* name, double number) { figure_name(name).value(number); }
-void JsonWriter::figure(const char* name, std::uint64_t number) { figure_name(name).value(number); }
+JsonWriter& JsonWriter::value(const char* text) { return value(std::string_view(text)); }
 
 JsonWriter& JsonWriter::value(std::string_view text) {
   separate();

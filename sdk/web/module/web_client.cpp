@@ -69,9 +69,10 @@ std::array<double, 3> gravity(const client::ClientCore& core) {
 /// A member for each figure that a list names.
 struct WriteFigure {
   JsonWriter& json;
-  void operator()(const char* name, double number) const { json.figure(name, number); }
-  void operator()(const char* name, std::uint64_t number) const { json.figure(name, number); }
-  void operator()(const char* name, std::uint32_t number) const { json.figure(name, std::uint64_t{number}); }
+  template <class T>
+  void operator()(const char* name, T number) const {
+    json.member(name, number);
+  }
 };
 
 void write(JsonWriter& json, const transport::ServerStatusMessage& server) {
