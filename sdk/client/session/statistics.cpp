@@ -4,7 +4,8 @@ namespace tandem::client {
 
 ClientStatus figures(const Statistics& statistics) {
   ClientStatus out;
-  static_cast<ClientFigures&>(out) = statistics;
+  const ClientFigures& counted = statistics;
+  static_cast<ClientFigures&>(out) = counted;
   out.refused_messages += statistics.foreign_messages;
   out.mbit_per_s = statistics.mean_mbit_per_s();
   out.latency_ms_p50 = statistics.latency.quantile_ms(0.5);

@@ -11,7 +11,8 @@ transport::ClientStatusMessage StatusReport::next(const Statistics& statistics, 
   const double elapsed_s = static_cast<double>(now_ns - std::exchange(last_ns_, now_ns)) / 1e9;
   const std::uint64_t bytes = statistics.payload_bytes - std::exchange(last_bytes_, statistics.payload_bytes);
   transport::ClientStatusMessage status;
-  static_cast<ReportedFigures&>(status) = statistics;
+  const ReportedFigures& counted = statistics;
+  static_cast<ReportedFigures&>(status) = counted;
   // Of the last second, not since the start.
   status.client_ms_p50 = statistics.recent_cost.quantile_ms(0.5);
   status.mbit_per_s = first ? 0 : static_cast<double>(bytes) * 8 / kBitsPerMbit / elapsed_s;

@@ -194,7 +194,8 @@ ServerStatus Server::status() const {
   const host::Host& host = *impl_->host;
   const host::HostTotals totals = host.totals();
   ServerStatus status;
-  static_cast<ServerCounts&>(status) = totals;
+  const ServerCounts& counts = totals;
+  static_cast<ServerCounts&>(status) = counts;
   status.frame = host.frame();
   status.state_hash = host.hash();
   status.participants = host.participants();

@@ -24,7 +24,8 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
     corrected_per_frame_ = made > 0 ? static_cast<double>(stream.corrected - before.corrected) / made : 0;
   }
   transport::ServerStatusMessage status;
-  static_cast<ServerCounts&>(status) = totals;
+  const ServerCounts& counts = totals;
+  static_cast<ServerCounts&>(status) = counts;
   status.snapshot_bytes = stream.snapshot_bytes;
   status.snapshots = stream.snapshots;
   status.session = session_;
