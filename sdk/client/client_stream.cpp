@@ -48,7 +48,7 @@ void ClientCore::take_deltas(Now now) {
     const Frame frame = received.message.frame;
     const std::int64_t server_time_ns = received.message.server_time_ns;
     const Follower::Step taken = to->take(std::move(received.message), now.steady_ns);
-    statistics_.queue_high_water = std::max(statistics_.queue_high_water, to->most_waiting());
+    statistics_.queue_high_water = std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
     if (taken.done && is_played) epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
     if (!taken.loss) continue;
     if (is_played) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <type_traits>
 
+#include "sdk/transport/fields.hpp"
+
 namespace tandem::transport {
 namespace {
 
@@ -130,33 +132,6 @@ class Reader {
   bool ok_ = true;
 };
 
-template <class M, class T>
-concept Is = std::is_same_v<std::remove_const_t<M>, T>;
-
-template <class Visitor, class... Values>
-void primitives(Visitor& visit, Values&... values) {
-  (visit.primitive(values), ...);
-}
-
-template <class Visitor, class Values>
-void numbers(Visitor& visit, Values& values) {
-  visit.sequence(values, [&](auto& value) { visit.primitive(value); });
-}
-
-// Each message, field by field in the order of idl/tandem.idl.
-
-template <class Visitor, Is<BodyType> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.radius, m.colour_rgba, m.shape);
-  visit.text(m.name);
-  numbers(visit, m.shape_values);
-}
-
-template <class Visitor, Is<Parameter> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.id, m.value);
-}
-
 void parameters(Writer& visit, const StreamParameters& values) {
   visit.sequence(list_parameters(values), [&](const Parameter& parameter) { fields(visit, parameter); });
 }
@@ -165,96 +140,6 @@ void parameters(Reader& visit, StreamParameters& values) {
   std::vector<Parameter> all;
   visit.sequence(all, [&](Parameter& parameter) { fields(visit, parameter); });
   values = parameters_from(all).value_or(StreamParameters{});
-}
-
-template <class Visitor, Is<StreamMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.id.id, m.id.generation, m.layout.region_blocks, m.client_cost_ns, m.max_delta_bytes,
-             m.max_snapshot_bytes, m.layout_hash);
-  visit.text(m.layout.codec);
-  visit.text(m.layout.predictor);
-  visit.sequence(m.layout.groups, [&](auto& group) { visit.text(group); });
-  numbers(visit, m.layout.radii);
-  parameters(visit, m.layout.parameters);
-  numbers(visit, m.layout.predictor_constants);
-  visit.sequence(m.layout.codec_tables);
-}
-
-template <class Visitor, Is<SessionMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.protocol_version, m.capacity, m.frame_rate_hz, m.lattice_unit, m.lead,
-             m.window_ceiling);
-  visit.text(m.session);
-  visit.text(m.scene);
-  visit.text(m.scene_description);
-  visit.sequence(m.types, [&](auto& type) { fields(visit, type); });
-  visit.sequence(m.streams, [&](auto& stream) { fields(visit, stream); });
-}
-
-template <class Visitor, Is<DeltaMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.stream.id, m.stream.generation, m.frame, m.part, m.parts, m.last_input,
-             m.server_time_ns, m.hash);
-  visit.sequence(m.payload);
-}
-
-template <class Visitor, Is<ScheduledInputMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.number, m.frame, m.source_client, m.source_number, m.kind);
-  numbers(visit, m.values);
-}
-
-template <class Visitor, Is<SnapshotMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.stream.id, m.stream.generation, m.frame, m.part, m.parts, m.total_bytes);
-  visit.sequence(m.bytes);
-}
-
-template <class Visitor, Is<ReplyEntry> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.number, m.frame, m.code);
-}
-
-template <class Visitor, Is<ReplyMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.client, m.epoch, m.role, m.phase, m.reason, m.highest_input, m.client_clock_ns,
-             m.server_time_ns);
-  visit.sequence(m.entries, [&](auto& entry) { fields(visit, entry); });
-}
-
-template <class Visitor, Is<InputMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.client, m.epoch, m.number, m.client_frame, m.kind);
-  numbers(visit, m.values);
-  visit.sequence(m.bytes);
-}
-
-template <class Visitor, Is<AckMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.client, m.epoch, m.protocol_version, m.stream.id, m.stream.generation, m.phase,
-             m.applied, m.simulated, m.role_wanted, m.join_attempt, m.clock_ns, m.snapshot_frame,
-             m.snapshot_parts);
-  numbers(visit, m.missing);
-}
-
-template <class Visitor, Is<ServerStatusMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.frame, m.uptime_s, m.frame_rate_hz, m.mbit_per_s, m.raw_mbit_per_s,
-             m.frame_ms_p50, m.frame_ms_p99, m.corrected_per_frame, m.threshold, m.bodies, m.at_rest,
-             m.participants, m.observers, m.window, m.queue_high_water, m.delta_bytes, m.reply_bytes,
-             m.input_bytes, m.snapshot_bytes, m.stalls, m.suspended_ms, m.refused_inputs, m.refused_messages,
-             m.snapshots, m.stream);
-  visit.text(m.session);
-  visit.text(m.codec);
-  visit.text(m.predictor);
-}
-
-template <class Visitor, Is<ClientStatusMessage> M>
-void fields(Visitor& visit, M& m) {
-  primitives(visit, m.client, m.epoch, m.applied, m.stream.id, m.stream.generation, m.role, m.phase,
-             m.too_slow, m.queue_high_water, m.lag_ms, m.client_ms_p50, m.mbit_per_s, m.frames_applied,
-             m.resyncs, m.hash_mismatches, m.inputs_sent, m.inputs_refused);
-  visit.text(m.session);
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/layout/layout.hpp"
 #include "tandem/body_shape.hpp"
+#include "tandem/client_figures.hpp"
+#include "tandem/server_figures.hpp"
 
 namespace tandem::transport {
 
@@ -186,25 +188,18 @@ struct AckMessage {
   bool operator==(const AckMessage&) const = default;
 };
 
-struct ServerStatusMessage {
+struct ServerStatusMessage : ServerFigures {
   static constexpr const char* kTopic = "TandemServerStatus";
   std::string session;       ///< key
   std::uint32_t stream = 0;  ///< key
   Epoch epoch = 0;
   Frame frame = 0;
-  double uptime_s = 0, frame_rate_hz = 0, mbit_per_s = 0, raw_mbit_per_s = 0, frame_ms_p50 = 0,
-         frame_ms_p99 = 0;
-  double corrected_per_frame = 0;
-  double threshold = 0;  ///< in force, scene units
-  std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0, queue_high_water = 0;
-  /// Handed to the writers since the start, once each however many readers there are.
-  std::uint64_t delta_bytes = 0, reply_bytes = 0, input_bytes = 0, snapshot_bytes = 0;
-  std::uint64_t stalls = 0, suspended_ms = 0, refused_inputs = 0, refused_messages = 0, snapshots = 0;
   std::string codec, predictor;
   bool operator==(const ServerStatusMessage&) const = default;
 };
 
-struct ClientStatusMessage {
+/// `client_ms_p50` and `mbit_per_s` are those of the last second.
+struct ClientStatusMessage : ReportedFigures {
   static constexpr const char* kTopic = "TandemClientStatus";
   ClientId client = 0;  ///< key
   std::string session;
@@ -214,8 +209,7 @@ struct ClientStatusMessage {
   std::uint32_t role = 0, phase = 0;
   std::uint32_t too_slow = 0;  ///< 1: the median frame takes more than half a period
   std::uint32_t queue_high_water = 0;
-  double lag_ms = 0, client_ms_p50 = 0, mbit_per_s = 0;
-  std::uint64_t frames_applied = 0, resyncs = 0, hash_mismatches = 0, inputs_sent = 0, inputs_refused = 0;
+  double lag_ms = 0;
   bool operator==(const ClientStatusMessage&) const = default;
 };
 

@@ -189,8 +189,8 @@ OutgoingPtr Gateway::reply(Viewer& viewer, std::int64_t now_ns) const {
 
 std::optional<std::int64_t> Gateway::cut_due_ns() const {
   if (!collecting_since_ns_) return std::nullopt;
-  const std::int64_t spaced_ns = cut_at_ns_ ? *cut_at_ns_ + kSpacingNs : INT64_MIN;
-  return std::max(*collecting_since_ns_ + kCollectNs, spaced_ns);
+  const std::int64_t spaced_ns = cut_at_ns_ ? *cut_at_ns_ + accounts::kSnapshotSpacingNs : INT64_MIN;
+  return std::max(*collecting_since_ns_ + accounts::kGatewayTransfers.collect_ns, spaced_ns);
 }
 
 // All viewers that wait share one snapshot; live messages follow it.
@@ -222,8 +222,9 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
   const bool role_changed = std::exchange(granted_, granted) != granted;
   for (auto& [id, viewer] : viewers_) {
     if (role_changed) viewer.now.reply.on_change();
-    if (viewer.now.passage.unfinished() && (now_ns - viewer.now.passage.progress_ns() > kStalledPassageNs ||
-                                            now_ns - viewer.now.passage.began_ns() > kLongestPassageNs))
+    const SnapshotPassage& passage = viewer.now.passage;
+    if (passage.unfinished() && (now_ns - passage.progress_ns() > accounts::kGatewayTransfers.stalled_ns ||
+                                 now_ns - passage.began_ns() > accounts::kGatewayTransfers.longest_ns))
       viewer.now.passage = {};
     if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
   }

@@ -34,16 +34,10 @@ struct Limits {
 /// a viewer it stands where the server stands towards a client. Every buffer is bounded. Not thread-safe.
 class Gateway {
  public:
-  static constexpr std::int64_t kCollectNs = 100 * kMillisecond;  ///< joiners of one snapshot
-  static constexpr std::int64_t kSpacingNs = 250 * kMillisecond;  ///< between two snapshots at least
   /// A viewer that is this far behind gets a snapshot where that is smaller than what is queued for it.
   static constexpr std::int64_t kBehindNs = kSecond;
   /// One that takes nothing for so long is let go.
   static constexpr std::int64_t kNotReadingNs = 30 * kSecond;
-  /// A snapshot of which nothing arrived for so long is given up.
-  static constexpr std::int64_t kStalledPassageNs = 30 * kSecond;
-  /// And one that takes longer, whatever the viewer says that arrived.
-  static constexpr std::int64_t kLongestPassageNs = 1800 * kSecond;
   /// Inputs of a viewer without an outcome; what a reply can tell of.
   static constexpr std::size_t kMostUndecided = transport::kReplyRing;
 

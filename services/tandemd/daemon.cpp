@@ -178,16 +178,13 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
          {"snapshots", stream.snapshots},
          {"snapshot_bytes", stream.snapshot_bytes}});
   }
-  const Json object{{"frames", totals.frames},
-                    {"mbit_per_s", mbit_per_s},
-                    {"frame_ms", {{"p50", totals.frame_ms_p50}, {"p99", totals.frame_ms_p99}}},
-                    {"clients_seen", totals.clients_seen},
-                    {"stalls", totals.stalls},
-                    {"refused_inputs", totals.refused_inputs},
-                    {"snapshots", totals.snapshots},
-                    {"snapshot_bytes", totals.snapshot_bytes},
-                    {"demotions", totals.demotions},
-                    {"streams", streams}};
+  Json object{{"frames", totals.frames},
+              {"mbit_per_s", mbit_per_s},
+              {"frame_ms", {{"p50", totals.frame_ms_p50}, {"p99", totals.frame_ms_p99}}},
+              {"clients_seen", totals.clients_seen}};
+  each_server_count([&object](const char* name, std::uint64_t count) { object[name] = count; }, totals);
+  object["demotions"] = totals.demotions;
+  object["streams"] = std::move(streams);
   const std::string line = object.dump() + '\n';
   if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     return fail(ErrorCode::kIo, "the report could not be written to stdout");

@@ -13,6 +13,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/scenes/script.hpp"
+#include "services/tool/figures.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
@@ -221,18 +222,9 @@ bool HeadlessClient::succeeded() const {
 
 Json HeadlessClient::report() const {
   const client::Statistics& figures = core_->statistics();
-  const auto pair = [](const DurationHistogram& q) {
-    return Json{{"p50", q.quantile_ms(0.5)}, {"p99", q.quantile_ms(0.99)}};
-  };
+  const ClientStatus status = core_->status();
   Json out;
-  out["frames_applied"] = figures.frames_applied;
-  out["resyncs"] = figures.resyncs;
-  out["hash_mismatches"] = figures.hash_mismatches;
-  out["payload_bytes"] = figures.payload_bytes;
-  out["mbit_per_s"] = figures.mbit_per_s();
-  out["latency_ms"] = pair(figures.latency);
-  out["input_latency_ms"] = pair(figures.input_latency);
-  out["client_ms"] = pair(figures.frame_cost);
+  each_client_figure([&out](const char* name, auto value) { put_figure(out, name, value); }, status);
   const double frames = std::max<double>(1, static_cast<double>(figures.frames_applied));
   const auto mean_ms = [frames](std::int64_t total_ns) {
     return static_cast<double>(total_ns) / 1e6 / frames;
@@ -244,23 +236,15 @@ Json HeadlessClient::report() const {
                     {"acknowledge", mean_ms(figures.costs.acknowledge_ns)}};
   out["played_s"] = static_cast<double>(figures.last_applied_ns - figures.first_applied_ns) / 1e9;
   out["join_ms"] = first_join_ms_ ? Json(*first_join_ms_) : Json(nullptr);
-  out["inputs_sent"] = figures.inputs_sent;
-  out["inputs_refused"] = figures.inputs_refused;
   out["last_frame"] = last_frame_;
   out["state_hash"] = to_hex(last_hash_);
-  const ClientStatus status = core_->status();
   out["client"] = to_hex(status.client_id);
   out["role"] = status.role == ClientRole::kParticipant ? "participant" : "observer";
   out["lead"] = status.lead;
   out["epochs"] = figures.epochs;
   out["stream"] = status.stream;
   out["stream_reason"] = status.stream_reason;
-  out["stream_changes"] = figures.stream_changes;
   out["discovery_ms"] = session_ns_ != 0 ? static_cast<double>(session_ns_ - started_ns_) / 1e6 : 0.0;
-  out["inputs_acted"] = figures.inputs_acted;
-  out["inputs_unknown"] = figures.inputs_unknown;
-  out["refused_messages"] = status.refused_messages;
-  out["queue_high_water"] = figures.queue_high_water;
   return out;
 }
 
@@ -269,7 +253,7 @@ std::string HeadlessClient::summary() const {
   return fmt::format(
       "{}{} frames, last {} with hash {}, {:.3f} Mbit/s; latency {:.2f} / {:.2f} ms, client {:.3f} / {:.3f} "
       "ms (p50 / p99); joined in {:.0f} ms; {} resyncs, {} mismatches; inputs: {} sent, {} refused\n",
-      options_.name, figures.frames_applied, last_frame_, to_hex(last_hash_), figures.mbit_per_s(),
+      options_.name, figures.frames_applied, last_frame_, to_hex(last_hash_), figures.mean_mbit_per_s(),
       figures.latency.quantile_ms(0.5), figures.latency.quantile_ms(0.99),
       figures.frame_cost.quantile_ms(0.5), figures.frame_cost.quantile_ms(0.99), first_join_ms_.value_or(0),
       figures.resyncs, figures.hash_mismatches, figures.inputs_sent, figures.inputs_refused);

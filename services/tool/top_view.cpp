@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <string_view>
+#include <utility>
 
 #include "services/json/json.hpp"
+#include "services/tool/figures.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -26,56 +29,39 @@ double share_percent(const transport::ServerStatusMessage& s) {
   return s.raw_mbit_per_s > 0 ? 100 * s.mbit_per_s / s.raw_mbit_per_s : 0;
 }
 
+/// The names that bytes have in JSON: of one object together.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
+    {{"delta_bytes", "deltas"},
+     {"reply_bytes", "replies"},
+     {"input_bytes", "inputs"},
+     {"snapshot_bytes", "snapshots"}}};
+
 Json json_of(const transport::ServerStatusMessage& s) {
-  return {{"session", s.session},
-          {"stream", s.stream},
-          {"epoch", s.epoch},
-          {"frame", s.frame},
-          {"uptime_s", s.uptime_s},
-          {"frame_rate_hz", s.frame_rate_hz},
-          {"mbit_per_s", s.mbit_per_s},
-          {"raw_mbit_per_s", s.raw_mbit_per_s},
-          {"frame_ms", {{"p50", s.frame_ms_p50}, {"p99", s.frame_ms_p99}}},
-          {"corrected_per_frame", s.corrected_per_frame},
-          {"bodies", s.bodies},
-          {"participants", s.participants},
-          {"observers", s.observers},
-          {"window", s.window},
-          {"bytes",
-           {{"deltas", s.delta_bytes},
-            {"replies", s.reply_bytes},
-            {"inputs", s.input_bytes},
-            {"snapshots", s.snapshot_bytes}}},
-          {"stalls", s.stalls},
-          {"suspended_ms", s.suspended_ms},
-          {"refused_inputs", s.refused_inputs},
-          {"refused_messages", s.refused_messages},
-          {"snapshots", s.snapshots},
-          {"codec", s.codec},
-          {"predictor", s.predictor},
-          {"threshold", s.threshold},
-          {"at_rest", s.at_rest},
-          {"queue_high_water", s.queue_high_water}};
+  Json out{{"session", s.session}, {"stream", s.stream}, {"epoch", s.epoch}, {"frame", s.frame}};
+  each_server_figure(
+      [&out](std::string_view name, auto value) {
+        const auto* const bytes = std::ranges::find(kBytes, name, &decltype(kBytes)::value_type::first);
+        bytes != kBytes.end() ? put_figure(out["bytes"], bytes->second, value) : put_figure(out, name, value);
+      },
+      s);
+  out["codec"] = s.codec;
+  out["predictor"] = s.predictor;
+  return out;
 }
 
 Json json_of(const transport::ClientStatusMessage& c) {
-  return {{"client", fmt::format("{:016x}", c.client)},
-          {"session", c.session},
-          {"stream", c.stream.id},
-          {"epoch", c.epoch},
-          {"applied", c.applied},
-          {"role", role_word(c.role)},
-          {"phase", phase_word(c.phase)},
-          {"lag_ms", c.lag_ms},
-          {"client_ms_p50", c.client_ms_p50},
-          {"too_slow", c.too_slow != 0},
-          {"mbit_per_s", c.mbit_per_s},
-          {"frames_applied", c.frames_applied},
-          {"resyncs", c.resyncs},
-          {"hash_mismatches", c.hash_mismatches},
-          {"inputs_sent", c.inputs_sent},
-          {"inputs_refused", c.inputs_refused},
-          {"queue_high_water", c.queue_high_water}};
+  Json out{{"client", fmt::format("{:016x}", c.client)},
+           {"session", c.session},
+           {"stream", c.stream.id},
+           {"epoch", c.epoch},
+           {"applied", c.applied},
+           {"role", role_word(c.role)},
+           {"phase", phase_word(c.phase)},
+           {"lag_ms", c.lag_ms},
+           {"too_slow", c.too_slow != 0},
+           {"queue_high_water", c.queue_high_water}};
+  each_reported_figure([&out](const char* name, auto value) { out[name] = value; }, c);
+  return out;
 }
 
 bool played(const transport::ServerStatusMessage& s) { return s.participants + s.observers > 0; }

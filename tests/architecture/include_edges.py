@@ -22,13 +22,14 @@ PREDICT = ["sdk/core/predict", "sdk/core/predict/contact"]
 CODEC = ["sdk/core/codec", "sdk/core/codec/paper", "sdk/core/codec/tracker"]
 TABLES = LAYOUT + PREDICT + CODEC + ["sdk/core/tables"]
 TIMELINE = TABLES + ["sdk/core/timeline"]
+FIGURES = ["public/client_figures.hpp", "public/server_figures.hpp"]
 CLIENT = ["sdk/client", "sdk/client/drawing", "sdk/client/following", "sdk/client/session"]
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
 HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/outgoing", "services/host/streams"]
 LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
 # What all rooms of a target may include besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
-OF_HOST = SIMULATION + TIMELINE + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"]
+OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"]
 OF_LAB = (
     SIMULATION
     + TIMELINE
@@ -50,7 +51,7 @@ EDGES = {
     "sdk/core/codec/tracker": LAYOUT + ["sdk/core/codec"],
     "sdk/core/tables": LAYOUT + PREDICT + CODEC + ["sdk/core/predict/ballistic"],
     "sdk/core/timeline": TABLES,
-    "sdk/transport": LAYOUT + ["public/body_shape.hpp"],
+    "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
     "sdk/transport/dds": LAYOUT + ["sdk/transport"],
     "sdk/statistics": [],
@@ -67,7 +68,7 @@ EDGES = {
     "services/json": [],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
-    "services/host/include": ["public/result.hpp", "public/body_shape.hpp"],
+    "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
     "services/planning": OF_HOST
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
     "services/host/streams": OF_HOST,

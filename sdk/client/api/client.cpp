@@ -1,6 +1,7 @@
 // tandem.h: joining, events and input.
 #include <cmath>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "sdk/client/api/client_id.hpp"
@@ -92,6 +93,38 @@ tandem_result send(tandem_client handle, transport::InputKind kind, std::vector<
   });
 }
 
+struct CopyFigure {
+  template <class To, class From>
+  void operator()(const char* /*name*/, To& to, const From& from) const {
+    static_assert(std::is_same_v<To, From>, "tandem_status has a figure in another type than ClientFigures");
+    to = from;
+  }
+};
+
+struct CopyState {
+  template <class To, class From>
+  void operator()(const char* /*name*/, To& to, const From& from) const {
+    if constexpr (std::is_array_v<To>) {
+      write_text(from, to);
+    } else {
+      to = static_cast<To>(from);
+    }
+  }
+};
+
+// Besides what the lists name.
+constexpr std::size_t kOtherStatusBytes = sizeof tandem_status::size + sizeof tandem_status::events_dropped;
+constexpr std::size_t listed_status_bytes() {
+  std::size_t bytes = kOtherStatusBytes;
+  const tandem_status status = TANDEM_STATUS_INIT;
+  const auto add = [&bytes](const char*, const auto& member) { bytes += sizeof member; };
+  each_client_figure(add, status);
+  each_client_state(add, status);
+  return bytes;
+}
+static_assert(listed_status_bytes() == sizeof(tandem_status),
+              "tandem_status has a member that is in no list: name it in tandem/client_figures.hpp");
+
 }  // namespace
 
 tandem_result join_over(std::unique_ptr<transport::ClientPort> port, RunningClient::Clock clock,
@@ -166,41 +199,9 @@ tandem_result tandem_get_status(tandem_client client, tandem_status* status) noe
     if (!known) return refuse(known.error());
     const ClientStatus& s = *known;
     tandem_status out = TANDEM_STATUS_INIT;
-    out.phase = static_cast<tandem_phase>(s.phase);
-    out.role = static_cast<tandem_role>(s.role);
-    out.lead = s.lead;
-    out.server_alive = s.server_alive ? 1 : 0;
-    out.queue_high_water = s.queue_high_water;
-    out.client_id = s.client_id;
-    out.epoch = s.epoch;
-    out.frame = s.frame;
-    out.state_hash = s.state_hash;
-    out.frames_applied = s.frames_applied;
-    out.resyncs = s.resyncs;
-    out.hash_mismatches = s.hash_mismatches;
-    out.refused_messages = s.refused_messages;
-    out.payload_bytes = s.payload_bytes;
-    out.inputs_sent = s.inputs_sent;
-    out.inputs_acted = s.inputs_acted;
-    out.inputs_refused = s.inputs_refused;
-    out.inputs_unknown = s.inputs_unknown;
+    each_client_figure(CopyFigure{}, out, s);
+    each_client_state(CopyState{}, out, s);
     out.events_dropped = running.events_dropped();
-    out.frame_rate_hz = s.frame_rate_hz;
-    out.mbit_per_s = s.mbit_per_s;
-    out.latency_ms_p50 = s.latency_ms_p50;
-    out.latency_ms_p99 = s.latency_ms_p99;
-    out.input_latency_ms_p50 = s.input_latency_ms_p50;
-    out.input_latency_ms_p99 = s.input_latency_ms_p99;
-    out.client_ms_p50 = s.client_ms_p50;
-    out.client_ms_p99 = s.client_ms_p99;
-    out.join_ms = s.join_ms;
-    out.round_trip_ms = s.round_trip_ms;
-    out.jitter_ms = s.jitter_ms;
-    write_text(s.scene, out.scene);
-    write_text(s.reason, out.reason);
-    write_text(s.stream, out.stream);
-    write_text(s.stream_reason, out.stream_reason);
-    out.stream_changes = s.stream_changes;
     write_struct(out, status);
     return kOk;
   });

@@ -21,22 +21,15 @@ struct CostTotals {
   std::int64_t acknowledge_ns = 0;  ///< writing acknowledgements
 };
 
-/// Counts since the client was made; they survive rejoins and epochs.
-struct Statistics {
-  std::uint64_t frames_applied = 0;
-  std::uint64_t payload_bytes = 0;
-  std::uint64_t resyncs = 0;  ///< by loss, gap or refusal; a first join and a new epoch are none
+/// Counts since the client was made; they survive rejoins and epochs. Those of ClientFigures are counted in
+/// place; what is in there of durations and rates comes with figures().
+struct Statistics : ClientFigures {
   std::array<std::uint64_t, kResyncReasons> resyncs_by_reason{};
   std::uint64_t epochs = 0;
-  std::uint64_t stream_changes = 0;  ///< to another one of the same session
-  std::uint64_t hash_mismatches = 0;
-  std::uint64_t refused_messages = 0;  ///< malformed deltas, snapshots, scheduled inputs, sessions
   std::uint64_t stale_messages = 0;    ///< of another epoch
   std::uint64_t foreign_messages = 0;  ///< not from the participant that announced the session
-  std::uint64_t inputs_sent = 0, inputs_acted = 0, inputs_refused = 0, inputs_unknown = 0;
   std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
   std::int64_t join_ns = 0;                                ///< last join
-  std::size_t queue_high_water = 0;
   double smoothed_latency_ns = 0;   ///< publish to applied, over about the last half second
   DurationHistogram latency;        ///< publish to applied
   DurationHistogram input_latency;  ///< sent to the frame it acted on applied
@@ -50,7 +43,7 @@ struct Statistics {
     smoothed_latency_ns += (static_cast<double>(latency_ns) - smoothed_latency_ns) * gain;
   }
   /// Payload since the first applied frame; 2^20 bits to the Mbit.
-  [[nodiscard]] double mbit_per_s() const {
+  [[nodiscard]] double mean_mbit_per_s() const {
     const auto span_ns = static_cast<double>(last_applied_ns - first_applied_ns);
     return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / kBitsPerMbit / (span_ns / 1e9) : 0;
   }

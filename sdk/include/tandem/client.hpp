@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -380,40 +381,10 @@ inline Result<ClientStatus> Client::status() const {
   tandem_status c = TANDEM_STATUS_INIT;
   if (const auto got = checked(tandem_get_status(handle_, &c)); !got) return unexpected(got);
   ClientStatus s;
-  s.phase = static_cast<ClientPhase>(c.phase);
-  s.role = static_cast<ClientRole>(c.role);
-  s.client_id = c.client_id;
-  s.server_alive = c.server_alive != 0;
-  s.reason = c.reason;
-  s.scene = c.scene;
-  s.epoch = c.epoch;
-  s.frame = c.frame;
-  s.state_hash = c.state_hash;
-  s.frame_rate_hz = c.frame_rate_hz;
-  s.lead = c.lead;
-  s.frames_applied = c.frames_applied;
-  s.resyncs = c.resyncs;
-  s.hash_mismatches = c.hash_mismatches;
-  s.refused_messages = c.refused_messages;
-  s.payload_bytes = c.payload_bytes;
-  s.mbit_per_s = c.mbit_per_s;
-  s.latency_ms_p50 = c.latency_ms_p50;
-  s.latency_ms_p99 = c.latency_ms_p99;
-  s.input_latency_ms_p50 = c.input_latency_ms_p50;
-  s.input_latency_ms_p99 = c.input_latency_ms_p99;
-  s.client_ms_p50 = c.client_ms_p50;
-  s.client_ms_p99 = c.client_ms_p99;
-  s.join_ms = c.join_ms;
-  s.round_trip_ms = c.round_trip_ms;
-  s.jitter_ms = c.jitter_ms;
-  s.inputs_sent = c.inputs_sent;
-  s.inputs_acted = c.inputs_acted;
-  s.inputs_refused = c.inputs_refused;
-  s.inputs_unknown = c.inputs_unknown;
-  s.queue_high_water = c.queue_high_water;
-  s.stream = c.stream;
-  s.stream_reason = c.stream_reason;
-  s.stream_changes = c.stream_changes;
+  each_client_figure([](const char*, auto& to, const auto& from) { to = from; }, s, c);
+  each_client_state([](const char*, auto& to,
+                       const auto& from) { to = static_cast<std::remove_reference_t<decltype(to)>>(from); },
+                    s, c);
   return s;
 }
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "tandem/client_figures.hpp"
+
 namespace tandem {
 
 /// A participant may send input and the server waits for it, within limits; an observer only watches.
@@ -19,8 +21,8 @@ enum class ClientPhase : std::uint8_t {
 
 enum class LogLevel : std::uint8_t { kInfo = 0, kWarning = 1, kError = 2 };
 
-/// Figures since connect(). Times in milliseconds, percentiles over all frames.
-struct ClientStatus {
+/// How a client stands, and its figures.
+struct ClientStatus : ClientFigures {
   ClientPhase phase = ClientPhase::kSearching;
   ClientRole role = ClientRole::kObserver;  ///< as granted by the server
   std::uint64_t client_id = 0;
@@ -31,25 +33,29 @@ struct ClientStatus {
   std::uint64_t frame = 0;       ///< last frame agreed with the server
   std::uint64_t state_hash = 0;  ///< of that frame
   double frame_rate_hz = 0;
-  std::uint32_t lead = 0;  ///< in force; lower than asked for when the session allows less
-  std::uint64_t frames_applied = 0;
-  std::uint64_t resyncs = 0;  ///< joins after the first one of an epoch
-  std::uint64_t hash_mismatches = 0;
-  std::uint64_t refused_messages = 0;  ///< bytes that broke a rule of the protocol
-  std::uint64_t payload_bytes = 0;
-  double mbit_per_s = 0;                          ///< of payload since the first frame; 2^20 bits to the Mbit
-  double latency_ms_p50 = 0, latency_ms_p99 = 0;  ///< publish to applied; needs one clock for both hosts
-  double input_latency_ms_p50 = 0,
-         input_latency_ms_p99 = 0;              ///< sent until the frame it acted on was applied
-  double client_ms_p50 = 0, client_ms_p99 = 0;  ///< decode, apply and simulate, a frame
-  double join_ms = 0;  ///< last join: from learning of the session, or of the loss, to playing
-  double round_trip_ms = 0, jitter_ms = 0;
-  std::string stream;                ///< that is played or joined: its name, or its number
-  std::string stream_reason;         ///< why that one, for a human
-  std::uint64_t stream_changes = 0;  ///< from one stream of a session to another
-  std::uint64_t inputs_sent = 0, inputs_acted = 0, inputs_refused = 0, inputs_unknown = 0;
-  std::uint32_t queue_high_water = 0;  ///< deltas that waited at once, at most
+  std::uint32_t lead = 0;     ///< in force; lower than asked for when the session allows less
+  std::string stream;         ///< that is played or joined: its name, or its number
+  std::string stream_reason;  ///< why that one, for a human
 };
+
+/// Calls visit("name", that member of each of `of`) for what ClientStatus and tandem_status have besides
+/// figures.
+template <class Visit, class... Of>
+constexpr void each_client_state(const Visit& visit, Of&... of) {
+  visit("phase", of.phase...);
+  visit("role", of.role...);
+  visit("client_id", of.client_id...);
+  visit("server_alive", of.server_alive...);
+  visit("reason", of.reason...);
+  visit("scene", of.scene...);
+  visit("epoch", of.epoch...);
+  visit("frame", of.frame...);
+  visit("state_hash", of.state_hash...);
+  visit("frame_rate_hz", of.frame_rate_hz...);
+  visit("lead", of.lead...);
+  visit("stream", of.stream...);
+  visit("stream_reason", of.stream_reason...);
+}
 
 enum class BodyChange : std::uint8_t {
   kNone = 0,

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sdk/python/module/columns.hpp"
+#include "tandem/client_types.hpp"
 #include "tandem/tandem.h"
 
 namespace tandem::python {
@@ -102,21 +103,13 @@ class Connection {
   [[nodiscard]] py::dict status() const {
     tandem_status s = TANDEM_STATUS_INIT;
     check(unlocked([&] { return tandem_get_status(client_, &s); }));
-    return py::dict(
-        "phase"_a = s.phase, "role"_a = s.role, "lead"_a = s.lead, "server_alive"_a = s.server_alive != 0,
-        "queue_high_water"_a = s.queue_high_water, "client_id"_a = s.client_id, "epoch"_a = s.epoch,
-        "frame"_a = s.frame, "state_hash"_a = s.state_hash, "frames_applied"_a = s.frames_applied,
-        "resyncs"_a = s.resyncs, "hash_mismatches"_a = s.hash_mismatches,
-        "refused_messages"_a = s.refused_messages, "payload_bytes"_a = s.payload_bytes,
-        "inputs_sent"_a = s.inputs_sent, "inputs_acted"_a = s.inputs_acted,
-        "inputs_refused"_a = s.inputs_refused, "inputs_unknown"_a = s.inputs_unknown,
-        "events_dropped"_a = s.events_dropped, "frame_rate_hz"_a = s.frame_rate_hz,
-        "mbit_per_s"_a = s.mbit_per_s, "latency_ms_p50"_a = s.latency_ms_p50,
-        "latency_ms_p99"_a = s.latency_ms_p99, "input_latency_ms_p50"_a = s.input_latency_ms_p50,
-        "input_latency_ms_p99"_a = s.input_latency_ms_p99, "client_ms_p50"_a = s.client_ms_p50,
-        "client_ms_p99"_a = s.client_ms_p99, "join_ms"_a = s.join_ms, "round_trip_ms"_a = s.round_trip_ms,
-        "jitter_ms"_a = s.jitter_ms, "scene"_a = s.scene, "reason"_a = s.reason, "stream"_a = s.stream,
-        "stream_reason"_a = s.stream_reason, "stream_changes"_a = s.stream_changes);
+    py::dict out;
+    const auto add = [&out](const char* name, const auto& value) { out[name] = value; };
+    each_client_state(add, s);
+    out["server_alive"] = s.server_alive != 0;
+    each_client_figure(add, s);
+    out["events_dropped"] = s.events_dropped;
+    return out;
   }
 
   /// `arrays`: the eight columns in the order of tandem_columns, None for what is not wanted. Returns the

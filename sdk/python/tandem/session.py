@@ -8,6 +8,8 @@ from typing import Any, Optional
 
 import numpy as np
 
+from .figures import ClientFigures
+
 Vector = tuple[float, float, float]
 
 
@@ -84,44 +86,23 @@ class _FromNative:
 
 
 @dataclass(frozen=True)
-class Status(_FromNative):
-    """Figures since the client was made. Times in milliseconds, percentiles over all frames."""
+class Status(ClientFigures, _FromNative):
+    """How a client stands, and its figures. Times in milliseconds, percentiles over all frames."""
 
     phase: Phase
     role: Role  #: as granted by the server
     lead: int  #: in force, frames; lower than asked for where the session allows less
     server_alive: bool
-    queue_high_water: int  #: deltas that waited at once, at most
     client_id: int  #: random; kept for as long as the client lives
     epoch: int  #: of the server's run; 0 before the first
     frame: int  #: last frame agreed with the server
     state_hash: int  #: of that frame
-    frames_applied: int
-    resyncs: int  #: joins after the first one of an epoch
-    hash_mismatches: int
-    refused_messages: int  #: bytes that broke a rule of the protocol
-    payload_bytes: int  #: of deltas
-    inputs_sent: int
-    inputs_acted: int
-    inputs_refused: int
-    inputs_unknown: int  #: lost on the way, or their answer was
-    events_dropped: int  #: before they were taken
     frame_rate_hz: float
-    mbit_per_s: float  #: of payload since the first frame; 2^20 bits to the Mbit
-    latency_ms_p50: float  #: publish to applied; needs one clock for both hosts
-    latency_ms_p99: float
-    input_latency_ms_p50: float  #: sent until the frame it acted on was applied
-    input_latency_ms_p99: float
-    client_ms_p50: float  #: decode, apply and simulate, a frame
-    client_ms_p99: float
-    join_ms: float  #: last join: from learning of the session, or of the loss, to playing
-    round_trip_ms: float
-    jitter_ms: float
     scene: str
     reason: str  #: why role or phase is not what was asked for; empty where it is
     stream: str  #: name of the stream that is played or joined; its number where it has no name
     stream_reason: str  #: why that one
-    stream_changes: int  #: from one stream of a session to another
+    events_dropped: int  #: before they were taken
 
 
 @dataclass(frozen=True)

@@ -42,12 +42,19 @@ JsonWriter& JsonWriter::close(char bracket) {
   return *this;
 }
 
-JsonWriter& JsonWriter::name(std::string_view name) {
-  value(name);
-  out_ += ':';
+JsonWriter& JsonWriter::name(const char* name) {
+  separate();
+  out_ += '"';
+  for (bool capital = false; *name != 0; ++name) {
+    if (*name != '_') out_ += capital && *name >= 'a' ? static_cast<char>(*name - 'a' + 'A') : *name;
+    capital = *name == '_';
+  }
+  out_ += "\":";
   first_ = true;
   return *this;
 }
+
+JsonWriter& JsonWriter::value(const char* text) { return value(std::string_view(text)); }
 
 JsonWriter& JsonWriter::value(std::string_view text) {
   separate();

@@ -17,10 +17,11 @@ class JsonWriter {
   JsonWriter& end_object() { return close('}'); }
   JsonWriter& begin_list() { return open('['); }
   JsonWriter& end_list() { return close(']'); }
-  JsonWriter& name(std::string_view name);
+  /// Of letters, digits and underscores, in JavaScript's spelling: `frame_ms_p50` becomes `frameMsP50`.
+  JsonWriter& name(const char* name);
 
   JsonWriter& value(std::string_view text);
-  JsonWriter& value(const char* text) { return value(std::string_view(text)); }
+  JsonWriter& value(const char* text);
   JsonWriter& value(double number);
   JsonWriter& value(std::uint64_t number);
   JsonWriter& value(std::uint32_t number) { return value(std::uint64_t{number}); }
@@ -29,7 +30,7 @@ class JsonWriter {
 
   /// A member of an object.
   template <class T>
-  JsonWriter& member(std::string_view member_name, const T& content) {
+  JsonWriter& member(const char* member_name, const T& content) {
     return name(member_name).value(content);
   }
 

@@ -66,28 +66,22 @@ std::array<double, 3> gravity(const client::ClientCore& core) {
   return result;
 }
 
+/// A member for each figure that a list names.
+struct WriteFigure {
+  JsonWriter& json;
+  template <class T>
+  void operator()(const char* name, T number) const {
+    json.member(name, number);
+  }
+};
+
 void write(JsonWriter& json, const transport::ServerStatusMessage& server) {
   json.begin_object()
       .member("session", server.session)
       .member("epoch", server.epoch)
-      .member("frame", server.frame)
-      .member("uptimeS", server.uptime_s)
-      .member("frameRateHz", server.frame_rate_hz)
-      .member("mbitPerS", server.mbit_per_s)
-      .member("rawMbitPerS", server.raw_mbit_per_s)
-      .member("frameMsP50", server.frame_ms_p50)
-      .member("frameMsP99", server.frame_ms_p99)
-      .member("correctedPerFrame", server.corrected_per_frame)
-      .member("threshold", server.threshold)
-      .member("bodies", server.bodies)
-      .member("atRest", server.at_rest)
-      .member("participants", server.participants)
-      .member("observers", server.observers)
-      .member("window", server.window)
-      .member("stalls", server.stalls)
-      .member("codec", server.codec)
-      .member("predictor", server.predictor)
-      .end_object();
+      .member("frame", server.frame);
+  each_server_figure(WriteFigure{json}, server);
+  json.member("codec", server.codec).member("predictor", server.predictor).end_object();
 }
 
 }  // namespace
@@ -183,26 +177,14 @@ std::string WebClient::status() const {
       .member("bodies", state != nullptr ? state->alive_count() : 0U)
       .member("atRest", state != nullptr ? state->rest_count() : 0U)
       .member("corrected", state != nullptr ? corrected_count_ : 0U)
-      .member("framesApplied", status.frames_applied)
-      .member("resyncs", status.resyncs)
-      .member("hashMismatches", status.hash_mismatches)
-      .member("refusedMessages", status.refused_messages)
-      .member("payloadBytes", status.payload_bytes)
       .member("lagMs", lag_ns_.value_or(0) / 1e6)
-      .member("roundTripMs", status.round_trip_ms)
-      .member("jitterMs", status.jitter_ms)
-      .member("joinMs", status.join_ms)
       .name("frameMs")
       .begin_object()
       .member("p50", status.client_ms_p50)
       .member("p99", status.client_ms_p99)
-      .end_object()
-      .member("inputsSent", status.inputs_sent)
-      .member("inputsActed", status.inputs_acted)
-      .member("inputsRefused", status.inputs_refused)
-      .member("inputsUnknown", status.inputs_unknown)
-      .name("gravity")
-      .begin_list();
+      .end_object();
+  each_client_figure(WriteFigure{json}, status);
+  json.name("gravity").begin_list();
   for (const double axis : gravity(core_)) json.value(axis);
   json.end_list().name("uncorrected");
   if (const auto drift = core_.drift()) {

@@ -1,2 +1,3 @@
 export { Client } from './client';
+export * from './figures';
 export * from './types';

@@ -1,5 +1,7 @@
 // What an application sees. Units: scene units, milliseconds, Mbit of 2^20 bits.
 
+import type { ClientFigures, ServerFigures } from './figures';
+
 export type Role = 'observer' | 'participant';
 
 /**
@@ -54,31 +56,16 @@ export interface ConnectOptions {
 export type LogLevel = 'info' | 'warning' | 'error';
 
 /** What the gateway passes on of the server, once a second. */
-export interface ServerStatus {
+export interface ServerStatus extends ServerFigures {
   session: string;
   epoch: number;
   frame: number;
-  uptimeS: number;
-  frameRateHz: number;
-  mbitPerS: number;
-  rawMbitPerS: number;
-  frameMsP50: number;
-  frameMsP99: number;
-  correctedPerFrame: number;
-  /** In force; scene units. */
-  threshold: number;
-  bodies: number;
-  atRest: number;
-  participants: number;
-  observers: number;
-  window: number;
-  stalls: number;
   codec: string;
   predictor: string;
 }
 
-/** What the module tells of itself; the order and the names are those of WebClient::status(). */
-export interface ModuleStatus {
+/** What the module tells of itself: WebClient::status(). */
+export interface ModuleStatus extends ClientFigures {
   phase: 'searching' | 'refused' | 'joining' | 'playing';
   serverAlive: boolean;
   /** Why phase or role are not what was asked for; empty when they are. */
@@ -102,25 +89,10 @@ export interface ModuleStatus {
   atRest: number;
   /** Bodies that the last delta corrected. */
   corrected: number;
-  framesApplied: number;
-  /** Joins after the first one of an epoch. */
-  resyncs: number;
-  hashMismatches: number;
-  /** Messages that broke a rule of the protocol. */
-  refusedMessages: number;
-  payloadBytes: number;
   /** Published to applied, by the estimate of the server's clock. */
   lagMs: number;
-  roundTripMs: number;
-  jitterMs: number;
-  /** Of the last join, from learning of the session, or of the loss, to playing. */
-  joinMs: number;
-  /** Decode, apply and simulate, a frame. */
+  /** Of clientMsP50 and clientMsP99. */
   frameMs: { p50: number; p99: number };
-  inputsSent: number;
-  inputsActed: number;
-  inputsRefused: number;
-  inputsUnknown: number;
   /** In force, scene units / s^2; zero before a snapshot. */
   gravity: [number, number, number];
   /** Null unless showUncorrected() is on and a state is held. */

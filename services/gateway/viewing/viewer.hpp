@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
+#include "services/accounts/limits.hpp"
 #include "services/accounts/outcomes.hpp"
 #include "services/accounts/reply_schedule.hpp"
 #include "services/accounts/token_bucket.hpp"
@@ -16,9 +17,8 @@
 namespace tandem::gateway {
 
 // Per viewer; the bursts are as large.
-inline constexpr double kMessagesPerSecond = 200;  ///< a viewer that joins acknowledges 50 times a second
-inline constexpr double kInputsPerSecond = 60;
-inline constexpr double kOtherInputsPerSecond = 5;  ///< of these, other than gravity
+inline constexpr double kMessagesPerSecond = 200;   ///< a viewer that joins acknowledges 50 times a second
+inline constexpr double kOtherInputsPerSecond = 5;  ///< of its inputs, those that are not gravity
 
 struct Viewer {
   enum class Flow : std::uint8_t {
@@ -32,9 +32,9 @@ struct Viewer {
   std::uint64_t told_announcement = 0;  ///< number of the newest it was sent
   std::uint64_t told_status = 0;
   accounts::TokenBucket messages{kMessagesPerSecond, kMessagesPerSecond};
-  accounts::TokenBucket inputs{kInputsPerSecond, kInputsPerSecond};
+  accounts::TokenBucket inputs = accounts::kInputs;
   accounts::TokenBucket other_inputs{kOtherInputsPerSecond, kOtherInputsPerSecond};
-  accounts::TokenBucket snapshots_again{0.5, 4};
+  accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;
   /// Since when something waits to be sent and nothing was taken.
   std::optional<std::int64_t> waiting_since_ns;
 

@@ -185,17 +185,19 @@ ServerStatus Server::status() const {
   if (impl_ == nullptr) return {};
   const host::Host& host = *impl_->host;
   const host::HostTotals totals = host.totals();
-  return {.frame = host.frame(),
-          .state_hash = host.hash(),
-          .participants = host.participants(),
-          .observers = host.observers(),
-          .payload_bytes = totals.payload_bytes,
-          .corrected = totals.corrected,
-          .stalls = totals.stalls,
-          .refused_inputs = totals.refused_inputs,
-          .threshold = host.threshold_m(),
-          .frame_ms_p50 = totals.frame_ms_p50,
-          .frame_ms_p99 = totals.frame_ms_p99};
+  ServerStatus status;
+  const ServerCounts& counts = totals;
+  static_cast<ServerCounts&>(status) = counts;
+  status.frame = host.frame();
+  status.state_hash = host.hash();
+  status.participants = host.participants();
+  status.observers = host.observers();
+  status.payload_bytes = totals.payload_bytes;
+  status.corrected = totals.corrected;
+  status.threshold = host.threshold_m();
+  status.frame_ms_p50 = totals.frame_ms_p50;
+  status.frame_ms_p99 = totals.frame_ms_p99;
+  return status;
 }
 
 }  // namespace tandem

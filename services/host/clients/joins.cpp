@@ -7,7 +7,7 @@ namespace tandem::host {
 bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
                    std::int64_t now_ns) {
   ready_.clear();
-  const bool spaced = !served_at_ns_ || now_ns - *served_at_ns_ >= kSpacingNs;
+  const bool spaced = !served_at_ns_ || now_ns - *served_at_ns_ >= accounts::kSnapshotSpacingNs;
   const bool may_cut = spaced && !transfer.full(now_ns);
   bool someone_asks = false;
   for (const auto& [id, account] : roster.accounts()) {
@@ -22,7 +22,7 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTr
     return false;
   }
   if (!collecting_since_ns_) collecting_since_ns_ = now_ns;
-  return may_cut && now_ns - *collecting_since_ns_ >= kCollectNs;
+  return may_cut && now_ns - *collecting_since_ns_ >= accounts::kHostTransfers.collect_ns;
 }
 
 void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
@@ -38,8 +38,8 @@ void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
 
 std::optional<std::int64_t> JoinDesk::due_ns(const SnapshotTransfer& transfer, std::int64_t now_ns) const {
   if (!collecting_since_ns_ || transfer.full(now_ns)) return std::nullopt;
-  const std::int64_t spaced_ns = served_at_ns_ ? *served_at_ns_ + kSpacingNs : INT64_MIN;
-  return std::max(*collecting_since_ns_ + kCollectNs, spaced_ns);
+  const std::int64_t spaced_ns = served_at_ns_ ? *served_at_ns_ + accounts::kSnapshotSpacingNs : INT64_MIN;
+  return std::max(*collecting_since_ns_ + accounts::kHostTransfers.collect_ns, spaced_ns);
 }
 
 }  // namespace tandem::host

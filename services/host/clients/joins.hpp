@@ -18,9 +18,6 @@ class JoinDesk {
  public:
   explicit JoinDesk(std::uint32_t stream) : stream_(stream) {}
 
-  static constexpr std::int64_t kCollectNs = 10 * kMillisecond;   ///< joiners of one snapshot
-  static constexpr std::int64_t kSpacingNs = 250 * kMillisecond;  ///< between two snapshots at least
-
   /// True when the time has come to make one snapshot for all who are ready: they say `joining` and
   /// name the stream, all writers that they need have matched their participant, they are not being sent one,
   /// they were not served for this attempt, and where they were served before, their participant has not

@@ -11,6 +11,7 @@
 
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/port.hpp"
+#include "services/accounts/limits.hpp"
 #include "services/accounts/outcomes.hpp"
 #include "services/accounts/reply_schedule.hpp"
 #include "services/accounts/token_bucket.hpp"
@@ -20,14 +21,11 @@
 
 namespace tandem::host {
 
-inline constexpr double kInputsPerSecond = 60;  ///< per client, on average
-inline constexpr double kInputBurst = 60;       ///< per client, at once
-
 /// The last outcomes of a client's inputs, and how fast it may send.
 struct InputAccount {
   std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
   accounts::Outcomes outcomes;
-  accounts::TokenBucket rate{kInputsPerSecond, kInputBurst};
+  accounts::TokenBucket rate = accounts::kInputs;
 };
 
 struct JoinAccount {
@@ -75,7 +73,7 @@ struct Account {
 /// What all clients of one DDS participant may cost together, or ids would multiply it.
 struct Peer {
   StallMeter stalls;
-  accounts::TokenBucket snapshots_again{0.5, 4};  ///< beyond the first of each account
+  accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;  ///< beyond the first of each account
 };
 
 /// The stream that it is on its way into, from outside or from another.

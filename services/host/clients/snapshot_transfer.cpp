@@ -105,10 +105,10 @@ void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
       holds_[entry.part] = is_new[entry.part] = counts[i] = true;
       bytes += entry.sent.bytes;
     }
-    // A part that was sent twice is taken to have come by the last copy for which there was time, once DDS has
-    // given up the first.
-    const bool by_copy = is_new[entry.part] && given_up(flying_.front()) &&
-                         now_ns - entry.sent.at_ns >= window_.least_ns();
+    // A part that was sent twice is taken to have come by the last copy for which there was time, once DDS
+    // has given up the first.
+    const bool by_copy =
+        is_new[entry.part] && given_up(flying_.front()) && now_ns - entry.sent.at_ns >= window_.least_ns();
     if (is_first || by_copy) settled = i + 1;
   }
   std::erase_if(again_, [this, &held](std::size_t part) {  // it was on its way after all
@@ -241,11 +241,13 @@ bool SnapshotTransfer::serve(transport::ClientId client, Passage& passage, std::
 
 bool SnapshotTransfer::serves(transport::ClientId client, std::int64_t now_ns) const {
   const auto passage = passages_.find(client);
-  return passage != passages_.end() && now_ns - passage->second.heard_ns() < kStalledNs;
+  return passage != passages_.end() &&
+         now_ns - passage->second.heard_ns() < accounts::kHostTransfers.stalled_ns;
 }
 
 bool SnapshotTransfer::stalled(const Passage& passage, std::int64_t now_ns) {
-  return now_ns - passage.progress_ns() >= kStalledNs || now_ns - passage.began_ns() >= kLongestNs;
+  return now_ns - passage.progress_ns() >= accounts::kHostTransfers.stalled_ns ||
+         now_ns - passage.began_ns() >= accounts::kHostTransfers.longest_ns;
 }
 
 std::pair<std::size_t, std::size_t> SnapshotTransfer::held_count_and_bytes(bool all,

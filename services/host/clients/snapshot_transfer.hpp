@@ -77,10 +77,6 @@ class Passage {
 class SnapshotTransfer {
  public:
   static constexpr std::size_t kPartBytes = 1'300;
-  /// A receiver to which nothing got through for this long is dropped when another needs the memory.
-  static constexpr std::int64_t kStalledNs = 3 * kSecond;
-  /// So is one that has been served for this long.
-  static constexpr std::int64_t kLongestNs = 60 * kSecond;
   /// Of all snapshots held; two of any size have room.
   static constexpr std::size_t kMostHeldBytes = std::size_t{128} << 20U;
 
@@ -111,6 +107,7 @@ class SnapshotTransfer {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
+  /// It is dropped when another needs the memory: nothing got through, or it has been served for too long.
   [[nodiscard]] static bool stalled(const Passage& passage, std::int64_t now_ns);
   /// Of the snapshots held; `all`: also of those whose receivers are stalled.
   [[nodiscard]] std::pair<std::size_t, std::size_t> held_count_and_bytes(bool all, std::int64_t now_ns) const;

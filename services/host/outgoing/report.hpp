@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sdk/core/layout/layout.hpp"
+#include "tandem/server_figures.hpp"
 
 namespace tandem::host {
 
@@ -35,13 +36,10 @@ struct StreamTotals {
 };
 
 /// Counts since the start, of all streams together where streams differ.
-struct HostTotals {
+struct HostTotals : ServerCounts {
   std::uint64_t frames = 0, corrected = 0;
-  std::uint64_t payload_bytes = 0, snapshot_bytes = 0;  ///< of the deltas and snapshots themselves
-  std::uint64_t reply_bytes = 0, input_bytes = 0;       ///< of replies and scheduled inputs as messages
-  std::uint64_t stalls = 0;                             ///< suspensions that a participant caused
-  std::uint64_t suspended_ms = 0;  ///< waiting past due, for participants or for the queue
-  std::uint64_t refused_inputs = 0, refused_messages = 0, snapshots = 0, demotions = 0, clients_seen = 0;
+  std::uint64_t payload_bytes = 0;  ///< of the deltas themselves
+  std::uint64_t demotions = 0, clients_seen = 0;
   double frame_ms_p50 = 0, frame_ms_p99 = 0;
   std::vector<StreamTotals> streams;  ///< in the order of their ids
 };

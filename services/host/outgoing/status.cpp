@@ -24,6 +24,10 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
     corrected_per_frame_ = made > 0 ? static_cast<double>(stream.corrected - before.corrected) / made : 0;
   }
   transport::ServerStatusMessage status;
+  const ServerCounts& counts = totals;
+  static_cast<ServerCounts&>(status) = counts;
+  status.snapshot_bytes = stream.snapshot_bytes;
+  status.snapshots = stream.snapshots;
   status.session = session_;
   status.stream = stream_;
   status.epoch = epoch_;
@@ -44,14 +48,6 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   status.observers = present.observers;
   status.window = present.window;
   status.delta_bytes = stream.payload_bytes;
-  status.reply_bytes = totals.reply_bytes;
-  status.input_bytes = totals.input_bytes;
-  status.snapshot_bytes = stream.snapshot_bytes;
-  status.stalls = totals.stalls;
-  status.suspended_ms = totals.suspended_ms;
-  status.refused_inputs = totals.refused_inputs;
-  status.refused_messages = totals.refused_messages;
-  status.snapshots = stream.snapshots;
   status.queue_high_water = static_cast<std::uint32_t>(outbox_->high_water());
   if (!outbox_->push(std::move(status))) return;
   second_ = totals;

@@ -1,6 +1,7 @@
 // The header itself: what must not change by accident.
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstring>
 #include <string>
 
@@ -28,6 +29,7 @@ TEST(TheHeader, IsTheSameInCAndInCpp) {
 TEST(TheHeader, KeepsTheSizesThatWereReleased) {
   static_assert(sizeof(void*) != 8 || (sizeof(tandem_options) == 56 && sizeof(tandem_columns) == 104));
   EXPECT_EQ(sizeof(tandem_status), 752U);
+  EXPECT_EQ(offsetof(tandem_status, stream_changes), 744U);
   EXPECT_EQ(sizeof(tandem_sample_options), 24U);
   EXPECT_EQ(sizeof(tandem_frame), 48U);
   EXPECT_EQ(sizeof(tandem_event), 304U);

@@ -130,7 +130,7 @@ class GatewayTest : public ::testing::Test {
   ViewerId join(transport::ClientId client) {
     const ViewerId id = *gateway.admit();
     EXPECT_FALSE(say(id, ack(client, transport::Phase::kJoining)));
-    later(Gateway::kSpacingNs);
+    later(accounts::kSnapshotSpacingNs);
     std::uint32_t held = 0, parts = 1;
     while (held < parts) {
       for (const auto& part : only<transport::SnapshotMessage>(read(id))) {

@@ -53,7 +53,7 @@ TEST_F(GatewayTest, AJoinerGetsASnapshotAndEveryDeltaAfterIt) {
   EXPECT_FALSE(say(id, ack(7, Phase::kJoining)));
   frame();
   EXPECT_EQ(only<DeltaMessage>(read(id)).size(), 0U) << "of no use before the cut";
-  later(Gateway::kCollectNs);
+  later(accounts::kGatewayTransfers.collect_ns);
   EXPECT_EQ(world.cuts, 1);
   frame();
   frame();
@@ -69,9 +69,9 @@ TEST_F(GatewayTest, ThoseWhoJoinTogetherShareOneSnapshotAndEveryMessage) {
   world.snapshot.resize(100);
   const ViewerId a = *gateway.admit(), b = *gateway.admit();
   EXPECT_FALSE(say(a, ack(1, Phase::kJoining)));
-  later(Gateway::kCollectNs / 2);
+  later(accounts::kGatewayTransfers.collect_ns / 2);
   EXPECT_FALSE(say(b, ack(2, Phase::kJoining)));
-  later(Gateway::kCollectNs / 2);
+  later(accounts::kGatewayTransfers.collect_ns / 2);
   EXPECT_EQ(world.cuts, 1);
   frame();
   std::vector<OutgoingPtr> of_a, of_b;
@@ -93,7 +93,7 @@ TEST_F(GatewayTest, ScheduledInputsThatTheSnapshotLacksGoBeforeIt) {
   gateway.on_scheduled(scheduled(3, 5), now_ns);
   const ViewerId id = *gateway.admit();
   EXPECT_FALSE(say(id, ack(7, Phase::kJoining)));
-  later(Gateway::kCollectNs);
+  later(accounts::kGatewayTransfers.collect_ns);
   const auto got = read(id);
   const auto inputs = only<ScheduledInputMessage>(got);
   ASSERT_EQ(inputs.size(), 2U);
@@ -127,7 +127,7 @@ TEST_F(GatewayTest, AQuestionIsAnsweredOnceAndAgainOnlyWhenAskedAgain) {
   }
   EXPECT_EQ(world.cuts, 1);
   EXPECT_FALSE(say(id, ack(7, Phase::kJoining, 2)));
-  later(Gateway::kCollectNs);
+  later(accounts::kGatewayTransfers.collect_ns);
   EXPECT_EQ(world.cuts, 2);
 }
 
@@ -255,7 +255,7 @@ TEST_F(SlowViewerTest, OneThatFallsBehindGoesOnWithTheNewestAndJoinsAgain) {
   EXPECT_EQ(frames(only<DeltaMessage>(read(id))), std::vector<Frame>{world.frame});
   EXPECT_EQ(gateway.counts().skips, 1U);
   EXPECT_FALSE(say(id, ack(7, Phase::kJoining, 2)));
-  later(Gateway::kCollectNs);
+  later(accounts::kGatewayTransfers.collect_ns);
   frame(1000);
   const auto got = read(id);
   EXPECT_EQ(only<SnapshotMessage>(got)[0].frame, world.frame - 1);
@@ -275,12 +275,12 @@ TEST_F(SlowViewerTest, WhatWeighsMoreThanASnapshotIsSkippedAfterASecond) {
 TEST_F(SlowViewerTest, OneThatFallsBehindWhileItJoinsGetsAFreshSnapshot) {
   const ViewerId id = *gateway.admit();
   EXPECT_FALSE(say(id, ack(7, Phase::kJoining)));
-  later(Gateway::kCollectNs);
+  later(accounts::kGatewayTransfers.collect_ns);
   read(id);  // as many parts as may be on their way
   for (int i = 0; i < 200; ++i) frame(1000);
   EXPECT_TRUE(only<DeltaMessage>(read(id)).empty());
-  later(Gateway::kSpacingNs);
-  later(Gateway::kSpacingNs);
+  later(accounts::kSnapshotSpacingNs);
+  later(accounts::kSnapshotSpacingNs);
   EXPECT_EQ(world.cuts, 2);
   const auto parts = only<SnapshotMessage>(read(id));
   ASSERT_FALSE(parts.empty());

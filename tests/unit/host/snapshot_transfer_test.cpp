@@ -367,7 +367,7 @@ TEST_F(SnapshotTransferTest, MemoryIsFullWithSnapshotsOnTheirWayButNotWithThoseO
   EXPECT_FALSE(transfer.full(now_ns)) << "two of any size have room";
   start(8, kLarge, {2});
   EXPECT_TRUE(transfer.full(now_ns));
-  now_ns += SnapshotTransfer::kStalledNs;
+  now_ns += accounts::kHostTransfers.stalled_ns;
   EXPECT_FALSE(transfer.full(now_ns));
   start(9, kLarge, {3});
   EXPECT_FALSE(transfer.serves(1, now_ns));

@@ -3,13 +3,17 @@
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "sdk/transport/units.hpp"
 
 namespace tandem::tool {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsSupersetOf;
 using ::testing::Not;
 
 transport::ServerStatusMessage server(const std::string& session) {
@@ -75,6 +79,52 @@ TEST(TopView, tells_bytes_by_kind_bodies_at_rest_and_who_is_too_slow) {
   const auto json = nlohmann::json::parse(view.to_json());
   EXPECT_EQ(json["sessions"][0]["bytes"]["deltas"], 12'345'678);
   EXPECT_EQ(json["clients"][0]["too_slow"], true);
+}
+
+std::vector<std::string> names(const nlohmann::json& object) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : object.items()) names.push_back(name);
+  return names;
+}
+
+// Scripts read these: names may come, none may go.
+TEST(TopView, has_a_name_for_every_figure) {
+  TopView view;
+  view.update(server("a"), 0);
+  view.update(client(1, "a"), 0);
+  const auto json = nlohmann::json::parse(view.to_json());
+  const auto& session = json["sessions"][0]["streams"][0];
+  EXPECT_THAT(names(session), IsSupersetOf({"session",
+                                            "stream",
+                                            "epoch",
+                                            "frame",
+                                            "uptime_s",
+                                            "frame_rate_hz",
+                                            "mbit_per_s",
+                                            "raw_mbit_per_s",
+                                            "frame_ms",
+                                            "corrected_per_frame",
+                                            "bodies",
+                                            "participants",
+                                            "observers",
+                                            "window",
+                                            "bytes",
+                                            "stalls",
+                                            "suspended_ms",
+                                            "refused_inputs",
+                                            "refused_messages",
+                                            "snapshots",
+                                            "codec",
+                                            "predictor",
+                                            "threshold",
+                                            "at_rest",
+                                            "queue_high_water"}));
+  EXPECT_THAT(names(session["frame_ms"]), ElementsAre("p50", "p99"));
+  EXPECT_THAT(names(session["bytes"]), ElementsAre("deltas", "inputs", "replies", "snapshots"));
+  EXPECT_THAT(names(json["clients"][0]),
+              IsSupersetOf({"client", "session", "stream", "epoch", "applied", "role", "phase", "lag_ms",
+                            "client_ms_p50", "too_slow", "mbit_per_s", "frames_applied", "resyncs",
+                            "hash_mismatches", "inputs_sent", "inputs_refused", "queue_high_water"}));
 }
 
 TEST(TopView, tells_which_stream_a_client_plays_and_its_predictor_once_heard) {

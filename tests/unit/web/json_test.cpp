@@ -32,6 +32,13 @@ TEST(Json, NumbersThatAreNotFiniteAreNull) {
   EXPECT_EQ(out, "[null,null,-0.25]");
 }
 
+TEST(Json, NamesHaveTheSpellingOfJavaScript) {
+  std::string out;
+  JsonWriter json(out);
+  json.begin_object().member("frame_ms_p50", 0.5).member("rawMbitPerS", 2.0).member("at_", true).end_object();
+  EXPECT_EQ(out, R"({"frameMsP50":0.5,"rawMbitPerS":2,"at":true})");
+}
+
 TEST(Json, TextsAreEscaped) {
   EXPECT_EQ(text("a\"b\\c\n\x01"), R"("a\u0022b\u005cc\u000a\u0001")");
   EXPECT_EQ(text("\xC3\xA4 \xE2\x82\xAC \xF0\x9F\x98\x80"), "\"\xC3\xA4 \xE2\x82\xAC \xF0\x9F\x98\x80\"");

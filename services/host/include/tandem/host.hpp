@@ -20,6 +20,7 @@
 #include "tandem/body_shape.hpp"
 #include "tandem/result.hpp"
 #include "tandem/scenery.hpp"
+#include "tandem/server_figures.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem {
@@ -83,12 +84,12 @@ struct ServerOptions {
   std::function<void(std::string_view)> log = {};
 };
 
-/// Counts since the start.
-struct ServerStatus {
+/// How a server stands, and its counts since the start.
+struct ServerStatus : ServerCounts {
   std::uint64_t frame = 0;                        ///< of the last delta
   std::uint64_t state_hash = 0;                   ///< of that frame, as every client has it
   std::uint32_t participants = 0, observers = 0;  ///< playing now
-  std::uint64_t payload_bytes = 0, corrected = 0, stalls = 0, refused_inputs = 0;
+  std::uint64_t payload_bytes = 0, corrected = 0;
   double threshold = 0;                       ///< in force
   double frame_ms_p50 = 0, frame_ms_p99 = 0;  ///< step, predict, encode, apply
 };

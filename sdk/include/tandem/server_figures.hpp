@@ -1,0 +1,82 @@
+#pragma once
+// The figures of a server. Each is written once, here: a line in a struct and a line in the list behind it.
+// The status message, the host's totals, tandem::Server, `tandemd --json`, the browser and `tandem top` go
+// through the lists. Where else a new one has to be named, and what then checks it: CONTRIBUTING.md, "Where a
+// new thing goes".
+
+#include <cstdint>
+
+namespace tandem {
+
+// sdk/package/figures.py reads the structs: a figure a line, with its text behind it.
+
+/// Counts since the start, of all streams together where streams differ.
+struct ServerCounts {
+  std::uint64_t reply_bytes = 0;       ///< of replies as messages
+  std::uint64_t input_bytes = 0;       ///< of scheduled inputs as messages
+  std::uint64_t snapshot_bytes = 0;    ///< of the snapshots themselves, repetitions too
+  std::uint64_t stalls = 0;            ///< suspensions that a participant caused
+  std::uint64_t suspended_ms = 0;      ///< waiting past due, for participants or for the queue
+  std::uint64_t refused_inputs = 0;    ///< by rule, rate or simulation
+  std::uint64_t refused_messages = 0;  ///< that broke a rule of the protocol
+  std::uint64_t snapshots = 0;         ///< made for those who join
+  bool operator==(const ServerCounts&) const = default;
+};
+
+/// What TandemServerStatus tells of one stream, once a second: rates and durations of the last second, bytes
+/// handed to the writers since the start, once each however many readers there are.
+struct ServerFigures : ServerCounts {
+  double uptime_s = 0;                 ///< since the start
+  double frame_rate_hz = 0;            ///< as it is kept
+  double mbit_per_s = 0;               ///< of payload; 2^20 bits to the Mbit
+  double raw_mbit_per_s = 0;           ///< what positions and velocities would need uncompressed
+  double frame_ms_p50 = 0;             ///< step, predict, encode, apply
+  double frame_ms_p99 = 0;             ///< as frame_ms_p50
+  double corrected_per_frame = 0;      ///< bodies that a delta corrects
+  double threshold = 0;                ///< in force, scene units
+  std::uint32_t bodies = 0;            ///< alive
+  std::uint32_t at_rest = 0;           ///< of the bodies
+  std::uint32_t participants = 0;      ///< that play
+  std::uint32_t observers = 0;         ///< that play
+  std::uint32_t window = 0;            ///< frames that a participant may be behind
+  std::uint32_t queue_high_water = 0;  ///< messages that waited at once, at most
+  std::uint64_t delta_bytes = 0;       ///< of the deltas' payload
+  bool operator==(const ServerFigures&) const = default;
+};
+
+/// Calls visit("name", that figure of each of `of`) one by one, in the order of idl/tandem.idl. What is in
+/// `of` may be any struct with these members: of the IDL, several to copy from one to the other.
+template <class Visit, class... Of>
+constexpr void each_server_count(const Visit& visit, Of&... of) {
+  visit("reply_bytes", of.reply_bytes...);
+  visit("input_bytes", of.input_bytes...);
+  visit("snapshot_bytes", of.snapshot_bytes...);
+  visit("stalls", of.stalls...);
+  visit("suspended_ms", of.suspended_ms...);
+  visit("refused_inputs", of.refused_inputs...);
+  visit("refused_messages", of.refused_messages...);
+  visit("snapshots", of.snapshots...);
+}
+
+/// The same for all.
+template <class Visit, class... Of>
+constexpr void each_server_figure(const Visit& visit, Of&... of) {
+  visit("uptime_s", of.uptime_s...);
+  visit("frame_rate_hz", of.frame_rate_hz...);
+  visit("mbit_per_s", of.mbit_per_s...);
+  visit("raw_mbit_per_s", of.raw_mbit_per_s...);
+  visit("frame_ms_p50", of.frame_ms_p50...);
+  visit("frame_ms_p99", of.frame_ms_p99...);
+  visit("corrected_per_frame", of.corrected_per_frame...);
+  visit("threshold", of.threshold...);
+  visit("bodies", of.bodies...);
+  visit("at_rest", of.at_rest...);
+  visit("participants", of.participants...);
+  visit("observers", of.observers...);
+  visit("window", of.window...);
+  visit("queue_high_water", of.queue_high_water...);
+  visit("delta_bytes", of.delta_bytes...);
+  each_server_count(visit, of...);
+}
+
+}  // namespace tandem
