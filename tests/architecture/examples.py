@@ -14,7 +14,12 @@ import sys
 import tempfile
 
 # How many sources each may touch by hand.
-EXAMPLES = {"new_client_figure.patch": 3, "new_server_figure.patch": 4}
+EXAMPLES = {
+    "new_client_figure.patch": 3,
+    "new_server_figure.patch": 4,
+    "new_predictor.patch": 4,
+    "new_stream_option.patch": 3,
+}
 SOURCES = {".cpp", ".hpp", ".c", ".h", ".idl", ".py", ".ts", ".proto", ".txt"}
 # What sdk/package/figures.py reads or writes.
 FIGURES = (
