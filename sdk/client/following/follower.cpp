@@ -124,6 +124,8 @@ Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_n
   const Frame frame = part.frame;
   const bool last_part = part.part + 1 == part.parts;
   const Outcome outcome = deltas_.add(std::move(part));
+  // Where nothing was buffered, deltas may come that the snapshot counts already.
+  if (!joining_) deltas_.drop_through(timeline_.applied());
   if (outcome == Outcome::kStored) return {.done = last_part};
   if (outcome == Outcome::kIgnored) return {};
   // Who joins starts the buffer again; after a gap the snapshot asked for may still fit what follows.
@@ -132,7 +134,6 @@ Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_n
 }
 
 Follower::Step Follower::apply_front(const ScheduledInputs& scheduled, std::int64_t waited_ns) {
-  deltas_.drop_through(timeline_.applied());
   const CompleteDelta* const delta = deltas_.front();
   if (delta == nullptr) return {};
   const Frame frame = delta->frame;
@@ -157,7 +158,6 @@ Follower::Step Follower::wait_for_inputs(Frame frame, std::int64_t waited_ns) {
 }
 
 std::optional<Follower::Loss> Follower::check_lag(std::int64_t now_ns) {
-  deltas_.drop_through(timeline_.applied());
   if (!lag_.exceeded(deltas_.size(), now_ns)) return std::nullopt;
   return Loss{ResyncReason::kLag, timeline_.applied()};
 }
