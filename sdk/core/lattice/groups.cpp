@@ -84,17 +84,21 @@ std::uint8_t bits_of(const Groups& groups) {
 }
 
 void put_body(unsigned groups, const BodyState& body, ByteWriter& out) {
-  const auto put = [&out](const auto& vector) {
-    for (const std::int32_t number : vector) out.put(number);
+  ByteWriter copy = out;  // which stays in registers
+  const auto put = [&copy](const auto& vector) {
+    for (const std::int32_t number : vector) copy.put(number);
   };
   for_each_vector(groups, put, body);
+  out = copy;
 }
 
 void get_body(unsigned groups, ByteReader& in, BodyState& body) {
-  const auto get = [&in](auto& vector) {
-    for (std::int32_t& number : vector) number = in.get<std::int32_t>();
+  ByteReader copy = in;
+  const auto get = [&copy](auto& vector) {
+    for (std::int32_t& number : vector) number = copy.get<std::int32_t>();
   };
   for_each_vector(groups, get, body);
+  in = copy;
 }
 
 std::size_t body_bytes(unsigned groups) {

@@ -10,16 +10,18 @@ namespace {
 
 Result<void> check_groups(const Layout& layout) {
   const auto refuse = [](std::string reason) { return fail(ErrorCode::kInvalidArgument, std::move(reason)); };
-  bool needs_radii = false;
+  bool complete = true, needs_radii = false;
   auto name = layout.groups.begin();
   for (const ChannelGroup& each : kChannelGroups) {
     const bool listed = name != layout.groups.end() && *name == each.name;
-    if (!listed && each.listed == nullptr) return refuse("channel groups that do not begin with position");
+    complete &= listed || each.listed != nullptr;
     if (listed) ++name;
     needs_radii |= listed && each.needs_radii;
   }
   if (name != layout.groups.end())
-    return fail(ErrorCode::kUnsupported, "channel group '" + *name + "', unknown, repeated or out of order");
+    return fail(ErrorCode::kUnsupported,
+                "unknown channel group '" + *name + "', or one that is repeated or out of order");
+  if (!complete) return refuse("channel groups without position");
   if (!needs_radii && !layout.radii.empty()) return refuse("radii that no channel group needs");
   if (!needs_radii) return {};
   if (layout.radii.size() != layout.type_count) return refuse("orientations need a radius for each type");
