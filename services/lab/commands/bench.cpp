@@ -14,7 +14,7 @@
 namespace tandem::lab {
 namespace {
 
-constexpr double kLeastThreshold = std::numeric_limits<double>::min(), kMostThreshold = 1e6;
+constexpr double kLeastScale = std::numeric_limits<double>::min(), kMostScale = 1e6;
 
 }  // namespace
 
@@ -71,13 +71,13 @@ commandline::Option add_seed_option(commandline::Command command, std::uint64_t&
 
 commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice) {
   return command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
-      .range(kLeastThreshold, kMostThreshold);
+      .range(kLeastScale, kMostScale);
 }
 
 void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice) {
   const commandline::Option scale = add_threshold_scale(command, choice);
   command.add_option("--threshold", choice.threshold_m, "Error threshold, scene units (default: the scene's)")
-      .range(kLeastThreshold, kMostThreshold)
+      .range(planning::kLeastLength, planning::kMostLength)
       .excludes(scale);
 }
 
