@@ -36,8 +36,8 @@ struct ServerFigures : ServerCounts {
   double threshold = 0;                ///< in force, scene units
   std::uint32_t bodies = 0;            ///< bodies alive
   std::uint32_t at_rest = 0;           ///< bodies at rest
-  std::uint32_t participants = 0;      ///< that play
-  std::uint32_t observers = 0;         ///< that play
+  std::uint32_t participants = 0;      ///< participants that play
+  std::uint32_t observers = 0;         ///< observers that play
   std::uint32_t window = 0;            ///< maximum number of frames that a participant may be behind
   std::uint32_t queue_high_water = 0;  ///< maximum number of messages that waited at once
   std::uint64_t delta_bytes = 0;       ///< size of the deltas' payload

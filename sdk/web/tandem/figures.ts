@@ -84,9 +84,9 @@ export interface ServerFigures {
   bodies: number;
   /** Bodies at rest. */
   atRest: number;
-  /** That play. */
+  /** Participants that play. */
   participants: number;
-  /** That play. */
+  /** Observers that play. */
   observers: number;
   /** Maximum number of frames that a participant may be behind. */
   window: number;
