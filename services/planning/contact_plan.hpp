@@ -1,5 +1,5 @@
 #pragma once
-// A world as the constants of the predictors that compute contacts.
+// Turns a world into the constants of the predictors that compute contacts.
 
 #include <cstdint>
 #include <string_view>
@@ -11,8 +11,8 @@
 
 namespace tandem::planning {
 
-/// The integers that travel in the session. `predictor` is named in errors: kInvalidArgument for a world
-/// without scenery or body types, with scenery that is no geometry, or one that does not fit the lattice.
+/// Returns the integers that travel in the session. Errors name `predictor`: kInvalidArgument for a world
+/// without scenery or body types, with invalid geometry in its scenery, or one that does not fit the lattice.
 [[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const World& world,
                                                                   const host::Lattice& lattice,
                                                                   std::string_view predictor);
