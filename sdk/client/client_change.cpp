@@ -1,4 +1,4 @@
-// Which stream is played, and the way over into another one: idl/STATES.md, "Changing the stream".
+// Chooses the stream that is played, and changes to another one: idl/STATES.md, "Changing the stream".
 #include <algorithm>
 #include <utility>
 
@@ -17,7 +17,7 @@ Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::Ses
   return follow(session, now);
 }
 
-// The one that is chosen: it was found playable, so making its timeline again cannot fail.
+// Makes a follower of the chosen stream. It was found playable, so making its timeline again cannot fail.
 Result<std::unique_ptr<Follower>> ClientCore::follow(const transport::SessionMessage& session,
                                                      Now now) const {
   const transport::StreamMessage& stream = session.streams[chooser_->chosen().index];
@@ -140,7 +140,7 @@ void ClientCore::give_up_change(const std::string& why, Now now) {
   ack_due_ = true;
 }
 
-// The same epoch with other streams: what is followed goes on, if it is still there.
+// Handles other streams in the same epoch: the stream that is followed goes on, if it still exists.
 void ClientCore::adopt_streams(const transport::SessionMessage& session, Now now) {
   EpochState& e = *epoch_;
   const auto still = [&session](const Follower& follower) {

@@ -12,14 +12,15 @@
 namespace tandem::client {
 namespace {
 
-// An acknowledgement is repeated after this, so that the server hears from a client even when no frame comes.
+// An acknowledgement is repeated after this time, so that the server hears from a client even if no frame
+// comes.
 constexpr std::int64_t kPlayingRepeatNs = kSecond;
-constexpr std::int64_t kDeafRepeatNs = 4 * kSecond;  // nobody hears it: DDS repeats each many times by itself
-// Longest that poll() asks to sleep; and while it plays and misses nothing, when all that may happen wakes
-// it.
+constexpr std::int64_t kDeafRepeatNs = 4 * kSecond;  // no server hears it, and DDS repeats each many times
+// Maximum sleep that poll() asks for, in general and while the client plays and misses nothing, when every
+// event wakes it.
 constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
 constexpr std::int64_t kMaxPlayingSleepNs = 500 * kMillisecond;
-// A server from which nothing comes for so long while it is joined makes room for another, if there is one.
+// If nothing comes from a server for so long while the client joins, another server may take its place.
 constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
 
 Drawable drawable(const Picture& picture) {
@@ -56,7 +57,8 @@ ClientCore::ClientCore(CoreOptions options, transport::ClientPort& port, CoreLis
       status_report_(options_.role == transport::Role::kObserver ? 2 * kSecond : kSecond) {}
 
 std::int64_t ClientCore::poll(Now now) {
-  // After a pause of the process itself, what is late may be waiting outside: count it as one short wait.
+  // After a pause of this process late messages may still wait to be read: counts the pause as one short
+  // wait.
   const std::int64_t since_ns =
       last_poll_ns_ == 0 ? 0 : std::clamp<std::int64_t>(now.steady_ns - last_poll_ns_, 0, kMaxSleepNs);
   last_poll_ns_ = now.steady_ns;
@@ -97,18 +99,18 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
     if (epoch_->played->joining()) {
       due = std::min(due, epoch_->played->next_due_ns());
     } else if (epoch_->played->front() != nullptr && !epoch_->played->misses_input()) {
-      due = now.steady_ns;  // more than one poll applies
+      due = now.steady_ns;  // there are more frames than one poll applies
     } else if (pictures_.wanted() && epoch_->pacer.known() &&
                epoch_->played->timeline().now() < epoch_->played->timeline().applied() + epoch_->lead) {
       due = std::min(due, epoch_->pacer.due_ns(epoch_->played->timeline().now() + 1));
     }
   }
-  // Never in the past and never a busy loop, whatever the estimates say.
+  // The result is never in the past and never causes a busy loop, whatever the estimates are.
   return std::max(due, now.steady_ns + kMillisecond / 2);
 }
 
-// Acknowledgements are rare where nobody waits for them (idl/STATES.md, "Acknowledgements"): each costs more
-// bytes than many a delta.
+// Acknowledgements are rare if the server does not wait for them (idl/STATES.md, "Acknowledgements"), because
+// each costs more bytes than many a delta.
 std::int64_t ClientCore::next_ack_ns() const {
   const EpochState& e = *epoch_;
   if (e.played->joining()) return last_ack_ns_ + e.played->repeat_ns();
@@ -121,7 +123,7 @@ std::int64_t ClientCore::next_ack_ns() const {
   const double period_ns = 1e9 / e.session.frame_rate_hz;
   if (e.played->timeline().applied() - acknowledged_ >= transport::ack_spacing(e.session.window_ceiling))
     return last_ack_ns_;
-  // Without a further delta the server may be waiting.
+  // If no further delta comes, the server may be waiting.
   const auto quiet_ns = statistics_.last_applied_ns + static_cast<std::int64_t>(1.25 * period_ns);
   return std::min({repeat_ns, last_ack_ns_ + transport::kAckSpacingNs, quiet_ns});
 }
@@ -142,11 +144,11 @@ void ClientCore::take_sessions(Now now) {
       }
       if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
     }
-    // Of one that cannot be played the next is looked at; each once, so this ends.
+    // If a session cannot be played, the next one is tried. Each is tried once, so this ends.
   } while (!epoch_ && !inbox_.sessions.empty());
 }
 
-// A new epoch: everything of the old one is dropped, unseen.
+// Starts a new epoch: everything of the old one is dropped without being read.
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
   port_.close_streams();
   join_attempts_ = join_attempt();
@@ -234,7 +236,8 @@ void ClientCore::send_ack(Now now) {
   const bool joins = changes || e.played->joining();
   ack.phase = joins ? transport::Phase::kJoining : transport::Phase::kPlaying;
   if (joins) joined.tell_progress(ack);
-  // Who changes the stream says both: the snapshot that comes in, and how far it plays.
+  // A client that changes its stream acknowledges both the incoming snapshot and the last frame that it
+  // played.
   if (!e.played->joining()) {
     ack.applied = acknowledged_ = e.played->timeline().applied();
     ack.simulated = e.played->timeline().now();
@@ -243,7 +246,7 @@ void ClientCore::send_ack(Now now) {
   ack.clock_ns = now.steady_ns;
   ack.join_attempt = joined.join_attempt();
   const std::int64_t began_ns = measure();
-  // A failed write is tried again at the next poll, as the acknowledgement stays due.
+  // A failed write is tried again at the next poll, because the acknowledgement stays due.
   ack_due_ = !port_.write(ack).has_value();
   if (statistics_.frames_applied > 0) statistics_.costs.acknowledge_ns += measure() - began_ns;
   last_ack_ns_ = now.steady_ns;
@@ -271,7 +274,7 @@ void ClientCore::send_status(Now now) {
     status.phase = static_cast<std::uint32_t>(epoch_->played->joining() ? transport::Phase::kJoining
                                                                         : transport::Phase::kPlaying);
   }
-  // Best effort: one lost second of figures is made good by the next.
+  // Best effort: the next figures replace a lost second.
   static_cast<void>(port_.write(status));
 }
 
@@ -311,7 +314,7 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
 void ClientCore::echo(const transport::InputMessage& gravity, Now now) {
   EpochState& e = *epoch_;
   if (gravity.values.size() != kPositionChannels || !e.pacer.known()) return;
-  // The lattice counts velocity in 1/64 of its unit.
+  // Lattice velocities are in 1/64 of the lattice unit.
   const double scale = 64 / (e.session.lattice_unit * e.session.frame_rate_hz * e.session.frame_rate_hz);
   std::array<float, kPositionChannels> in_lattice{};
   for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
@@ -381,7 +384,7 @@ void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
   if (epoch_ && epoch_->has_played)
     epoch_->pictures.on_loaded(epoch_->played->timeline(), epoch_->pacer, last_poll_ns_);
-  pictures_.want();  // last: without memory for a first picture, the next call tries again
+  pictures_.want();  // last, so that the next call tries again if there was no memory for a first picture
 }
 
 std::optional<Drawable> ClientCore::drawable() {
@@ -401,7 +404,7 @@ std::optional<Drift> ClientCore::drift() const {
   return epoch_->uncorrected->drift();
 }
 
-// While joining again, the last picture is still there to be drawn, as long as it is of this epoch.
+// While the client rejoins, the last picture can still be drawn if it is of this epoch.
 Result<SampledFrame> ClientCore::sample(const SampleRequest& request, const SampleColumns& columns, Now now) {
   const PictureExchange::Reading reading(pictures_);
   if (reading.picture() == nullptr) return fail(ErrorCode::kOutOfOrder, "nothing to draw");

@@ -1,4 +1,4 @@
-// The way into a stream: for the first time, or beside the one that is played; and what follows a loss.
+// Joins a stream, for the first time or while another is played, and handles losses.
 #include <algorithm>
 #include <utility>
 
@@ -40,7 +40,7 @@ void ClientCore::begin(Now now) {
   log(LogLevel::kInfo, "playing from frame " + std::to_string(snapshot->frame));
 }
 
-// From the agreed state as it is now.
+// Starts from the current agreed state.
 void ClientCore::follow_uncorrected() {
   EpochState& e = *epoch_;
   e.pictures.draw_instead(nullptr);
@@ -69,7 +69,7 @@ void ClientCore::on_loss(const Follower::Loss& loss, Now now) {
     log(LogLevel::kWarning, "joining again: " + loss.text());
   }
   e.join_began_ns = now.steady_ns;
-  if (e.change) {  // on its way anyhow
+  if (e.change) {  // the client is on its way anyway
     move_over(now);
     return;
   }

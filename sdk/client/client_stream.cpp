@@ -1,4 +1,4 @@
-// What comes of an epoch: take it in, and play.
+// Takes the messages of an epoch, and plays.
 #include <algorithm>
 #include <utility>
 
@@ -9,10 +9,11 @@ namespace tandem::client {
 
 namespace {
 
-// A client that is far behind does what else is due, and lets others call it, after so many frames.
+// After so many frames a client that is far behind does its other work and lets other calls proceed.
 constexpr int kFramesPerPoll = 64;
 
-// A stamp is untrusted: clocks an hour apart say nothing about latency, and no difference may overflow.
+// Stamps are untrusted: clocks that are an hour apart say nothing about latency, and no difference may
+// overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
   constexpr std::int64_t kMostNs = 3600 * kSecond;
   return wall_ns - std::clamp(server_time_ns, wall_ns - kMostNs, wall_ns + kMostNs);
@@ -20,8 +21,8 @@ std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
 
 }  // namespace
 
-// Deltas first: whatever scheduled inputs they promise were published before them, so taking the inputs
-// afterwards finds the most.
+// Deltas come first: the scheduled inputs that they count were published before them, so taking inputs
+// afterwards finds as many as possible.
 void ClientCore::take_stream(Now now) {
   if (!epoch_->played->is_open()) return;
   take_deltas(now);
@@ -48,7 +49,8 @@ void ClientCore::take_deltas(Now now) {
     const Frame frame = received.message.frame;
     const std::int64_t server_time_ns = received.message.server_time_ns;
     const Follower::Step taken = to->take(std::move(received.message), now.steady_ns);
-    statistics_.queue_high_water = std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
+    statistics_.queue_high_water =
+        std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
     if (taken.done && is_played) epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
     if (!taken.loss) continue;
     if (is_played) {
@@ -66,7 +68,7 @@ void ClientCore::take_scheduled() {
     if (!belongs(received)) continue;
     const auto input = read_scheduled(received.message);
     if (!input) {
-      // Its number stays missing, which brings about a rejoin when a delta needs it.
+      // The number stays missing, which causes a rejoin when a delta needs it.
       ++statistics_.refused_messages;
       log(LogLevel::kWarning, input.error().message);
       continue;
@@ -81,7 +83,7 @@ void ClientCore::take_scheduled() {
 void ClientCore::take_snapshots(Now now) {
   using Outcome = SnapshotAssembly::Outcome;
   inbox_.snapshots.clear();
-  port_.take(inbox_.snapshots);  // also while nothing joins: what comes late is not kept
+  port_.take(inbox_.snapshots);  // also while nothing joins, so that late parts are not kept
   if (!epoch_->played->joining() && !(epoch_->change && epoch_->change->to().joining())) return;
   for (auto& received : inbox_.snapshots) {
     if (!belongs(received)) continue;
@@ -136,7 +138,7 @@ void ClientCore::on_applied(const CompleteDelta& delta, std::int64_t cost_ns, No
   listener_.on_applied(e.session.epoch, delta);
 }
 
-// The frames that the server simulates by now, as far as the lead allows.
+// Simulates the frames that the server has reached by now, as far as the lead allows.
 void ClientCore::simulate_ahead(Now now) {
   EpochState& e = *epoch_;
   if (!e.pacer.known()) return;
@@ -153,7 +155,7 @@ void ClientCore::play_ahead(Now now) {
   if (e.played->timeline().now() != simulated) e.pictures.on_simulated(e.played->timeline(), e.pacer);
 }
 
-// Once all that others wait for is done: the picture and the acknowledgement of the last frame.
+// Called after the work that others wait for: the picture and the acknowledgement of the last frame.
 void ClientCore::prepare_next() {
   EpochState& e = *epoch_;
   if (e.played->joining()) return;

@@ -31,7 +31,7 @@ using transport::Reason;
 
 constexpr std::int64_t kLongestWakeNs = 50 * kMillisecond;
 constexpr std::int64_t kShortWakeNs = 10 * kMillisecond;
-constexpr std::int64_t kLookNs = kSecond / 4;  // between looks for rivals and for dead clients
+constexpr std::int64_t kLookNs = kSecond / 4;  // time between checks for rivals and for dead clients
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
 
@@ -68,7 +68,7 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   const std::uint32_t capacity = simulation.capacity();
   if (capacity != layout.capacity)
     return refuse(fmt::format("{} slots for a simulation of {}", layout.capacity, capacity));
-  // As clients read it, who would stumble over it one by one.
+  // Reads it as clients do; otherwise each of them would fail.
   if (const auto text = transport::read_text_message(config.scene_description); !text)
     return refuse(text.error().message);
   return {};
@@ -120,7 +120,7 @@ struct Host::Impl {
             .written = source->frame() - std::min(source->frame(), unwritten),
             .period_ns = pacing.period_ns()};
   }
-  // A snapshot waits for a frame, which is rounded for it; not while the session is suspended.
+  // A snapshot waits for a frame, which is rounded for it, but not while the session is suspended.
   [[nodiscard]] std::int64_t frame_awaited_until_ns() const {
     return state == State::kRunning ? pacing.suspended_from_ns() + pacing.period_ns() : INT64_MIN;
   }
@@ -155,7 +155,7 @@ struct Host::Impl {
   void note_foreigner(transport::ClientId client);
   void refuse_stream(const transport::Received<transport::AckMessage>& ack);
 
-  // What each stream has of its own.
+  // The data of each stream.
   struct Lane {
     Lane(std::uint32_t stream, const ServiceConfig& config, Outbox& outbox)
         : joins(stream), transfer(outbox), status(config.session, stream, config.epoch, outbox) {}
@@ -186,10 +186,10 @@ struct Host::Impl {
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
   std::optional<std::int64_t> first_poll_ns;
   std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
-  Waiting waiting = Waiting::kNothing;  // what the due frame waits for, since the last poll
-  Frame written_then = 0;               // at the last poll
+  Waiting waiting = Waiting::kNothing;  // what the due frame has waited for since the last poll
+  Frame written_then = 0;               // last frame written, as of the last poll
   bool held = false;                    // the due frame had to wait
-  bool stalled = false;                 // and was counted as a stall
+  bool stalled = false;                 // the wait was counted as a stall
   std::int64_t suspended_ns = 0;
 
   FrameReport report;
@@ -236,7 +236,7 @@ void Host::Impl::claim_name() {
   last_look_ns = now_ns;
 }
 
-// Before anything new is taken in: the time since the last poll is charged to those who were to blame then.
+// Call before new messages are taken: charges the time since the last poll to those that were to blame then.
 void Host::Impl::charge_waiting() {
   if (waiting == Waiting::kNothing) return;
   const std::int64_t waited_ns = now_ns - std::max(last_poll_ns, pacing.suspended_from_ns());
@@ -251,7 +251,8 @@ void Host::Impl::charge_waiting() {
 }
 
 void Host::Impl::receive() {
-  // Inputs are taken first and digested last: an acknowledgement sent before an input is then seen before it.
+  // Inputs are taken first and handled last, so that an acknowledgement that was sent before an input is
+  // handled before it.
   acks.clear();
   input_samples.clear();
   port->take(input_samples);
@@ -261,7 +262,7 @@ void Host::Impl::receive() {
 }
 
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
-  const bool of_session = ack.message.epoch != 0;  // or it still looks for one
+  const bool of_session = ack.message.epoch != 0;  // false: the client still looks for a session
   if (of_session) claim.acknowledged(ack.message.epoch, ack.from, now_ns);
   const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
   if (reason == Reason::kNone) {
@@ -294,7 +295,8 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
   }
   ++totals.refused_messages;
   if (reason == Reason::kForeignClient) {
-    // Not answered: a reply is keyed by the client, so the rightful owner would take it for his.
+    // Not answered, because a reply is keyed by the client's id, and the rightful owner would take it as its
+    // own.
     note_foreigner(input.message.client);
     return;
   }
@@ -318,7 +320,7 @@ StreamSet Host::Impl::snapshots_due() {
   return due;
 }
 
-// Of a stream that ends nothing is left to be sent.
+// Nothing of a stream that ends remains to be sent.
 void Host::Impl::choose_streams(StreamSet joined) {
   const StreamSet before = source->active();
   source->set_active(audience.wanted(roster, now_ns) | joined);
@@ -328,7 +330,7 @@ void Host::Impl::choose_streams(StreamSet joined) {
 }
 
 void Host::Impl::look_around() {
-  // More often while somebody is waited for: he may be gone.
+  // More often while the server waits for a client, because that client may be gone.
   if (now_ns - last_look_ns < (waiting == Waiting::kParticipants ? kLongestWakeNs : kLookNs)) return;
   last_look_ns = now_ns;
   roster.look_for_dead(*port, moment());

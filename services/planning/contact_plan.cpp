@@ -12,7 +12,8 @@ namespace {
 
 using engine::Vec3;
 
-// What does not fit, or is no number, ends at a value beyond every limit, which the check at the end refuses.
+// A value that does not fit or is not a number becomes one beyond every limit, which the check at the end
+// refuses.
 std::int32_t rounded(double value) {
   if (std::isnan(value)) return INT32_MAX;
   return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), double{INT32_MIN}, double{INT32_MAX}));
@@ -22,7 +23,7 @@ Vec3i scaled(const Vec3& v, double scale) {
   return {rounded(v[0] * scale), rounded(v[1] * scale), rounded(v[2] * scale)};
 }
 
-// Gains of one sub-step for a body of type 0.
+// The gains of one sub-step for a body of type 0.
 ContactMaterial material_of(const Scenery::Law& law, double mass, double dt_s, double substeps) {
   const double share = dt_s / (mass * substeps);
   return {rounded(16384.0 * law.spring * dt_s * share), rounded(8192.0 * law.damping * share),
@@ -30,14 +31,17 @@ ContactMaterial material_of(const Scenery::Law& law, double mass, double dt_s, d
 }
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-bool is_unit(const Vec3& v) { return std::fabs(dot(v, v) - 1) < 1e-3; }  // false for what is no number
+bool is_unit(const Vec3& v) {
+  return std::fabs(dot(v, v) - 1) < 1e-3;
+}  // false for values that are not
+   // numbers
 bool is_orthonormal(const std::array<Vec3, 3>& axes) {
   for (std::size_t i = 0; i < 3; ++i)
     if (!is_unit(axes[i]) || !(std::fabs(dot(axes[i], axes[(i + 1) % 3])) < 1e-3)) return false;
   return true;
 }
 
-// What is wrong; empty: nothing.
+// Returns what is wrong; empty if nothing is.
 std::string fault(const World& world) {
   if (!world.scenery || world.types.empty()) return "needs a world with body types and scenery";
   if (!std::ranges::all_of(world.types, [](const BodyType& type) { return type.mass > 0; }))

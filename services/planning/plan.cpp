@@ -29,7 +29,7 @@ std::vector<std::byte> codec_tables(const TrainedTable& table, const Groups& gro
   if (!groups.orientation) return bytes;
   append(table.turn_code_lengths);
   append(table.spin_code_lengths);
-  // Of a table that was trained before bodies turned.
+  // The table was trained before bodies turned.
   if (table.turn_code_lengths.empty()) bytes.insert(bytes.end(), usual.begin() + 2 * kSymbols, usual.end());
   return bytes;
 }
@@ -40,7 +40,7 @@ Result<void> choose_groups(const World& world, const CodecTraits& traits, host::
   return host::choose_groups(world.turns, sizes, stream.lattice, traits, stream.layout);
 }
 
-// Where the codec reads them and bodies turn.
+// Sets the steps of turns if the codec reads them and bodies turn.
 Result<void> choose_turn_steps(const World& world, const TrainedTable& table, const CodecTraits& traits,
                                host::StreamConfig& stream) {
   if (!traits.reads_steps || !groups_of(stream.layout).orientation) return {};
@@ -49,7 +49,7 @@ Result<void> choose_turn_steps(const World& world, const TrainedTable& table, co
                               stream.layout.parameters.codec);
 }
 
-// Cells are as large as the largest bodies, and hold so many smaller ones at most.
+// Cells are as large as the largest bodies and hold only a limited number of smaller ones.
 bool are_alike(const std::vector<BodyType>& types) {
   if (types.empty()) return false;
   const auto [smallest, largest] = std::ranges::minmax(types, {}, &BodyType::contact_radius);
@@ -89,7 +89,7 @@ Result<void> choose_predictor(const World& world, const Wishes& wishes, const Co
   return set_predictor(world, basic_predictor(), stream);
 }
 
-/// Of a stream, in metres.
+/// The thresholds of a stream, in metres.
 struct Thresholds {
   double first = 0, finest = 0;
 };
@@ -101,7 +101,7 @@ Thresholds thresholds_of(const World& world, const Wishes& wishes) {
   return {first_m, first_m * host::kFinestShare};
 }
 
-// On a lattice that the session's streams share.
+// Plans a stream on the lattice that the session's streams share.
 Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const World& world, const Wishes& wishes) {
   const auto traits = codec_traits(wishes.codec);
   if (!traits) return tl::unexpected(traits.error());
@@ -141,7 +141,7 @@ tl::unexpected<Error> of_stream(const std::string& name, const Error& error) {
   return fail(error.code, fmt::format("stream {}: {}", name, error.message));
 }
 
-/// A stream's name and all that is wished for it.
+/// A stream's name and all its wishes.
 struct Wished {
   std::string name;
   Wishes wishes;

@@ -6,7 +6,7 @@
 namespace tandem::planning {
 namespace {
 
-// How far two sizes are apart, 1 when equal.
+// The ratio of two sizes, at least 1; 1 if they are equal.
 double ratio(double a, double b) { return a > b ? a / b : b / a; }
 
 }  // namespace

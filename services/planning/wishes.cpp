@@ -25,7 +25,7 @@ std::string known_keys() {
   return keys;
 }
 
-/// Puts a value where it belongs; false for what is none.
+/// Stores a value in its field; returns false for an invalid one.
 struct Set {
   std::string_view value;
   Wishes* wishes;

@@ -1,4 +1,4 @@
-// tandem.h: finding sessions.
+// Implements "Finding sessions" of tandem.h.
 #include <algorithm>
 #include <cstddef>
 
@@ -10,7 +10,7 @@
 namespace tandem::api {
 namespace {
 
-// Never destroyed, so that a browser held by a static object may still be closed.
+// The registry of browsers. It is never destroyed, so that a static object can still close its browser.
 Registry<Browser>& browsers() {
   static auto* const all = new Registry<Browser>;
   return *all;

@@ -1,4 +1,4 @@
-// tandem.h: joining, events and input.
+// Implements joining, events and input of tandem.h.
 #include <cmath>
 #include <string>
 #include <type_traits>
@@ -112,7 +112,7 @@ struct CopyState {
   }
 };
 
-// Besides what the lists name.
+// Size of the members of tandem_status that are in no list.
 constexpr std::size_t kOtherStatusBytes = sizeof tandem_status::size + sizeof tandem_status::events_dropped;
 constexpr std::size_t listed_status_bytes() {
   std::size_t bytes = kOtherStatusBytes;

@@ -40,7 +40,7 @@ void EventLog::on_snapshot(const transport::SnapshotMessage& snapshot) {
 }
 
 void EventLog::on_resync(client::ResyncReason reason) {
-  if (!std::exchange(playing_, false)) return;  // it was joining still
+  if (!std::exchange(playing_, false)) return;  // it was still joining
   add({.kind = TANDEM_EVENT_LOST, .text = describe(reason)});
 }
 
@@ -69,7 +69,7 @@ void EventLog::end(const client::ClientCore& core) {
     add({.kind = TANDEM_EVENT_REFUSED, .text = core.status().reason});
   }
   if (const transport::ReplyMessage* reply = core.reply()) {
-    // Observers by their own choice are told no reason.
+    // A client that chose to be an observer gets no reason.
     const bool demoted = reply->role == transport::Role::kObserver && reply->reason != 0;
     if (demoted != std::exchange(demoted_, demoted)) {
       add({.kind = demoted ? TANDEM_EVENT_DEMOTED : TANDEM_EVENT_PROMOTED,

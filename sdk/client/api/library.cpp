@@ -1,4 +1,4 @@
-// tandem.h: what needs no handle.
+// Implements the functions of tandem.h that need no handle.
 #include "sdk/client/api/boundary.hpp"
 #include "sdk/transport/clock.hpp"
 

@@ -1,4 +1,4 @@
-// tandem.h: drawing.
+// Implements "Drawing" of tandem.h.
 #include <cmath>
 #include <cstddef>
 #include <initializer_list>
@@ -59,7 +59,7 @@ tandem_result tandem_sample(tandem_client client, const tandem_sample_options* o
     tandem_columns where = TANDEM_COLUMNS_INIT;
     tandem_frame what = TANDEM_FRAME_INIT;
     tandem_result result = TANDEM_OK;
-    where.capacity = std::numeric_limits<std::uint32_t>::max();  // nothing to have room for
+    where.capacity = std::numeric_limits<std::uint32_t>::max();  // without columns any capacity is enough
     if (options != nullptr) result = read_struct(options, how);
     if (result == TANDEM_OK && columns != nullptr) result = read_struct(columns, where);
     if (result == TANDEM_OK && frame != nullptr) {

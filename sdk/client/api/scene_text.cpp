@@ -16,7 +16,7 @@ using transport::scalar;
 using Message = transport::TextMessage;
 using Field = transport::TextField;
 
-/// Far from where a float would overflow, so that what is computed with it stays finite.
+/// Far below the overflow of a float, so that results computed with it stay finite.
 constexpr double kLargest = 1e30;
 
 double number(const Message* message, std::string_view name) {
@@ -26,7 +26,7 @@ double number(const Message* message, std::string_view name) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   const std::string_view rest(end, static_cast<std::size_t>(text.data() + text.size() - end));
   const bool whole = error == std::errc() && (rest.empty() || rest == "f" || rest == "F");
-  return whole && std::abs(value) <= kLargest ? value : 0;  // not of NaN
+  return whole && std::abs(value) <= kLargest ? value : 0;  // false for NaN
 }
 
 Vector vector(const Message* message) {
@@ -52,7 +52,7 @@ Solid plane(const Message& text) {
   return solid;
 }
 
-// Each turn is about an axis of the scene, so it comes in front of those before it.
+// Each turn is about an axis of the scene, so its quaternion is multiplied from the left.
 Solid box(const Message& text) {
   Solid solid;
   solid.shape = Solid::Shape::kBox;

@@ -1,4 +1,4 @@
-// tandem.h: what a session is made of.
+// Implements "What a session is made of" of tandem.h.
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
@@ -60,7 +60,7 @@ tandem_solid to_c(const Solid& solid) {
   return out;
 }
 
-/// Of the session that is known; read again where that is another run of a server.
+/// The scene of the known session. It is read again if that is another run of a server.
 Result<std::shared_ptr<const KnownScene>> scene_of(RunningClient& client) {
   auto held = client.scene();
   Epoch epoch = 0;

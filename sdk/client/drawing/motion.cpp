@@ -69,7 +69,7 @@ void put_vectors(const float* x, const float* y, const float* z, float scale, st
       std::memcpy(to + 2 * sizeof(float), &scaled_z[i], sizeof(float));
     }
   };
-  stride == kPacked ? store(kPacked) : store(stride);  // a step that the compiler knows is unrolled
+  stride == kPacked ? store(kPacked) : store(stride);  // the compiler unrolls a constant stride
 }
 
 }  // namespace tandem::client

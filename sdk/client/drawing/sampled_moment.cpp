@@ -5,23 +5,23 @@
 namespace tandem::client {
 namespace {
 
-// More than that between two samples tells of nothing; keeps floats finite.
+// A longer distance between two samples means nothing; the limit keeps floats finite.
 constexpr double kFarFrames = 1000;
 
 float bounded(double frames) { return static_cast<float>(std::clamp(frames, -kFarFrames, kFarFrames)); }
 
-// Velocities are v + a in the first frame beyond the last, v + 2 a in the second, and so on: the first is in
-// the velocity that is drawn.
+// Velocities are v + a in the first frame beyond the last, v + 2 a in the second, and so on; the drawn
+// velocity contains the first a.
 double fall_after(double beyond) { return beyond > 1 ? beyond * (beyond - 1) / 2 : 0; }
 
-// Where the moment leaps ahead of the clock, as after trouble, the leap is a correction.
+// If the moment leaps ahead of the clock, for example after an interruption, the leap is a correction.
 void since_last(SampledMoment& moment, double start, double last_frame, double elapsed) {
   moment.span.gap = bounded(std::min(std::max(0.0, start - last_frame), elapsed));
   moment.span.since =
       bounded(std::min(moment.frame - std::max(start, last_frame), elapsed - moment.span.gap));
 }
 
-// What was drawn last already moves at the echo's speed of then.
+// The bodies drawn last already move at the echo's speed of that time.
 void add_echo(const GravityEcho& echo, double rate_hz, SampledMoment& moment) {
   const double longest = SampledMoment::kEchoS * rate_hz;
   const Span& span = moment.span;
@@ -57,7 +57,7 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
     moment.span.after = bounded(moment.frame - number(moment.at));
     since_last(moment, number(moment.from), last_frame, elapsed);
     if (moment.from == moment.at)
-      moment.from = nullptr;  // no way leads to it, and bodies have their own speed
+      moment.from = nullptr;  // there is no way from an earlier frame; bodies have their own speed
     if (picture.echo && mode == SampleMode::kExtrapolate) add_echo(*picture.echo, rate_hz, moment);
     return moment;
   }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr float kVelocityScale = 1.0F / 64;
 constexpr double kSpinScale = 1.0 / (1 << 28);
-constexpr double kLeastSmoothingS = 1e-6;  // shorter counts as 0: floats end where velocities divide by it
+constexpr double kLeastSmoothingS = 1e-6;  // a shorter time counts as 0, because velocities are divided by it
 constexpr double kMostSmoothingS = 10;
 
 template <class T>
@@ -17,7 +17,7 @@ std::byte* slot_of(const Column<T>& column, std::size_t slot) {
   return reinterpret_cast<std::byte*>(column.first) + slot * column.stride;
 }
 
-/// Values of a run of slots, from `begin` on.
+/// The values of a run of slots, from `begin` on.
 template <class T>
 void put(const Column<T>& column, std::size_t begin, const T* from, std::size_t count) {
   if (column.first == nullptr) return;
@@ -35,17 +35,16 @@ void put_one(const Column<float>& column, std::size_t slot, const std::array<flo
 
 }  // namespace
 
-/// Slots begin .. begin + count - 1, in work.
+/// The work data of slots begin .. begin + count - 1.
 struct Sampler::Run {
   std::size_t begin = 0, count = 0;
   std::array<std::uint8_t, kRun> changes{};  // BodyChange
-  bool changed = false;                      // any of them
+  bool changed = false;                      // any of them changed
   Numbers speeds{};
   std::array<Extra, kPositionChannels> extra{};
 };
 
-// Another epoch: whatever is alive in it is new. Where memory runs out on the way, the next sample begins
-// again.
+// Begins another epoch: all its bodies are new. If memory runs out on the way, the next sample begins again.
 void Sampler::begin(const Picture& picture) {
   const std::size_t capacity = picture.agreed->alive.size();
   epoch_ = 0;
@@ -124,7 +123,7 @@ void Sampler::show_places(const SampledMoment& moment, const Smoothing& smoothin
     const Extra* const more = extra ? &run.extra[axis] : nullptr;
     show(places, run.speeds.data(), more, run.count, moment.span, smoothing, shown_place, shown_speed);
     if (!run.changed) continue;
-    // What is new or elsewhere has nothing to come back from.
+    // Bodies that are new or have jumped have no offset to decay.
     for (std::size_t i = 0; i < run.count; ++i) {
       if (run.changes[i] == static_cast<std::uint8_t>(BodyChange::kNone)) continue;
       show(places + i, run.speeds.data() + i, nullptr, 1, moment.span, {}, shown_place + i, shown_speed + i);
@@ -189,8 +188,8 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
       request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMostSmoothingS) : kSmoothingS;
   Smoothing smoothing;
   if (request.mode == SampleMode::kExtrapolate) {
-    // By the clock, and where moments are asked for that leap ahead of it, over the leap: an offset that was
-    // carried on further than it has decayed would grow from leap to leap.
+    // The time by the clock; if the requested moments leap ahead of it, the time of the leap. Otherwise an
+    // offset that is carried further than it has decayed would grow from leap to leap.
     const double elapsed = std::max(later(last_ns_, now_ns) / period_ns, moved_on);
     const double constant = smoothing_s >= kLeastSmoothingS ? smoothing_s * 1e9 / period_ns : 0;
     smoothing = Smoothing::exponential(elapsed, constant);

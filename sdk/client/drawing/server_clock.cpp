@@ -8,12 +8,12 @@ namespace {
 
 // Both clocks are bounded here so that differences of received stamps cannot overflow.
 constexpr std::int64_t kClockLimitNs = std::numeric_limits<std::int64_t>::max() / 4;
-// Stamps within this of each other do not contradict: the kernel slews a wall clock by less in one span.
+// Stamps that differ by less than this do not contradict: the kernel slews a wall clock by less in one span.
 constexpr std::int64_t kToleranceNs = 2'000'000;
 // Weight of a new stamp in the phase and in the jitter: 1/8 settles within half a second at 30 Hz.
 constexpr double kPhaseGain = 1.0 / 8;
 constexpr double kJitterGain = 1.0 / 16;
-// Further off than this many periods, the server has been suspended or runs at another rate.
+// If a delta is off by more than this many periods, the server was suspended or runs at another rate.
 constexpr double kRestartPeriods = 1.5;
 
 std::int64_t bounded(std::int64_t time_ns) { return std::clamp(time_ns, -kClockLimitNs, kClockLimitNs); }
@@ -39,7 +39,7 @@ void ServerClock::on_message(std::int64_t server_time_ns, std::int64_t now_ns) {
 }
 
 void ServerClock::on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns) {
-  // Before turn(): only a message that brings bounds may make older ones be forgotten.
+  // Checked before turn(): only a message with bounds may cause older ones to be forgotten.
   if (echoed_client_ns <= 0 || echoed_client_ns > now_ns) return;
   turn(now_ns);
   const std::int64_t bound = bounded(server_time_ns) - bounded(echoed_client_ns);
@@ -95,7 +95,7 @@ double Pacer::arrived_frame(std::int64_t now_ns) const {
 }
 
 std::int64_t Pacer::due_ns(Frame frame) const {
-  // A server may number its frames as it likes, but nothing is due further off than any clock goes.
+  // A server may number its frames as it likes, but nothing is due beyond the range of a clock.
   constexpr double kFarNs = 1e18;
   const double ahead =
       std::clamp((static_cast<double>(frame) - static_cast<double>(base_frame_)) * period_ns_ + phase_ns_,

@@ -12,7 +12,7 @@ namespace tandem::client {
 Uncorrected::Uncorrected(const Layout& layout, const ClientTimeline& timeline)
     : state_(timeline.state(timeline.applied())), parameters_(timeline.parameters().step) {
   auto made = make_predictor(layout.predictor, layout.capacity, layout.predictor_constants);
-  TANDEM_ASSERT(made.has_value());  // the timeline has such a one
+  TANDEM_ASSERT(made.has_value());  // the timeline has made the same one
   predictor_ = std::move(*made);
 }
 

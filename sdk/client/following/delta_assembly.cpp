@@ -41,7 +41,7 @@ DeltaAssembly::Outcome DeltaAssembly::add(transport::DeltaMessage&& part) {
   if (last_complete_ && part.frame <= *last_complete_) return Outcome::kIgnored;
   if (last_complete_ && part.frame > *last_complete_ + 1) return start_again(std::move(part), Outcome::kGap);
   if (part.part != 0) {
-    // Subscribed in the middle of a frame: only at the very beginning is this no loss.
+    // The client subscribed in the middle of a frame. Only at the very beginning this is not a loss.
     return last_complete_ ? start_again(std::move(part), Outcome::kLostPart) : Outcome::kIgnored;
   }
   return begin(std::move(part));
@@ -93,7 +93,8 @@ DeltaAssembly::Outcome DeltaAssembly::finish() {
 void DeltaAssembly::pop() {
   queued_bytes_ -= queue_[first_].payload.size();
   queue_[first_++] = {};
-  // Mostly that was the only one. Else what is left moves down now and then, so that memory stays bounded.
+  // Usually that was the only element. Otherwise the rest is moved down now and then, so that memory stays
+  // bounded.
   if (first_ == queue_.size() || first_ >= kMostPopped) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(first_));
     first_ = 0;

@@ -63,7 +63,7 @@ bool Follower::too_old(Frame frame_of_snapshot) const {
 
 SnapshotAssembly::Outcome Follower::take(transport::SnapshotMessage&& part, std::int64_t now_ns) {
   using Outcome = SnapshotAssembly::Outcome;
-  // One that is too old was made for an earlier joiner.
+  // A snapshot that is too old was made for an earlier joiner.
   if (!joining_ || !joiner_.asked() || too_old(part.frame)) return Outcome::kIgnored;
   const Outcome outcome = snapshot_.add(std::move(part));
   if (outcome != Outcome::kStored) return outcome;
@@ -124,11 +124,12 @@ Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_n
   const Frame frame = part.frame;
   const bool last_part = part.part + 1 == part.parts;
   const Outcome outcome = deltas_.add(std::move(part));
-  // Where nothing was buffered, deltas may come that the snapshot counts already.
+  // If nothing was buffered, deltas may come that the snapshot already contains.
   if (!joining_) deltas_.drop_through(timeline_.applied());
   if (outcome == Outcome::kStored) return {.done = last_part};
   if (outcome == Outcome::kIgnored) return {};
-  // Who joins starts the buffer again; after a gap the snapshot asked for may still fit what follows.
+  // A joining client restarts its buffer. After a gap the requested snapshot may still fit the deltas that
+  // follow.
   if (joining_ && outcome != Outcome::kGap && outcome != Outcome::kLostPart) joiner_.ask_again(now_ns);
   return {.loss = Loss{reason_of(outcome), frame}};
 }
@@ -144,13 +145,13 @@ Follower::Step Follower::apply_front(const ScheduledInputs& scheduled, std::int6
   input_missing_ns_.reset();
   applied = timeline_.apply(frame, delta->last_input, delta->hash, delta->payload);
   if (applied) return {.done = true};
-  deltas_.pop();  // of no use any more, while those behind it are
+  deltas_.pop();  // this delta is useless now, but those behind it are not
   const bool mismatch = applied.error().code == ErrorCode::kMismatch;
   return {.loss = Loss{mismatch ? ResyncReason::kMismatch : ResyncReason::kRefused, frame,
                        std::move(applied.error().message)}};
 }
 
-// Before `frame` can be applied.
+// Waits for the inputs that `frame` needs.
 Follower::Step Follower::wait_for_inputs(Frame frame, std::int64_t waited_ns) {
   input_missing_ns_ = input_missing_ns_ ? *input_missing_ns_ + waited_ns : 0;
   if (*input_missing_ns_ < kInputPatienceNs) return {};

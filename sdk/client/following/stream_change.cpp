@@ -3,14 +3,14 @@
 namespace tandem::client {
 
 bool StreamChange::gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_ns) {
-  // A server that is silent altogether says nothing about this stream.
+  // A server that is completely silent says nothing about this stream.
   if (now_ns - last_applied_ns > kSecond) to_->excuse_silence(now_ns);
   return now_ns - to_->heard_ns() > kPatienceNs;
 }
 
 Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInputs& scheduled) {
   const Frame here = played.timeline().applied();
-  // Who is behind for long does not wait for what it left to catch up.
+  // A client that is far behind does not wait for the stream that it leaves to catch up.
   const bool behind = static_cast<double>(played.waiting()) > frame_rate_hz_;
   for (int i = 0; i < kFramesPerPoll && (behind || to_->timeline().applied() < here); ++i) {
     Follower::Step step = to_->apply_front(scheduled, 0);

@@ -39,7 +39,7 @@ void SentInputs::on_applied(Frame frame, std::int64_t now_ns, std::vector<InputO
 void SentInputs::settle(std::vector<InputOutcome>& outcomes) {
   std::erase_if(pending_, [&](const Pending& input) {
     if (input.frame == 0 || input.frame > last_applied_.frame) return false;
-    // A rejoin may have skipped the frame: then the state that shows the input is the newest one.
+    // A rejoin may have skipped the frame. Then the newest state is the one that shows the input.
     const Applied& exact = applied_at_[static_cast<std::size_t>(input.frame % applied_at_.size())];
     const std::int64_t at_ns = exact.frame == input.frame ? exact.at_ns : last_applied_.at_ns;
     outcomes.push_back({InputOutcome::Kind::kActed, input.number, input.frame, 0,

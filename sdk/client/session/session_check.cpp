@@ -12,8 +12,8 @@ namespace {
 constexpr std::uint32_t kDefinedLead = 1;
 constexpr double kMinFrameRateHz = 1;
 constexpr double kMaxFrameRateHz = 10'000;
-// The largest payload has a correction and a lifecycle record of every slot: below 128 bytes a slot with
-// orientations, plus headers.
+// The largest payload has a correction and a lifecycle record of every slot: less than 128 bytes per slot
+// with orientations, plus headers.
 constexpr std::uint64_t kMaxBytesPerSlot = 256;
 constexpr std::uint64_t kMaxFixedBytes = 1U << 20U;
 

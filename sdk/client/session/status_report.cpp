@@ -13,7 +13,7 @@ transport::ClientStatusMessage StatusReport::next(const Statistics& statistics, 
   transport::ClientStatusMessage status;
   const ReportedFigures& counted = statistics;
   static_cast<ReportedFigures&>(status) = counted;
-  // Of the last second, not since the start.
+  // The figure of the last second, not since the start.
   status.client_ms_p50 = statistics.recent_cost.quantile_ms(0.5);
   status.mbit_per_s = first ? 0 : static_cast<double>(bytes) * 8 / kBitsPerMbit / elapsed_s;
   status.lag_ms = statistics.smoothed_latency_ns / 1e6;

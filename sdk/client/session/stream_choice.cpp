@@ -11,11 +11,11 @@
 namespace tandem::client {
 namespace {
 
-// Losses of so short a time are the link's.
+// Several losses within this time are attributed to the link.
 constexpr std::int64_t kLossSpanNs = 30 * kSecond;
 constexpr std::size_t kManyLosses = 2;
-// Frames that come later than this part of the rate, over a link whose round trip has grown, are queued in
-// it.
+// If frames arrive at less than this part of the rate, over a link whose round trip has grown, they are
+// queued in the link.
 constexpr double kFullRate = 0.85;
 constexpr std::int64_t kQueuedNs = 150 * kMillisecond;
 
@@ -73,7 +73,7 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
 std::optional<double> measure_own_step(std::int64_t (*clock_ns)()) {
   if (clock_ns == nullptr) return std::nullopt;
   constexpr std::uint32_t kBodies = 4096;
-  constexpr int kMostSteps = 1024;  // for a clock that stands still, or nearly so
+  constexpr int kMostSteps = 1024;  // limit for a clock that stands still or nearly does
   constexpr std::int64_t kEnoughNs = 20 * kMillisecond;
   const auto predictor = make_predictor(basic_predictor().name, kBodies, {});
   if (!predictor) return std::nullopt;
@@ -129,7 +129,7 @@ double StreamChooser::cost_ns(const Candidate& candidate) const {
   return candidate.measured_ns > 0 ? candidate.measured_ns : candidate.offer.announced_ns * slowness_;
 }
 
-// Like with like: a frame that was measured has more in it than its announced step.
+// Compares like with like: a measured frame contains more than its announced step.
 double StreamChooser::relative_cost(const Candidate& a, const Candidate& b) {
   const bool measured = a.measured_ns > 0 && b.measured_ns > 0;
   const double of_a = measured ? a.measured_ns : a.offer.announced_ns;
@@ -141,8 +141,8 @@ bool StreamChooser::fits(const Candidate& candidate, double share) const {
   return cost_ns(candidate) <= share * period_ns_;
 }
 
-// Where rates are not known: a dearer step saves bits, or nobody would offer it, and so does a coarser
-// threshold.
+// If rates are unknown: a more expensive step saves bits, because nobody would offer it otherwise, and so
+// does a coarser threshold.
 bool StreamChooser::fewer_bits(const Candidate& a, const Candidate& b) const {
   if (a.bits_per_s > 0 && b.bits_per_s > 0) return a.bits_per_s < b.bits_per_s;
   if (a.offer.announced_ns != b.offer.announced_ns) return a.offer.announced_ns > b.offer.announced_ns;
@@ -194,7 +194,7 @@ StreamChooser::Best StreamChooser::best(std::int64_t now_ns) const {
   return {cheapest(now_ns), "cheapest step"};
 }
 
-// By what the preference looks at; who is not known is worth a try.
+// Compares by what the preference is about. A stream with unknown figures is worth a try.
 bool StreamChooser::worthwhile(const Candidate& other, const Candidate& present) const {
   using Kind = StreamPreference::Kind;
   if (preference_.kind == Kind::kError && other.offer.threshold < present.offer.threshold) return true;
@@ -236,7 +236,7 @@ void StreamChooser::look_at_last_second(const Seen& seen) {
   frames_ = 0;
 }
 
-// Of streams that are not played here: a processor that was hot, or a scene that was wild, may have calmed
+// Forgets the figures of streams that are not played here: a hot processor or a wild scene may have calmed
 // down.
 void StreamChooser::forget_old_figures(std::int64_t now_ns) {
   for (Candidate& candidate : offers_) {
@@ -266,8 +266,8 @@ std::optional<std::size_t> StreamChooser::find_named() const {
   return static_cast<std::size_t>(found - offers_.begin());
 }
 
-// Fewer frames than the session has, while what is sent waits in a queue on the way. A server that waits for
-// another client, or is slow itself, leaves the round trip as it is.
+// True if fewer frames come than the session has while messages are queued on the way. A server that waits
+// for another client or is slow itself does not change the round trip.
 bool StreamChooser::starved(const Seen& seen) const {
   if (seen.idle_since_ns || seen.round_trip_ns == 0 || best_round_trip_ns_ == 0) return false;
   const auto elapsed_ns = static_cast<double>(seen.now_ns - looked_ns_);
@@ -298,12 +298,12 @@ bool StreamChooser::reconsider(const Seen& seen) {
   look_at_last_second(seen);
   looked_ns_ = seen.now_ns;
   forget_old_figures(seen.now_ns);
-  if (seen.idle_since_ns) {  // a join that gets on is not given up for another
+  if (seen.idle_since_ns) {  // a join that makes progress is not given up for another
     return seen.now_ns - std::max(*seen.idle_since_ns, changed_ns_) >= kLongJoinNs &&
            leave_link("nothing of " + offers_[chosen_].offer.name + " came for 10 s while joining",
                       seen.now_ns);
   }
-  if (const auto named = find_named()) {  // elsewhere only after a change that was given up
+  if (const auto named = find_named()) {  // another stream is chosen only after a change that was given up
     if (*named == chosen_ || seen.now_ns < offers_[*named].barred_until_ns) return false;
     change(*named, "asked for by name", seen.now_ns);
     return true;
@@ -327,7 +327,7 @@ bool StreamChooser::reconsider(const Seen& seen) {
 
 bool StreamChooser::leave_slow(std::int64_t now_ns) {
   const Candidate& present = offers_[chosen_];
-  const std::size_t other = cheapest(INT64_MAX);  // also one that the link was left for
+  const std::size_t other = cheapest(INT64_MAX);  // also a stream that was left because of the link
   if (relative_cost(offers_[other], present) >= kWorthwhile) return false;
   return leave_for(other,
                    "a frame of " + present.offer.name + " takes " + milliseconds(cost_ns(present)) + " of " +

@@ -1,4 +1,4 @@
-// tandem::Server: a Host with a clock, a DDS port and the thread that sends.
+// Implements tandem::Server: a Host with a clock, a DDS port and a thread that sends.
 #include "tandem/host.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 using transport::steady_ns;
 using transport::wall_ns;
 
-// Nothing, where it is no number.
+// Converts seconds to nanoseconds; 0 if the value is not a number.
 std::int64_t to_ns(double seconds, double most) {
   return seconds > 0 ? static_cast<std::int64_t>(std::min(seconds, most) * 1e9) : 0;
 }
@@ -51,7 +51,7 @@ Result<planning::Wishes> wishes_of(const ServerOptions& options) {
   planning::Wishes wishes;
   wishes.codec = options.codec;
   wishes.predictor = options.predictor;
-  wishes.automatic = options.target_mbit_per_s != 0;  // what is no number is refused with its goal
+  wishes.automatic = options.target_mbit_per_s != 0;  // a value that is not a number is refused with the goal
   wishes.target_mbit_per_s = options.target_mbit_per_s;
   if (options.max_error != 0) wishes.max_error_m = options.max_error;
   if (options.budget_bytes != 0) wishes.budget_bytes = options.budget_bytes;
@@ -135,7 +135,7 @@ struct Server::Impl {
   std::function<void(std::string_view)> log;
   std::unique_ptr<transport::ServerPort> port;
   std::unique_ptr<host::Host> host;
-  host::Publisher publisher;  // last: it stops before what it writes to is gone
+  host::Publisher publisher;  // last member: it stops before its outbox and port are destroyed
   bool polling = false;
   Error error{ErrorCode::kOutOfOrder, "the session goes on"};
 };

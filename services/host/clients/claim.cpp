@@ -14,7 +14,7 @@ std::string participant_name(const transport::ParticipantId& id) {
   return text;
 }
 
-// Far more than a session has clients.
+// Far more than the clients of a session.
 constexpr std::size_t kMostParticipants = 4096;
 constexpr std::size_t kMostNoted = 64;
 
@@ -28,7 +28,7 @@ std::ptrdiff_t Claim::followers(Epoch epoch) const {
   return std::ranges::count_if(newest_, [epoch](const auto& entry) { return entry.second.epoch == epoch; });
 }
 
-// Where nobody's followers tell.
+// Decides when the numbers of followers do not.
 bool Claim::comes_first(const Other& other) const {
   const Epoch theirs = other.message.epoch;
   const Epoch apart = theirs > epoch_ ? theirs - epoch_ : epoch_ - theirs;

@@ -17,7 +17,7 @@ bool well_formed(const transport::InputMessage& input) {
          std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
 }
 
-// A client that was handed a snapshot and sends input plays already, whichever topic is faster.
+// A client that was sent a snapshot and sends input plays already, whichever topic is faster.
 bool may_play(const Account& account) {
   return account.phase == transport::Phase::kPlaying || was_served(account);
 }
@@ -34,7 +34,7 @@ Reason InputDesk::handle(Account& account, const transport::InputMessage& input,
   }
   transport::ReplyEntry entry{.number = input.number, .frame = 0, .code = 0};
   if (input.number <= account.inputs.highest) {
-    // The first outcome of a number is the one that counts; the reply tells it again.
+    // The first outcome of a number counts; the reply repeats it.
     ++refused_;
     entry.code = static_cast<std::uint32_t>(Reason::kDuplicate);
     if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);

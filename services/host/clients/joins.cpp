@@ -15,7 +15,9 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTr
     if (account.join.served && !roster.peer(account).snapshots_again.has(now_ns)) continue;
     if (!account.open) continue;
     someone_asks = true;
-    if (may_cut && port.joined(account.from, id, stream_)) ready_.push_back(id);  // which takes a while
+    if (may_cut && port.joined(account.from, id, stream_))
+      ready_.push_back(id);  // checked last, because it
+                             // takes a while
   }
   if (may_cut ? ready_.empty() : !someone_asks) {
     collecting_since_ns_.reset();

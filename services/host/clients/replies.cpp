@@ -14,7 +14,7 @@ Reason standing_reason(const Account& account) {
 
 }  // namespace
 
-// False while there is no room: a writer has to end before its client's next one is opened.
+// Returns false while there is no room: a client's old writer has to end before its next one is opened.
 bool ReplyDesk::close_forgotten(Roster& roster) {
   auto& forgotten = roster.forgotten();
   while (!forgotten.empty()) {

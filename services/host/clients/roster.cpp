@@ -13,8 +13,9 @@ using transport::Reason;
 using transport::Role;
 
 constexpr std::int64_t kReturnNs = 10'000'000'000;   // a demoted client must keep up this long
-constexpr std::int64_t kSilenceNs = 30'000'000'000;  // without an acknowledgement a client is taken for gone
-constexpr std::int64_t kForgetNs = 60'000'000'000;   // and its account deleted, if not before
+constexpr std::int64_t kSilenceNs = 30'000'000'000;  // a client without an acknowledgement for so long counts
+                                                     // as gone
+constexpr std::int64_t kForgetNs = 60'000'000'000;   // its account is deleted after this time at the latest
 
 }  // namespace
 
@@ -79,8 +80,8 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (ack.epoch == 0) return expect(ack, account, from, now.ns);
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
   if (!lists(ack.stream)) return Reason::kNoStream;
-  // It goes on with the stream that it plays until it has the other's snapshot. Its `playing` may have been
-  // overwritten by what it says now, also that of `next_stream` where it is on its way back.
+  // The client plays its stream until it has the other's snapshot. Its `playing` may have been overwritten by
+  // what it says now; so may the `playing` of `next_stream`, if the client is on its way back.
   const bool changes =
       account != nullptr && ack.phase == Phase::kJoining && ack.applied > 0 &&
       (ack.stream.id == account->stream ? account->next_stream && was_served(*account)
@@ -103,12 +104,11 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
              of_stream(account->stream),
          now.ns);
   } else if (plays && ack.applied > account->applied && ack.applied > account->timed_from) {
-    // The frame that has waited longest for this acknowledgement, as they are not sent for each.
+    // The frame that has waited longest for this acknowledgement. Frames are not acknowledged one by one.
     if (const auto at_ns = times.of(std::max(account->applied, account->timed_from) + 1))
       account->round_trip.measured(now.ns - *at_ns);
   }
-  // A joiner, also one whose `joining` was overwritten by its `playing`, counts only once it has caught up
-  // again.
+  // A joiner counts only once it has caught up again, even if its `joining` was overwritten by its `playing`.
   if (!plays || starts_over || ack.role_wanted == Role::kObserver) account->counted = false;
   account->asked = true;
   account->wanted = ack.role_wanted;
@@ -135,7 +135,7 @@ bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, b
       account.next_stream != before.next_stream)
     account.reply.schedule.on_change();
   if (account.phase != Phase::kPlaying || before.phase != Phase::kPlaying) return true;
-  // It asked for a snapshot of another stream, and now it plays that one, or gave it up.
+  // The client asked for a snapshot of another stream, and now it plays that one or gave it up.
   if (before.next_stream && account.stream != before.stream && account.stream == *before.next_stream)
     note(account, "changed to stream " + rules_.streams[account.stream], now.ns);
   const bool expected = changes || before.next_stream || account.attempt == before.attempt;
@@ -180,7 +180,7 @@ bool Roster::blamed(const Now& now) const {
 }
 
 void Roster::charge(std::int64_t duration_ns, const Now& now) {
-  std::set<transport::ParticipantId> charged;  // once, however many of its clients are to blame
+  std::set<transport::ParticipantId> charged;  // charged once, however many of its clients are to blame
   for (auto& [id, account] : accounts_) {
     if (!blamed(account, now)) continue;
     StallMeter& stalls = peer(account).stalls;

@@ -9,23 +9,23 @@
 namespace tandem::host {
 namespace {
 
-// DDS repairs what it loses; where nothing is heard for two round trips and a little, a part is sent once
-// more, so that a link that was gone is found again soon.
+// DDS repairs its losses. If nothing is heard for two round trips and a little, a part is sent again, so that
+// a link that comes back is found soon.
 constexpr std::int64_t kProbeNs = kSecond / 4;
-constexpr std::int64_t kFirstProbeNs = kSecond;  // at most
+constexpr std::int64_t kFirstProbeNs = kSecond;  // maximum
 constexpr std::int64_t kMostProbeNs = 2 * kSecond;
-// After so long without an arrival the rate of the link is measured anew.
+// After this time without an arrival the rate of the link is measured anew.
 constexpr std::int64_t kForgetRateNs = 2 * kSecond;
-// DDS repeats no part for longer: the lifespan of the writer.
+// DDS repeats a part no longer than this, the lifespan of the writer.
 constexpr std::int64_t kRepeatedNs = 3 * kSecond / 10;
-// No receiver is sent more than so many times what there is.
+// Maximum number of bytes sent to a receiver, in multiples of the snapshot's size.
 constexpr std::size_t kMostTimes = 4;
 constexpr std::size_t kSlackBytes = 64U << 10U;
-// Parts of one receiver queued in one go, so that many receivers take turns.
+// Maximum number of parts queued for one receiver at a time, so that many receivers take turns.
 constexpr int kTurn = 16;
 
-// Tells for each part whether the acknowledgement says that it is held. An acknowledgement with the most runs
-// allowed says nothing about the parts after the last run.
+// Returns for each part whether the acknowledgement says that it is held. An acknowledgement with the maximum
+// number of runs says nothing about the parts after the last run.
 std::vector<bool> held_parts(const transport::AckMessage& ack, std::size_t parts) {
   std::vector<bool> held(parts, true);
   std::size_t told = 0;
@@ -91,7 +91,8 @@ bool Passage::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns
   return true;
 }
 
-// DDS delivers in the order of sending: what left before a part that arrived, and has not arrived, is lost.
+// DDS delivers in the order of sending. A part that left before one that arrived, and has not arrived itself,
+// is lost.
 void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
   std::size_t bytes = 0;
   std::size_t settled = 0;  // entries up to the last one that arrived
@@ -105,13 +106,13 @@ void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
       holds_[entry.part] = is_new[entry.part] = counts[i] = true;
       bytes += entry.sent.bytes;
     }
-    // A part that was sent twice is taken to have come by the last copy for which there was time, once DDS
-    // has given up the first.
+    // A part that was sent twice counts as arrived by the last copy for which there was time, if DDS has
+    // given up the first.
     const bool by_copy =
         is_new[entry.part] && given_up(flying_.front()) && now_ns - entry.sent.at_ns >= window_.least_ns();
     if (is_first || by_copy) settled = i + 1;
   }
-  std::erase_if(again_, [this, &held](std::size_t part) {  // it was on its way after all
+  std::erase_if(again_, [this, &held](std::size_t part) {  // the part was on its way after all
     if (held[part]) holds_[part] = true;
     return held[part];
   });
@@ -179,8 +180,8 @@ bool Passage::exhausted() const { return sent_bytes_ > kMostTimes * snapshot_->b
 
 void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::span<const std::byte> bytes,
                              std::span<const transport::ClientId> receivers, std::int64_t now_ns) {
-  // A frame that stands still is cut once: receivers tell snapshots apart by their frame. Inputs that came
-  // since reach them by the topic of inputs.
+  // A frame is cut only once while it does not advance, because receivers distinguish snapshots by their
+  // frame. Inputs that came since reach them by the topic of inputs.
   const bool is_same = latest_ && latest_->head.epoch == epoch && latest_->head.stream == stream &&
                        latest_->head.frame == frame;
   if (!is_same) latest_ = make_snapshot(epoch, stream, frame, bytes);
@@ -211,9 +212,9 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
   });
   next_ns_ = INT64_MAX;
   if (passages_.empty()) return;
-  // In turns: whoever follows the one that was served last comes first.
+  // Serves receivers in turns: the one after the last served comes first.
   auto next = passages_.upper_bound(last_served_);
-  std::size_t satisfied = 0;  // one after another, in this round
+  std::size_t satisfied = 0;  // receivers in a row that were satisfied in this round
   while (satisfied < passages_.size()) {
     if (next == passages_.end()) next = passages_.begin();
     const std::uint64_t before = bytes_;

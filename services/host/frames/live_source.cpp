@@ -15,7 +15,7 @@ using transport::Reason;
 
 namespace {
 
-// More than one core for a stream would be for its blocks: StreamConfig::local.
+// A stream uses more than one core only for its blocks: StreamConfig::local.
 std::uint32_t threads_for(std::size_t streams) {
   return std::min(static_cast<std::uint32_t>(streams), std::max(1U, std::thread::hardware_concurrency()));
 }
@@ -85,7 +85,7 @@ void LiveSource::set_active(StreamSet streams) {
     }
     if (!streams[id] || lane.stream) continue;
     auto stream = begin(id);
-    TANDEM_ASSERT(stream.has_value());  // it was begun once, from the same configuration
+    TANDEM_ASSERT(stream.has_value());  // it was begun before, from the same configuration
     lane.stream.emplace(std::move(*stream));
   }
 }
@@ -152,14 +152,14 @@ Reason LiveSource::schedule(const engine::Input& input, const engine::Classifica
                             const InputOrigin& origin, Outbox& outbox, Frame& acts_on) {
   const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);
   if (!drive) return Reason::kInvalid;
-  // s + A: no client can have simulated it, as none is further than A beyond delta s - 1.
+  // s + A: no client can have simulated it, because none is further than A beyond delta s - 1.
   const Frame frame = next_frame() + session_.lead;
   if (scheduling_frame_ != frame) scheduled_now_ = 0;
   if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return Reason::kRateLimited;
   if (scheduled_.size() >= kMaxPendingInputs) return Reason::kRateLimited;
   const ScheduledDrive scheduled{.number = last_input_ + 1, .frame = frame, .drive = *drive};
   for (Lane& lane : lanes_) {
-    // What one of them refuses, all do: they hold the same inputs, and the drive is checked above.
+    // If one stream refuses an input, all do: they hold the same inputs, and the drive is checked above.
     if (lane.stream && !lane.stream->schedule(scheduled)) return Reason::kInvalid;
   }
   ++last_input_;

@@ -7,7 +7,7 @@
 
 namespace tandem::host {
 
-// Deltas are not counted: they never come without the end of their frame.
+// Deltas are not counted, because they never come without the end of their frame.
 std::uint32_t* Outbox::count_of(const Outgoing& message, std::uint32_t& limit) {
   if (std::holds_alternative<transport::DeltaMessage>(message)) return nullptr;
   if (std::holds_alternative<EndOfFrame>(message)) {

@@ -8,22 +8,22 @@ namespace {
 
 constexpr std::uint32_t kFramesPerDecision = 15;
 
-// How much the logarithms of beta and E move for a cosine, and at most, in one decision. The logarithms are
-// never taken: beta and E are multiplied by exp(change).
+// The change of the logarithms of beta and E per cosine, and its maximum in one decision. The logarithms are
+// never computed: beta and E are multiplied by exp(change).
 constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
 constexpr double kDecayRate = 2, kMostDecayChange = 0.7;
 constexpr double kLeastGain = 0.35, kMostGain = 1.8;
 constexpr double kLeastDecay = 15, kMostDecay = 60000;  // in 1/65536
-// The less of c is kept, the less is worth learning: gamma = 0.25 where E is below 800, then its inverse.
+// If less of c is kept, less is worth learning: gamma = 0.25 if E is below 800, then it falls as its inverse.
 constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
-// Corrections of a fifth of the bodies, and a hundred at least; beta needs three times as many, because
-// bodies that start to fall agree with themselves for a while.
+// A decision needs corrections of a fifth of the bodies, and at least a hundred. beta needs three times as
+// many, because bodies that start to fall agree with themselves for a while.
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
-// Smaller changes, as shares, are not worth the bytes of saying so.
+// Smaller relative changes are not worth the bytes of sending them.
 constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
 
-// exp(x) for |x| <= 1 by its Pade approximant of order [3/3], to 1e-6. Not std::exp: that one may differ from
-// machine to machine in the last bit, and the gains go on the wire.
+// exp(x) for |x| <= 1 by its Pade approximant of order [3/3], to 1e-6. std::exp is not used, because its last
+// bit may differ from machine to machine, and the gains go on the wire.
 double exp_of(double x) {
   const double even = 120 + 12 * x * x;
   const double odd = 60 * x + x * x * x;

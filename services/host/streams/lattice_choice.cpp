@@ -14,7 +14,7 @@ constexpr double kDefaultRange = 8;  // thresholds; about what fast scenes leave
 constexpr double kRangeSteps = 127;
 constexpr int kAngleBits = 28;  // of a radian on the lattice
 
-// Rounded up, at least 1. Errors are the caller's: the value was checked to be finite and not negative.
+// Rounds up to at least 1. The caller has checked that the value is finite and not negative.
 std::int32_t step_of(double range) {
   return static_cast<std::int32_t>(std::clamp(std::ceil(range / kRangeSteps), 1.0, double{kPositionLimit}));
 }

@@ -12,9 +12,9 @@ namespace {
 constexpr std::uint8_t mark(engine::Event::Kind kind) {
   return static_cast<std::uint8_t>(1U << static_cast<unsigned>(kind));
 }
-// Of a quaternion's squared norm: single precision and an engine that seldom normalises.
+// Tolerance of a quaternion's squared norm, for single precision and an engine that seldom normalises.
 constexpr double kNormSlack = 0.01;
-// One short of the limit, whose square a double does not tell from the next integers.
+// One below the limit, because a double cannot distinguish the limit's square from the next integers.
 constexpr double kMostSpin = kSpinLimit - 1;
 
 constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
@@ -39,7 +39,7 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
 
 Result<void> Mirror::check(const engine::Bodies& bodies) const {
   const std::size_t capacity = shown_.size();
-  std::string wrong;  // the first
+  std::string wrong;  // the first fault
   const auto look_at = [&](std::string_view name, std::size_t size) {
     if (wrong.empty() && size != capacity)
       wrong = fmt::format("the simulation's column {} has {} slots, not {}", name, size, capacity);
@@ -102,12 +102,12 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
     mishaps_.clamped += kept < 1 ? 1 : 0;
     for (std::size_t i = 0; i < q.size(); ++i)
       target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
-    // Towards zero, so that no rounding leads out of the limit.
+    // Rounds towards zero, so that the result stays within the limit.
     for (std::size_t i = 0; i < w.size(); ++i) target_.w(i)[s] = static_cast<std::int32_t>(w[i] * kept);
   }
 }
 
-// Says of a body that cannot be told what is wrong with it.
+// Records why a body cannot be shown to clients.
 void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
   ++mishaps_.removed;
   constexpr std::string_view kAxes = "xyz";
@@ -188,8 +188,8 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
   if (shown && (!was || reused)) {
     spawn(slot, type);
   } else if (shown && (marks & kTeleported) != 0) {
-    // A slot gets one record a frame; a type changed in the same step differs still in the next and follows
-    // then.
+    // A slot gets one record per frame. A type that changed in the same step still differs in the next one
+    // and follows then.
     lifecycle_.push_back({.kind = LifecycleKind::kTeleport,
                           .slot = slot,
                           .reuse = 0,

@@ -9,15 +9,17 @@
 namespace tandem::host {
 namespace {
 
-// Of the threshold in one decision. Up faster than down: what is too fine is paid for by others on the link.
+// Maximum factors on the threshold in one decision. It rises faster than it falls, because a stream that is
+// too fine takes bandwidth from others on the link.
 constexpr double kMostRise = 2, kMostFall = 0.8;
 constexpr double kDeadBand = 0.03;  // around the target, so that a calm scene is left alone
-// With fewer corrections, as a share of the bodies in a frame, nothing is to be learnt of what a finer
-// threshold would cost as soon as something moves.
+// With fewer corrections, as a share of the bodies in a frame, nothing can be learned about the cost of a
+// finer threshold when something moves.
 constexpr double kQuiet = 0.001;
 constexpr int kPressed = 8;          // decisions, two seconds
-constexpr double kLeastRoom = 1.25;  // of the budget above the target
-// A range grows at once and shrinks slowly: too small a range costs error, too large a one only bits.
+constexpr double kLeastRoom = 1.25;  // minimum ratio of the budget to the target
+// A range grows at once and shrinks slowly. A range that is too small costs error, one that is too large
+// costs only bits.
 constexpr double kShrink = 0.97;
 
 }  // namespace
@@ -64,8 +66,7 @@ double QualityControl::ratio() const {
 
 std::int32_t QualityControl::next_threshold(std::int32_t threshold) const {
   if (std::abs(ratio() - 1) <= kDeadBand) return threshold;
-  // Bits fall with about the threshold's inverse; the square root keeps a decision from overshooting what it
-  // caused.
+  // Bits fall with about the inverse of the threshold. The square root avoids overshooting.
   const double factor = std::clamp(std::sqrt(std::max(ratio(), 1e-3)), kMostFall, kMostRise);
   const bool quiet = static_cast<double>(corrected_) < kQuiet * bodies_ * frames_;
   const std::int32_t finest = quiet ? std::min(start_.threshold, threshold) : goal_.smallest_threshold;
@@ -74,7 +75,7 @@ std::int32_t QualityControl::next_threshold(std::int32_t threshold) const {
 }
 
 CodecParameters QualityControl::with_steps(CodecParameters parameters) const {
-  // In a time without corrections nothing is learnt.
+  // Nothing is learned without corrections.
   if (steps_ == StepRule::kLeave || statistics_.bodies == 0) return parameters;
   const CodecParameters wanted = trained_parameters(statistics_, parameters.threshold);
   const auto follow = [&](std::int32_t step, std::int32_t needed, std::int32_t trained) {

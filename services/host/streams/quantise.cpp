@@ -1,5 +1,5 @@
-// The engine's floats become integers here and nowhere else. Kept in a file of its own so that it is compiled
-// for vector units; nothing but conversions, so results do not depend on it.
+// Only this file converts the engine's floats to integers. It is separate so that it can be compiled for
+// vector units. It does nothing but conversions, so results do not depend on that.
 #include "services/host/streams/mirror.hpp"
 
 namespace tandem::host {
@@ -23,7 +23,7 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
     to[i] = static_cast<std::int32_t>(scaled + (scaled < 0 ? -0.5 : 0.5));
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t high = to[i] > limit ? limit : to[i];  // a float's last bit may lie beyond
+    const std::int32_t high = to[i] > limit ? limit : to[i];  // the last bit of a float may lie beyond
     to[i] = high < -limit ? -limit : high;
   }
 }

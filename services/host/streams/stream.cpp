@@ -36,7 +36,8 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
   return {};
 }
 
-// What a stream with these groups tells of a mirror that may know orientations besides.
+// The part of a mirror's state that a stream with these groups sends; the mirror may have orientations in
+// addition.
 State told(const State& shown, const Groups& groups) {
   if (shown.groups() == groups) return shown;
   State state(shown.capacity(), groups);
@@ -47,10 +48,10 @@ State told(const State& shown, const Groups& groups) {
   return state;
 }
 
-// So a snapshot cut soon after has little to say of a heap that lies there. One at the top of its throw is
-// slow as well: it is corrected once more.
+// Puts slow bodies to rest, so that a snapshot cut soon after needs few bytes for a heap of resting bodies. A
+// body at the top of its throw is slow too; it is then corrected once more.
 void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) {
-  // Further than the threshold after so many frames, in 1/64 lattice unit a frame.
+  // A speed that exceeds the threshold after so many frames, in 1/64 lattice unit per frame.
   constexpr std::int64_t kFrames = 30;
   const auto slow = [&](Slot slot) {
     for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
@@ -68,7 +69,8 @@ void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) 
   }
 }
 
-// A session may begin without a body: a measure of what bodies cost then takes these, far from each other.
+// A session may begin without bodies. The cost of bodies is then measured with these, which are far from each
+// other.
 State spread_bodies(const Layout& layout) {
   constexpr Slot kMost = 4096, kSide = 16;
   constexpr std::int32_t kApart = 4096;
@@ -102,7 +104,7 @@ struct Stream::Impl final : EncodeObserver {
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
   }
 
-  // What the encoder tells goes to whom it concerns.
+  // Passes on what the encoder tells to the parts that need it.
   void frame(const State& predicted, const State& target, const CodecParameters& in_force) override {
     if (quality) quality->observe(predicted, target, in_force);
     if (other != nullptr) other->frame(predicted, target, in_force);
@@ -122,11 +124,11 @@ struct Stream::Impl final : EncodeObserver {
   StreamConfig config;
   ServerTimeline timeline;
   StreamParameters parameters;  // of the next frame
-  Drive drive;                  // of the start
+  Drive drive;                  // drive at the start
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
-  std::vector<LifecycleRecord> records;  // of the frame at hand, where the mirror's name groups of others
-  EncodeObserver* other = nullptr;       // of the frame at hand
+  std::vector<LifecycleRecord> records;  // of the current frame, if the mirror's records name other groups
+  EncodeObserver* other = nullptr;       // of the current frame
   std::uint32_t bodies = 0;
   std::int64_t (*clock)() = nullptr;
 };
@@ -161,7 +163,7 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
 }
 
 Result<void> choose_gains(StreamConfig& config) {
-  // What the constants make of the predictor, which may be another than the name says.
+  // The predictor that the constants lead to; its name may differ from the configured one.
   const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
   if (!predictor) return tl::unexpected(predictor.error());
   const auto traits = find_predictor((*predictor)->name());
