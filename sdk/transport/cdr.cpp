@@ -14,7 +14,7 @@ namespace {
 constexpr std::array<std::byte, kCdrHeaderBytes> kLittleEndianCdr{std::byte{0}, std::byte{1}, std::byte{0},
                                                                   std::byte{0}};
 
-/// An unsigned integer of a primitive's size, and its bits.
+/// An unsigned integer of a primitive's size, with its bits.
 template <class T>
 auto to_bits(T value) {
   if constexpr (std::is_same_v<T, double>) {
@@ -37,7 +37,7 @@ T from_bits(decltype(to_bits(T{})) bits) {
   }
 }
 
-/// Appends what it visits. Every primitive stands at a multiple of its size, counted from behind the header.
+/// Appends what it visits. Every primitive is at a multiple of its size, counted from the end of the header.
 class Writer {
  public:
   explicit Writer(Bytes& out) : out_(out), start_(out.size() + kCdrHeaderBytes) {
@@ -77,7 +77,7 @@ class Writer {
   std::size_t start_;
 };
 
-/// Fills what it visits. After something impossible all that follows reads as zero and ok() is false.
+/// Fills what it visits. After impossible bytes everything that follows reads as zero and ok() is false.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> body) : in_(body) {}
@@ -94,7 +94,7 @@ class Reader {
   void text(std::string& value) {
     const std::span<const std::byte> bytes = take(length(), 1);
     const auto* const from = reinterpret_cast<const char*>(bytes.data());
-    // With its NUL, and no other.
+    // The text has one NUL, at its end.
     ok_ = ok_ && !bytes.empty() && strnlen(from, bytes.size()) == bytes.size() - 1;
     value.assign(ok_ ? from : "");
   }
@@ -102,8 +102,7 @@ class Reader {
     const std::span<const std::byte> bytes = take(length(), 1);
     values.assign(bytes.begin(), bytes.end());
   }
-  // Nothing is reserved: a count that is not followed by as many elements ends with the first that is
-  // missing.
+  // No memory is reserved: a count without as many elements ends at the first missing one.
   template <class T, class Each>
   void sequence(std::vector<T>& values, Each&& each) {
     values.clear();
@@ -163,7 +162,7 @@ Result<M> read_cdr(std::span<const std::byte> bytes, Padding padding) {
   M message;
   fields(reader, message);
   if (!reader.ok()) return refuse("truncated, or a text without its end");
-  // The options' lowest two bits count the bytes that fill up the last word.
+  // The lowest two bits of the options count the bytes that fill up the last word.
   const std::size_t announced = std::to_integer<unsigned>(bytes[3]) & 3U;
   const bool whole = padding == Padding::kAny ? reader.remaining() <= 3 : reader.remaining() == announced;
   if (!whole) return refuse("bytes left over");

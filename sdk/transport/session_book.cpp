@@ -5,8 +5,8 @@
 
 namespace tandem::transport {
 namespace {
-// Sessions have one server, for a moment two; somebody who announces from many participants must not fill our
-// memory.
+// Sessions have one server, for a moment two. A host that announces from many participants must not fill this
+// process's memory.
 constexpr std::size_t kMaxEntries = 64;
 }  // namespace
 
@@ -25,7 +25,7 @@ void SessionBook::put(std::uint64_t writer, Received<SessionMessage> announcemen
   if (back_of_the_line) std::rotate(known, known + 1, entries_.end());
 }
 
-// The current one stays, whoever crowds in.
+// The current one always stays.
 void SessionBook::make_room() {
   auto least = std::ranges::find_if(entries_, [](const Entry& entry) { return !entry.live; });
   const auto other = [this](const Entry& entry) { return entry.writer != current_; };

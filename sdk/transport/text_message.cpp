@@ -15,7 +15,7 @@ bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/// Recursive descent. The first thing that is wrong ends it.
+/// A recursive descent parser. It stops at the first fault.
 class Reader {
  public:
   explicit Reader(std::string_view text) : text_(text) {}
@@ -54,7 +54,7 @@ class Reader {
   }
   bool count_field() { return ++fields_ <= kMostFields || wrong("too many fields"); }
 
-  /// Up to `end`, which is taken; 0 is the end of the text.
+  /// Reads up to and including `end`; 0 is the end of the text.
   bool fields(TextMessage& message, char end, int depth) {
     if (depth > kMostLevels) return wrong("too many levels");
     for (;;) {
@@ -104,7 +104,8 @@ class Reader {
     return (peek() == '-' || peek() == '+') && at_ > from && (text_[at_ - 1] == 'e' || text_[at_ - 1] == 'E');
   }
 
-  /// Nothing that is read here needs more than the first, without escapes resolved.
+  /// Reads adjacent strings and returns the first, without escapes resolved. No field that is read needs
+  /// more.
   bool strings(std::string_view& first) {
     bool some = false;
     for (skip_space(); peek() == '"' || peek() == '\''; skip_space()) {
@@ -137,7 +138,7 @@ class Reader {
   const char* wrong_ = "";
 };
 
-// As protobuf, the last of several values counts.
+// The last of several values counts, as in protobuf.
 const TextField* last(const TextMessage* message, std::string_view name) {
   if (message == nullptr) return nullptr;
   const auto found =

@@ -15,22 +15,21 @@ struct DeltaCodec::Impl {
   TypeId type_count = 0;
   Groups groups;
   StreamParameters parameters;  // in force
-  StreamParameters next;        // server: from the next encode() on
-  bool round_next = false;      // server: in the next encode()
-  Vec3i gravity{};              // at the delta at hand
-  // Of the delta at hand.
+  StreamParameters next;        // server: parameters from the next encode() on
+  bool round_next = false;      // server: the next encode() rounds
+  Vec3i gravity{};              // at the current delta
+  // The lifecycle of the current delta.
   std::vector<LifecycleRecord> lifecycle;
-  std::vector<std::uint8_t> alive;  // after lifecycle; used only where there is some
-  std::vector<Slot> renewed;        // slots of lifecycle records that brought or ended a body
+  std::vector<std::uint8_t> alive;  // after lifecycle; used only if there are records
+  std::vector<Slot> renewed;        // slots whose body a lifecycle record started or ended
   std::vector<Section> sections;
-  // Of the last one that was applied.
+  // The records of the last delta that was applied.
   std::span<const LifecycleRecord> applied;
-  std::vector<Slot>
-      merged;  // touched slots; used only where lifecycle or rounding adds to the corrected ones
+  std::vector<Slot> merged;  // touched slots; used only if lifecycle or rounding adds to the corrected ones
   std::span<const Slot> touched, corrected;
 
   struct Parsed {
-    int stage = 0;  // where a section belongs among the others: lifecycle, parameters, rounding, corrections
+    int stage = 0;  // order of the section among the others: lifecycle, parameters, rounding, corrections
     StreamParameters parameters;
     std::optional<Rounding> rounding;
     std::span<const std::uint8_t> alive;
@@ -53,7 +52,7 @@ void DeltaCodec::Impl::list_renewed() {
 Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const std::byte> body,
                                              const State& predicted, Parsed& parsed) {
   const auto enter = [&parsed](int stage) {
-    // Corrections may repeat (one section a block), the others may not.
+    // Corrections may repeat (one section per block), the others may not.
     if (stage < parsed.stage || (stage == parsed.stage && stage != 4)) return false;
     parsed.stage = stage;
     return true;

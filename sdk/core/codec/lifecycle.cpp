@@ -10,7 +10,7 @@ constexpr std::size_t kMostTypeBytes = 3;
 bool carries_body(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport;
 }
-// Whose content a record holds, of a spawn and a teleport.
+// The groups whose content a record of a spawn or teleport holds.
 unsigned named(const LifecycleRecord& record, const Groups& groups) {
   return record.kind == LifecycleKind::kSpawn ? bits_of(groups) : record.groups;
 }
@@ -18,7 +18,7 @@ bool carries_type(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTypeChange;
 }
 
-// rest and c of the whole body begin anew.
+// Resets rest and c of the whole body.
 void teleport(const LifecycleRecord& record, State& state) {
   BodyState body = state.body(record.slot);
   move_body(record.groups, record.body, body);

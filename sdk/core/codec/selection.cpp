@@ -78,7 +78,8 @@ Result<std::uint32_t> parse_mask(const Block& block, std::span<const std::uint8_
   if (mask.empty()) return fail(ErrorCode::kMalformed, "truncated bit mask");
   std::uint32_t count = 0;
   for (std::size_t at = 0; at < mask.size(); at += 8) {
-    // By 64 slots: how often the inner loop turns is hard to guess for a processor, so guess seldom.
+    // Works on 64 slots at a time: the number of rounds of the inner loop is hard to predict for a processor,
+    // so there should be few such loops.
     std::uint64_t bits = 0;
     std::memcpy(&bits, mask.data() + at, std::min<std::size_t>(8, mask.size() - at));
     for (; bits != 0; bits &= bits - 1) {

@@ -18,8 +18,8 @@ static_assert([] {
   return columns == kColumns;
 }());
 
-// Calls visit() for each vector that a lifecycle record says of a body with these groups (bits), in their
-// order there; for the same one of several bodies at once.
+// Calls visit() for each vector that a lifecycle record of a body with these groups (bits) holds, in the
+// record's order; with several bodies, for the same vector of all at once.
 template <class Visit, class... Bodies>
 constexpr void for_each_vector(unsigned groups, const Visit& visit, Bodies&... bodies) {
   if ((groups & kMovesPosition) != 0) {

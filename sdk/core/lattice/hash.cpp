@@ -15,7 +15,7 @@ namespace {
 
 using Update = XXH_errorcode (*)(XXH3_state_t*, const void*, std::size_t);
 
-// The same bits either way; see hash_avx2.hpp.
+// Both give the same bits; see hash_avx2.hpp.
 Update fastest_update() {
 #ifdef TANDEM_HASH_AVX2
   if (__builtin_cpu_supports("avx2") != 0) return update_avx2;
@@ -27,14 +27,14 @@ Update fastest_update() {
 
 struct StateHasher::Impl {
   using Working = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
-  // Of a block: what all groups share, and each group.
+  // Leaves of a block: the columns that all groups share, and each group.
   [[nodiscard]] static std::size_t leaves_of(const State& state) {
     std::size_t count = 1;
     for_each_group(state.groups(), [&count](const ChannelGroup&) { ++count; });
     return count;
   }
 
-  // The part of a column, or of several one after another, that belongs to a block.
+  // Adds the part of a column, or of several consecutive ones, that belongs to a block.
   void add(XXH3_state_t* h, const auto& column, Slot first, std::uint32_t slots) const {
     const auto part = column.subspan(first, slots);
     update(h, part.data(), part.size_bytes());

@@ -13,8 +13,8 @@ using Wide = std::int64_t;
 // 1/d in 2^-28.
 constexpr std::int32_t over(std::int32_t d) { return ((1 << 28) + d / 2) / d; }
 
-// Products of 32 bits and shifts whose result fits 32 again: all that vector units without 64-bit products
-// and arithmetic shifts need. A logical shift leaves the same 32 bits as an arithmetic one.
+// Products of 32 bits, and shifts whose result fits 32 bits: these suffice for vector units without 64-bit
+// products and arithmetic shifts. A logical shift leaves the same 32 bits as an arithmetic one.
 [[gnu::always_inline]] inline std::int32_t shifted(Wide x, unsigned bits) {
   return static_cast<std::int32_t>(static_cast<std::uint64_t>(x) >> bits);
 }
@@ -81,7 +81,7 @@ TANDEM_VECTOR_CLONES void turn_all(const std::int32_t* wx, const std::int32_t* w
 
 Wide length_squared(Wide x, Wide y, Wide z) { return x * x + y * y + z * z; }
 
-// to * conjugate(from), of a sign that makes it the shorter turn.
+// to * conjugate(from), with the sign that makes it the shorter turn.
 Quaternion difference(const Quaternion& from, const Quaternion& to) {
   const auto [ax, ay, az, aw] = std::array<std::int64_t, 4>{-from[0], -from[1], -from[2], from[3]};
   const auto [bx, by, bz, bw] = std::array<std::int64_t, 4>{to[0], to[1], to[2], to[3]};
@@ -102,7 +102,7 @@ std::uint64_t half_sine_squared(const Quaternion& difference) {
   return sum;
 }
 
-// Of the half angle h: h / sin h by the series of the arc sine in sin^2; up to 1 rad it is off by 1/200.
+// h / sin h of the half angle h, by the series of the arc sine in sin^2; up to 1 rad it is off by 1/200.
 std::array<std::int64_t, 3> rough_turn_between(const Quaternion& from, const Quaternion& to) {
   const Quaternion d = difference(from, to);
   const auto x = static_cast<std::int64_t>(half_sine_squared(d) >> 32U);  // 2^-28
@@ -115,7 +115,7 @@ std::array<std::int64_t, 3> rough_turn_between(const Quaternion& from, const Qua
   return spin;
 }
 
-// The same direction, at most 2 rad long.
+// The vector with the same direction, at most 2 rad long.
 Spin shortened(std::array<std::int64_t, 3> spin) {
   std::uint64_t squared = 0;
   for (const std::int64_t a : spin) squared += static_cast<std::uint64_t>(a * a);
@@ -171,7 +171,7 @@ std::uint64_t half_sine(const Quaternion& from, const Quaternion& to) {
 
 Spin turn_between(const Quaternion& from, const Quaternion& to) {
   const Spin rough = shortened(rough_turn_between(from, to));
-  // What it is off by turns about the same axis.
+  // The error of the rough result is a turn about the same axis.
   std::array<std::int64_t, 3> spin = rough_turn_between(turned(from, rough), to);
   for (std::size_t i = 0; i < 3; ++i) spin[i] += rough[i];
   return shortened(spin);

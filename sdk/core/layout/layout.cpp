@@ -60,7 +60,7 @@ Groups groups_of(const Layout& layout) {
 
 std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
                           std::uint64_t lattice_unit_bits) {
-  // A text, so that a client in any language can build the same bytes.
+  // The hash is of a text, so that a client in any language can build the same bytes.
   std::string text = "tandem-layout " + std::to_string(protocol_version);
   const auto append = [&text](const auto& values) {
     for (const std::int32_t value : values) text += ' ' + std::to_string(value);

@@ -25,13 +25,14 @@ Made make_contact(std::uint32_t capacity, std::span<const std::int32_t> constant
   });
 }
 
-// Beyond so many bodies `field` would take even a fast client most of a frame.
+// With more bodies `field` would take even a fast client most of a frame.
 constexpr std::uint32_t kMostForField = 50'000;
 constexpr std::uint32_t kAnyNumber = std::numeric_limits<std::uint32_t>::max();
 
 constexpr std::array kTable{
-    // Contacts in one step a frame, which leaves a force to learn. Bodies are corrected more often, and early
-    // at 0.08: the RMS error falls by 4 % for 4 % of the bits. Decay 20 %, beta 1.2, gamma 0.25.
+    // Computes contacts in one step per frame, which leaves a force to learn. Bodies are corrected more
+    // often, and early at 0.08: the RMS error falls by 4 % for 4 % of the bits. Decay 20 %, beta 1.2, gamma
+    // 0.25.
     PredictorTraits{.name = "field",
                     .most_bodies = kMostForField,
                     .only_spheres = true,
@@ -40,8 +41,8 @@ constexpr std::array kTable{
                     .first_gains = {13000, 39322, 16384},
                     .gain_aim = {10, -10},
                     .make = &make_contact<Contact::Tier::kField>},
-    // Contacts are predicted: what is left grows slower, and there is no force to learn. c is kept (92 %)
-    // only as long as it takes to see whether it should be. beta 0.7, gamma 0.
+    // Contacts are predicted, so the remaining error grows more slowly, and there is no force to learn. c is
+    // kept (92 %) only until it is clear whether it should be. beta 0.7, gamma 0.
     PredictorTraits{.name = "contact",
                     .most_bodies = 0,
                     .only_spheres = true,
@@ -50,7 +51,7 @@ constexpr std::array kTable{
                     .first_gains = {60000, 22938, 0},
                     .gain_aim = {},
                     .make = &make_contact<Contact::Tier::kContact>},
-    // Bodies move at the start, so that little of c is worth keeping: decay 20 %, beta 0.8, gamma 0.15.
+    // Bodies move at the start, so little of c is worth keeping: decay 20 %, beta 0.8, gamma 0.15.
     PredictorTraits{.name = "ballistic",
                     .most_bodies = kAnyNumber,
                     .only_spheres = false,

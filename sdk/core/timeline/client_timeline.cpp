@@ -13,7 +13,7 @@
 namespace tandem {
 
 struct ClientTimeline::Impl {
-  // A frame in the ring, and what the step that produced it read.
+  // A frame in the ring, and the input of the step that produced it.
   struct Held {
     State state;
     StepInput input;
@@ -34,8 +34,8 @@ struct ClientTimeline::Impl {
     parts.predictor->step(before.state, next.state, next.input);
   }
 
-  // After a delta changed the touched slots of the frame just applied, and perhaps what the steps from there
-  // on read.
+  // Call after a delta changed the touched slots of the frame just applied, and perhaps the inputs of the
+  // steps after it.
   void resimulate() {
     const std::span<const Slot> touched = parts.delta.touched();
     const StepParameters& parameters = parts.delta.parameters().step;
@@ -60,7 +60,7 @@ struct ClientTimeline::Impl {
   StreamId stream;
   Frame applied = 0;
   Frame now = 0;
-  Frame simulated = 0;  // now, or what is prepared beyond it
+  Frame simulated = 0;  // now, or the prepared frame beyond it
   bool playing = false;
   InputSchedule inputs;
   std::uint64_t hash = 0;
@@ -89,7 +89,7 @@ ClientTimeline::~ClientTimeline() = default;
 Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epoch, StreamId stream) {
   Impl& m = *impl_;
   m.playing = false;
-  // Beside the state that is drawn meanwhile; what was simulated beyond that goes.
+  // Loads beside the state that is drawn meanwhile; the frames simulated beyond it are dropped.
   m.now = m.simulated = m.applied;
   Impl::Held& place = m.at(m.applied + 1);
   State& state = place.state;
@@ -178,7 +178,7 @@ void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
                     .hash = m.hash,
                     .region_hash = m.parts.hasher.region_hash(),
                     .pending = {}};
-  // What lies beyond a gap is not promised by the number.
+  // The number does not promise the inputs beyond a gap.
   for (const ScheduledDrive& input : m.inputs.pending()) {
     if (input.number <= snapshot.last_input && input.frame > m.applied) snapshot.pending.push_back(input);
   }

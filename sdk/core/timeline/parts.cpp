@@ -10,7 +10,7 @@ namespace tandem {
 Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local,
                                  std::unique_ptr<Predictor> predictor) {
   if (auto good = check_layout(layout); !good) return tl::unexpected<Error>(good.error());
-  const auto traits = find_predictor(predictor->name());  // none of a caller's own
+  const auto traits = find_predictor(predictor->name());  // empty for a caller's own predictor
   auto codec = make_codec({.name = layout.codec,
                            .capacity = layout.capacity,
                            .tables = layout.codec_tables,

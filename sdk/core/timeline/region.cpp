@@ -10,12 +10,12 @@
 namespace tandem {
 namespace {
 
-// Coding one column. Bodies at rest are a kind of their own: most have v = 0 and the same c.
+// Codes one column. Bodies at rest have their own models, because most have v = 0 and the same c.
 class ColumnCoder {
  public:
   explicit ColumnCoder(Guess guess) : guess_(guess) {}
 
-  /// The number of the next body; `x` is what an encoder writes.
+  /// Codes the number of the next body; `x` is what an encoder writes.
   template <class Coder>
   [[gnu::always_inline]] std::int64_t code(Coder& coder, bool at_rest, std::int64_t x) {
     Kind& kind = kinds_[at_rest ? 1 : 0];
@@ -55,12 +55,12 @@ class RegionWriter {
     const auto shift = static_cast<unsigned>(used == 0 ? 0 : std::countr_zero(used));
     coder_.even(shift, kShiftBits);
     ColumnCoder numbers(guess);
-    NumberEncoder coder = coder_;  // a copy, so that bytes written leave it in registers
+    NumberEncoder coder = coder_;  // a copy, so that it stays in registers while bytes are written
     for (const Slot slot : bodies_)
       numbers.code(coder, !rest_.empty() && rest_[slot] != 0, std::int64_t{column[slot]} >> shift);
     coder_ = coder;
   }
-  /// From the next column on, bodies at rest are a kind of their own.
+  /// From the next column on, bodies at rest have their own models.
   void know_rest(std::span<const std::uint8_t> rest) { rest_ = rest; }
   NumberEncoder& coder() { return coder_; }
 
@@ -90,7 +90,7 @@ class RegionReader {
     for (const Slot slot : bodies_) {
       if (!good_) break;
       const std::int64_t x = numbers.code(coder, !rest_.empty() && rest_[slot] != 0, 0);
-      // Within 2^33 of numbers that were: shifted, it fits.
+      // Within 2^33 before the shift, so it fits.
       const std::int64_t value = x * (std::int64_t{1} << shift);
       good_ = value >= least && value <= most;
       if (good_) column[slot] = static_cast<T>(value);
@@ -108,7 +108,7 @@ class RegionReader {
   bool good_ = true;
 };
 
-// All columns in their order, to a writer or a reader of them.
+// Passes all columns in their order to a writer or a reader.
 template <class Columns, class TheState, class CodecColumns>
 void code_columns(Columns& columns, TheState& state, CodecColumns codec_columns, std::int64_t most_type) {
   columns.column(state.rest(), Guess::kZero, 0, 1);
@@ -124,7 +124,7 @@ void code_columns(Columns& columns, TheState& state, CodecColumns codec_columns,
     columns.column(codec_columns.subspan(at, state.capacity()), Guess::kZero, INT8_MIN, INT8_MAX);
 }
 
-// What the limits of columns do not say.
+// Checks what the limits of columns do not cover.
 bool bodies_are_valid(const State& state) {
   for (Slot slot = 0; slot < state.capacity(); ++slot) {
     if (state.alive()[slot] != 0 && !valid_body(state.body(slot))) return false;
@@ -152,7 +152,8 @@ std::size_t region_bytes_bound(const State& state, const Codec& codec) {
       slot_bits += run.columns * most_number_bits(2 * static_cast<std::uint32_t>(run.limit));
   });
   const std::size_t bits = capacity * slot_bits + codec.models_bits_bound();
-  constexpr std::size_t kFixedBytes = 256;  // region, hash, shifts; what models lose before they have learnt
+  constexpr std::size_t kFixedBytes = 256;  // region, hash, shifts, and the cost of models before they have
+                                            // learned
   return kFixedBytes + bits / 8 + bits / 256;
 }
 
@@ -163,7 +164,7 @@ void write_region(std::uint64_t hash, const State& state, const Codec& codec, By
   code_columns(region, state, numbers(codec.columns()), UINT16_MAX);
   codec.save_models(region.coder());
   const std::size_t size = region.coder().finish();
-  // One byte more than there is room for is refused.
+  // An overflow is reported as one byte more than there is room for.
   out.advance(region.coder().overflow() ? out.rest().size() + 1 : size);
 }
 

@@ -65,8 +65,8 @@ class DdsClientPort final : public ClientPort {
       open->second.set_limits(limits);
       return {};
     }
-    // As deep as the writer's, or what was repaired after a lost link would push itself out. It is memory
-    // only while the application does not take it.
+    // As deep as the writer's history; otherwise repaired samples would displace each other after a lost
+    // link. It takes memory only while the application does not take the samples.
     const auto depth = static_cast<std::int32_t>(
         delta_depth(session.frame_rate_hz, session.window_ceiling, stream.max_delta_bytes));
     auto delta = reader<DeltaMessage>("deltas", stream.id.id, {.depth = depth});
@@ -95,8 +95,8 @@ class DdsClientPort final : public ClientPort {
   void close_snapshots(std::uint32_t stream) override {
     if (wanted_snapshots_ == stream) wanted_snapshots_.reset();
   }
-  /// From now on, for as long as the port lives: the reader of DDS takes nothing from a writer before its
-  /// first heartbeat, which is a round trip that a join need not wait for.
+  /// Reads snapshots from now on, as long as the port lives. A DDS reader takes nothing from a writer before
+  /// its first heartbeat, and a join need not wait for that round trip.
   Result<void> read_snapshots(ClientId client) {
     if (snapshots_ && snapshots_client_ == client) return {};
     auto snapshots = endpoints_.node.reader<SnapshotMessage>(
@@ -117,7 +117,7 @@ class DdsClientPort final : public ClientPort {
     if (!snapshots_) return;
     const std::size_t before = out.size();
     snapshots_->take(dropped_, out);
-    if (!wanted_snapshots_) out.resize(before);  // late parts of one that is taken
+    if (!wanted_snapshots_) out.resize(before);  // late parts of a snapshot that is complete
   }
   void take(std::vector<Received<ReplyMessage>>& out) override {
     if (common_) common_->reply.take(dropped_, out);
@@ -146,7 +146,7 @@ class DdsClientPort final : public ClientPort {
       deltas.set_limits(limits);
     }
   };
-  /// What all streams of an epoch have in common.
+  /// What all streams of an epoch share.
   struct Common {
     Reader<ScheduledInputMessage> scheduled;
     Reader<ReplyMessage> reply;
@@ -159,8 +159,8 @@ class DdsClientPort final : public ClientPort {
     return endpoints_.node.reader<M>(name, options);
   }
 
-  // Until one is followed: a server that has heard of a client makes the writers for it while that still
-  // learns of the session.
+  // Called until a session is followed: a server that has heard of a client makes the writers for it while
+  // the client still learns of the session.
   void tell_servers() {
     constexpr std::int64_t kSpacingNs = 100'000'000;
     const std::int64_t now_ns = steady_ns();
@@ -182,11 +182,11 @@ class DdsClientPort final : public ClientPort {
   Endpoints endpoints_;
   DdsOptions options_;
   std::map<std::uint32_t, Stream> streams_;  // by id
-  std::optional<Common> common_;             // once a stream was opened
-  std::optional<Epoch> epoch_;               // of what is open
+  std::optional<Common> common_;             // set when a stream was opened
+  std::optional<Epoch> epoch_;               // epoch of what is open
   std::optional<Reader<SnapshotMessage>> snapshots_;
   ClientId snapshots_client_ = 0;
-  std::optional<std::uint32_t> wanted_snapshots_;  // of this stream
+  std::optional<std::uint32_t> wanted_snapshots_;  // stream whose snapshots are wanted
   std::int64_t told_ns_ = INT64_MIN / 2;
   std::atomic<std::uint64_t> dropped_ = 0;
 };

@@ -26,7 +26,7 @@ std::vector<char*> lend_each(const std::vector<std::string>& texts) {
   return lent;
 }
 
-// Keeps what a stream's struct points to.
+// Holds the memory that a stream's struct points to.
 struct LentStream {
   explicit LentStream(const StreamMessage& stream) : groups(lend_each(stream.layout.groups)) {
     for (const auto& [id, value] : list_parameters(stream.layout.parameters)) {

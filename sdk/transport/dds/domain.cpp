@@ -14,15 +14,15 @@ namespace {
 
 struct Domains {
   struct Use {
-    dds_entity_t handle = 0;  // 0: not ours to delete
+    dds_entity_t handle = 0;  // 0: created by others, so not deleted here
     unsigned users = 0;
   };
   std::mutex mutex;
   std::map<std::uint32_t, Use> uses;
 };
 
-// Cyclone keeps one table of domains per process; this counts our uses of it. Never destroyed, so that a port
-// held by a static object may still close.
+// Cyclone keeps one table of domains per process; this counts the uses of it here. It is never destroyed, so
+// that a static object can still close its port.
 Domains& domains() {
   static auto* const all = new Domains;
   return *all;

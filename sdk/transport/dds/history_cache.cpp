@@ -32,10 +32,10 @@ HistoryCache::HistoryCache(OnSample call, void* argument) : dds_rhc{}, call_(cal
 
 bool HistoryCache::store(ddsi_rhc* self, const ddsi_writer_info* writer, ddsi_serdata* sample,
                          ddsi_tkmap_instance* instance) {
-  // The cache begins with what the protocol layer sees of it.
+  // The cache begins with the part that the protocol layer sees.
   auto& cache = *static_cast<HistoryCache*>(reinterpret_cast<dds_rhc*>(self));
   cache.hold(instance);
-  // A sample without data only tells that its instance was disposed of or lost its writer.
+  // A sample without data only tells that its instance was disposed of or has lost its writer.
   if (sample->kind == SDK_DATA) cache.call_(cache.argument_, writer->iid, *sample);
   return true;
 }

@@ -6,7 +6,8 @@
 namespace tandem::transport::dds {
 namespace {
 
-// Writer handles are never reused, so entries only age; far above the number of writers a session has.
+// Writer handles are never reused, so entries only age. The limit is far above the number of writers of a
+// session.
 constexpr std::size_t kMaxKnown = 4096;
 
 struct EndpointDeleter {

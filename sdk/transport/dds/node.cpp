@@ -3,8 +3,8 @@
 namespace tandem::transport::dds {
 namespace {
 
-// Cyclone DDS never blocks a keep-last writer for its history; should a network do so, this is how often a
-// write looks at its stop flag.
+// Cyclone DDS never blocks a keep-last writer because of its history. If a network blocks one, a write checks
+// its stop flag at this interval.
 constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
 
 Qos in_partitions(const std::vector<std::string>& partitions) {
@@ -25,14 +25,14 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
   dds_qset_durability(qos.get(),
                       topic.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
-  // No resource limits: a reliable reader that refuses a sample stops all delivery from that peer until it
-  // fits.
+  // There are no resource limits, because a reliable reader that refuses a sample stops all delivery from
+  // that peer until it fits.
   const std::int32_t durable_depth = topic.durable_depth != 0 ? topic.durable_depth : depth;
   dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, durable_depth, DDS_LENGTH_UNLIMITED,
                               DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   dds_qset_lifespan(qos.get(), topic.lifespan);
   dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, lease);
-  // Instances may have writers in two participants; the end of one must not end the other's.
+  // Instances may have writers in two participants; the end of one writer must not end the other's instance.
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;
 }

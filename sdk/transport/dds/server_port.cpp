@@ -44,7 +44,7 @@ class DdsServerPort final : public ServerPort {
     if (count == 0 || count > kMaxStreams) return fail(ErrorCode::kInvalidArgument, "1 to 8 streams");
     while (streams_.size() < count) {
       const auto stream = static_cast<std::uint32_t>(streams_.size());
-      // Those of stream 0 share the node's publisher.
+      // The writers of stream 0 share the node's publisher.
       const std::string partition = stream == 0 ? std::string() : stream_partition(session_, stream);
       auto delta = endpoints_.node.writer<DeltaMessage>("deltas", delta_depth_, partition);
       if (!delta) return tl::unexpected(delta.error());
@@ -93,7 +93,7 @@ class DdsServerPort final : public ServerPort {
       const std::scoped_lock lock(clients_mutex_);
       clients_.emplace(client, Client{std::move(*snapshot), std::move(*reply)});
     }
-    forget_stranger(client);  // or what it was told before could be taken for news
+    forget_stranger(client);  // otherwise the earlier answer could be taken as a new one
     return {};
   }
   void close_client(ClientId client) override {
@@ -157,8 +157,8 @@ class DdsServerPort final : public ServerPort {
     return false;
   }
 
-  // The writer that all clients read keeps the last answer to each stranger for late readers; so that
-  // strangers cannot fill memory, it keeps the latest few.
+  // The writer that all clients read keeps the last answer to each stranger for late readers. It keeps only
+  // the latest few, so that strangers cannot fill memory.
   void remember_stranger(ClientId client) {
     if (std::ranges::find(strangers_, client) != strangers_.end()) return;
     strangers_.push_back(client);
@@ -177,11 +177,12 @@ class DdsServerPort final : public ServerPort {
   std::string session_;
   std::int32_t delta_depth_;
   std::vector<Writer<DeltaMessage>> streams_;
-  // Changed by the writing thread alone, which reads without the lock.
+  // Only the writing thread changes this, so it reads without the lock.
   std::map<ClientId, Client> clients_;
   std::mutex clients_mutex_;
-  std::set<ClientId> asked_for_;    // of the writing thread: whose writers are there, or are tried again
-  std::deque<ClientId> strangers_;  // of the writing thread
+  std::set<ClientId> asked_for_;    // used by the writing thread: clients whose writers exist or are tried
+                                    // again
+  std::deque<ClientId> strangers_;  // used by the writing thread
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
@@ -195,7 +196,7 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   auto scheduled = node->writer<ScheduledInputMessage>("scheduled inputs");
   auto reply = node->writer<ReplyMessage>("replies");
   auto status = node->writer<ServerStatusMessage>("server status");
-  // Looked at now and then: what others say about themselves must not wake the simulation.
+  // Polled now and then, because the announcements of others must not wake the simulation.
   auto others = dds::Announcements::create(*node, {.ignore_own = true, .watched = false});
   auto input = node->reader<InputMessage>("inputs");
   auto ack = node->reader<AckMessage>("acknowledgements");

@@ -9,7 +9,7 @@ namespace {
 struct TopicRules {
   bool reliable = true;
   bool transient_local = false;
-  std::size_t durable_depth = SIZE_MAX;  // of each key's history, what late readers get
+  std::size_t durable_depth = SIZE_MAX;  // part of each key's history that late readers get
 };
 // In the order of AnyMessage; the same QoS as in dds/topics.hpp.
 constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
@@ -24,7 +24,7 @@ constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
     {false, false},     // client status
 }};
 
-// About what DDS puts around a sample: headers of IP, UDP and RTPS, and its fields besides the payload.
+// The approximate overhead of DDS for a sample: headers of IP, UDP and RTPS, and fields besides the payload.
 constexpr std::size_t kOverheadBytes = 150;
 
 struct PayloadBytes {
@@ -74,8 +74,8 @@ Fabric::Index Fabric::add_participant(const std::string& session) {
   const auto index = static_cast<Index>(participants_.size());
   Participant participant;
   participant.session = session;
-  // Random first, so that which of two servers has the lower id depends on the seed; the index makes it
-  // unique.
+  // The random part comes first, so that the seed decides which of two servers has the lower id. The index
+  // makes it unique.
   const std::uint64_t high = random_.next();
   for (std::size_t i = 0; i < 8; ++i) participant.id.bytes[i] = static_cast<std::uint8_t>(high >> (8U * i));
   for (std::size_t i = 0; i < 4; ++i)
@@ -297,7 +297,7 @@ bool Fabric::settle_front(Pair& pair, Index index) {
   const Index to = readers_[pair.reader].participant;
   Travelling& front = pair.travelling.front();
   const LinkModel& model = link(writer.participant, to);
-  if (participants_[to].frozen_ns != kNever) return false;  // set_frozen() takes it up again
+  if (participants_[to].frozen_ns != kNever) return false;  // set_frozen() resumes it
   if (front.to_repair) {
     if (gone(writer.participant) || !keeps(writer, front.sample)) {
       ++counts_.overwritten;
@@ -322,7 +322,7 @@ bool Fabric::settle_front(Pair& pair, Index index) {
 
 void Fabric::deliver(const Pair& pair, const Sample& sample) {
   Reader& reader = readers_[pair.reader];
-  // By writer, as the DDS port keeps them, so that nobody pushes out the samples of others.
+  // Kept by writer, as in the DDS port, so that no writer displaces the samples of others.
   const Index from = writers_[pair.writer].participant;
   const auto same_key = [&](const Arrived& arrived) {
     return arrived.from == from && arrived.key == sample.key;
@@ -420,7 +420,7 @@ void Fabric::set_frozen(const ParticipantId& participant, bool frozen) {
     return;
   }
   subject.frozen_ns = kNever;
-  // What came while it was frozen overran its socket; it asks for it again.
+  // Samples that came while it was frozen overran its socket; it asks for them again.
   for (const Index reader : subject.readers) {
     for (const Index index_of_pair : readers_[reader].pairs) {
       Pair& pair = pairs_[index_of_pair];

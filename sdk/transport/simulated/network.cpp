@@ -17,7 +17,7 @@ constexpr std::uint32_t kInputDepth = 64;
 constexpr std::uint32_t kSnapshotWriterDepth = 64;
 constexpr std::uint32_t kSnapshotReaderDepth = 4096;
 
-/// What both kinds of port share: a participant and its samples.
+/// The common part of both kinds of port: a participant and its samples.
 class Member {
  public:
   Member(std::shared_ptr<Fabric> fabric, std::string session)
@@ -54,7 +54,7 @@ class Member {
       }
     });
   }
-  /// Takes announcements into the book, which afterwards knows who lives.
+  /// Takes announcements into the book, which afterwards knows who is alive.
   void refresh(Fabric::Index reader, SessionBook& book) {
     if (fabric_->killed(self_)) return;
     fabric_->take(reader, [&](Fabric::Index from, const AnyMessage& any) {
@@ -277,7 +277,7 @@ class SimulatedClientPort final : public ClientPort {
     std::optional<Fabric::Index> snapshots;
     Limits limits;
   };
-  /// What all streams of an epoch have in common.
+  /// What all streams of an epoch share.
   struct Common {
     Epoch epoch = 0;
     Fabric::Index scheduled = 0, reply = 0;
@@ -291,7 +291,7 @@ class SimulatedClientPort final : public ClientPort {
   std::uint32_t delta_depth_;
   Fabric::Index ack_, input_, status_, sessions_, server_status_;
   std::map<std::uint32_t, Stream> streams_;  // by id
-  std::optional<Common> common_;             // once a stream was opened
+  std::optional<Common> common_;             // set when a stream was opened
   SessionBook book_;
 };
 

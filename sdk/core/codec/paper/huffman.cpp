@@ -8,7 +8,7 @@
 namespace tandem {
 
 CodeLengths build_code_lengths(const SymbolCounts& counts) {
-  // A package is a set of symbols; each time a symbol is in a chosen package its code grows by one bit.
+  // A package is a set of symbols. Each time a symbol is in a chosen package, its code grows by one bit.
   struct Package {
     std::uint64_t weight;
     std::vector<std::uint8_t> symbols;

@@ -30,7 +30,7 @@ void HuffmanResiduals::write(std::span<const Candidate> chosen, std::byte* to) c
 
 Result<void> HuffmanResiduals::read(std::span<const std::byte> values, std::span<Residual> residuals) const {
   BitReader in(values);
-  // Three symbols to a refill: see kMaxCodeLength. Returns false when they reach past the end.
+  // Reads three symbols per refill: see kMaxCodeLength. Returns false if they reach beyond the end.
   const auto read_three = [&in](const HuffmanCode& code, std::int8_t* to) {
     in.refill();
     for (std::size_t i = 0; i < 3; ++i) {

@@ -5,7 +5,7 @@
 namespace tandem {
 namespace {
 
-// Null, or why the stream is none.
+// Returns null, or why the stream is invalid.
 const char* decode_block(const TrackerFrame& frame, const Block& block, std::span<const std::byte> stream) {
   TrackerDelta::Part& part = frame.delta.blocks[block.index];
   const TrackerModels& models = frame.memory.models();
@@ -16,7 +16,7 @@ const char* decode_block(const TrackerFrame& frame, const Block& block, std::spa
   std::uint32_t count = 0;
   RangeDecoder range(stream);
   const Slot end = block.first + block.slots;
-  // Bits are worth guessing where few bodies are corrected: here, where they have less than 0.8 bits each.
+  // Branches on bits pay if few bodies are corrected: here, if they have less than 0.8 bits each.
   if (stream.size() * 10 < block.slots) {
     for (Slot slot = block.first; slot < end; ++slot) {
       if (range.get(p1[flags[slot]])) corrected[count++] = slot;

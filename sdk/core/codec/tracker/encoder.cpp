@@ -8,21 +8,22 @@
 namespace tandem {
 namespace {
 
-// A body within the threshold but beyond this share of it (1/256) goes early if the model half expects it
-// anyway. 0.85: at 0.8 bits grow by 1.4 % and the RMS error falls by a tenth, at 1 nobody goes early
-// (RESEARCH.md).
+// A body within the threshold but beyond this share of it (in 1/256) is corrected early if the model half
+// expects it anyway. The share is 0.85. At 0.8 bits grow by 1.4 % and the RMS error falls by a tenth; at 1 no
+// body goes early (RESEARCH.md).
 constexpr std::int64_t kEarlyShare = 218;
-// Bits that an error of one threshold is worth: a smaller one is wrong again later, so bits spent on it come
-// back. With 9 bits fall by 0.8 % and the RMS error grows by 5 %; with 20 bits grow by 0.8 %. That of a body
-// at rest stays: its RMS error falls by 1.3 % for 0.2 % of the bits (RESEARCH.md).
+// The worth in bits of an error of one threshold. A body with a smaller error is wrong again later, so bits
+// spent on it come back. With 9 bits fall by 0.8 % and the RMS error grows by 5 %; with 20 bits grow by 0.8
+// %. The error of a body at rest stays, so it is worth more: its RMS error falls by 1.3 % for 0.2 % of the
+// bits (RESEARCH.md).
 constexpr std::uint64_t kErrorWorth = 14, kRestingErrorWorth = 40;
 constexpr std::size_t kHeaderBytes = 1 + 2 + 1;  // estimated: type, length, block
-// Under a budget: this share of it may stay unused (1/64), and this often what is sent is written; if
-// estimates mislead, the last times with half as many bodies.
+// Under a budget: this share of it (1/64) may stay unused, and the sections are written at most this many
+// times. If estimates mislead, the last times write half as many bodies.
 constexpr std::size_t kSpareShare = 64;
 constexpr std::uint32_t kMostWrites = 8, kMostEstimates = 4;
 constexpr std::size_t kTooLarge = SIZE_MAX;
-// In 1/256 bits: a byte, and a first guess of what a body costs with its share of the flags.
+// In 1/256 bits: a byte, and a first guess of the cost of a body with its share of the flags.
 constexpr std::int64_t kByte = std::int64_t{8} << 8U;
 constexpr std::int64_t kGuessedCost = std::int64_t{16} << 8U;
 
@@ -57,7 +58,7 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
   budget = std::min({budget, bound, out.rest().size()});
   costs_.learn(frame.memory.models());
   stillness_.follow(frame.at, target);
-  // Where bodies wait, the budget was too small a frame ago and probably still is.
+  // If bodies wait, the budget was too small in the previous frame and probably still is.
   const bool is_enough = !some_wait_ || budget >= bound;
   frame.for_each_block([&](const Block& block) {
     gather(frame, target, block);
@@ -146,7 +147,7 @@ void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, cons
 bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget) {
   rank(frame);
   const auto all = static_cast<std::uint32_t>(order_.size());
-  bool may_all_fit = some_wait_;  // else they were tried
+  bool may_all_fit = some_wait_;  // false: they were tried
   const auto try_all = [&] {
     may_all_fit = false;
     frame.for_each_block([&](const Block& block) { choose(frame, target, block); });
@@ -156,7 +157,7 @@ bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& t
   std::uint32_t fits = 0;
   std::uint32_t too_many = all + 1;
   std::uint32_t written = too_many;
-  std::int64_t beyond = kByte;  // what is written over what was estimated
+  std::int64_t beyond = kByte;  // excess of the written size over the estimate
   for (std::uint32_t i = 0; i < kMostWrites && too_many - fits > 1; ++i) {
     std::uint32_t last = too_many - 1;
     if (i >= kMostEstimates) {
@@ -181,7 +182,7 @@ void TrackerEncoder::rank(const TrackerFrame& frame) {
   frame.for_each_block([&](const Block& block) {
     TrackerDelta::Part& coded = frame.delta.blocks[block.index];
     frame.list_flags(block);
-    // Finer than costs_, because there are so many of them.
+    // Finer than costs_, because there are many of them.
     std::uint64_t zeros = 0;
     for (std::uint32_t model = 0; model < TrackerModelIndex::kSteps; ++model) {
       if (coded.counts[model][0] == 0) continue;
@@ -302,7 +303,7 @@ void TrackerEncoder::write_block(const TrackerFrame& frame, const Block& block, 
       most_tracker_bytes_per_body(frame.memory.turns()) * block.slots + kTrackerSlackBytes;
   RangeEncoder flags{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
   frame.list_flags(block);
-  // Corrected bodies get a mark beside their models, so that no branch asks which they are.
+  // Corrected bodies get a mark in their models, so that no branch has to test which they are.
   constexpr std::uint16_t kMark = 0x8000;
   static_assert(TrackerModelIndex::kAll <= kMark);
   for (std::uint32_t i = 0; i < count; ++i) {

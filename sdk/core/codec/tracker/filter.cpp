@@ -7,19 +7,20 @@
 namespace tandem {
 namespace {
 
-// Steps in 1/256 of the threshold.
+// Converts steps to 1/256 of the threshold.
 Vec3i relative(const TrackerSteps& steps) {
   return TrackerSteppings::relative(
       {std::clamp(steps[0], -127, 127), std::clamp(steps[1], -127, 127), std::clamp(steps[2], -127, 127)});
 }
 
-// One over a vector's length, as `root` / (2^30 * 2^halvings).
+// The inverse of a vector's length: `root` / (2^30 * 2^halvings).
 struct InverseLength {
   std::uint64_t root;
   unsigned halvings;
 };
 
-// Of the square x > 0 of the length. With u = x / 4^halvings in 1/4 .. 1, Newton's iteration for 1 / sqrt(u),
+// Computes it from the square x > 0 of the length. With u = x / 4^halvings in 1/4 .. 1, Newton's iteration
+// for 1 / sqrt(u),
 //   y' = y (3 - u y^2) / 2,
 // squares the relative error times 1.5: from the 0.1 of the line that it starts with to 1e-7 in three steps.
 // y in 2^-30, at most 2; u in 2^-32; all products fit 64 bits.
@@ -32,9 +33,9 @@ InverseLength inverse_length(std::uint64_t x) {
   return {y, 32 - leading / 2};
 }
 
-// Cosine in 1/GainEvidence::kCosineOne of two vectors with this product and these lengths.
+// The cosine, in 1/GainEvidence::kCosineOne, of two vectors with this product and these lengths.
 std::int64_t cosine(std::int64_t product, const InverseLength& a, const InverseLength& b) {
-  // |product| is at most that of the lengths, 2^bits.
+  // product| is at most the product of the lengths, 2^bits.
   const unsigned bits = a.halvings + b.halvings;
   std::int64_t cosine = bits > 30 ? product >> (bits - 30) : product << (30 - bits);
   for (const InverseLength& each : {a, b}) cosine = cosine * static_cast<std::int64_t>(each.root) >> 30;
@@ -65,7 +66,7 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
 
 void add_evidence(const TrackerBody& body, const TrackerSteps& steps, const Vec3i& c,
                   GainEvidence& evidence) {
-  if (body.age == 0) return;  // hit: its last correction says nothing of this one
+  if (body.age == 0) return;  // the body was hit: its last correction says nothing about this one
   const auto squared = [](const Vec3i& vector) {
     return static_cast<std::uint64_t>(tracker_detail::dot(vector, vector));
   };
@@ -90,15 +91,15 @@ TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gra
       gravity_(gravity),
       gains_(gains),
       radii_(radii) {
-  // 256 / 64: c may move a body by four thresholds in a frame. Beyond, it would be corrected every frame
-  // anyway; but what holds it up is within reach whatever the threshold.
+  // 256 / 64: c may move a body by four thresholds in a frame. With a larger c it would be corrected every
+  // frame anyway. But the c that holds a body up is always permitted.
   std::int32_t fall = 0;
   for (const std::int32_t g : gravity) fall = std::max({fall, g, -g});
   most_c_ = std::max(std::int64_t{256} * parameters.threshold, std::int64_t{2} * fall);
   most_c_ = std::min<std::int64_t>(kVelocityLimit, most_c_);
 }
 
-// The same with an angle for `one`; w has the unit of angles, not 1/64 of it.
+// As move(), with an angle for `one`; w has the unit of angles, not 1/64 of it.
 void TrackerFilter::turn(State& state, Slot slot, const TrackerCorrection& correction,
                          TrackerBody& body) const {
   const TrackerSteps& steps = correction.turn;

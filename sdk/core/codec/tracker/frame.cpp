@@ -11,8 +11,8 @@ void TrackerFrame::list_flags(const Block& block) const {
   list_flag_models(memory.flag_ages() + block.first, memory.histories() + block.first,
                    at.predicted.rest().data() + block.first, at.alive.data() + block.first,
                    std::span(scratch.flags).subspan(block.first, block.slots));
-  // By turns in the places of zeros and ones, because neighbours often have the same model and an addition
-  // would wait for the one before.
+  // Counts alternately in the places of zeros and ones, because neighbours often have the same model, and an
+  // addition would wait for the previous one.
   counts = {};
   const Slot end = block.first + block.slots;
   for (Slot slot = block.first; slot < end; ++slot) ++counts[flags[slot]][slot & 1U];
@@ -31,7 +31,7 @@ void TrackerFrame::list_contexts(const Block& block, std::span<const Slot> slots
   for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = memory.column(i);
   TrackerContexts& contexts = scratch.contexts;
   const std::int32_t threshold = at.parameters.threshold;
-  // One takes as long as some twenty side by side.
+  // Computing one context alone takes as long as about twenty in the loop.
   if (slots.size() < block.slots / 20) {
     for (const Slot slot : slots) contexts.fill({block.index, slot, 1}, at.predicted, columns, threshold);
   } else {
@@ -48,8 +48,8 @@ TrackerTurnContext TrackerFrame::turn_context_of(Slot slot) const {
 }
 
 std::span<const Slot> TrackerFrame::join() const {
-  // A delta without corrections teaches that they are rare. Else a budget that not even one body fits,
-  // because its flags seem likely, would never be met.
+  // A delta without corrections teaches that corrections are rare. Otherwise a budget that no body fits,
+  // because flags seem likely, would never be met.
   const bool is_empty = std::all_of(delta.blocks.begin(), delta.blocks.end(),
                                     [](const TrackerDelta::Part& part) { return part.corrected == 0; });
   if (is_empty) for_each_block([this](const Block& block) { list_flags(block); });

@@ -8,8 +8,8 @@
 namespace tandem {
 namespace {
 
-// A way to correct one group: by no steps, or by one of the points around what is missing. The error is what
-// it leaves of that group; those of both add up.
+// A way to correct one group: by no steps, or by one of the points around the missing correction. The error
+// is what remains of that group; the errors of both groups add up.
 struct Way {
   TrackerPoint point;
   std::uint64_t error = 0;
@@ -22,7 +22,7 @@ class Search {
       : body_(body), worth_(worth), costs_(costs) {}
 
   void list(const TrackerSteppings& steppings, const TrackerContext& position, const TrackerContext& turn);
-  /// Tries all pairs, where `fine` those of both groups alone.
+  /// Tries all pairs of ways; if `fine`, only those that correct both groups.
   void run(const TrackerTurnContext& context, bool fine);
   [[nodiscard]] bool found() const { return cost_ != UINT64_MAX; }
   [[nodiscard]] const TrackerCorrection& best() const { return found() ? cheapest_ : nearest_; }
@@ -92,7 +92,7 @@ void Search::run(const TrackerTurnContext& context, bool fine) {
     const bool moves = is_some(positions_[i].point.steps);
     for (std::size_t j = 0; j < turns_.size(); ++j) {
       const bool turns = is_some(turns_[j].point.steps);
-      // Points of no steps stand at 0 alone.
+      // The way with no steps is only at index 0.
       if ((i != 0) != moves || (j != 0) != turns || (fine ? !(moves && turns) : !(moves || turns))) continue;
       const std::uint64_t of_one = std::uint64_t{both[0]} + which[turns ? 1 : 0];
       consider(positions_[i], turns_[j], moves && turns ? of_both : of_one, fine);

@@ -5,14 +5,14 @@
 namespace tandem {
 namespace {
 
-// Corrected and renewed bodies are younger than the others afterwards: they start again from zero.
+// Corrected and renewed bodies are younger than the others afterwards: their age restarts at zero.
 constexpr std::uint8_t kYoungest = 0xFF;
 
-// Models in a snapshot: each one's weight, as what it lacks of 256 (most that are used at all lack one), and
-// the probability of one that is used, as how far it is from the one before.
+// Codes models in a snapshot: the weight of each as its difference to 256 (most used models lack one), and
+// the probability of each used model as its difference to the previous one.
 class ModelsCoder {
  public:
-  /// False: a decoder read what no model is.
+  /// Returns false if a decoder read an invalid model.
   template <class Coder>
   bool code(Coder& coder, std::uint8_t& weight, std::uint16_t& p1) {
     const std::int64_t lacks = code_number(coder, weights_, static_cast<std::uint8_t>(0U - weight));
@@ -142,7 +142,7 @@ void TrackerMemory::grow_older(std::size_t column, const Block& block, std::span
                                const State& state) {
   std::byte* const age = columns_.data() + column * capacity_;
   for (const Slot slot : renewed) age[slot] = std::byte{kYoungest};
-  // 255 wraps to 0; what was 254 stays there.
+  // 255 wraps to 0; an age of 254 stays 254.
   const std::uint8_t* const alive = state.alive().data();
   const Slot end = block.first + block.slots;
   for (Slot slot = block.first; slot < end; ++slot) {

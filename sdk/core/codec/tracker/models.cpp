@@ -7,7 +7,8 @@
 namespace tandem {
 namespace {
 
-// Fifteen runs of counts, each about as wide as a third of its start: what the hazard of a correction needs.
+// Fifteen runs of counts, each about as wide as a third of its start. The probability of a correction needs
+// no finer ones.
 constexpr std::array<std::uint8_t, 14> kLastOfRun{0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 40, 64, 128, 250};
 constexpr std::array<std::uint8_t, 256> make_age_buckets() {
   std::array<std::uint8_t, 256> buckets{};
@@ -18,16 +19,16 @@ constexpr std::array<std::uint8_t, 256> make_age_buckets() {
   return buckets;
 }
 
-// 2^-10 rad a frame: below, the sign of an angular velocity says nothing.
+// 2^-10 rad per frame: the sign of a smaller angular velocity says nothing.
 constexpr std::int32_t kSlowTurn = 1 << 18;
 
-// How many of the limits are below n.
+// The number of limits below n.
 template <class... Limits>
 std::uint8_t above(std::uint8_t n, Limits... limits) {
   return static_cast<std::uint8_t>((static_cast<std::uint8_t>(n > limits) + ...));
 }
 
-// What ages, intervals and last steps say.
+// Lists the parts of contexts that follow from ages, intervals and last steps.
 TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
                                     const std::uint8_t* __restrict interval, const std::int8_t* __restrict x,
                                     const std::int8_t* __restrict y, const std::int8_t* __restrict z,
@@ -48,7 +49,7 @@ TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
   }
 }
 
-// Of one axis: which way it went last, which way c pushes and v goes.
+// Lists the sign context of one axis: the direction of the last correction, of c and of v.
 TANDEM_VECTOR_CLONES void list_signs(const std::int8_t* __restrict last, const std::int32_t* __restrict c,
                                      const std::int32_t* __restrict v, std::int32_t faint, std::int32_t slow,
                                      std::uint32_t slots, std::uint8_t* __restrict sign) {
@@ -60,7 +61,8 @@ TANDEM_VECTOR_CLONES void list_signs(const std::int8_t* __restrict last, const s
   }
 }
 
-// How long it was not corrected, whether it is at rest, how fast the predicted step has it.
+// Lists the rest context: how long the body was not corrected, whether it is at rest, and its predicted
+// speed.
 TANDEM_VECTOR_CLONES void list_rests(const std::uint8_t* __restrict age, const std::uint8_t* __restrict rest,
                                      const std::int32_t* __restrict x, const std::int32_t* __restrict y,
                                      const std::int32_t* __restrict z, std::int32_t slow, std::int32_t fast,
@@ -113,11 +115,11 @@ void TrackerContexts::fill(const Block& block, const State& predicted,
   };
   list_ages(bodies[0] + first, bodies[1] + first, steps(0), steps(1), steps(2), block.slots,
             column(0) + first, column(1) + first);
-  // Below 1/51 of the threshold a frame, and 1/2048 of it a frame squared, a sign says nothing.
+  // Below 1/51 of the threshold per frame, and 1/2048 of it per frame squared, a sign says nothing.
   for (std::size_t axis = 0; axis < 3; ++axis)
     list_signs(steps(axis), predicted.c(axis).data() + first, predicted.v(axis).data() + first,
                threshold / 32, threshold + threshold / 4, block.slots, column(2 + axis) + first);
-  // 20/64 and one threshold a frame.
+  // 20/64 of a threshold per frame, and one threshold per frame.
   const auto speed = [threshold](std::int64_t share) {
     return static_cast<std::int32_t>(std::min<std::int64_t>(share * threshold, kVelocityLimit));
   };
@@ -145,7 +147,7 @@ TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& 
   context.choice =
       (last * TrackerModelIndex::kShortAges + age(position)) * TrackerModelIndex::kShortAges + age(turn);
   std::uint8_t zero = 0, magnitude = 0;
-  // As columns of one slot.
+  // The values as columns of one slot.
   const auto turn_age = static_cast<std::uint8_t>(turn.age);
   const auto interval = static_cast<std::uint8_t>(turn.interval);
   std::array<std::int8_t, 3> last_steps{};
@@ -168,9 +170,10 @@ TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& 
 
 // The mean of a model's decisions, each counted once, with one that says what p1 was at the start:
 //   p1' = ((weight + 1) p1 + 65536 ones) / (weight + 1 + seen),  weight' = min(weight + seen, 255).
-// Up to 255 decisions it is their running mean. Beyond, the past is worth 256 decisions and fades: a delta of
-// n moves p1 by the share n / (256 + n) of the way to what it shows. With a larger limit models follow slower
-// when a scene calms down, with a smaller one they are noisy where decisions are rare; this one fits a byte.
+// Up to 255 decisions it is their running mean. After that the past counts as 256 decisions and fades: a
+// delta with n decisions moves p1 by the share n / (256 + n) of the way to their mean. With a larger limit
+// models follow more slowly when a scene calms down; with a smaller one they are noisy if decisions are rare.
+// This one fits a byte.
 void TrackerModels::learn(const TrackerCounts& counts, std::uint32_t models) {
   for (std::size_t i = 0; i < models; ++i) {
     const std::uint32_t ones = counts[i][1];
@@ -178,8 +181,8 @@ void TrackerModels::learn(const TrackerCounts& counts, std::uint32_t models) {
     if (seen == 0) continue;
     const std::uint32_t before = weight[i] + 1U;
     const std::uint64_t sum = std::uint64_t{before} * p1[i] + (std::uint64_t{ones} << 16U);
-    // At most 256 * 2^16 + 2^20 * 2^16 < 2^37. Two divisions, because the short one takes a third of the time
-    // and nearly always does.
+    // At most 256 * 2^16 + 2^20 * 2^16 < 2^37. There are two divisions, because the 32-bit one takes a third
+    // of the time and is nearly always enough.
     const std::uint64_t mean =
         sum >> 32U == 0 ? static_cast<std::uint32_t>(sum) / (before + seen) : sum / (before + seen);
     p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));

@@ -23,15 +23,16 @@ std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
   return to < from ? -q : q;
 }
 
-// The two lengths on either side of the residual on each axis, `shorter` and one more; a point is named by a
-// bit an axis, x the highest, 1: the longer one. (Third values, on the far side, do not pay: RESEARCH.md.)
+// The two lengths on either side of the residual on each axis: `shorter` and one more. A point is named by
+// one bit per axis, x the highest; 1: the longer one. (Third values, on the far side, do not pay:
+// RESEARCH.md.)
 class Choices {
  public:
   Choices(const Vec3i& from, const Vec3i& to, std::int32_t unit) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::uint32_t size = magnitude(to[axis], from[axis]);
       const bool is_negative = to[axis] < from[axis];
-      // The point of lower values comes first, so on an axis of negative values the interval is open below.
+      // The point with lower values comes first, so on an axis of negative values the interval is open below.
       const std::uint32_t inside = size - static_cast<std::uint32_t>(is_negative);
       const auto one = static_cast<std::uint32_t>(unit);
       std::uint32_t shorter = static_cast<std::uint32_t>(inside >= one);
@@ -42,7 +43,7 @@ class Choices {
     }
   }
 
-  /// The cheapest point within the error ball; false: there is none.
+  /// Finds the cheapest point within the error ball; returns false if there is none.
   bool cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
                 const TrackerContext& context, TrackerSteps& steps) const;
   [[nodiscard]] std::array<TrackerPoint, 8> list(const TrackerCosts& costs,
@@ -86,19 +87,19 @@ Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerC
   return result;
 }
 
-// Of each point: bits + worth * (error / threshold)^2, in 1/256 bits.
+// Computes for each point: bits + worth * (error / threshold)^2, in 1/256 bits.
 //
-// Bits: the axes are coded one after another, and an axis' contexts depend on how many before it moved; so
-// the costs of an axis are worked out once for each number of them (axis_costs) and picked by the point.
-// Error: a point that goes two steps or more along some axis uses the long unit, and errors of axes add up;
-// otherwise m axes move by one step of unit(m), and with r the distance on an axis
+// Bits: the axes are coded one after another, and the contexts of an axis depend on how many axes before it
+// moved. So the costs of an axis are computed once for each such number (axis_costs), and each point looks
+// them up. Error: a point that goes two steps or more along some axis uses the long unit, and the errors of
+// the axes add up. Otherwise m axes move by one step of unit(m), and with r the distance on an axis
 //   error^2 = sum of r^2 + m unit^2 - 2 unit (sum of r over the axes that move).
 //
-// All eight are worked out, used or not: almost no branch that is hard to guess. Errors wrap where a point is
-// of no use.
+// All eight are computed, used or not, so that there is almost no branch that is hard to predict. Errors of
+// useless points wrap.
 bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& worth, const TrackerCosts& costs,
                        const TrackerContext& context, TrackerSteps& steps) const {
-  std::array<std::array<std::uint64_t, 2>, 3> long_error{};  // squared, of the unit of long steps
+  std::array<std::array<std::uint64_t, 2>, 3> long_error{};  // squared errors with the unit of long steps
   std::array<std::array<std::uint64_t, 2>, 3> moved_size{};
   std::array<std::array<std::uint32_t, 2>, 3> is_moved{}, is_long{};
   std::uint64_t from_zero = 0;  // squared
@@ -119,11 +120,11 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
   const AxisCosts y_costs = axis_costs<1>(costs, context);
   const AxisCosts z_costs = axis_costs<2>(costs, context);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
-  std::uint64_t best = UINT64_MAX;  // cost, then the point; among equals the lowest values
+  std::uint64_t best = UINT64_MAX;  // cost, then the point; among equal costs the lowest values win
   const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     const std::uint32_t before_z = is_moved[0][x] + is_moved[1][y];
     const std::uint32_t moved = before_z + is_moved[2][z];
-    // Of m steps of one along m axes: the sum of (size - unit)^2 there and size^2 elsewhere.
+    // The error of one step along each of m axes: the sum of (size - unit)^2 there and size^2 elsewhere.
     const auto unit = static_cast<std::uint64_t>(steppings.unit(moved));
     const std::uint64_t sizes = moved_size[0][x] + moved_size[1][y] + moved_size[2][z];
     const std::uint64_t short_error = from_zero + unit * (moved * unit - 2 * sizes);
@@ -136,7 +137,7 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
     const bool counts = moved != 0 && error <= worth.limit;
     best = std::min(counts ? cost << 3U | point : UINT64_MAX, best);
   };
-  // Written out, so that what depends on a point alone is no index any more.
+  // Written out, so that values that depend only on the point need no index.
   try_point(0, 0, 0);
   try_point(0, 0, 1);
   try_point(0, 1, 0);

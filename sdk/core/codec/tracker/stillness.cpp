@@ -8,9 +8,9 @@
 namespace tandem {
 namespace {
 
-// Of a threshold a frame. At 4 recordings with rests take 1 % less bits and have an RMS error 2 % larger, and
-// the paper's scenes take up to 1.5 % more; at 2 up to 14 % more; at 16 recordings take 5 % more
-// (RESEARCH.md).
+// A body is slow below 1/kSlow of a threshold per frame. At 4 recordings with resting bodies take 1 % fewer
+// bits and have a 2 % larger RMS error, and the thesis's scenes take up to 1.5 % more bits; at 2 up to 14 %
+// more; at 16 recordings take 5 % more (RESEARCH.md).
 constexpr std::int64_t kSlow = 8;
 constexpr std::int64_t kMostPush = std::int64_t{1} << 29;  // so that four times a squared length fits
 
@@ -35,7 +35,7 @@ void Stillness::follow(const CodecFrame& frame, const State& target) {
     std::int32_t* const before = p_[axis].data();
     std::int32_t* const moved = moved_[axis].data();
     for (std::size_t s = 0; s < frames_.size(); ++s) {
-      // Wraps at 2^31, which is far in either direction.
+      // Wraps at 2^31, which counts as far in either direction.
       moved[s] = static_cast<std::int32_t>(static_cast<std::uint32_t>(now[s]) -
                                            static_cast<std::uint32_t>(before[s]));
       before[s] = now[s];
@@ -55,10 +55,10 @@ bool Stillness::is_still(const CodecFrame& frame, const State& target, Slot slot
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::int64_t d = moved_[axis][slot];
     if (d < -slow || d > slow) return false;
-    // Of a body seen for two frames it is not known: as if it stood.
+    // For a body that was seen for two frames it is unknown: the body counts as standing.
     const std::int64_t before = frames_[slot] < 3 ? d : moved_before_[axis][slot];
     const std::int64_t g = frame.gravity[axis];
-    // Beside gravity; the limit lets squares fit and is beyond what gravity can do.
+    // The acceleration besides gravity. The limit lets squares fit and is above what gravity can cause.
     const std::int64_t a = std::clamp((d - before) * 64 - g, -kMostPush, kMostPush);
     moved += d * d;
     pushed += a * a;

@@ -1,4 +1,4 @@
-// The tier `ballistic`: the paper's equation 3.1 (semi-implicit Euler, gravity and damping) on the lattice,
+// The tier `ballistic`: equation 3.1 of the thesis (semi-implicit Euler, gravity and damping) on the lattice,
 // plus the learned acceleration c:
 //   v += g + c;  c -= (c*E + 2^15) >> 16;  v -= (v*D + 2^15) >> 16;  clamp v, c to +-2^28;
 //   p += (v + 32) >> 6;  clamp p to +-2^30
@@ -12,8 +12,8 @@
 namespace tandem {
 namespace {
 
-// (x*k + 2^15) >> 16 exactly, by two products of 32 bits, which every vector unit has: the upper half of x
-// gives whole numbers, the lower one alone is rounded. Needs k < 2^16.
+// (x*k + 2^15) >> 16 exactly, by two products of 32 bits, which every vector unit has. The upper half of x
+// gives whole numbers; only the lower half is rounded. Needs k < 2^16.
 inline std::int32_t share_of(std::int32_t x, std::uint32_t k) {
   const auto whole = static_cast<std::uint32_t>(x >> 16) * k;
   const std::uint32_t rest = (static_cast<std::uint32_t>(x) & 0xFFFFU) * k + 0x8000U;
@@ -42,7 +42,7 @@ inline std::int32_t gravity_of(std::uint8_t alive, std::int32_t gravity) {
   return gravity & -static_cast<std::int32_t>(alive);
 }
 
-// One channel; of bodies at rest nothing changes. Columns never overlap; a compiler that is told so
+// Steps one channel. Bodies at rest do not change. Columns never overlap; with `__restrict` the compiler
 // vectorises.
 TANDEM_VECTOR_CLONES void step_channel(const std::uint8_t* __restrict rest, const std::int32_t* __restrict p,
                                        const std::int32_t* __restrict v, const std::int32_t* __restrict c,

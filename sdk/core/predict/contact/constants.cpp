@@ -50,7 +50,7 @@ constexpr std::size_t kPlaneValues = 4;
 constexpr std::size_t kBoxValues = 15;
 constexpr std::size_t kBallValues = 4;
 constexpr std::size_t kMostTypes = 65536;
-constexpr std::int32_t kMostSpringOfOneStep = 10240;  // 5/8; a stiffer one shakes
+constexpr std::int32_t kMostSpringOfOneStep = 10240;  // 5/8; a stiffer spring oscillates
 
 }  // namespace
 
@@ -106,7 +106,7 @@ Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> va
   const std::size_t planes = in.take_count(0, C::kMostShapes);
   const std::size_t boxes = in.take_count(0, C::kMostShapes);
   const std::size_t balls = in.take_count(0, C::kMostShapes);
-  // Before anything is reserved.
+  // Checked before memory is reserved.
   if (!in.good() ||
       in.left() != types * kTypeValues + planes * kPlaneValues + boxes * kBoxValues + balls * kBallValues) {
     return fail(ErrorCode::kMalformed, "predictor: constants of wrong number or range");

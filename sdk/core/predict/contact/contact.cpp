@@ -1,5 +1,5 @@
-// The tiers `contact` and `field`: v += g + c + contact forces, then as `ballistic`. Forces are those of the
-// state at the start of a sub-step, of S. Green, "Particle Simulation using CUDA" (2008):
+// The tiers `contact` and `field`: v += g + c + contact forces, then as `ballistic`. Forces are computed from
+// the state at the start of a sub-step, after S. Green, "Particle Simulation using CUDA" (2008):
 //   (damping + shear) * u - (spring * overlap + shear * (u.n)) * n
 #include "sdk/core/predict/contact/contact.hpp"
 
@@ -19,12 +19,12 @@ constexpr std::uint32_t kReachBits = 14;
 constexpr std::uint32_t kRootShift = 16;
 constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
 constexpr std::uint32_t kNearShift = 5;
-constexpr std::uint32_t kBeyond = 8;  // places a vector may read behind the last body
+constexpr std::uint32_t kBeyond = 8;  // number of places that a vector may read behind the last body
 constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
 
-// Every grid needs four cells a side, or the cells before and behind one would be the same.
+// Every grid needs four cells per side; otherwise the cells before and behind one would be the same.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
   std::uint32_t bits = 2;
   while ((1U << (3 * bits)) < 2 * capacity) ++bits;
@@ -37,7 +37,7 @@ std::int32_t largest_radius_of(const ContactConstants& constants) {
   return largest;
 }
 
-// Lattice units to grid units: two bodies that touch are less than 2^14 grid units apart.
+// The shift from lattice units to grid units: two touching bodies are less than 2^14 grid units apart.
 std::uint32_t shift_for(std::int32_t largest_radius) {
   const auto bits =
       static_cast<std::uint32_t>(std::bit_width(2 * static_cast<std::uint32_t>(largest_radius)));
@@ -77,7 +77,8 @@ bool accelerated(const State& state) {
          any_of(state.c(2).data(), count);
 }
 
-// The rank of each body among those of its cell, by slot, from kMostInCell on the same.
+// Computes the rank of each body among those of its cell, by slot; from kMostInCell on all have the same
+// rank.
 void rank_in_cells(std::span<const std::uint32_t> cells, std::span<const std::uint8_t> alive,
                    std::span<std::uint8_t> in_cell, std::span<std::uint32_t> ranks) {
   for (std::size_t s = 0; s < cells.size(); ++s) {
@@ -156,7 +157,7 @@ void Contact::sort(const State& state) {
   scatter(state);
 }
 
-// Nothing of this object is read in the loop: the compiler would read it again after every write.
+// The loop reads nothing of this object, because the compiler would read it again after every write.
 void Contact::scatter(const State& state) {
   const std::array<const std::int32_t*, 3> p{state.p(0).data(), state.p(1).data(), state.p(2).data()};
   const std::array<const std::int32_t*, 3> v{state.v(0).data(), state.v(1).data(), state.v(2).data()};
@@ -186,8 +187,8 @@ void Contact::scatter(const State& state) {
   count_ = count;
 }
 
-// Those found are worked on while they are in the cache, the odd ones of a batch with the next. They are kept
-// for the later sub-steps as long as there is room; else they are found again.
+// Pairs are processed while they are in the cache; those left over from a batch go with the next. They are
+// kept for the later sub-steps while there is room; otherwise they are found again.
 void Contact::add_pairs(bool first) {
   constexpr std::uint32_t kBatch = ContactPairs::kBatch;
   const auto add_forces = [this](std::uint32_t begin, std::uint32_t end) {
@@ -225,7 +226,7 @@ void Contact::add_pairs(bool first) {
   kept_ = pairs.count;
 }
 
-// All but what moves.
+// Copies all columns that do not move.
 void Contact::copy(const State& from, State& to) const {
   if (&from == &to) return;
   const auto copy = [](const auto& column, const auto& column_to) {

@@ -11,10 +11,10 @@
 namespace tandem {
 namespace {
 
-constexpr std::int32_t kForceLimit = 1 << 26;  // times a mobility of 16 a velocity stays below 2^31
+constexpr std::int32_t kForceLimit = 1 << 26;  // with a mobility of 16 a velocity stays below 2^31
 
-// The count of a shift, read anew: once clang 14 has moved a vector of it out of a loop, it does not know any
-// more that all counts are the same, and for WebAssembly shifts element by element.
+// Reads the count of a shift again. When clang 14 has moved a vector of it out of a loop, it no longer knows
+// that all counts are equal, and for WebAssembly it shifts element by element.
 inline std::int32_t here(std::int32_t count) {
 #ifdef __wasm_simd128__
   __asm__ volatile("" : "+r"(count));
@@ -37,7 +37,7 @@ inline X either(X mask, X x, X y) {
 inline std::int32_t same_as(std::int32_t x, std::int32_t /*like*/) { return x; }
 inline Four same_as(std::int32_t x, Four /*like*/) { return same(x); }
 
-// How an axis of a body moves, or of several bodies, or all axes of one.
+// The motion of one axis of a body, of one axis of several bodies, or of all axes of one body.
 struct Motion {
   explicit Motion(const ContactMove& move)
       : force_scale(4 << move.shift),
@@ -50,7 +50,7 @@ struct Motion {
     const X f = clamped(force, same_as(kForceLimit / force_scale, force)) * force_scale;
     return f * (mobility >> 16) + share_of(f, mobility & 0xFFFF, 0, 1U << 15U);
   }
-  /// `v` with all that pushes it.
+  /// `v` with all forces applied.
   template <class X>
   [[nodiscard]] X slowed(X v) const {
     return clamped(v - share_of(v, same_as(damping, v), 0, 1U << 15U), same_as(kVelocityLimit, v));
@@ -75,18 +75,18 @@ inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
   return view;
 }
 
-// Slots that follow each other, in the last sub-step.
+// Consecutive slots, in the last sub-step.
 struct Slots {
   static constexpr std::size_t kMost = 64;
   using Column = std::array<std::int32_t, kMost>;
 
   Slot first = 0;
   std::size_t count = 0;
-  std::array<Column, 3> f, p, v;    // p and v: where a sub-step was before
+  std::array<Column, 3> f, p, v;    // p and v: the state before the sub-step
   Column mobility, living, moving;  // the last two: all bits or none
 };
 
-// Inlined, as move_slots(), for each copy for a processor has its own.
+// Inlined, as move_slots(), because each copy for a processor needs its own.
 [[gnu::always_inline]] inline void gather(const ContactMove& move, std::span<const ContactBody> bodies,
                                           std::span<const ContactForce> forces,
                                           std::span<const std::uint32_t> place, const State& to,

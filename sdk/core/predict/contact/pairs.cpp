@@ -23,7 +23,8 @@ inline FourBits apart(FourBits a, FourBits b) {
   return reinterpret_cast<FourBits>(reinterpret_cast<EightHalves>(a) - reinterpret_cast<EightHalves>(b));
 }
 
-// The square of the lower plus that of the upper 16 bits, both signed. One instruction where there is one.
+// The square of the lower 16 bits plus that of the upper, both signed. It is one instruction where the
+// processor has one.
 inline FourBits squared(FourBits words) {
 #if defined(__wasm_simd128__)
   return reinterpret_cast<FourBits>(wasm_i32x4_dot_i16x8(words, words));
@@ -41,7 +42,7 @@ inline FourBits squared(FourBits words) {
 #endif
 }
 
-// A bit for each element, which is all ones or none.
+// One bit for each element; the elements are all ones or all zeros.
 inline std::uint32_t bits_set(FourBits mask) {
 #if defined(__wasm_simd128__)
   return static_cast<std::uint32_t>(wasm_i32x4_bitmask(mask));
@@ -54,7 +55,7 @@ inline std::uint32_t bits_set(FourBits mask) {
 #endif
 }
 
-// By four bits: the positions of those set, and how many they are.
+// Indexed by four bits: the positions of the bits that are set, and their number.
 struct Compression {
   FourBits positions;
   std::uint32_t count;
@@ -65,8 +66,8 @@ constexpr Compression kCompressions[16] = {
     {{3, 0, 0, 0}, 1}, {{0, 3, 0, 0}, 2}, {{1, 3, 0, 0}, 2}, {{0, 1, 3, 0}, 3},
     {{2, 3, 0, 0}, 2}, {{0, 2, 3, 0}, 3}, {{1, 2, 3, 0}, 3}, {{0, 1, 2, 3}, 4}};
 
-// Who is near one body; `kLater`: also where bodies are later. How many are is as good as random: no branch
-// depends on it.
+// Finds the bodies near one body; `kLater`: also at their later places. Their number is hard to predict, so
+// no branch depends on it.
 template <bool kLater>
 class Search {
  public:
@@ -128,11 +129,11 @@ inline void add(ContactForce& force, Four change) {
   std::memcpy(&force, &sum, sizeof sum);
 }
 
-// A body's pairs follow each other. Those worked on at once are from four places far apart, or each would
-// wait for the sum that the one before it stores.
+// The pairs of a body are consecutive. The pairs processed at once are from four places far apart; otherwise
+// each would wait for the sum that the previous one stores.
 constexpr std::size_t kStride = ContactPairs::kBatch / 4;
 
-// The forces of four pairs on the first of each, a row for a pair.
+// The forces of four pairs on the first body of each, one row per pair.
 inline std::array<Four, 4> forces_of(const ContactLaw& law, const std::uint32_t* inverse_root,
                                      const ContactView* views, const std::uint32_t* first,
                                      const std::uint32_t* second) {

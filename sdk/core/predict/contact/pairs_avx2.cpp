@@ -1,5 +1,5 @@
-// pairs.cpp eight at a time. Nothing inline of other headers is called here: the linker might keep
-// the AVX2 copy for everybody.
+// pairs.cpp for eight pairs at a time. No inline function of other headers is called here, because the linker
+// might keep its AVX2 copy for all callers.
 #include "sdk/core/predict/contact/cells.hpp"
 
 #ifdef __AVX2__
@@ -11,7 +11,7 @@ namespace {
 
 using Wide = __m256i;
 
-// By eight bits: the positions of those set, one a byte.
+// Indexed by eight bits: the positions of the bits that are set, one per byte.
 struct Compressions {
   std::uint64_t of[256];
 };
@@ -27,7 +27,7 @@ constexpr Compressions make_compressions() {
 }
 constexpr Compressions kCompressions = make_compressions();
 
-// By a number up to three full cells: as many bits, at most eight.
+// Indexed by a number up to three full cells: as many bits set, at most eight.
 struct Firsts {
   std::uint8_t of[3 * ContactGrid::kMostInCell + 1];
 };
@@ -49,8 +49,8 @@ inline void store(std::uint32_t* to, Wide x) { _mm256_storeu_si256(reinterpret_c
 
 inline Wide squared(Wide words) { return _mm256_madd_epi16(words, words); }
 
-// Who is near one body; `kLater`: also where bodies are later. How many are is as good as random: no branch
-// depends on it.
+// Finds the bodies near one body; `kLater`: also at their later places. Their number is hard to predict, so
+// no branch depends on it.
 template <bool kLater>
 class Search {
  public:
@@ -77,7 +77,8 @@ class Search {
   }
 
  private:
-  // Seldom: not as often in the code as there are runs. A copy, so that the other stays in registers.
+  // Called seldom, so it is not inlined for every run. `search` is copied, so that the caller's stays in
+  // registers.
   [[gnu::noinline]] static Search more(Search search, std::uint32_t from, std::uint32_t left) {
     for (; left > 8; from += 8, left -= 8) search.among_eight(from, left);
     search.among_eight(from, left);
@@ -117,7 +118,7 @@ std::uint32_t find(const ContactGrid& grid, std::uint32_t place, std::uint32_t e
                                   : find_pairs<Search<false>>(grid, place, enough, pairs);
 }
 
-// Four rows of four, twice side by side, turned over.
+// Transposes four rows of four, twice in parallel.
 inline void transpose(Wide& a, Wide& b, Wide& c, Wide& d) {
   const Wide ab_low = _mm256_unpacklo_epi32(a, b);
   const Wide ab_high = _mm256_unpackhi_epi32(a, b);
@@ -134,7 +135,7 @@ inline Wide both(const ContactView& a, const ContactView& b) {
                                  _mm_load_si128(reinterpret_cast<const __m128i*>(&b)), 1);
 }
 
-// Words in the lower halves; what is in the upper half of either does not count where the other's is 0.
+// Multiplies words in the lower halves; the upper half of one does not count if the other's is 0.
 inline Wide product(Wide a, Wide b) { return _mm256_madd_epi16(a, b); }
 inline Wide lower(Wide words) { return _mm256_unpacklo_epi16(words, Wide{}); }
 inline Wide upper(Wide words) { return _mm256_unpackhi_epi16(words, Wide{}); }
@@ -149,7 +150,7 @@ inline void subtract(ContactForce& force, __m128i change) {
   _mm_store_si128(f, _mm_sub_epi32(_mm_load_si128(f), change));
 }
 
-// The gather instruction takes longer where its results must not be guessed ahead.
+// The gather instruction takes longer on processors that must not speculate on its results.
 inline Wide looked_up(const std::uint32_t* table, Wide index) {
   alignas(32) std::uint32_t at[8];
   _mm256_store_si256(reinterpret_cast<Wide*>(at), index);
@@ -160,11 +161,11 @@ inline Wide looked_up(const std::uint32_t* table, Wide index) {
   return _mm256_inserti128_si256(_mm256_castsi128_si256(four(0)), four(4), 1);
 }
 
-// A body's pairs follow each other. Those worked on at once are from eight places far apart, or each would
-// wait for the sum that the one before it stores.
+// The pairs of a body are consecutive. The pairs processed at once are from eight places far apart; otherwise
+// each would wait for the sum that the previous one stores.
 constexpr std::size_t kStride = ContactPairs::kBatch / 8;
 
-// The forces of eight pairs on the first of each, as in pairs.cpp.
+// The forces of eight pairs on the first body of each, as in pairs.cpp.
 struct Forces {
   Wide row[4];  // pair k in the lower half of row k, pair k + 4 in the upper half
 };

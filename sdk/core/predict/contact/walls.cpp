@@ -21,7 +21,7 @@ Vec3l difference(const Vec3i& a, const Vec3i& b) {
   return {std::int64_t{a[0]} - b[0], std::int64_t{a[1]} - b[1], std::int64_t{a[2]} - b[2]};
 }
 
-// Of a vector whose components are at most 2^31.
+// The squared length of a vector whose components are at most 2^31.
 std::uint64_t squared(const Vec3l& d) {
   std::uint64_t sum = 0;
   for (const std::int64_t x : d) sum += static_cast<std::uint64_t>(x * x);
@@ -36,8 +36,8 @@ std::int64_t product(const Vec3i& a, const Vec3i& b) {
   return std::int64_t{a[0]} * b[0] + std::int64_t{a[1]} * b[1] + std::int64_t{a[2]} * b[2];
 }
 
-// Of where a body of radius `r` may touch: for every body that does, low <= normal . p <= high. All of it
-// stays below 2^63: |normal . p| <= 3 * 2^60, and the limits are at most 4.1 * 2^60.
+// Adds the slabs of the region where a body of radius `r` may touch: for every body that does, low <= normal
+// . p <= high. Everything stays below 2^63: |normal . p| <= 3 * 2^60, and the limits are at most 4.1 * 2^60.
 void add_slabs(const ContactConstants::Plane& plane, std::int64_t r, std::vector<Slab>& slabs) {
   slabs.push_back({plane.normal, -(std::int64_t{1} << 62), (plane.offset + r) * (1 << 30)});
 }
@@ -76,7 +76,7 @@ bool meets(const Slab& slab, const Extent& extent) {
   return most >= slab.low && least <= slab.high;
 }
 
-// Which of 64 bodies lie within all slabs, the first body in the lowest bit.
+// Finds which of 64 bodies lie within all slabs; the first body is the lowest bit.
 TANDEM_VECTOR_CLONES std::uint64_t within(const Slab* slabs, std::size_t count, const std::int32_t* x,
                                           const std::int32_t* y, const std::int32_t* z) {
   std::uint64_t all = ~std::uint64_t{0};
@@ -95,7 +95,7 @@ TANDEM_VECTOR_CLONES std::uint64_t within(const Slab* slabs, std::size_t count, 
 
 }  // namespace
 
-// The positions of up to 64 bodies that follow each other.
+// The positions of up to 64 consecutive bodies.
 struct PlacesOf64 {
   std::size_t first = 0;
   std::uint64_t present = 0;
@@ -209,7 +209,7 @@ WallTouch touch(const ContactConstants::Box& box, const Vec3i& p, std::int32_t r
   }
   WallTouch result;
   Vec3l normal{};  // in the box's axes, in 2^-14
-  if (inside) {    // out through the nearest face, the first of equals
+  if (inside) {    // out through the nearest face; among equal ones the first
     std::size_t nearest = 0;
     Vec3l depth{};
     for (std::size_t i = 0; i < 3; ++i) {
