@@ -1,6 +1,7 @@
 #pragma once
-// What one client may ask of whoever serves it, and how long it is waited for: of the host, over DDS, and of
-// a gateway, over a WebSocket. What becomes of who exceeds them: idl/STATES.md.
+// The limits on what one client may ask of its server, and how long the server waits for it. The server is a
+// host (over DDS) or a gateway (over a WebSocket). idl/STATES.md says what happens to clients that exceed
+// them.
 
 #include <cstdint>
 
@@ -20,10 +21,10 @@ inline constexpr TokenBucket kSnapshotsAgain{0.5, 4};
 /// Between two snapshots at least, however many come: those who come meanwhile share the next.
 inline constexpr std::int64_t kSnapshotSpacingNs = 250 * kMillisecond;
 
-/// Of snapshots on their way. The two differ, because what is served differs.
+/// The limits of snapshots on their way. The two differ, because what they serve differs.
 struct TransferLimits {
   std::int64_t collect_ns;  ///< joiners of one snapshot, from the first on
-  std::int64_t stalled_ns;  ///< nothing got through for so long: the transfer is given up
+  std::int64_t stalled_ns;  ///< after this time without an arrival the transfer is given up
   std::int64_t longest_ns;  ///< and so is one that takes longer, whatever its receiver says
 };
 

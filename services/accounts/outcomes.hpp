@@ -1,5 +1,5 @@
 #pragma once
-// What became of the inputs of one client.
+// The outcomes of the inputs of one client.
 
 #include <cstdint>
 #include <vector>
@@ -12,12 +12,13 @@ namespace tandem::accounts {
 /// The last kReplyRing outcomes, oldest first. Not thread-safe.
 class Outcomes {
  public:
-  /// An outcome is told for so long; replies are reliable, so the newest one is what may be lost with a link.
+  /// An outcome is repeated for this time. Replies are reliable, so only the newest one may be lost with a
+  /// link.
   static constexpr std::int64_t kToldNs = 5 * kSecond;
 
   void add(const transport::ReplyEntry& entry, std::int64_t now_ns);
   [[nodiscard]] bool has(std::uint64_t number) const;
-  /// What a reply of now holds.
+  /// The entries of a reply that is made now.
   [[nodiscard]] std::vector<transport::ReplyEntry> told(std::int64_t now_ns) const;
 
  private:

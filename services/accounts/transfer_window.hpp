@@ -23,10 +23,10 @@ class TransferWindow {
   static constexpr std::size_t kFirst = 7'800;
   static constexpr std::size_t kLeast = 2'600;
   static constexpr std::size_t kMost = 4U << 20U;  ///< 1 Gbit/s at 30 ms from sending to acknowledgement
-  /// What a full link may have queued.
+  /// Maximum queue of a full link.
   static constexpr std::int64_t kQueueNs = 100 * kMillisecond;
 
-  /// What is remembered of each part that is sent, to be handed back when it arrived.
+  /// What is remembered about each part that is sent. The caller hands it back when the part arrived.
   struct Sent {
     std::int64_t at_ns = 0;
     std::size_t bytes = 0;
@@ -42,7 +42,7 @@ class TransferWindow {
     behind_ns_ = std::clamp(now_ns - looked_ns_, kBurstNs, kMostBehindNs);
     looked_ns_ = now_ns;
   }
-  /// A part of so many bytes may leave beside those in flight.
+  /// True if a part of this size may be sent in addition to those in flight.
   [[nodiscard]] bool admits(std::size_t bytes, std::int64_t now_ns) const {
     return flying_ == 0 || (flying_ + bytes <= bytes_ && now_ns >= next_ns_);
   }
@@ -64,7 +64,7 @@ class TransferWindow {
   }
   /// Is not waited for any more.
   void lost(const Sent& part) { flying_ -= std::min(flying_, part.bytes); }
-  /// Parts of so many bytes were acknowledged together; `last` is the one that was sent last.
+  /// Parts of this total size were acknowledged together; `last` is the one that was sent last.
   void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
     flying_ -= std::min(flying_, bytes);
     follow_train(bytes, last, now_ns);
@@ -76,7 +76,7 @@ class TransferWindow {
              std::max(now_ns - last.arrived_ns, last.at_ns - last.last_arrived_at_ns), now_ns);
     resize();
   }
-  /// Nothing has arrived for long: what the link carries now is unknown.
+  /// Call if nothing has arrived for long: the rate of the link is unknown now.
   void start_over() {
     rates_ = {};
     starting_ = true;
@@ -85,7 +85,7 @@ class TransferWindow {
     least_ns_ = INT64_MAX;
   }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
-  /// From sending to acknowledgement at best; 0: nothing arrived yet.
+  /// Minimum time from sending to acknowledgement; 0: nothing has arrived yet.
   [[nodiscard]] std::int64_t least_ns() const { return least_ns_ == INT64_MAX ? 0 : least_ns_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-// Flags and subcommands of the programs. Stands before CLI11, which costs every file that includes it seconds
-// of compiling: commandline.cpp alone does.
+// Flags and subcommands of the programs. This header hides CLI11, which costs every file that includes it
+// seconds of compiling; only commandline.cpp does.
 
 #include <functional>
 #include <map>
@@ -16,13 +16,13 @@ class Option;
 
 namespace tandem::commandline {
 
-/// One flag or argument of a command, which owns it. All return the same option, so that calls can be
+/// One flag or argument of a command, which owns it. All members return the same option, so that calls can be
 /// chained.
 class Option {
  public:
   explicit Option(CLI::Option& option) : option_(&option) {}
 
-  /// What a value must be; one that is not is wrong usage. `range` takes int, unsigned, std::size_t and
+  /// Sets what values are allowed; another value is wrong usage. `range` takes int, unsigned, std::size_t and
   /// double, and --help names the type.
   template <class T>
   Option range(T least, T most);
@@ -36,7 +36,8 @@ class Option {
   Option required(bool is = true);
   Option needs(Option other);
   Option excludes(Option other);
-  /// By name, of the same command; it is an error of the program if there is none.
+  /// Excludes other options of the same command, by name. A name that does not exist is an error of the
+  /// program.
   Option excludes(const std::vector<std::string>& others);
 
   Option separated_by(char delimiter);  ///< several values in one text
@@ -98,7 +99,7 @@ class Program : public Command {
   Program(Program&&) = delete;
   Program& operator=(Program&&) = delete;
 
-  /// What --version prints.
+  /// Sets what --version prints.
   void version(const std::string& text);
   /// Prints help, version and errors. A number is the exit code of a program that is to end: 0, or 2 for
   /// wrong usage.

@@ -27,7 +27,7 @@ std::string name_of(std::string_view host) {
   return std::string(host.substr(0, host.find(':')));
 }
 
-// Names of which nobody else decides what they point to.
+// True for names that no other party can point elsewhere.
 bool is_address(const std::string& name) {
   std::array<unsigned char, 16> address{};
   return name == "localhost" || inet_pton(AF_INET, name.c_str(), address.data()) == 1 ||

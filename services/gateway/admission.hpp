@@ -1,5 +1,5 @@
 #pragma once
-// Who may open a connection.
+// Decides which requests may open a connection.
 
 #include <string>
 #include <string_view>

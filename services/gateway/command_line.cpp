@@ -16,7 +16,7 @@
 namespace tandem::gateway {
 namespace {
 
-/// Where the package puts the viewer; empty where it is not.
+/// The directory where the package installs the viewer; empty if it is not installed.
 std::string installed_viewer() {
   std::error_code error;
   const bool found = std::filesystem::exists(TANDEM_VIEWER_INSTALL_DIR "/index.html", error);
@@ -78,7 +78,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
     std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
     return {.options = std::nullopt, .exit_code = 2};
   }
-  // As many again for files, and for those who are refused.
+  // As many again for files, and some for refused connections.
   options.web.connections = 2 * options.limits.viewers + 64;
   return {.options = std::move(options), .exit_code = 0};
 }

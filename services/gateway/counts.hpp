@@ -1,5 +1,5 @@
 #pragma once
-// What a gateway has done since its start, and its lines in a log.
+// A gateway's counts since its start, and its lines in a log.
 
 #include <array>
 #include <cstdint>

@@ -20,7 +20,7 @@ void Gateway::announce(OutgoingPtr announcement) {
   ++announcement_number_;
 }
 
-// The same epoch with another stream: inputs go on, and so does what becomes of them.
+// The same epoch with another stream: inputs and their outcomes continue.
 void Gateway::on_session(const transport::SessionMessage& session) {
   const bool same_epoch = session_ && session_->epoch == session.epoch;
   session_ = session;
@@ -93,7 +93,7 @@ bool Gateway::reply_due(Viewer& viewer, std::int64_t now_ns) const {
   return viewer.now.heard && viewer.now.reply.due(role_of(viewer), now_ns);
 }
 
-// A snapshot on its way lies in front of the queue, so that alone does not make a viewer slow.
+// A snapshot on its way is in front of the queue, so it alone does not make a viewer slow.
 bool Gateway::is_behind(const Viewer& viewer, std::int64_t now_ns) const {
   const Viewer::InEpoch& state = viewer.now;
   if (state.place < log_.begin()) return true;

@@ -36,7 +36,7 @@ class Gateway {
  public:
   /// A viewer that is this far behind gets a snapshot where that is smaller than what is queued for it.
   static constexpr std::int64_t kBehindNs = kSecond;
-  /// One that takes nothing for so long is let go.
+  /// A viewer that reads nothing for this time is disconnected.
   static constexpr std::int64_t kNotReadingNs = 30 * kSecond;
   /// Inputs of a viewer without an outcome; what a reply can tell of.
   static constexpr std::size_t kMostUndecided = transport::kReplyRing;
@@ -57,9 +57,9 @@ class Gateway {
   };
   /// The next message to send to a viewer, who can take one.
   [[nodiscard]] Next next(ViewerId id, std::int64_t now_ns);
-  /// Those next() has something for. `out` is replaced.
+  /// Lists the viewers for which next() has something. Replaces `out`.
   void list_ready(std::int64_t now_ns, std::vector<ViewerId>& out);
-  /// Those that have to be let go, as they take nothing. `out` is replaced.
+  /// Lists the viewers that have to be disconnected because they read nothing. Replaces `out`.
   void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
 
   // What happens in the session.
@@ -79,7 +79,7 @@ class Gateway {
   [[nodiscard]] Counts& counts() { return counts_; }
   [[nodiscard]] std::size_t viewers() const { return viewers_.size(); }
   [[nodiscard]] Frame frame() const { return frame_; }
-  /// There is a session, and whoever announced it is there.
+  /// True if there is a session and its server is alive.
   [[nodiscard]] bool server_alive() const { return alive_; }
   [[nodiscard]] const std::optional<transport::SessionMessage>& session() const { return session_; }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What tandem-gateway was asked to do, checked and complete.
+// The options of tandem-gateway, checked and complete.
 
 #include <cstdint>
 #include <string>

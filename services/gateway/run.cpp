@@ -1,4 +1,4 @@
-// One thread for the session, one for the connections, and a lock around what both see.
+// There is one thread for the session, one for the connections, and a lock around the data that both use.
 #include "services/gateway/run.hpp"
 
 #include <fmt/format.h>

@@ -17,7 +17,7 @@ std::int64_t SessionClient::poll(Gateway& gateway, client::Now now) {
   return std::min(due_ns, gateway.poll(now.steady_ns));
 }
 
-// Until the server says otherwise: what it refuses, it says itself.
+// The role until the server says otherwise; the server itself reports what it refuses.
 transport::Role SessionClient::role() const {
   const transport::ReplyMessage* reply = core_.reply();
   return reply != nullptr ? reply->role : transport::Role::kParticipant;

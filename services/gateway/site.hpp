@@ -24,7 +24,7 @@ class Site {
     bool immutable = false;  ///< its name has a hash of its content
   };
 
-  /// Nothing to serve.
+  /// A site without files.
   Site() = default;
   /// Reads `folder`, which must hold an index.html. Names that begin with a dot and what is no regular file
   /// are left out. Errors: kIo, kCapacity.
@@ -37,7 +37,7 @@ class Site {
   std::map<std::string, File, std::less<>> files_;  // by path, with the slash in front
 };
 
-/// By a name's ending; unknown ones are octet streams.
+/// The media type by a name's extension; unknown ones are octet streams.
 [[nodiscard]] std::string_view media_type(std::string_view name);
 
 }  // namespace tandem::gateway

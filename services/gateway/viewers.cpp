@@ -1,4 +1,4 @@
-// What viewers say.
+// Handles the messages of viewers.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -57,7 +57,7 @@ std::optional<Refusal> Gateway::receive(ViewerId id, std::span<const std::byte> 
   return refusal;
 }
 
-// A viewer's status is for tools that watch a DDS domain; here nobody reads it.
+// A viewer's status is for tools that watch a DDS domain; the gateway does not read it.
 std::optional<Refusal> Gateway::take(Viewer& viewer, transport::ViewerMessage&& message,
                                      std::int64_t now_ns) {
   const auto client = std::visit([](const auto& body) { return body.client; }, message);
@@ -101,7 +101,7 @@ void Gateway::on_joining(Viewer& viewer, const transport::AckMessage& ack, std::
   state.attempt = ack.join_attempt;
   state.passage.acknowledged(ack, now_ns);
   if (state.flow == Viewer::Flow::kWaiting || state.served_attempt == state.attempt) return;
-  // What is on its way answers a repeated question too.
+  // The snapshot that is on its way also answers a repeated request.
   if (state.passage.unfinished()) {
     state.served_attempt = state.attempt;
     return;

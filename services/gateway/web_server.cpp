@@ -53,7 +53,7 @@ bool names(std::string_view list, std::string_view wanted) {
   return false;
 }
 
-/// One of WebSocket.
+/// One WebSocket connection.
 struct Connection {
   ViewerId id = 0;
   std::optional<Refusal> refused;
@@ -206,7 +206,7 @@ int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, 
   }
 }
 
-// Without this whoever asks for another WebSocket would only see the connection end.
+// Without this a client that asks for another WebSocket would only see the connection end.
 int WebServer::Impl::confirm_upgrade(lws* wsi) {
   const auto refuse = [&](unsigned status, const char* why) {
     return lws_return_http_status(wsi, status, why) != 0 ? -1 : 1;
@@ -266,7 +266,7 @@ int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, s
   const auto* const bytes = static_cast<const std::byte*>(in);
   const bool first = lws_is_first_fragment(wsi) != 0;
   if (first) connection.message.clear();
-  // One byte more than there may be is enough to be refused.
+  // One byte more than the limit is enough to refuse the message.
   const std::size_t room = kMostViewerBytes + 1 - connection.message.size();
   connection.message.insert(connection.message.end(), bytes, bytes + std::min(len, room));
   const bool whole = lws_is_final_fragment(wsi) != 0 && lws_remaining_packet_payload(wsi) == 0;
@@ -347,7 +347,7 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
 
 namespace {
 
-/// Why nobody can listen there; libwebsockets would not say. Nothing where somebody can.
+/// Why it is impossible to listen there, which libwebsockets would not say; empty if it is possible.
 std::optional<std::string> cannot_listen(const WebOptions& options) {
   const bool v6 = options.address.find(':') != std::string::npos;
   sockaddr_in6 six{};
@@ -385,7 +385,7 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
   impl->protocols[0] = {"http", Impl::on_http, sizeof(void*), 0, 0, nullptr, 0};
   impl->protocols[1] = {kSubprotocol, Impl::on_socket, sizeof(void*), kReceiveBytes, 0, nullptr, 0};
 
-  // What goes wrong on connections is counted by who handles them, and must not fill a log.
+  // The handlers of connections count their errors, which must not fill a log.
   lws_set_log_level(0, nullptr);
   lws_context_creation_info info{};
   info.port = options.port;

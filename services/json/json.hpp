@@ -64,9 +64,9 @@ class Json {
   [[nodiscard]] const std::string& text() const;
   [[nodiscard]] const Members& members() const;
 
-  /// In one line. Numbers that are not finite are null; what is not UTF-8 becomes U+FFFD.
+  /// The text in one line. Numbers that are not finite become null; bytes that are not UTF-8 become U+FFFD.
   [[nodiscard]] std::string dump() const;
-  /// Nothing if `text` is not one value of JSON.
+  /// Reads one JSON value; empty if `text` is not one.
   [[nodiscard]] static std::optional<Json> parse(const std::string& text);
 
  private:

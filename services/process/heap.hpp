@@ -1,6 +1,6 @@
 #pragma once
-// Free memory of a program, given back to the system. For programs alone: a library does not decide
-// over the heap of its host.
+// Gives the free memory of a program back to the system. Only for programs: a library must not manage the
+// heap of its host.
 
 #include <condition_variable>
 #include <mutex>

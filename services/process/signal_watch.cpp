@@ -16,7 +16,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-/// False for a wake-up of our own, which has `mark`; a stop that is over; and at `deadline`.
+/// Returns false for this program's own wake-up, which has `mark`, for a stop that is over, and at
+/// `deadline`.
 bool wait_for_signal(const sigset_t& signals, const void* mark,
                      const std::optional<Clock::time_point>& deadline) {
   siginfo_t info{};
@@ -98,7 +99,7 @@ void SignalWatch::give_up(const std::string& when) const {
             ". Reports and files were finished before; other programs may not have heard that it left, until "
             "its lease runs out.\n";
   }
-  // Neither a lock that somebody holds nor a reader that is stuck may keep the process.
+  // Neither a held lock nor a stuck reader may keep the process alive.
   pollfd out{STDERR_FILENO, POLLOUT, 0};
   if (poll(&out, 1, 0) == 1 && (out.revents & POLLOUT) != 0) {
     [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, line.data(), line.size());

@@ -23,8 +23,8 @@ class SignalWatch {
   struct Limits {
     /// For an orderly end; a program that is asked to end does so within 5 s.
     std::chrono::milliseconds end{4000};
-    /// A further signal within this time of the first is the same wish: a terminal and a parent process, or
-    /// timeout(1) alone, send two at once.
+    /// Another signal within this time of the first counts as the same request, because a terminal with a
+    /// parent process, or timeout(1), sends two at once.
     std::chrono::milliseconds repeat{1000};
   };
 

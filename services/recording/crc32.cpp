@@ -3,7 +3,7 @@
 namespace tandem::recording {
 namespace {
 
-// One byte's remainders by the polynomial 0x04C11DB7, bits reversed.
+// The remainders of one byte by the polynomial 0x04C11DB7, bits reversed.
 constexpr std::array<std::uint32_t, 256> kRemainders = [] {
   std::array<std::uint32_t, 256> table{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {

@@ -1,5 +1,5 @@
 #pragma once
-// What writer and reader of MCAP files (mcap.dev) share.
+// The common part of writer and reader of MCAP files (mcap.dev).
 
 #include <array>
 #include <cstddef>
@@ -23,9 +23,9 @@ enum Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-/// Before the content of a record: opcode and length.
+/// Size of the head of a record: opcode and length.
 inline constexpr std::size_t kRecordHead = 1 + 8;
-/// What a checksum field holds where there is none.
+/// The value of a checksum field if there is no checksum.
 inline constexpr std::uint32_t kNoChecksum = 0;
 
 /// CRC-32 as in IEEE 802.3 and zlib. `before`: the checksum of the bytes in front.

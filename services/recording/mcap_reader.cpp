@@ -119,7 +119,7 @@ void McapReader::survey() {
       if (fields.get<std::uint32_t>() > 0)
         indexes_.emplace_back(static_cast<std::uint32_t>(chunks_.size() - 1), channel);
     }
-    // Those of the summary, so that a channel is known before its chunk is read.
+    // Learns the channels of the summary, so that a channel is known before its chunk is read.
     if (record->opcode == kChannel) static_cast<void>(learn(*record));
     ended = record->opcode == kFooter;
   }

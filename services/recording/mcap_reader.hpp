@@ -43,7 +43,7 @@ class McapReader {
   /// kUnsupported (compression); nothing can be read behind one.
   [[nodiscard]] Result<bool> next(McapMessage& out);
 
-  /// Where to read from on.
+  /// A place to read from.
   struct Place {
     std::uint64_t at = 0;
     std::uint64_t first_ns = 0;  ///< log time, by the chunk's head
@@ -56,7 +56,7 @@ class McapReader {
   /// The first and the last log time of all chunks, by their heads; 0 without any.
   [[nodiscard]] std::uint64_t first_ns() const { return first_ns_; }
   [[nodiscard]] std::uint64_t last_ns() const { return last_ns_; }
-  /// Where the file is cut short: the first byte that belongs to no whole record.
+  /// The place where the file is cut short: the first byte that belongs to no complete record.
   [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return torn_at_; }
 
  private:
@@ -84,7 +84,7 @@ class McapReader {
   std::uint64_t data_at_ = 0;    // behind the magic
   std::uint64_t end_ = 0;        // of the whole records
   std::uint64_t at_ = 0;         // of the next record in the file
-  std::uint64_t record_at_ = 0;  // of the one at hand, for errors
+  std::uint64_t record_at_ = 0;  // place of the current record, for errors
   std::map<std::uint16_t, Channel> channels_;
   std::vector<Place> chunks_;
   std::vector<std::pair<std::uint32_t, std::uint16_t>> indexes_;  // place in chunks_, channel

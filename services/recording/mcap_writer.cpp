@@ -13,7 +13,7 @@ namespace {
 
 using transport::Bytes;
 
-// Most of a chunk are payloads, which no compressor makes smaller; what is around them, the fastest does.
+// Most of a chunk is payloads, which no compressor makes smaller. The fastest level is enough for the rest.
 constexpr int kLevel = 1;
 
 /// The fields of a record, little-endian, without padding.

@@ -40,7 +40,7 @@ class McapWriter {
   McapWriter(McapWriter&&) = delete;
   McapWriter& operator=(McapWriter&&) = delete;
 
-  /// What a channel's messages are, for whoever reads them.
+  /// The kind of a channel's messages, for readers of the file.
   struct Kind {
     std::string topic, message_encoding;
     std::string schema_name, schema_encoding;
@@ -48,7 +48,7 @@ class McapWriter {
   };
   /// Makes a channel before its first message. No effect where the topic has one.
   void declare(const Kind& kind);
-  /// The same for a topic of Tandem: CDR, described by the IDL.
+  /// The kind for a topic of Tandem: CDR, described by the IDL.
   template <class M>
   void declare() {
     declare(kind_of(M::kTopic));
@@ -66,7 +66,7 @@ class McapWriter {
     add(M::kTopic, cdr_, log_time_ns, publish_time_ns);
     return cdr_.size();
   }
-  /// What follows starts a new chunk.
+  /// Ends the chunk: the next message starts a new one.
   void end_chunk();
   /// Ends the file: nothing may be added afterwards. Errors: the first one of the sink.
   [[nodiscard]] Result<void> finish();

@@ -13,7 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where a chain of links ends, be there a file or not. Without a cycle: the caller has asked for the status.
+// The end of a chain of links, whether a file exists there or not. There is no cycle, because the caller has
+// asked for the status.
 fs::path follow_links(fs::path path) {
   std::error_code error;
   while (fs::is_symlink(path, error)) {

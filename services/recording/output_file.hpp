@@ -12,9 +12,9 @@
 
 namespace tandem::recording {
 
-/// Writes to `path`.part, a new file, and renames it: whoever has an older file of that name open or mapped
-/// keeps it as it was. Destroyed before it has its name, it leaves nothing behind; a process that is killed
-/// leaves the .part, which the next run replaces. Not thread-safe.
+/// Writes to `path`.part, a new file, and renames it. A process that has an older file of that name open or
+/// mapped keeps it as it was. An object that is destroyed before the renaming leaves nothing behind. A
+/// process that is killed leaves the .part, which the next run replaces. Not thread-safe.
 class OutputFile {
  public:
   /// Follows symbolic links, so that they stay. Errors: kIo, naming the file and the reason: also where
@@ -38,7 +38,7 @@ class OutputFile {
   /// close(), then take_name().
   Result<void> commit();
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// What write() handed over, the part of a failed one too that the system took.
+  /// The bytes that write() handed over, including the part of a failed write that the system took.
   [[nodiscard]] std::uint64_t written_bytes() const { return written_bytes_; }
 
  private:

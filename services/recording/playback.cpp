@@ -176,7 +176,7 @@ Result<std::optional<Playback::Step>> Playback::take(transport::SnapshotMessage 
   if (run.snapshots.add(std::move(message)) == client::SnapshotAssembly::Outcome::kRefused)
     return fail(ErrorCode::kMalformed, "a snapshot that breaks a rule of the format");
   const auto whole = run.snapshots.take();
-  // One that the recorder cut says what is held anyway.
+  // A snapshot that the recorder cut contains only what is held anyway.
   if (!whole || (run.timeline.playing() && whole->frame <= run.timeline.applied())) return std::nullopt;
   const auto loaded = run.timeline.load(whole->bytes, run.session.epoch, stream().id);
   if (!loaded) return tl::unexpected(loaded.error());

@@ -24,7 +24,7 @@ class Playback {
  public:
   /// Errors, naming the file: kIo, kMalformed, kUnsupported.
   static Result<std::unique_ptr<Playback>> open(const std::string& path);
-  /// Of bytes that outlive it; errors name none.
+  /// Opens bytes, which must outlive the playback. Errors name no file.
   static Result<std::unique_ptr<Playback>> open(std::span<const std::byte> file);
 
   enum class Step : std::uint8_t {
@@ -41,27 +41,27 @@ class Playback {
   /// from there on call next() until the frame is there. Errors: as next().
   [[nodiscard]] Result<void> seek(Epoch epoch, Frame frame);
 
-  /// When the message at hand was recorded, wall clock, ns since 1970.
+  /// When the current message was recorded, wall clock, ns since 1970.
   [[nodiscard]] std::uint64_t time_ns() const { return time_ns_; }
-  /// Of the first message; 0 without any.
+  /// The time of the first message; 0 if there is none.
   [[nodiscard]] std::uint64_t first_ns() const { return reader_.first_ns(); }
-  /// The same, and of the last message; seconds since the first.
+  /// The times of the current and of the last message, in seconds since the first.
   [[nodiscard]] double time_s() const { return seconds_since_first(time_ns_); }
   [[nodiscard]] double length_s() const { return seconds_since_first(reader_.last_ns()); }
-  /// Where the file is cut short, if it is.
+  /// The place where the file is cut short, if it is.
   [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return reader_.torn_at(); }
 
-  // Of the run at hand, after the first kStarted:
+  // The current run, after the first kStarted:
   [[nodiscard]] const transport::SessionMessage& session() const { return run_->session; }
   [[nodiscard]] const transport::StreamMessage& stream() const { return run_->session.streams[run_->stream]; }
   [[nodiscard]] ClientTimeline& timeline() { return run_->timeline; }
-  // Of the last kFrame:
+  // The last kFrame:
   [[nodiscard]] const client::CompleteDelta& delta() const { return delta_; }
   /// The scheduled inputs that its delta is the first to promise, by number.
   [[nodiscard]] const std::vector<transport::ScheduledInputMessage>& inputs() const { return inputs_; }
 
  private:
-  // What is held of one epoch.
+  // The data of one epoch.
   struct Run {
     Run(transport::SessionMessage announced, client::Playable playable);
     template <class M>
@@ -82,7 +82,7 @@ class Playback {
                                                 std::span<const std::byte> file);
   [[nodiscard]] double seconds_since_first(std::uint64_t ns) const;
   void rewind();
-  // Where next() can begin a run.
+  // The places where next() can begin a run.
   [[nodiscard]] std::vector<McapReader::Place> starts() const;
   // Each returns what the message brought about, if anything.
   [[nodiscard]] Result<std::optional<Step>> take(const McapMessage& message);

@@ -26,12 +26,12 @@ class Recorder {
   static Result<Recorder> create(const std::string& path, Compression compression);
 
   void add(const transport::SessionMessage& session, std::int64_t wall_ns);
-  /// From which the client started, again perhaps.
+  /// Adds the snapshot from which the client started or restarted.
   void add(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns);
   void add(const transport::ScheduledInputMessage& input, std::int64_t wall_ns);
-  /// Of the stream of the snapshot before; as one part, whatever it came in.
+  /// Adds a delta of the previous snapshot's stream, as one part, however many parts it came in.
   void add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns);
-  /// What bears on no state.
+  /// Adds messages that affect no state.
   void add(const transport::ReplyMessage& reply, std::int64_t wall_ns);
   void add(const transport::ServerStatusMessage& status, std::int64_t wall_ns);
   void add(const transport::AckMessage& ack, std::int64_t wall_ns);
@@ -43,12 +43,12 @@ class Recorder {
   /// Writes the agreed state of a timeline whose last delta was added.
   void cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns);
 
-  /// False after an error: nothing more is written.
+  /// Returns false after an error; nothing more is written then.
   [[nodiscard]] bool good() const { return named_ && writer_->written(); }
   /// Ends the file, or drops it where no snapshot came. Errors: kIo, also of anything written before.
   [[nodiscard]] Result<void> finish();
 
-  /// By topic: messages, and their bytes before compression.
+  /// For each topic: number of messages, and their bytes before compression.
   struct Share {
     std::uint64_t messages = 0, bytes = 0;
   };
@@ -78,7 +78,8 @@ class Recorder {
   std::unique_ptr<McapWriter> writer_;  // stays where it is
   std::optional<transport::SessionMessage> session_;
   StreamId stream_;
-  /// Those that no delta in the file has promised yet: whoever starts from a snapshot needs them behind it.
+  /// Inputs that no delta in the file has counted yet; a reader that starts from a snapshot needs them after
+  /// it.
   std::map<std::uint64_t, transport::ScheduledInputMessage> unpromised_;
   std::optional<std::int64_t> started_ns_;  // the last snapshot
   Totals counted_;                          // with the open chunk

@@ -1,5 +1,5 @@
 #pragma once
-// From generated messages to plain values. Internal to scenes.
+// Converts generated messages to plain values. Internal to scenes.
 
 #include <scene.pb.h>
 #include <cmath>
@@ -17,7 +17,7 @@ inline engine::Vec3f to_float(const engine::Vec3& v) {
 }
 inline engine::Vec3f to_float(const idl::Vec3& v) { return to_float(to_vec3(v)); }
 
-/// Not checked.
+/// Converts a shape without checking it.
 inline engine::Shape to_shape(const idl::BodyType& type) {
   using Kind = engine::Shape::Kind;
   const auto half = [](double length) { return static_cast<float>(length / 2); };

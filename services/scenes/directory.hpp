@@ -1,5 +1,5 @@
 #pragma once
-// Where scene files are. Internal to scenes.
+// Finds scene files. Internal to scenes.
 
 #include <string>
 #include <string_view>

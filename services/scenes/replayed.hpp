@@ -1,5 +1,5 @@
 #pragma once
-// What the announcement of a replayed session says beside its scene.
+// What the announcement of a replayed session contains besides its scene.
 
 #include <cstdint>
 #include <string>

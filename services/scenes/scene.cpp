@@ -32,8 +32,8 @@ engine::Plane to_plane(const idl::Plane& plane) {
 engine::Box to_box(const idl::Box& box) {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // a column an axis of the box
   for (const idl::Turn& turn : box.turns()) {
-    // From rise and run rather than an angle: no sine or cosine of a mathematics library, whose last bits
-    // differ.
+    // Uses rise and run instead of an angle, because the last bits of sine and cosine differ between
+    // mathematics libraries.
     const Eigen::Vector2d direction = Eigen::Vector2d(turn.run(), turn.rise()).normalized();
     const int about = turn.axis() == "x" ? 0 : turn.axis() == "y" ? 1 : 2;
     const int b = (about + 1) % 3;

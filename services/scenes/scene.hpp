@@ -72,7 +72,7 @@ struct Poking {
 struct Scene {
   std::string name;
   std::string path;
-  std::uint32_t number = 0;  ///< in the paper's tables; 0: none
+  std::uint32_t number = 0;  ///< number in the thesis's tables; 0: none
   std::string description;
   std::string text;  ///< the scene without its script as protobuf text, for clients that draw it
   double dt_s = 0;
@@ -106,7 +106,7 @@ struct Scene {
 /// everything. Errors: kInvalidArgument for an unknown name (lists the known ones), kIo, kMalformed with
 /// file, line and field.
 [[nodiscard]] Result<Scene> load_scene(std::string_view name_or_path);
-/// The same of a text, as a session announces it: without trained tables. `source` names it in errors.
+/// Reads a scene from a text, as a session announces it, without trained tables. `source` names it in errors.
 /// Errors: kMalformed.
 [[nodiscard]] Result<Scene> parse_scene(const std::string& text, const std::string& source);
 

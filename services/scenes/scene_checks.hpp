@@ -1,5 +1,5 @@
 #pragma once
-// What a scene file must fulfil beyond its schema. Internal to scenes.
+// Checks the rules for a scene file that its schema does not express. Internal to scenes.
 
 #include <scene.pb.h>
 

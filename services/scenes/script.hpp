@@ -1,5 +1,5 @@
 #pragma once
-// Inputs that nobody has to type: of a scene's scripted users, and from input script files.
+// Scripted inputs: of a scene's users, and from input script files.
 
 #include <cstdint>
 #include <string>
@@ -39,7 +39,7 @@ class Script {
     std::size_t rank = 0;  // of its routine: the order within a frame and user
     ScriptedInput input;
   };
-  // One user's tilting or poking: when it goes on, and what that depends on.
+  // One user's tilting or poking: the time of the next action, and what it depends on.
   struct Routine {
     std::uint32_t user = 0;
     std::size_t rank = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// Where bodies are at frame 0. Internal to scenes.
+// The places of bodies at frame 0. Internal to scenes.
 
 #include <cstdint>
 #include <vector>

@@ -63,7 +63,7 @@ Result<std::string> read_all(const std::string& path) {
   if (!std::filesystem::is_regular_file(path, ignored)) return fail(ErrorCode::kIo, path + ": no such file");
   std::ifstream in(path, std::ios::binary);
   std::string text;
-  // In pieces: files are small, and one may grow while it is read.
+  // Reads in pieces: files are small, and one may grow while it is read.
   std::array<char, 16384> piece{};
   while (in.read(piece.data(), piece.size()), in.gcount() > 0) {
     text.append(piece.data(), static_cast<std::size_t>(in.gcount()));

@@ -50,7 +50,7 @@ class Node {
 [[nodiscard]] Result<void> parse_text(const std::string& text, const std::string& source,
                                       google::protobuf::Message& message,
                                       google::protobuf::TextFormat::ParseInfoTree& lines);
-/// The same of a file. Errors: kIo, kMalformed.
+/// Reads a file in the same way. Errors: kIo, kMalformed.
 [[nodiscard]] Result<void> read_text_file(const std::string& path, google::protobuf::Message& message,
                                           google::protobuf::TextFormat::ParseInfoTree& lines);
 

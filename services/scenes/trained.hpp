@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench train` learnt about a scene, kept in a file beside it.
+// What `tandem bench train` learned about a scene; it is kept in a file next to the scene.
 
 #include <cstdint>
 #include <string>
@@ -17,7 +17,8 @@ using planning::TrainedTable;
                                              double threshold_m);
 /// NAME.trained.textproto for NAME.textproto.
 [[nodiscard]] std::string trained_path(const std::string& scene_path);
-/// Tables beside a scene; none when there is no such file. Errors: kIo, kMalformed with file, line and field.
+/// Loads the tables next to a scene; empty if there is no such file. Errors: kIo, kMalformed with file, line
+/// and field.
 [[nodiscard]] Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path);
 /// Puts `table` in the place of the one for the same size and threshold, or behind the others, and replaces
 /// the file in one go. Errors: kIo, kMalformed when the file there cannot be read.

@@ -10,7 +10,7 @@
 
 namespace tandem::sessions {
 
-/// What an operator wishes of a scene.
+/// An operator's wishes for a scene.
 struct SessionChoice : planning::Wishes {
   std::uint32_t bodies = 0;
 };

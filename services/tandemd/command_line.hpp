@@ -7,8 +7,8 @@
 
 namespace tandem::daemon {
 
-/// What the command line says: options to run with, or the exit code of --help, --version or a usage error,
-/// whose text was printed.
+/// The result of the command line: options to run with, or the exit code of --help, --version or a usage
+/// error, whose text was printed.
 struct CommandLine {
   std::optional<Options> options;
   int exit_code = 0;

@@ -135,7 +135,7 @@ std::string text_of(const idl::Stream& stream, const google::protobuf::FieldDesc
   }
 }
 
-/// False for a number that is none, or too large.
+/// Returns false for text that is not a number, or one that is too large.
 bool set_text(const std::string& text, const google::protobuf::FieldDescriptor& field, idl::Stream& stream) {
   using google::protobuf::FieldDescriptor;
   const google::protobuf::Reflection& values = *stream.GetReflection();
@@ -202,7 +202,7 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
 Result<ServerConfig> load_config(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened", path));
-  // Not by iterators: where reading fails, as of a directory, they throw.
+  // Does not use iterators, because they throw if reading fails, for example for a directory.
   std::string text;
   std::array<char, 4096> piece{};
   while (in.read(piece.data(), piece.size()), in.gcount() > 0)
@@ -231,8 +231,8 @@ Result<idl::Stream> parse_stream(const std::string& text) {
 }
 
 ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
-  // What a flag excludes goes with it, where only the file says it: a length, a scale and auto exclude each
-  // other, quality follows auto, and auto and a budget need codecs that have them.
+  // Drops settings from the file that conflict with a flag: a length, a scale and auto exclude each other,
+  // quality follows auto, and auto and a budget need codecs that have them.
   const CodecTraits traits = traits_of(flags.codec());
   if (flags.has_threshold() || flags.has_threshold_auto() || flags.has_threshold_scale())
     file.clear_threshold();

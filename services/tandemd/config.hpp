@@ -12,12 +12,11 @@ namespace tandem::daemon {
 /// Reads a configuration file. Errors: kIo; kMalformed naming file, line and field.
 [[nodiscard]] Result<idl::ServerConfig> load_config(const std::string& path);
 
-/// What flags say wins over what the file says; and what a flag excludes goes with it.
+/// Merges flags and file. Flags win, and settings from the file that conflict with a flag are dropped.
 [[nodiscard]] idl::ServerConfig merge(const idl::ServerConfig& flags, idl::ServerConfig file);
 
-/// Reads what --stream says: NAME:ITEM,ITEM..., where an item is key=value (planning::kStreamOptions), or a
-/// predictor alone. Errors:
-/// kInvalidArgument.
+/// Reads the value of --stream: NAME:ITEM,ITEM..., in which an item is key=value (planning::kStreamOptions)
+/// or only a predictor. Errors: kInvalidArgument.
 [[nodiscard]] Result<idl::Stream> parse_stream(const std::string& text);
 
 /// Checks what needs no scene. Errors: kInvalidArgument naming the flag and what it takes.

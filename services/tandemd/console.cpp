@@ -34,7 +34,7 @@ std::string coding_text(const host::StreamConfig& stream) {
 
 namespace {
 
-// Who plays which; nothing of a single stream.
+// The numbers of clients by stream; empty if there is only one stream.
 std::string streams_text(const host::HostTotals& totals) {
   std::string text;
   for (const host::StreamTotals& stream : totals.streams) {

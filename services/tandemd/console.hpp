@@ -1,5 +1,5 @@
 #pragma once
-// What tandemd shows while it runs: log lines, and on a terminal one live line.
+// The output of tandemd while it runs: log lines, and on a terminal one live line.
 
 #include <cstdint>
 #include <string>

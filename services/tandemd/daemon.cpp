@@ -253,7 +253,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
   const Ending ending = serve(**host, **port, script, hashes, publisher, options, signals.stop());
-  // Before the last writes: should DDS keep one of them, nothing else is missing.
+  // Done before the last writes: if DDS blocks one of them, nothing else is missing.
   const int exit_code = signals.finish(tell_end(**host, ending, hashes, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();

@@ -1,5 +1,5 @@
 #pragma once
-// One session from start to end: what tandemd does once it knows its options.
+// Runs one session from start to end, with given options.
 
 #include "services/process/signal_watch.hpp"
 #include "services/tandemd/options.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// What tandemd was asked to do, checked and complete.
+// The options of tandemd, checked and complete.
 
 #include <cstdint>
 #include <optional>

@@ -7,16 +7,16 @@
 
 namespace tandem::tool {
 
-/// What the chosen subcommand does. Returns the process's exit code: 0 done, 1 failed. Usage errors (2) are
-/// services/commandline's: a subcommand says what its values must be, and refuses what is left from its
-/// callback.
+/// Runs the chosen subcommand. Returns the process's exit code: 0 done, 1 failed. services/commandline
+/// handles usage errors (2): a subcommand declares what its values must be, and refuses the remaining errors
+/// in its callback.
 using Run = std::function<int()>;
 
 /// Each adds one subcommand to `app`; when the command line chooses it, its callback sets `run`.
 void add_join(commandline::Command app, Run& run);
 void add_record(commandline::Command app, Run& run);
 void add_replay(commandline::Command app, Run& run);
-/// Of evaluation; services/lab defines them, where it is a part of the build.
+/// Subcommands for evaluation; services/lab defines them if it is part of the build.
 void add_bench(commandline::Command app, Run& run);
 void add_export(commandline::Command app, Run& run);
 void add_top(commandline::Command app, Run& run);

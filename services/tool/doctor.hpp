@@ -9,7 +9,7 @@ namespace tandem::tool {
 
 enum class Verdict : std::uint8_t { kGood, kWarning, kFailure };
 
-/// One thing looked at.
+/// One check and its result.
 struct Check {
   std::string name;
   Verdict verdict = Verdict::kGood;
@@ -24,7 +24,7 @@ struct Interface {
   bool up = false, loopback = false, multicast = false;
 };
 
-/// What the machine says about itself; a plain value, so that verdicts can be tested without a machine.
+/// The facts about the machine; a plain value, so that verdicts can be tested without a machine.
 struct MachineFacts {
   std::vector<Interface> interfaces;
   std::vector<std::string> multicast_works;  ///< names of interfaces where a datagram to a group came back

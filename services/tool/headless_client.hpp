@@ -47,13 +47,13 @@ class HeadlessClient final : public client::CoreListener {
 
   /// Plays until its time is over or `stop` is set.
   void run(const std::atomic<bool>& stop);
-  /// True when it played, with no hash mismatch, and all files are written.
+  /// True if it played without a hash mismatch and all files are written.
   [[nodiscard]] bool succeeded() const;
   /// The JSON object of the result, valid after run().
   [[nodiscard]] Json report() const;
-  /// Of the capture, valid after run(); null without one.
+  /// The recorder of the capture, valid after run(); null without one.
   [[nodiscard]] const recording::Recorder* recorder() const { return recorder_.get(); }
-  /// The same in a few lines for humans.
+  /// The result in a few lines for humans.
   [[nodiscard]] std::string summary() const;
 
  private:

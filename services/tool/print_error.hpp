@@ -6,8 +6,8 @@
 
 namespace tandem::tool {
 
-/// As far as stderr takes it: fmt::print would throw where it takes no more, and end a run for the sake of a
-/// line.
+/// Writes as much as stderr takes. fmt::print would throw if it takes no more, and end the program because of
+/// one line.
 inline void print_error(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 }  // namespace tandem::tool

@@ -39,9 +39,10 @@ class RecordedSource final : public host::FrameSource {
   transport::Reason accept(const engine::Input& input, const host::InputOrigin& origin, host::Outbox& outbox,
                            Frame& acts_on) override;
 
-  /// Where to go on, in seconds since the recording's first message, once a client has asked for it.
+  /// The time to continue at, in seconds since the recording's first message, after a client has asked for
+  /// one.
   [[nodiscard]] std::optional<double> sought_s() const { return sought_s_; }
-  /// After next() had nothing and nothing is sought: what the playback said instead, kStarted where another
+  /// After next() returned nothing without a seek: what the playback returned instead; kStarted if another
   /// run begins.
   [[nodiscard]] const Result<recording::Playback::Step>& ending() const { return ending_; }
 

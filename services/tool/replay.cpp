@@ -50,7 +50,7 @@ struct Served {
   std::optional<double> sought_s;  ///< a client wants to go on there
 };
 
-/// What all runs of a replay have in common.
+/// The data that all runs of a replay share.
 struct ReplayState {
   Epoch epoch = 0;      ///< the last; 0 before the first
   bool sought = false;  ///< a client did
@@ -69,7 +69,8 @@ void end_port(ReplayState& state, const std::atomic<bool>& stop) {
   }
 }
 
-/// Publishes the run at hand to its end, or until a client seeks. `hold`: no frame, and no end of its own.
+/// Publishes the current run to its end, or until a client seeks. `hold`: makes no frame and does not end by
+/// itself.
 Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplayState& state, bool hold,
                      const std::atomic<bool>& stop) {
   const bool first = state.epoch == 0;
@@ -129,8 +130,8 @@ Result<Step> go_to(Playback& playback, double from_s) {
   return step;
 }
 
-/// From `from_s` to the end of the file, or until stopped. Who seeks may want to seek back: then it stays
-/// there.
+/// Plays from `from_s` to the end of the file, or until stopped. After a seek it stays at the end, because
+/// the client may want to seek back.
 Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState& state,
                   const std::atomic<bool>& stop) {
   auto step = go_to(playback, options.from_s);

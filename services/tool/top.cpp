@@ -40,7 +40,7 @@ void collect(transport::Monitor& monitor, TopView& view) {
   view.forget_silent(now_ns);
 }
 
-/// False when stdout takes no more.
+/// Returns false if stdout takes no more.
 bool show(const TopView& view, const TopOptions& options) {
   const bool screen = !options.once && !options.stream && ::isatty(STDOUT_FILENO) != 0;
   if (screen) std::fputs("\x1b[H\x1b[2J", stdout);

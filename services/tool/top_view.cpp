@@ -66,8 +66,8 @@ Json json_of(const transport::ClientStatusMessage& c) {
 
 bool played(const transport::ServerStatusMessage& s) { return s.participants + s.observers > 0; }
 
-/// A session's status: what its streams share, sums of what is each one's, and them all. The rates of a
-/// stream that nobody plays are those of a time when somebody did, and do not count.
+/// A session's status: what its streams share, sums over the streams, and all streams. The rates of a stream
+/// without clients are old and do not count.
 template <class Streams>
 Json json_of_session(Streams first, Streams last) {
   transport::ServerStatusMessage sum = first->second.status;
@@ -90,7 +90,7 @@ Json json_of_session(Streams first, Streams last) {
   return session;
 }
 
-/// In at most five characters.
+/// The number of bytes in at most five characters.
 std::string short_bytes(std::uint64_t bytes) {
   constexpr std::array<const char*, 5> kUnits{"", "k", "M", "G", "T"};
   auto value = static_cast<double>(bytes);

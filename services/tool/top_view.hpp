@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem top` shows: the newest status of every session and client, as JSON or as a table.
+// The view of `tandem top`: the newest status of every session and client, as JSON or as a table.
 
 #include <cstdint>
 #include <map>

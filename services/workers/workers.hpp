@@ -9,12 +9,12 @@
 
 namespace tandem {
 
-/// Of a pool, its caller's among them; more would hardly find blocks.
+/// Maximum number of threads of a pool, including the caller's; more would hardly find blocks.
 inline constexpr std::uint32_t kMaxThreads = 64;
 
 /// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
-/// because a static split waits for the thread whose core somebody else is using; nor is a thread waited for
-/// that wakes up late and finds nothing left. Jobs write to places of their own.
+/// because a static split waits for a thread whose core another program is using. A thread that wakes up late
+/// and finds nothing left is not waited for. Jobs must write to separate places.
 class Workers {
  public:
   /// `prepare` is called first on each thread of its own.
@@ -44,12 +44,12 @@ class Workers {
   /// Takes blocks until none is left; returns the ticket that said so.
   std::uint64_t take_blocks();
 
-  // Of the run at hand. They change only while no block is taken.
+  // The current run. These change only while no block is taken.
   const void* context_ = nullptr;
   void (*call_)(const void*, std::uint32_t, std::uint32_t) = nullptr;
   std::uint32_t count_ = 0;
   std::uint32_t block_ = 1;
-  // Number of the run in the upper half, blocks that nobody took yet in the lower.
+  // The number of the run in the upper half, the number of blocks not yet taken in the lower.
   std::atomic<std::uint64_t> ticket_{0};
   std::atomic<std::uint32_t> undone_{0};  // blocks
   std::atomic<bool> stop_{false};

@@ -74,7 +74,7 @@ Rigid::Rigid(const RigidWorld& world)
   build();
 }
 
-// Bullet's objects from the columns alone, so that two loads of the same bytes go on alike.
+// Builds Bullet's objects only from the columns, so that two loads of the same bytes continue identically.
 void Rigid::build() {
   physics_ = std::make_unique<Physics>(rigid_);
   physics_->set_gravity(columns_.gravity);

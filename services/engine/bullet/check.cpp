@@ -11,7 +11,7 @@
 namespace tandem::engine {
 namespace {
 
-// What is wrong beyond the rules of particles; empty: nothing.
+// Checks the rules that particles do not have. Returns what is wrong; empty if nothing is.
 std::string fault(const RigidWorld& rigid) {
   const World& world = rigid.world;
   if (!world.emitters.empty() || !world.regions.empty())

@@ -1,5 +1,5 @@
 #pragma once
-// What a simulation of rigid bodies accepts: worlds at the start, inputs at run time.
+// Checks what a simulation of rigid bodies accepts: worlds at the start, inputs at run time.
 
 #include "services/engine/bullet/motion.hpp"
 #include "services/engine/bullet/world.hpp"

@@ -33,7 +33,8 @@ struct Remove {
 [[nodiscard]] Input to_input(const Spawn& spawn);
 [[nodiscard]] Input to_input(const Remove& remove);
 
-/// What the bytes of a kApplication input say; neither when they are no such input. Values are not checked.
+/// Reads the bytes of a kApplication input; both functions return nothing for other bytes. Values are not
+/// checked.
 [[nodiscard]] std::optional<Spawn> spawn_of(std::span<const std::byte> bytes);
 [[nodiscard]] std::optional<Remove> remove_of(std::span<const std::byte> bytes);
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a body's motion may be. An engine of rigid bodies explodes now and then; a session must outlive it.
+// Limits on a body's motion. Rigid bodies explode now and then; a session must survive it.
 
 #include <cstdint>
 

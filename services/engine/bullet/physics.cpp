@@ -6,14 +6,14 @@
 namespace tandem::engine {
 namespace {
 
-// Below these for two seconds an island falls asleep; piles tremble with less. Bullet's own, 0.8 and 1, stop
-// what is just tipping over.
+// An island whose bodies move less than this for two seconds falls asleep; piles tremble with less. Bullet's
+// defaults, 0.8 and 1, stop bodies that are just tipping over.
 constexpr btScalar kSleepMPerS = 0.25F;
 constexpr btScalar kSleepRadPerS = 0.5F;
 // Scene units: without it a ball on a plane rolls for ever. Of round bodies only: it takes three more
 // constraints a contact, and most of the time of a heap of boxes.
 constexpr btScalar kRollingFriction = 0.005F;
-// Of its size; Bullet's own, 4 cm, is as large as a small hull. Hulls grow by it.
+// Relative to the hull's size; Bullet's default, 4 cm, is as large as a small hull. Hulls grow by it.
 constexpr btScalar kHullMargin = 0.02F;
 constexpr int kSceneSlot = -1;
 

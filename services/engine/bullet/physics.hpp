@@ -49,7 +49,7 @@ class Physics {
   void add_static(std::unique_ptr<btCollisionShape> shape, const btTransform& at);
 
   const RigidWorld* world_;
-  // What is declared first goes last: bodies outlive the world that lists them.
+  // Members that are declared first are destroyed last: bodies outlive the world that lists them.
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;  // by type
   std::vector<btVector3> inertia_;                         // by type
   std::vector<std::unique_ptr<btCollisionShape>> scene_shapes_;

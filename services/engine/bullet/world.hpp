@@ -1,5 +1,5 @@
 #pragma once
-// What a simulation of rigid bodies is made of, as plain values. Scenes fill it in.
+// The description of a simulation of rigid bodies, as plain values. Scenes fill it in.
 
 #include <array>
 #include <vector>

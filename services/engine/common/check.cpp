@@ -30,7 +30,7 @@ bool sane(const Box& box) {
   return sane(box.centre);
 }
 
-// What is wrong; empty: nothing.
+// Returns what is wrong; empty if nothing is.
 std::string fault(const World& world) {
   const std::size_t types = world.types.size();
   if (world.capacity == 0 || world.capacity > kMaxBodies) {

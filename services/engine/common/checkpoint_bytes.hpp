@@ -71,7 +71,7 @@ class CheckpointReader {
   return XXH3_64bits(bytes.data(), bytes.size());
 }
 
-/// What every checkpoint begins with.
+/// The head of every checkpoint.
 struct CheckpointHead {
   std::uint64_t magic;
   std::uint64_t world;    ///< fingerprint()
@@ -82,7 +82,7 @@ struct CheckpointHead {
 inline void seal(std::vector<std::byte>& out, std::size_t begin) {
   CheckpointWriter(out).value(checksum(std::span<const std::byte>(out).subspan(begin)));
 }
-/// What is before the checksum; nothing if that is another.
+/// The bytes before the checksum; empty if the checksum is wrong.
 [[nodiscard]] inline std::optional<std::span<const std::byte>> unsealed(std::span<const std::byte> bytes) {
   std::uint64_t sum = 0;
   if (bytes.size() < sizeof sum) return std::nullopt;

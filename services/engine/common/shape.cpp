@@ -38,7 +38,7 @@ Extents half_extents(const Shape& shape) {
   return {radius, radius, radius};
 }
 
-// What is wrong; empty: nothing.
+// Returns what is wrong; empty if nothing is.
 std::string fault(const Shape& shape) {
   const std::vector<float>& v = shape.values;
   switch (shape.kind) {

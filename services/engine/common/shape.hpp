@@ -1,5 +1,5 @@
 #pragma once
-// What a rigid body looks like.
+// The shape of a rigid body.
 
 #include <cstdint>
 #include <string_view>
@@ -9,8 +9,8 @@
 
 namespace tandem::engine {
 
-/// In the body's frame, around its centre of mass; scene units. Kinds and values are those of a session's
-/// body types: idl/PROTOCOL.md, "Fields".
+/// A shape in the body's frame, around its centre of mass; scene units. Kinds and values are those of a
+/// session's body types: idl/PROTOCOL.md, "Fields".
 struct Shape {
   enum class Kind : std::uint8_t { kSphere = 1, kBox = 2, kCapsule = 3, kCylinder = 4, kHull = 5 };
   Kind kind = Kind::kSphere;
@@ -30,7 +30,7 @@ inline constexpr std::size_t kMostHullPoints = 256;
 /// Errors: kInvalidArgument with the rule that `shape` breaks. A hull must have an extent along each axis.
 [[nodiscard]] Result<void> check(const Shape& shape);
 
-/// From the centre to the farthest point. Of a shape that check() accepts.
+/// The distance from the centre to the farthest point, for a shape that check() accepts.
 [[nodiscard]] double bounding_radius(const Shape& shape);
 /// Half of the least extent along x, y and z: the size that errors are compared with.
 [[nodiscard]] double inner_radius(const Shape& shape);

@@ -1,5 +1,5 @@
 #pragma once
-// What a particle simulation is made of, as plain values. Scenes fill it in.
+// The description of a particle simulation, as plain values. Scenes fill it in.
 
 #include <array>
 #include <cstdint>

@@ -32,7 +32,7 @@ struct Columns {
   std::array<std::vector<float>, 3> position, velocity;
   std::vector<std::uint8_t> alive;
   std::vector<std::uint16_t> type;
-  std::vector<Contact> contact;  ///< the force accumulator of the paper: acts in the next step
+  std::vector<Contact> contact;  ///< the force accumulator of the thesis: acts in the next step
 
   std::uint64_t frame = 0;
   std::uint64_t spawned = 0;  ///< bodies that emitters have let go or left out, counts their random numbers

@@ -17,7 +17,7 @@ Float3 penalty(const Material& material, float overlap, Float3 n, Float3 u) {
   return (material.damping + material.shear) * u - along * n;
 }
 
-// Where a body touches a surface: how deep, and the unit vector from the body's centre into the surface.
+// A touch of a body and a surface: its depth, and the unit vector from the body's centre into the surface.
 struct Touch {
   float overlap = 0;
   Float3 into;

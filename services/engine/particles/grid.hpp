@@ -1,5 +1,5 @@
 #pragma once
-// Uniform cells (paper, section 3.2.1; S. Green 2008): bodies sorted so that those of a cell, and of cells
+// Uniform cells (thesis, section 3.2.1; S. Green 2008): bodies sorted so that those of a cell, and of cells
 // that are neighbours along x, lie next to each other.
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace tandem::engine {
 
-/// What the contact loop reads of a body: half a cache line.
+/// The part of a body that the contact loop reads: half a cache line.
 struct Record {
   float x, y, z, radius;
   float vx, vy, vz;
@@ -25,13 +25,14 @@ struct Run {
   std::uint32_t begin = 0, end = 0;
 };
 
-/// A cell holds no more than this: what keeps a step bounded when everything is in one place. The rest of its
-/// bodies meet nobody, and nobody them. Equal spheres squeezed to half their diameter are 16 in a cell.
+/// Maximum number of bodies of a cell that take part in contacts; it bounds a step when everything is in one
+/// place. The other bodies of the cell meet no body. Equal spheres that are squeezed to half their diameter
+/// are 16 in a cell.
 inline constexpr std::uint32_t kMaxInCell = 128;
 inline constexpr std::uint32_t kMaxNeighbours = 27 * kMaxInCell;
 
-/// Where the bodies near a cell are, by ascending place: runs of cells along x, one or (where the grid wraps)
-/// two for each of nine rows, without the empty ones.
+/// The places of the bodies near a cell, ascending: runs of cells along x, one or (where the grid wraps) two
+/// for each of nine rows, without the empty ones.
 struct Neighbourhood {
   std::array<Run, 18> runs{};
   std::uint32_t count = 0;
@@ -53,7 +54,7 @@ class Grid {
   [[nodiscard]] std::uint32_t cell_of(float x, float y, float z) const {
     return (along(z, 2) << (bits_[0] + bits_[1])) | (along(y, 1) << bits_[0]) | along(x, 0);
   }
-  /// With `later_only`, rows that lie before the cell's own are left out: half of the look-ups.
+  /// With `later_only`, rows before the cell's own are left out, which saves half of the look-ups.
   [[nodiscard]] Neighbourhood neighbourhood(std::uint32_t cell, bool later_only = false) const;
 
  private:

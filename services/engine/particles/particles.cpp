@@ -1,6 +1,5 @@
-// The paper's full simulation (section 3.2.1). Deviations: the damping of equation 3.1's forces is written as
-// a factor on the velocity, exactly as the predicted step has it; with sub-steps, gravity and damping act
-// once.
+// The thesis's full simulation (section 3.2.1). Deviations: the damping of equation 3.1's forces is a factor
+// on the velocity, exactly as in the predicted step; with sub-steps, gravity and damping act once.
 #include "services/engine/particles/particles.hpp"
 
 #include <algorithm>
@@ -146,7 +145,7 @@ void Particles::step() {
   count_colliding();
 }
 
-// Before the integration, so that a push changes the speed in the very step it acts in.
+// Called before the integration, so that a push changes the speed in the step in which it acts.
 void Particles::push_bodies() {
   for (const Push& push : columns_.pushes) {
     for (std::uint32_t slot = 0; slot < world_.capacity; ++slot) {

@@ -28,7 +28,7 @@ class InputMerger {
     ViewerId viewer = 0;
     std::uint64_t number = 0;
   };
-  /// What became of it. `known` is false where nobody can tell.
+  /// The outcome of an input. `known` is false if it cannot be known.
   struct Verdict {
     Claim claim;
     bool known = true;
@@ -42,7 +42,7 @@ class InputMerger {
   /// Sends what waits and is due.
   void flush(World& world, std::int64_t now_ns, std::vector<Verdict>& out);
   void on_outcome(const client::InputOutcome& outcome, std::vector<Verdict>& out);
-  /// A new epoch: nobody is told of the old one's inputs.
+  /// Begins a new epoch: outcomes of the old epoch's inputs are not reported.
   void clear();
 
   [[nodiscard]] bool waiting() const { return !gravity_claims_.empty(); }

@@ -29,7 +29,7 @@ class LiveLog {
   /// `place` is one from begin() to end() - 1.
   [[nodiscard]] const OutgoingPtr& at(Place place) const { return entry(place).message; }
   [[nodiscard]] std::int64_t time_ns(Place place) const { return entry(place).at_ns; }
-  /// Of all messages from `place` on; `place` is one from begin() to end().
+  /// The size of all messages from `place` on; `place` is from begin() to end().
   [[nodiscard]] std::size_t bytes_from(Place place) const {
     return place == end() ? 0 : pushed_ - entry(place).pushed_before;
   }

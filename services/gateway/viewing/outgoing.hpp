@@ -9,8 +9,8 @@
 
 namespace tandem::gateway {
 
-/// One envelope, made once and shared by all viewers that it goes to. In front of it is room for the framing
-/// of whoever sends it, so that nobody has to copy it.
+/// One envelope, made once and shared by all its viewers. In front of it is room for the sender's framing, so
+/// that it need not be copied.
 class Outgoing {
  public:
   static constexpr std::size_t kHeadroom = 32;

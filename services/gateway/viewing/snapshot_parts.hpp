@@ -15,7 +15,7 @@ namespace tandem::gateway {
 
 /// Made once, shared by all viewers that join together.
 struct SnapshotParts {
-  /// Of a part, unless there would be more than kMostParts.
+  /// Minimum size of a part; parts are larger if there would be more than kMostParts.
   static constexpr std::size_t kLeastPartBytes = 1'300;
   static constexpr std::size_t kMostParts = 1'024;
 
@@ -33,12 +33,12 @@ struct SnapshotParts {
 /// A WebSocket keeps order and loses nothing, so what arrived is a number of parts. Not thread-safe.
 class SnapshotPassage {
  public:
-  /// Nothing to send.
+  /// A passage with nothing to send.
   SnapshotPassage() = default;
   SnapshotPassage(std::shared_ptr<const SnapshotParts> snapshot, std::int64_t now_ns)
       : snapshot_(std::move(snapshot)), began_ns_(now_ns), progress_ns_(now_ns) {}
 
-  /// Not all of it has been handed out.
+  /// True if parts remain to be handed out.
   [[nodiscard]] bool unfinished() const { return snapshot_ != nullptr; }
   [[nodiscard]] std::int64_t began_ns() const { return began_ns_; }
   /// When a part arrived last, or it began.
@@ -46,7 +46,7 @@ class SnapshotPassage {
   [[nodiscard]] bool has_next() const;
   /// The next message, of those that have one.
   [[nodiscard]] OutgoingPtr next(std::int64_t now_ns);
-  /// What a joining viewer says that it holds. Untrusted.
+  /// Notes what a joining viewer says it holds. Untrusted.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// What a gateway keeps of one connection.
+// The data that a gateway keeps for one connection.
 
 #include <cstdint>
 #include <optional>
@@ -38,7 +38,7 @@ struct Viewer {
   /// Since when something waits to be sent and nothing was taken.
   std::optional<std::int64_t> waiting_since_ns;
 
-  /// Of the epoch: a new one starts with a new object.
+  /// The data of one epoch; a new epoch starts with a new object.
   struct InEpoch {
     bool heard = false;  ///< an acknowledgement of this epoch came
     transport::Phase phase = transport::Phase::kJoining;

@@ -1,5 +1,5 @@
 #pragma once
-// What a gateway asks of the session that it is a client of.
+// What a gateway needs from the session of which it is a client.
 
 #include <cstdint>
 #include <optional>
@@ -16,7 +16,7 @@ class World {
 
   /// It holds an agreed state and follows it.
   [[nodiscard]] virtual bool playing() const = 0;
-  /// As granted by the server: an observer's inputs are refused.
+  /// The role that the server granted; an observer's inputs are refused.
   [[nodiscard]] virtual transport::Role role() const = 0;
   /// The wall clock of the server's host at `now_ns`; nothing while it is not known.
   [[nodiscard]] virtual std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const = 0;

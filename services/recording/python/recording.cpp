@@ -42,7 +42,7 @@ struct Columns {
   ArrayColumn<TypeId> types;
   ArrayColumn<std::uint8_t> alive, reuse;
 
-  /// In scene units and seconds.
+  /// Fills columns in scene units and seconds.
   void fill(const State& state, double unit, double rate_hz) const {
     const std::size_t bodies = state.capacity();
     const bool turning = state.groups().orientation;
@@ -73,7 +73,8 @@ struct Columns {
 
 /// A playback that several threads may hold: each call is one turn, without the interpreter's lock.
 class Reader {
-  // Nothing of Python's is touched within, so that whoever has the interpreter's lock never waits for a turn.
+  // Nothing of Python is touched within, so that a thread that holds the interpreter's lock never waits for a
+  // turn.
   template <class Call>
   auto locked(const Call& call) {
     const py::gil_scoped_release release;
@@ -125,7 +126,7 @@ class Reader {
     if (!done) refuse(done.error());
   }
 
-  /// Writes the state at hand. `arrays`: the columns in the order of tandem_columns, None for what is not
+  /// Writes the current state. `arrays`: the columns in the order of tandem_columns, None for what is not
   /// wanted; the last, the changes, is not looked at.
   void write(const py::tuple& arrays) {
     Columns to;
@@ -149,7 +150,7 @@ class Reader {
     if (!written) raise(written.error());
   }
 
-  // Of the last state that next() gave:
+  // The last state that next() returned:
   [[nodiscard]] Epoch epoch() {
     return locked([this] { return session_.epoch; });
   }

@@ -1,5 +1,5 @@
 #pragma once
-// A session on the simulated network, and clients of it behind tandem.h. Time passes while somebody waits.
+// A session on the simulated network, and its clients behind tandem.h. Time passes while a caller waits.
 
 #include <cstdint>
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace tandem::api {
 
-/// One at a time: clients without a thread read its clock. All from one thread.
+/// Only one may exist at a time, because clients without a thread read its clock. All calls from one thread.
 class Playground {
  public:
   static constexpr std::uint32_t kBodies = 24;
@@ -25,7 +25,7 @@ class Playground {
   Playground(Playground&&) = delete;
   Playground& operator=(Playground&&) = delete;
 
-  /// As tandem_join(), without a thread.
+  /// Does what tandem_join() does, without a thread.
   tandem_result join(const tandem_options* options, tandem_client* client);
   /// A client that joined; 0 if it could not.
   tandem_client join();
