@@ -43,7 +43,7 @@ struct Session {
   }
 };
 
-/// One of the paper's codecs on bodies that turn.
+/// One of the thesis's codecs on bodies that turn.
 Session turning_session() {
   Session session;
   session.codec = codec_names()[*rc::gen::inRange<std::size_t>(0, 5)];

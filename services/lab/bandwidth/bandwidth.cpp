@@ -36,7 +36,7 @@ class Lengths {
   std::uint64_t count_ = 0;
 };
 
-/// Of what a client shows to the simulation's floats, over all bodies that are shown.
+/// The errors of what a client shows against the simulation's floats, over all bodies that are shown.
 class Errors {
  public:
   /// `shown(channel, body)` in scene units.
@@ -46,7 +46,7 @@ class Errors {
       if (alive[body] != 0) centre_.add_squared(distance_squared(bodies, body, shown));
     }
   }
-  /// As above, and how far the farthest point of a surface is off.
+  /// Does the same, and adds the maximum error of a point of the surface.
   void add(const State& agreed, const engine::Bodies& bodies, double unit,
            std::span<const std::int32_t> radii) {
     const auto shown = [&](std::size_t channel, std::size_t body) { return agreed.p(channel)[body] * unit; };
@@ -95,7 +95,7 @@ class Errors {
   bool has_surface_ = false;
 };
 
-/// How far corrections move bodies at once: what somebody sees who shows a client's state as it is.
+/// The jumps of bodies by corrections: what is visible if a client's state is shown as it is.
 class Snaps {
  public:
   /// The state of the frame before its delta.
@@ -103,7 +103,7 @@ class Snaps {
     for (std::size_t i = 0; i < kPositionChannels; ++i)
       before_[i].assign(predicted.p(i).begin(), predicted.p(i).end());
   }
-  /// And after it. `renewed`: bodies that are new or jumped, which is no correction.
+  /// Call after the correction. `renewed`: bodies that are new or jumped, which is no correction.
   void after(const State& agreed, std::span<const Slot> touched, std::span<const LifecycleRecord> renewed) {
     for (const Slot slot : touched) {
       if (std::ranges::any_of(renewed, [slot](const auto& record) { return record.slot == slot; })) continue;
@@ -144,7 +144,7 @@ class CodeAccount final : public EncodeObserver {
   }
 
  private:
-  /// Of all decisions at the best fixed probability of each context.
+  /// The bits of all decisions at the best fixed probability of each context.
   [[nodiscard]] double least_bits() const {
     double bits = 0;
     for (const auto& [zeros, ones] : decisions_) {
@@ -226,8 +226,8 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   return {};
 }
 
-/// What a joiner would be sent after the last frame: a snapshot of one frame more, which is rounded for it,
-/// in which bodies go on as they move.
+/// The size of the snapshot that a joiner would get after the last frame. It is cut one frame later, which is
+/// rounded for it and in which bodies move on.
 std::size_t snapshot_bytes(host::Mirror& mirror, host::Stream& stream, const engine::Bodies& last) {
   std::array<std::vector<float>, 3> position;
   engine::Bodies bodies = last;
@@ -247,7 +247,7 @@ std::size_t snapshot_bytes(host::Mirror& mirror, host::Stream& stream, const eng
   return snapshot.size();
 }
 
-/// What a lane measured over `frames` frames, the last of which left `bodies`.
+/// The row that a lane measured over `frames` frames, the last of which left `bodies`.
 BandwidthRow row_of(Lane& lane, double frames, const engine::Bodies& bodies) {
   const host::StreamConfig& stream = lane.stream.config();
   BandwidthRow row;

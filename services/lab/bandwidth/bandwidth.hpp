@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench bandwidth` measures: codecs side by side over one trajectory, without a network.
+// What `tandem bench bandwidth` measures: several codecs over the same trajectory, without a network.
 
 #include <cstdint>
 #include <functional>
@@ -19,7 +19,7 @@ namespace tandem::lab {
 /// One row of the result: a scene, a size and a codec. Times are medians over the frames.
 struct BandwidthRow {
   std::string scene;
-  std::optional<int> number;  ///< of the paper's scene, 1..5
+  std::optional<int> number;  ///< number of the thesis's scene, 1..5
   std::uint32_t bodies = 0;
   std::string codec, predictor;
   CodecTraits traits;           ///< none of a peer

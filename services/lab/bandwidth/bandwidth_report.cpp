@@ -35,7 +35,7 @@ std::string file_name(const BandwidthRow& row) {
   return fmt::format("{}-{}", std::filesystem::path(row.scene).stem().string(), row.bodies);
 }
 
-/// Of `count` frames from `first` on.
+/// The rate of `count` frames from `first` on.
 double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count) {
   return lab::mbit_per_s(std::span(row.bytes).subspan(first, count), row.dt_s);
 }
@@ -55,7 +55,8 @@ std::string series_csv(Rows rows) {
   return text;
 }
 
-/// `none` is left out as in the paper, since it is constant and far above the others; peers have their table.
+/// `none` is left out as in the thesis, because it is constant and far above the others; peers have their own
+/// table.
 bool drawn(const BandwidthRow& row) {
   return row.missing.empty() && !row.predictor.empty() && row.traits.reads_threshold;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// What others would send for the same frames at the same largest error: general compressors, and dead
+// What other methods would send for the same frames at the same maximum error: general compressors, and dead
 // reckoning as in DIS.
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace tandem::lab {
 
-/// What all peers are told about a run.
+/// The properties of a run that all peers need.
 struct PeerSetting {
   std::uint32_t bodies = 0;
   double threshold = 0;  ///< scene units: the largest Euclidean error of a position
@@ -39,7 +39,7 @@ struct PeerKind {
   std::unique_ptr<Peer> (*make)(const PeerSetting& setting);
 };
 
-/// In the order of their rows.
+/// All peers, in the order of their rows.
 [[nodiscard]] const std::vector<PeerKind>& peer_kinds();
 
 }  // namespace tandem::lab

@@ -27,14 +27,15 @@ void add_smoothing(commandline::Command bench, Run& run);
 /// of range, else 1.
 int report(const std::string& command, const Error& error);
 
-/// The scenes of the paper, in the order of their numbers.
+/// The scenes of the thesis, in the order of their numbers.
 [[nodiscard]] std::vector<std::string> paper_scenes();
-/// Loads the scenes of a --scene flag: names, files, or "all" for the paper's. Errors: those of load_scene().
+/// Loads the scenes of a --scene flag: names, files, or "all" for the thesis's. Errors: those of
+/// load_scene().
 [[nodiscard]] Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names);
 
 inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
 
-/// What --predictor takes where it may be chosen automatically.
+/// The values of --predictor where it may be chosen automatically.
 [[nodiscard]] std::vector<std::string> predictor_choices();
 
 /// Flags that several subcommands have.

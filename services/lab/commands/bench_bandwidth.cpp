@@ -1,4 +1,4 @@
-// `tandem bench bandwidth`: the paper's table 5.3 and everything like it.
+// `tandem bench bandwidth`: the thesis's table 5.3 and similar measurements.
 
 #include <fmt/format.h>
 
@@ -86,7 +86,7 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   if (!source) return tl::unexpected(source.error());
   auto rows = measure(scene, *source, options, options.frames, progress);
   if (!rows) return rows;
-  // With another number of users it is not the scene of the paper's table.
+  // With another number of users it is not the scene of the thesis's table.
   const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
   for (BandwidthRow& row : *rows) {
     if (as_in_paper) row.number = static_cast<int>(scene.number);
@@ -96,8 +96,8 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   return rows;
 }
 
-/// What a session needs to know about a trajectory, in the shape of a scene. Errors: kMalformed where
-/// the scene that it names is none.
+/// What a session needs to know about a trajectory, in the form of a scene. Errors: kMalformed if the file
+/// that it names is not a scene.
 Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
   scenes::Scene scene;
   scene.name = path;
@@ -150,7 +150,8 @@ Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const Ba
                           sidecar_path(options.trajectory).value(), predictor));
 }
 
-/// There is no other run to train on, so a trajectory trains the paper's codecs itself, in their favour.
+/// There is no other run to train on, so the thesis's codecs are trained with the trajectory itself, which
+/// favours them.
 Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& options) {
   const auto make = [&] {
     return RecordedTrajectory::open(options.trajectory)
@@ -183,7 +184,7 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   return rows;
 }
 
-/// Jobs run beside each other; their rows come in the order of the jobs.
+/// Runs jobs in parallel; their rows come in the order of the jobs.
 Result<std::vector<BandwidthRow>> measure_jobs(std::span<const Job> jobs, const BandwidthOptions& options) {
   std::vector<Result<std::vector<BandwidthRow>>> results(jobs.size());
   std::atomic<std::size_t> next = 0;
@@ -241,7 +242,7 @@ int run_bandwidth(const BandwidthOptions& options) {
 
 namespace {
 
-/// As tandemd has them.
+/// Adds the options with the same meaning as in tandemd.
 void add_quality_options(commandline::Command command, sessions::SessionChoice& choice) {
   const commandline::Option scale = add_threshold_scale(command, choice);
   command

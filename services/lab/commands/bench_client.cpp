@@ -1,4 +1,5 @@
-// `tandem bench client`: what a client costs, beside the full simulation that it is spared.
+// `tandem bench client`: the cost of a client, next to that of the full simulation that it does not have to
+// run.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -37,7 +38,7 @@ struct ClientOptions {
 
 Json to_json(const Cost& cost) { return {{"p50", cost.p50}, {"p99", cost.p99}, {"p999", cost.p999}}; }
 
-// In memory.
+// The row of a client in memory.
 
 Json to_json(const ClientCostRow& row) {
   return {{"scene", row.scene},
@@ -68,7 +69,7 @@ void print(const ClientCostRow& row) {
              two(row.sampled_frame), two(row.sample), row.beside.p50, row.beside.p999);
 }
 
-// As processes.
+// The row of clients as processes.
 
 Json to_json(const ClientProcessSetup& setup, const ClientProcessRow& row, double engine_ms) {
   return {{"scene", setup.scene},

@@ -21,7 +21,7 @@ namespace tandem::lab {
 namespace {
 
 constexpr const char* kCommand = "bench framerate";
-// What the thesis's phone did with the full simulation of its first scene with 10,000 bodies.
+// The rate of the thesis's phone with the full simulation of its first scene with 10,000 bodies.
 constexpr double kPhoneUpdatesPerS = 4.4;
 
 std::atomic<bool> stopped = false;
@@ -69,7 +69,7 @@ void tell(const std::string& line) {
   if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K{}", line);
 }
 
-/// Nothing for this machine as it is.
+/// Empty for this machine as it is.
 Result<std::optional<Calibration>> set_up(FramerateOptions& options, const std::string& name,
                                           ThinDevice* processor) {
   options.setup.slowdown = 1;

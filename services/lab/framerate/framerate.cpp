@@ -179,7 +179,7 @@ Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, d
   for (int i = 0; i < kMostTries; ++i) {
     if (auto set = device.set_share(found.share); !set) return tl::unexpected(set.error());
     progress(fmt::format("thin device: client-only with {:.1f} % of a processor", 100 * found.share));
-    // As long as a row is measured: bodies that fall cost less than bodies that lie.
+    // Runs as long as a row is measured, because falling bodies cost less than resting ones.
     const auto rate = client_only(setup, &device, kScene, kCalibratedBodies, setup.seconds);
     if (!rate) return tl::unexpected(rate.error());
     found.updates_per_s = *rate;

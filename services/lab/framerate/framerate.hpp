@@ -21,13 +21,13 @@ inline constexpr std::string_view kClientOnly = "client-only";
 
 /// `tracker` with this predicted step.
 inline constexpr std::string_view kBallistic = "ballistic", kField = "field";
-/// Whatever server and user take when nobody says anything: the streams of the one, the choice of the other.
+/// The defaults of server and user: the streams of the one, the choice of the other.
 inline constexpr std::string_view kAsItComes = "auto";
 
 /// One row of the result.
 struct FramerateRow {
   std::string scene;
-  std::optional<int> number;  ///< of the paper's scene, 1..5
+  std::optional<int> number;  ///< number of the thesis's scene, 1..5
   std::uint32_t users = 1, bodies = 0;
   std::string method;  ///< client-only, a codec, a predicted step, or auto
   std::string device;  ///< native, thin or thesis
@@ -52,7 +52,7 @@ struct Calibration {
       0;  ///< thesis: of a body in the step that it was calibrated by; 0: measured, today's engine
 };
 
-/// Where server and users meet.
+/// The kind of link between server and users.
 enum class LinkKind : std::uint8_t {
   kNamespaces,  ///< DDS between processes in network namespaces: the real thing, for root only
   kMemory,      ///< all in one process and in simulated time: for everybody, without what DDS costs
@@ -85,7 +85,7 @@ void measure_row(const FramerateSetup& setup, ThinDevice* device,
 /// Fills the row as measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
 [[nodiscard]] Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row);
 
-/// Sets the device's share of a processor so that client-only makes `updates_per_s` of the paper's first
+/// Sets the device's share of a processor so that client-only makes `updates_per_s` of the thesis's first
 /// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
 /// share. Errors: kIo.
 [[nodiscard]] Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device,
@@ -99,7 +99,7 @@ void measure_row(const FramerateSetup& setup, ThinDevice* device,
 /// {"devices": [...], "rows": [...]}, one line. `limited_by`: what limits the processor.
 [[nodiscard]] std::string to_json(std::span<const FramerateRow> rows, const std::string& limited_by,
                                   std::span<const Calibration> calibrations);
-/// A table for people, with the paper's numbers beside ours.
+/// A table for people, with the thesis's numbers next to the measured ones.
 [[nodiscard]] std::string to_table(std::span<const FramerateRow> rows);
 
 }  // namespace tandem::lab

@@ -22,7 +22,7 @@ using transport::simulated::Bottleneck;
 constexpr std::int64_t kTickNs = 100'000;
 constexpr std::int64_t kWallOffsetNs = 1'700'000'000'000'000'000;
 constexpr std::uint64_t kMostFrames = 1'000'000;
-// Of simulated time, until everybody plays.
+// Maximum simulated time until all clients play.
 constexpr std::int64_t kStartNs = 60'000'000'000;
 
 /// Runs `work` unless an earlier one still keeps this processor busy.

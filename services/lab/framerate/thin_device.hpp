@@ -22,7 +22,7 @@ class ThinDevice {
   [[nodiscard]] virtual std::string name() const = 0;
   /// For ChildPlace::cgroup_procs; empty: none.
   [[nodiscard]] virtual std::string procs() const = 0;
-  /// Of one processor, in (0, 1]. For what runs now and later. Errors: kIo.
+  /// Sets the share of one processor, in (0, 1], for programs that run now and later. Errors: kIo.
   virtual Result<void> set_share(double share) = 0;
   /// A process that was just started in procs(); it is forgotten by release().
   virtual void hold(pid_t process) = 0;

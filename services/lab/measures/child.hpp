@@ -13,9 +13,10 @@
 
 namespace tandem::lab {
 
-/// Of the program that runs.
+/// The path of the running program.
 [[nodiscard]] std::string own_path();
-/// `tandemd` beside this program, as installed and as built, or else in PATH; empty: nowhere.
+/// Finds `tandemd` next to this program, as installed and as built, otherwise in PATH; empty if it is not
+/// there.
 [[nodiscard]] std::string find_server();
 
 struct ChildPlace {

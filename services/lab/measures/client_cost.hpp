@@ -16,8 +16,8 @@ struct ClientCostSetup {
   std::uint64_t frames = 300;  ///< measured, after the first 60
 };
 
-/// Milliseconds. Of the calling thread's own time on a core, so that what else runs on the machine counts
-/// little; but waiting is part of `beside`.
+/// Milliseconds. They count the calling thread's own time on a core, so that other programs on the machine
+/// matter little; but waiting is part of `beside`.
 struct Cost {
   double p50 = 0, p99 = 0, p999 = 0;
 };
@@ -28,8 +28,8 @@ struct ClientCostRow {
   std::uint64_t frames = 0;
   double corrected_per_frame = 0;  ///< bodies
   Cost engine = {};                ///< a step of the full simulation, one thread
-  /// All that a client does in a frame, in which nobody samples: taking what came, the predicted step,
-  /// decoding, applying, checking the hash, acknowledging.
+  /// The work of a client in a frame without sampling: taking messages, the predicted step, decoding,
+  /// applying, checking the hash, acknowledging.
   Cost frame = {};
   Cost predicted = {};      ///< the predicted step's part of it
   Cost sampled_frame = {};  ///< `frame` of a client that is sampled: besides, what is drawn is made ready

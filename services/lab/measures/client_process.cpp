@@ -126,7 +126,7 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   return row;
 }
 
-/// Of what `of` takes from each row.
+/// The median of what `of` takes from each row.
 template <class Of>
 double median_of(const std::vector<ClientProcessRow>& rows, Of&& of) {
   std::vector<double> values;

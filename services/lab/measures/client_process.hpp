@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench client` measures: all that a client costs, as a process of its own.
+// What `tandem bench client` measures: the whole cost of a client, as a separate process.
 
 #include <atomic>
 #include <cstdint>

@@ -58,7 +58,7 @@ Result<void> set_address(int control, unsigned long what, const std::string& add
   return {};
 }
 
-/// In a thread of its own: the namespace is that of the calling thread from then on.
+/// Runs in a separate thread, because the namespace stays with the calling thread.
 Result<Enclave> make_here(const std::string& address) {
   if (unshare(CLONE_NEWNET) != 0) return failure("a network namespace of its own");
   Enclave enclave;
@@ -84,14 +84,14 @@ struct Packet {
   std::vector<char> bytes;
 };
 
-/// What was let through by a moment.
+/// The traffic that was let through up to a moment.
 struct Mark {
   std::int64_t at_ns = 0;
   std::uint64_t bytes_there = 0;
 };
 constexpr std::int64_t kMarkEveryNs = 100'000'000;
 
-/// From one device to the other.
+/// The way from one device to the other.
 struct Way {
   Way(int from_fd, int to_fd, const transport::simulated::BottleneckOptions& options)
       : from(from_fd), to(to_fd), link(options) {}

@@ -1,5 +1,5 @@
 #pragma once
-// What the system counts of a running process and its threads.
+// The system's counters of a running process and its threads.
 
 #include <sys/types.h>
 
@@ -30,7 +30,7 @@ struct ProcessReading {
 /// Errors: kIo, when there is no such process.
 [[nodiscard]] Result<ProcessReading> read_process(pid_t process);
 
-/// What went on between two readings, in threads that both have seen.
+/// The difference between two readings, in threads that both have seen.
 struct ProcessSpan {
   double seconds = 0;
   double cpu_ms = 0;

@@ -32,10 +32,10 @@ class Replay {
   [[nodiscard]] Frame frame() const { return frame_; }
   /// Inputs that change the predicted step and act in the step that produced frame().
   [[nodiscard]] std::span<const ScheduledDrive> scheduled() const { return scheduled_; }
-  /// In force before the first step.
+  /// The drive in force before the first step.
   [[nodiscard]] const Drive& start_drive() const { return start_drive_; }
   [[nodiscard]] const engine::Simulation& simulation() const { return *simulation_; }
-  /// Of the last next(): the engine's step.
+  /// Duration of the engine's step in the last next().
   [[nodiscard]] std::int64_t step_ns() const { return step_ns_; }
 
  private:

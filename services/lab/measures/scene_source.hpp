@@ -1,5 +1,5 @@
 #pragma once
-// What a measurement runs on: a scene's simulation with what its scripted users do.
+// The source of a measurement: a scene's simulation with the actions of its scripted users.
 
 #include <cstdint>
 #include <memory>

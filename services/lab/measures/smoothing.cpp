@@ -38,7 +38,7 @@ class Lengths {
     sum_ += value;
   }
   [[nodiscard]] double mean() const { return count_ == 0 ? 0 : sum_ / static_cast<double>(count_); }
-  /// Of which a share `q` is not longer.
+  /// The length that a share `q` does not exceed.
   [[nodiscard]] double quantile(double q) const {
     auto left = static_cast<std::uint64_t>(q * static_cast<double>(count_));
     for (std::size_t step = 0; step < counts_.size(); ++step) {
@@ -56,7 +56,7 @@ class Lengths {
   double sum_ = 0;
 };
 
-/// Where the full simulation had its bodies.
+/// The places of the bodies in the full simulation.
 class Truth {
  public:
   void add(Frame frame, const engine::Bodies& bodies) {

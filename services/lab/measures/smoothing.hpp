@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench smoothing` measures: what somebody sees of corrections, with and without smoothing.
+// What `tandem bench smoothing` measures: how visible corrections are, with and without smoothing.
 
 #include <cstdint>
 #include <string>
@@ -18,10 +18,10 @@ struct SmoothingSetup {
   double rate_hz = 144;    ///< of samples
   double smoothing_s = -1;
   double delay_ms = 5, jitter_ms = 3;  ///< of the network, each way
-  double outage_s = 0;                 ///< every five seconds the link is cut for so long
+  double outage_s = 0;                 ///< the link is cut for this time every five seconds
 };
 
-/// What one of the clients showed. Scene units, over all bodies and samples.
+/// The statistics of what one of the clients showed. Scene units, over all bodies and samples.
 struct Seen {
   /// 99.9th percentile of the second difference of the place shown (its length), less that of the true motion
   /// at the same moments. Bodies that are new or jumped are left out.

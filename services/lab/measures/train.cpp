@@ -14,7 +14,7 @@ constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experi
 
 double radians(std::uint32_t on_lattice) { return std::ldexp(static_cast<double>(on_lattice), -28); }
 
-/// What a stream corrected in one pass over the source.
+/// The statistics of what a stream corrected in one pass over the source.
 Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
                                          const std::function<Result<Source>()>& make, std::uint64_t frames,
                                          const std::function<void(Frame)>& progress) {

@@ -69,7 +69,7 @@ engine::Shape shape_of(const transport::BodyType& type) {
   return {static_cast<engine::Shape::Kind>(type.shape), 0, type.shape_values};
 }
 
-/// Of the smallest body, as far as a session says it; 0 where it does not.
+/// The radius of the smallest body, if the session says it; otherwise 0.
 double smallest_radius(const transport::SessionMessage& session) {
   double smallest = 0;
   for (const transport::BodyType& type : session.types) {
@@ -108,7 +108,7 @@ Result<void> export_states(const std::string& recording, const std::string& npy)
   info.dt_s = 1 / session.frame_rate_hz;
   info.threshold = reader->timeline().parameters().codec.threshold * session.lattice_unit;
   info.radius = smallest_radius(session);
-  // Of a session that no scene file made, what the announcement says has to do.
+  // For a session without a scene file the announcement has to suffice.
   const auto scene = scenes::parse_scene(session.scene_description, session.scene);
   const std::filesystem::path scene_file =
       std::filesystem::path(*sidecar).replace_extension(".scene.textproto");

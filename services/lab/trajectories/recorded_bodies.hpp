@@ -10,7 +10,7 @@
 
 namespace tandem::lab {
 
-/// From the lattice to scene units, seconds and radians.
+/// Converts bodies from the lattice to scene units, seconds and radians.
 class RecordedBodies {
  public:
   /// `lattice_unit` in scene units, `dt_s` seconds a frame.

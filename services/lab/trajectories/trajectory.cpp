@@ -22,14 +22,14 @@ constexpr std::string_view kMagic{"\x93NUMPY\x01\x00", 8};
 constexpr std::size_t kHeaderBytes = 128;
 constexpr std::size_t kMostShapes = 4096;
 constexpr double kNormSlack = 1e-3;
-// Of a body's row: w, x, y, z, then the angular velocity.
+// First column in a body's row of: w, x, y, z, then the angular velocity.
 constexpr std::size_t kOrientation = 6;
 constexpr std::size_t kTurning = 10;
 // numpy writes 118; std::regex recurses for every character, so a long header would end the stack.
 constexpr std::size_t kMaxHeaderBytes = 4096;
 // Rows are read and checked a frame at a time; a frame count beyond this is a broken header.
 constexpr std::uint64_t kMaxRows = 1U << 24U;
-// Of the numbers in the sidecar; beyond, somebody mistook something.
+// Maximum of the numbers in the sidecar; a larger one is a mistake.
 constexpr double kMostNumber = 1e9;
 
 std::string header(std::uint64_t rows, std::uint32_t bodies, std::size_t channels) {

@@ -51,8 +51,8 @@ struct TrajectoryInfo {
   /// Scene that tells radius, materials and walls, for predictors that need them: a name, or the path of a
   /// .textproto. Empty: none. In the file a relative path starts at the file's folder.
   std::string scene;
-  /// What bodies look like, at most 4,096; where the file has a list of radii, a sphere for each radius.
-  /// Empty: not told.
+  /// The shapes of bodies, at most 4,096. If the file has a list of radii, there is a sphere for each radius.
+  /// Empty: unknown.
   std::vector<engine::Shape> shapes;
   std::vector<std::uint16_t> shape_of;  ///< by body, with shapes
 };

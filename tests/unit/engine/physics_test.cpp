@@ -1,4 +1,4 @@
-// Closed-form solutions of the paper's section 3.2.1 and of the penalty contact.
+// Closed-form solutions of the thesis's section 3.2.1 and of the penalty contact.
 #include "tests/unit/engine/worlds.hpp"
 
 namespace tandem::engine {
