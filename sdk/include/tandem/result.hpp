@@ -17,7 +17,7 @@ enum class ErrorCode : std::uint8_t {
   kOutOfOrder = 5,       ///< a frame, number or epoch that does not follow what is held
   kCapacity = 6,         ///< a declared limit would be exceeded
   kTimeout = 7,          ///< nothing arrived in time
-  kConflict = 8,         ///< somebody else owns the name
+  kConflict = 8,         ///< another party owns the name
   kTransport = 9,        ///< the middleware reported an error
   kIo = 10,              ///< a file could not be read or written
   // Only the functions in tandem/tandem.h return the following.

@@ -86,7 +86,7 @@ class Connection {
   void prefer(const std::string& preference) {
     check(unlocked([&] { return tandem_prefer(client_, preference.c_str()); }));
   }
-  // In slices, so that Ctrl-C ends the wait.
+  // Waits in slices, so that Ctrl-C ends the wait.
   void wait_until_playing(double timeout_s) {
     constexpr double kSliceS = 0.1;
     using Seconds = std::chrono::duration<double>;

@@ -20,7 +20,7 @@ namespace py = pybind11;
   throw py::error_already_set();
 }
 
-/// Where an array's elements are. Nothing of it keeps the array alive.
+/// The place of an array's elements. It does not keep the array alive.
 template <class T>
 struct ArrayColumn {
   T* first = nullptr;  ///< null: not wanted
@@ -28,8 +28,8 @@ struct ArrayColumn {
   std::uint32_t bodies = std::numeric_limits<std::uint32_t>::max();
 };
 
-/// Of shape (n,), or (n, components) where there are several, which then lie side by side; the elements of T,
-/// or bool where T is a byte. `object` None: not wanted. Raises TypeError and ValueError, naming the array.
+/// The array has the shape (n,), or (n, components) with adjacent components; its elements are T, or bool if
+/// T is a byte. `object` None: not wanted. Raises TypeError and ValueError, naming the array.
 template <class T>
 ArrayColumn<T> column_of(const py::handle& object, const char* name, py::ssize_t components) {
   if (object.is_none()) return {};
@@ -51,7 +51,7 @@ ArrayColumn<T> column_of(const py::handle& object, const char* name, py::ssize_t
   if (dimensions == 2 && array.strides(1) != kSize) throw refuse("a body's numbers must lie side by side");
   if (array.shape(0) >= std::numeric_limits<std::uint32_t>::max()) throw refuse("is too long");
   const auto bodies = static_cast<std::uint32_t>(array.shape(0));
-  // Of a single body the stride says nothing.
+  // The stride of an array with a single body means nothing.
   const py::ssize_t stride = bodies > 1 ? array.strides(0) : components * kSize;
   if (stride < components * kSize || stride % kSize != 0 || stride > std::numeric_limits<std::int32_t>::max())
     throw refuse("its bodies must follow one another, without overlap");

@@ -21,7 +21,7 @@ TANDEM_IMPORT(clock_ms) double import_clock_ms();
 namespace tandem::web {
 namespace {
 
-/// Where Sample's arrays lie. Orientations are null without orientations.
+/// The places of Sample's arrays. Orientations are null if the session has none.
 struct SampleView {
   double frame = 0;
   std::uint32_t capacity = 0;

@@ -17,7 +17,8 @@ class JsonWriter {
   JsonWriter& end_object() { return close('}'); }
   JsonWriter& begin_list() { return open('['); }
   JsonWriter& end_list() { return close(']'); }
-  /// Of letters, digits and underscores, in JavaScript's spelling: `frame_ms_p50` becomes `frameMsP50`.
+  /// Writes a name of letters, digits and underscores in JavaScript's spelling: `frame_ms_p50` becomes
+  /// `frameMsP50`.
   JsonWriter& name(const char* name);
 
   JsonWriter& value(std::string_view text);

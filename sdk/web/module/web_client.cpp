@@ -56,7 +56,7 @@ const char* name_of(transport::Shape shape) {
 
 std::string colour(std::uint32_t rgba) { return "#" + to_hex(rgba).substr(8); }
 
-/// In force, scene units / s^2; zero before a snapshot.
+/// The gravity in force, scene units / s^2; zero before a snapshot.
 std::array<double, 3> gravity(const client::ClientCore& core) {
   std::array<double, 3> result{};
   if (core.timeline() == nullptr || core.session() == nullptr) return result;

@@ -62,10 +62,9 @@ class WebClient final : private client::CoreListener {
   void show_uncorrected(bool on) { core_.show_uncorrected(on); }
   /// As Client::sample(). The arrays are valid until the next call.
   [[nodiscard]] const Sample* sample(SampleMode mode, client::Now now);
-  /// Of each slot 1 where the last delta applied corrected the body.
+  /// For each slot: 1 if the last applied delta corrected its body.
   [[nodiscard]] std::span<const std::uint8_t> corrected() const { return corrected_; }
-  /// Of each slot the frame, modulo 2^32, of the last delta that corrected it; 0 where none of this epoch
-  /// did.
+  /// For each slot: the frame, modulo 2^32, of the last delta that corrected it; 0 if none of this epoch did.
   [[nodiscard]] std::span<const std::uint32_t> corrected_in() const { return corrected_in_; }
 
  private:

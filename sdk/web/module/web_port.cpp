@@ -106,7 +106,7 @@ Result<void> WebPort::open_stream(const transport::SessionMessage& session,
   return {};
 }
 
-// Those of the largest stream: what the client does not follow any more it passes over.
+// Uses the limits of the largest stream; the client ignores streams that it no longer follows.
 void WebPort::set_limits() {
   limits_ = {};
   if (streams_.empty()) return;

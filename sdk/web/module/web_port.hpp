@@ -20,10 +20,11 @@
 
 namespace tandem::web {
 
-/// Queues between a ClientCore and whoever holds the connection. Every queue is bounded. Not thread-safe.
+/// Queues between a ClientCore and the owner of the connection. Every queue is bounded. Not thread-safe.
 class WebPort final : public transport::ClientPort {
  public:
-  /// No WebSocket message is larger; whoever holds the connection refuses it before it is copied.
+  /// Maximum size of a WebSocket message; the owner of the connection refuses a larger one before it is
+  /// copied.
   static constexpr std::size_t kMaxMessageBytes = transport::kMaxSampleBytes + (1U << 16U);
   /// Decoded bytes that wait in one queue; what comes beyond it is dropped, and the client joins again.
   static constexpr std::size_t kMaxQueuedBytes = kMaxMessageBytes;
