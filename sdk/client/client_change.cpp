@@ -7,10 +7,21 @@
 
 namespace tandem::client {
 
+namespace {
+constexpr std::string_view kUnplayable =
+    "this client computes the stream otherwise than the server: the state soon differed after each of 3 snapshots";
+}  // namespace
+
 Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::SessionMessage& session,
                                                             Now now) {
-  const auto playable = playable_streams(session);
+  auto playable = playable_streams(session);
   if (!playable) return tl::unexpected<Error>(playable.error());
+  const auto unplayable = [&](std::size_t index) {
+    return epoch_ &&
+           std::count(epoch_->unplayable.begin(), epoch_->unplayable.end(), session.streams[index].id) > 0;
+  };
+  std::erase_if(*playable, unplayable);
+  if (playable->empty()) return fail(ErrorCode::kMismatch, std::string(kUnplayable));
   const bool choice = playable->size() > 1 && preference_.kind != StreamPreference::Kind::kNamed;
   if (choice && !own_step_ns_) own_step_ns_ = measure_own_step(options_.measure_ns);
   chooser_.emplace(list_offers(session, *playable), preference_, 1e9 / session.frame_rate_hz, own_step_ns_);
@@ -31,6 +42,21 @@ Result<std::unique_ptr<Follower>> ClientCore::follow(const transport::SessionMes
 void ClientCore::prefer(std::string_view preference) {
   preference_ = read_preference(preference);
   if (chooser_) chooser_->prefer(preference_);
+}
+
+void ClientCore::leave_unplayable(Now now) {
+  EpochState& e = *epoch_;
+  if (e.wrong_joins < kMostWrongJoins) return;
+  e.wrong_joins = 0;
+  e.unplayable.push_back(e.played->stream().id);
+  auto other = choose_stream(e.session, now);
+  if (!other) {
+    refuse(other.error());
+    port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
+    return;
+  }
+  log(LogLevel::kError, kUnplayable);
+  join_instead(std::move(*other), now);
 }
 
 void ClientCore::tell_stream() {

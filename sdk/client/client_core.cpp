@@ -68,6 +68,7 @@ std::int64_t ClientCore::poll(Now now) {
     port_.pass_over_session(transport::PassOver::kWhileThereIsAnother);
   }
   take_sessions(now);
+  if (epoch_ != nullptr) leave_unplayable(now);
   if (epoch_ != nullptr) {
     take_stream(now);
     take_replies(now);

@@ -64,6 +64,11 @@ class CoreListener {
 /// The rules of idl/STATES.md for one client. Every buffer is bounded. Not thread-safe, but for sample().
 class ClientCore {
  public:
+  /// A stream is left after so many joins in a row that each ended with a state other than the server's
+  /// within so many frames: this client computes it otherwise, and would join for ever.
+  static constexpr std::uint32_t kMostWrongJoins = 3;
+  static constexpr std::uint64_t kSettledFrames = 30;
+
   /// `port` and `listener` (may be null) must outlive it.
   ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener = nullptr);
   ~ClientCore() = default;
@@ -170,6 +175,7 @@ class ClientCore {
                                                                 Now now);
   [[nodiscard]] Result<std::unique_ptr<Follower>> follow(const transport::SessionMessage& session,
                                                          Now now) const;
+  void leave_unplayable(Now now);
   void tell_stream();
   void consider_streams(Now now);
   void change_stream(Now now);

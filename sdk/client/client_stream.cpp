@@ -48,7 +48,8 @@ void ClientCore::take_deltas(Now now) {
     const Frame frame = received.message.frame;
     const std::int64_t server_time_ns = received.message.server_time_ns;
     const Follower::Step taken = to->take(std::move(received.message), now.steady_ns);
-    statistics_.queue_high_water = std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
+    statistics_.queue_high_water =
+        std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
     if (taken.done && is_played) epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
     if (!taken.loss) continue;
     if (is_played) {
@@ -119,6 +120,7 @@ void ClientCore::on_applied(const CompleteDelta& delta, std::int64_t cost_ns, No
   if (e.uncorrected) e.uncorrected->on_applied(timeline);
   e.pictures.on_applied(timeline, e.pacer, now.steady_ns);
   ++statistics_.frames_applied;
+  if (++e.frames_since_join == kSettledFrames) e.wrong_joins = 0;
   statistics_.payload_bytes += delta.payload.size();
   statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta.server_time_ns));
   if (options_.measure_ns != nullptr) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "sdk/client/drawing/local_echo.hpp"
 #include "sdk/client/drawing/picture_writer.hpp"
@@ -38,6 +39,11 @@ struct EpochState {
   PictureWriter pictures;
   LocalEcho echo;
   std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while somebody wants that
+
+  /// Joins in a row after which the state soon differed from the server's.
+  std::uint32_t wrong_joins = 0;
+  std::uint64_t frames_since_join = 0;
+  std::vector<StreamId> unplayable;  ///< streams that this client computes otherwise than the server
 
   bool has_played = false;         ///< in this epoch
   std::int64_t silence_ns = 0;     ///< time with polls since anything came from the server
