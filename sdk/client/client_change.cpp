@@ -108,17 +108,18 @@ void ClientCore::join_instead(std::unique_ptr<Follower> other, Now now) {
   EpochState& e = *epoch_;
   e.played->close(port_);
   e.played = std::move(other);
+  e.has_loaded = false;
   e.join_began_ns = now.steady_ns;
   tell_stream();
 }
 
 void ClientCore::follow_change(Now now) {
   EpochState& e = *epoch_;
-  if (e.change->to().joining() && !join(e.change->to(), now)) {
-    if (e.change->gets_nowhere(now.steady_ns, statistics_.last_applied_ns))
-      give_up_change("nothing came", now);
+  if (e.change->gets_nowhere(now.steady_ns, statistics_.last_applied_ns)) {
+    give_up_change("nothing came", now);
     return;
   }
+  if (e.change->to().joining() && !join(e.change->to(), now)) return;
   const Follower::Step step = e.change->catch_up(*e.played, e.scheduled);
   if (step.loss) on_loss_in_change(*step.loss, now);
   if (step.done) move_over(now);
@@ -134,6 +135,7 @@ void ClientCore::move_over(Now now) {
   e.played->close(port_);
   const Frame left_at = e.played->timeline().applied();
   e.played = e.change->take();
+  e.has_loaded = !e.played->joining();
   e.change.reset();
   e.frame_cost_ns = 0;
   e.told_too_slow = false;

@@ -345,7 +345,9 @@ std::optional<std::int64_t> ClientCore::server_wall_ns(std::int64_t steady_ns) c
   return steady_ns + epoch_->pacer.clock().offset_ns();
 }
 std::uint32_t ClientCore::join_attempt() const {
-  return epoch_ ? epoch_->played->join_attempt() : join_attempts_;
+  if (!epoch_) return join_attempts_;
+  const std::uint32_t played = epoch_->played->join_attempt();
+  return epoch_->change ? std::max(played, epoch_->change->to().join_attempt()) : played;
 }
 
 ClientStatus ClientCore::status() const {
@@ -380,7 +382,7 @@ ClientStatus ClientCore::status() const {
 
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
-  if (epoch_ && epoch_->has_played)
+  if (epoch_ && epoch_->has_loaded)
     epoch_->pictures.on_loaded(epoch_->played->timeline(), epoch_->pacer, last_poll_ns_);
   pictures_.want();  // last: without memory for a first picture, the next call tries again
 }

@@ -32,7 +32,7 @@ void ClientCore::begin(Now now) {
   if (!snapshot) return;
   follow_uncorrected();
   if (pictures_.wanted()) e.pictures.on_loaded(e.played->timeline(), e.pacer, now.steady_ns);
-  e.has_played = true;
+  e.has_loaded = true;
   e.frames_since_join = 0;
   e.frame_cost_ns = 0;
   ack_due_ = true;

@@ -45,7 +45,7 @@ struct EpochState {
   std::uint64_t frames_since_join = 0;
   std::vector<StreamId> unplayable;  ///< streams that this client computes otherwise than the server
 
-  bool has_played = false;         ///< in this epoch
+  bool has_loaded = false;         ///< `played` holds a state that can be drawn
   std::int64_t silence_ns = 0;     ///< time with polls since anything came from the server
   std::int64_t join_began_ns = 0;  ///< the session was learned, or something was lost
   std::int64_t frame_cost_ns = 0;  ///< simulation since the last applied delta

@@ -21,6 +21,7 @@ inline constexpr std::string_view kAutomaticPredictor = "auto";
 /// Below, a frame has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
+inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
 
 /// What one of several streams is to have of its own; the rest it takes from Wishes.
 struct StreamWishes {
@@ -55,6 +56,7 @@ struct StreamOption {
   double least = 0, most = 0;          ///< of a number
   std::string_view takes = {};         ///< in errors: what it is
   std::optional<bool> automatic = {};  ///< what it makes of Wishes::automatic
+  bool steers = false;                 ///< goes with an automatic threshold alone
 };
 
 /// A new option is a field above and in idl/server.proto, a line here, and its use in plan.cpp.
@@ -66,7 +68,7 @@ inline constexpr std::array kStreamOptions{
                  .field = &Wishes::threshold_m,
                  .least = kLeastLength,
                  .most = kMostLength,
-                 .takes = "a length from 1e-9 to 1e9 metres",
+                 .takes = kLength,
                  .automatic = false},
     StreamOption{.key = "target-bandwidth",
                  .file_field = "target_bandwidth",
@@ -74,13 +76,15 @@ inline constexpr std::array kStreamOptions{
                  .least = 0.001,
                  .most = 1e6,
                  .takes = "a rate in Mbit/s, at least 0.001",
-                 .automatic = true},
+                 .automatic = true,
+                 .steers = true},
     StreamOption{.key = "max-error",
                  .file_field = "max_error",
                  .field = &Wishes::max_error_m,
                  .least = kLeastLength,
                  .most = kMostLength,
-                 .takes = "a length from 1e-9 to 1e9 metres"},
+                 .takes = kLength,
+                 .steers = true},
     StreamOption{.key = "budget",
                  .file_field = "budget_bytes",
                  .field = &Wishes::budget_bytes,
@@ -97,9 +101,15 @@ inline constexpr std::array kStreamOptions{
 /// read.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
+/// Checks what is said for all streams. Errors: kInvalidArgument, which begins with the option's key and a
+/// colon.
+[[nodiscard]] Result<void> check_wishes(const Wishes& wishes);
+
 /// Checks what a stream says for itself, and that it goes with what is said for all. Errors:
 /// kInvalidArgument.
 [[nodiscard]] Result<void> check_stream(const Wishes& common, const StreamWishes& stream);
+
+inline constexpr std::uint32_t kMostClients = 65'536;
 
 /// How the session is served, whatever its streams.
 struct ServiceWishes {

@@ -126,7 +126,10 @@ Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_n
   const Outcome outcome = deltas_.add(std::move(part));
   // Where nothing was buffered, deltas may come that the snapshot counts already.
   if (!joining_) deltas_.drop_through(timeline_.applied());
-  if (outcome == Outcome::kStored) return {.done = last_part};
+  if (outcome == Outcome::kStored) {
+    if (!joining_) heard_ns_ = now_ns;
+    return {.done = last_part};
+  }
   if (outcome == Outcome::kIgnored) return {};
   // Who joins starts the buffer again; after a gap the snapshot asked for may still fit what follows.
   if (joining_ && outcome != Outcome::kGap && outcome != Outcome::kLostPart) joiner_.ask_again(now_ns);

@@ -28,8 +28,8 @@ class StreamChange {
   /// Takes to() out, which ends the change.
   [[nodiscard]] std::unique_ptr<Follower> take() { return std::move(to_); }
 
-  /// While it joins, with no snapshot loaded: true when it is to be given up. `last_applied_ns`: when the
-  /// stream that is played had its last frame.
+  /// True when it is to be given up: nothing of its snapshot or its deltas has come for so long.
+  /// `last_applied_ns`: when the stream that is played had its last frame.
   [[nodiscard]] bool gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_ns);
   /// Once it plays: frame by frame behind the one that is played. Done: to() can take its place.
   [[nodiscard]] Follower::Step catch_up(const Follower& played, const ScheduledInputs& scheduled);

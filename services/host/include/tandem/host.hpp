@@ -44,12 +44,16 @@ struct ServerOptions {
   /// surface where bodies turn; scene units. The price of a frame grows as it shrinks.
   double threshold = 0.01;
   /// Largest |coordinate| that a body reaches; scene units. Who goes further disappears, which the log tells,
-  /// until the simulation despawns, spawns or teleports it (engine::Event). At most about a million thresholds.
+  /// until the simulation despawns, spawns or teleports it (engine::Event). At most about a million
+  /// thresholds.
   double extent = 100;
   /// Payload that the server keeps to by itself, Mbit/s (2^20 bits), with errors of up to `max_error`; 0:
   /// `threshold` alone decides.
   double target_mbit_per_s = 0;
-  double max_error = 0;           ///< with `target_mbit_per_s`; scene units; 0: four thresholds
+  /// Threshold and quantisation steps follow the bodies at run time, from a quarter of `threshold` up to
+  /// `max_error`; a target implies it.
+  bool automatic_threshold = false;
+  double max_error = 0;           ///< with an automatic threshold; scene units; 0: four thresholds
   std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
   /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
   /// field (they meet each other and the scenery), or auto: with codec tracker, scenery, and at most 50,000
