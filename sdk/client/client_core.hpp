@@ -1,6 +1,6 @@
 #pragma once
-// A client without a clock, a thread or a socket: join, reconstruct, re-simulate, rejoin, acknowledge, send
-// input.
+// The client without a clock, a thread or a socket: it joins, reconstructs, re-simulates, rejoins,
+// acknowledges and sends input.
 
 #include <cstdint>
 #include <functional>
@@ -31,37 +31,38 @@ struct Now {
 };
 
 struct CoreOptions {
-  std::string session;         ///< empty: whichever the port announces
+  std::string session;         ///< empty: the session that the port announces
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
-  std::string prefer;  ///< of streams: see read_preference()
-  bool echo = false;   ///< samples show a gravity of this client's as soon as it is sent
+  std::string prefer;  ///< preferred stream: see read_preference()
+  bool echo = false;   ///< samples show a gravity that this client sent at once
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
 };
 
-/// Hears what a client takes in, in order. For hash logs, captures and tests; must not call the client.
+/// Is told in order what a client takes in. For hash logs, captures and tests. It must not call the client.
 class CoreListener {
  public:
   virtual ~CoreListener() = default;
   virtual void on_session(const transport::SessionMessage& /*session*/) {}
-  /// One of the session's that was heard of last: it is joined, or, where the client plays already, its state
-  /// of the frame applied last is held, and what follows is of this stream.
+  /// A stream of the session in the last on_session(). The client joins it. If the client already plays, it
+  /// now has this stream's state of the frame applied last, and the following calls are for this stream.
   virtual void on_stream(const transport::StreamMessage& /*stream*/) {}
   virtual void on_server_status(const transport::ServerStatusMessage& /*status*/) {}
-  /// Loaded: the state of `snapshot.frame` is held.
+  /// A snapshot was loaded: the client holds the state of `snapshot.frame`.
   virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
-  /// New to this client, and in its timeline.
+  /// A scheduled input that is new to this client and in its timeline.
   virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/) {}
-  /// Applied, and its hash was right.
+  /// A delta was applied and its hash was right.
   virtual void on_applied(Epoch /*epoch*/, const CompleteDelta& /*delta*/) {}
   virtual void on_outcome(const InputOutcome& /*outcome*/) {}
   virtual void on_resync(ResyncReason /*reason*/) {}
 };
 
-/// The rules of idl/STATES.md for one client. Every buffer is bounded. Not thread-safe, but for sample().
+/// Implements the rules of idl/STATES.md for one client. Every buffer is bounded. Not thread-safe, except
+/// sample().
 class ClientCore {
  public:
   /// A stream is left after so many joins in a row that each ended with a state other than the server's
@@ -69,7 +70,7 @@ class ClientCore {
   static constexpr std::uint32_t kMostWrongJoins = 3;
   static constexpr std::uint64_t kSettledFrames = 30;
 
-  /// `port` and `listener` (may be null) must outlive it.
+  /// `port` and `listener` must outlive the core; `listener` may be null.
   ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener = nullptr);
   ~ClientCore() = default;
   ClientCore(const ClientCore&) = delete;
@@ -77,55 +78,56 @@ class ClientCore {
   ClientCore(ClientCore&&) = delete;
   ClientCore& operator=(ClientCore&&) = delete;
 
-  /// Takes what arrived and does what is due. Returns the steady time at which it wants to be called again
-  /// even if nothing arrives.
+  /// Takes what arrived and does what is due. Returns the steady time at which it must be called again even
+  /// if nothing arrives.
   std::int64_t poll(Now now);
 
-  /// Sends an input of the current epoch; returns its number.
-  /// Errors: kOutOfOrder (not playing, or joined as an observer), kInvalidArgument (a value that is not
-  /// finite, more than 16 values or 1,024 bytes), kTransport.
+  /// Sends an input in the current epoch and returns its number. Errors: kOutOfOrder (not playing, or joined
+  /// as an observer), kInvalidArgument (a value that is not finite, more than 16 values or 1,024 bytes),
+  /// kTransport.
   Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
                              Now now);
 
-  /// Of streams, from the next poll() on: see CoreOptions::prefer.
+  /// Changes CoreOptions::prefer, from the next poll() on.
   void prefer(std::string_view preference);
 
   [[nodiscard]] ClientPhase phase() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
-  /// Last announcement that was accepted or refused; null before the first.
+  /// The last announcement that was accepted or refused; null before the first.
   [[nodiscard]] const transport::SessionMessage* session() const;
-  /// The one of its streams that is played or joined; null while there is none. Valid until the next poll().
+  /// The stream that is played or joined; null while there is none. Valid until the next poll().
   [[nodiscard]] const transport::StreamMessage* stream() const;
-  /// The writer of the session's announcement lives, as the last poll() saw it.
+  /// True if the writer of the session's announcement was alive at the last poll().
   [[nodiscard]] bool server_alive() const { return server_alive_; }
   /// Null unless playing. Valid until the next poll().
   [[nodiscard]] const ClientTimeline* timeline() const;
-  /// Wall clock of the server at a steady time of this client's, as far as known.
+  /// The server's wall clock at a steady time of this client; empty while unknown.
   [[nodiscard]] std::optional<std::int64_t> server_wall_ns(std::int64_t steady_ns) const;
   [[nodiscard]] ClientStatus status() const;
   [[nodiscard]] std::uint32_t join_attempt() const;
-  /// The newest of this epoch; null before the first.
+  /// The newest reply of this epoch; null before the first.
   [[nodiscard]] const transport::ReplyMessage* reply() const;
 
-  /// Once before the first sample(): from now on each frame is made ready to be drawn.
+  /// Call once before the first sample(): from now on each frame is prepared for drawing.
   void start_sampling();
-  /// While on, sample() shows the state of the moment it was switched on, or of a later snapshot, only
-  /// predicted from there: see Uncorrected. What is agreed, acknowledged and hashed stays what it is.
+  /// While this is on, sample() shows the state of the moment it was switched on, or of a later snapshot,
+  /// only predicted from there: see Uncorrected. What is agreed, acknowledged and hashed does not change.
   void show_uncorrected(bool on);
-  /// Of what is shown, at the last frame applied; nothing while it is off or not playing.
+  /// The drift of the shown state at the last frame applied; empty while this is off or the client does not
+  /// play.
   [[nodiscard]] std::optional<Drift> drift() const;
-  /// The next three from any thread, at any time: they never wait for poll(). Nothing when there is nothing
-  /// to draw.
+  /// The next three functions may be called from any thread at any time. They never wait for poll(). The
+  /// result is empty or an error if there is nothing to draw.
   [[nodiscard]] std::optional<Drawable> drawable();
-  /// The bodies at one moment, straight into the caller's memory. Allocates nothing unless the session
+  /// Writes the bodies at one moment straight into the caller's memory. Allocates nothing unless the session
   /// changed. Errors: kOutOfOrder (nothing to draw), kCapacity (the columns are shorter than
-  /// drawable().capacity, and are left as they are).
+  /// drawable().capacity and are not written).
   Result<SampledFrame> sample(const SampleRequest& request, const SampleColumns& columns, Now now);
   /// See Client::sample().
   bool sample(Sample& out, SampleMode mode, Now now);
 
  private:
-  /// What a poll takes from the port; kept to reuse its memory.
+  /// The messages that a poll takes from the port; kept to reuse the memory.
   struct Inbox {
     std::vector<transport::Received<transport::SessionMessage>> sessions;
     std::vector<transport::Received<transport::DeltaMessage>> deltas;
@@ -148,9 +150,9 @@ class ClientCore {
   void send_status(Now now);
   [[nodiscard]] std::int64_t next_due_ns(Now now) const;
 
-  // client_stream.cpp: take in, play
+  // client_stream.cpp: take messages, play
   void take_stream(Now now);
-  /// Null, and counted, where it is none that is followed.
+  /// The follower of a stream. If the stream is not followed, returns null and counts the message.
   [[nodiscard]] Follower* followed(const StreamId& stream);
   void take_deltas(Now now);
   void take_scheduled();
@@ -161,13 +163,13 @@ class ClientCore {
   void play_ahead(Now now);
   void prepare_next();
 
-  // client_join.cpp: join, join again
+  // client_join.cpp: join and rejoin
   /// Returns the snapshot once it is loaded.
   [[nodiscard]] std::optional<transport::SnapshotMessage> join(Follower& to, Now now);
   void begin(Now now);
   void follow_uncorrected();
   void count(const Follower::Loss& loss);
-  /// By the stream that is played or joined.
+  /// Handles a loss of the stream that is played or joined.
   void on_loss(const Follower::Loss& loss, Now now);
 
   // client_change.cpp: choose, change
@@ -179,17 +181,17 @@ class ClientCore {
   void tell_stream();
   void consider_streams(Now now);
   void change_stream(Now now);
-  /// In the place of the one that is played or joined.
+  /// Joins `other` instead of the stream that is played or joined.
   void join_instead(std::unique_ptr<Follower> other, Now now);
   void follow_change(Now now);
-  /// By the stream that is on its way.
+  /// Handles a loss of the stream that the client is changing to.
   void on_loss_in_change(const Follower::Loss& loss, Now now);
   void move_over(Now now);
   void show_other(Frame left_at, Now now);
   void give_up_change(const std::string& why, Now now);
   void adopt_streams(const transport::SessionMessage& session, Now now);
 
-  /// Counts what is not of this epoch and this server.
+  /// True if a message is of this epoch and this server; others are counted.
   template <class M>
   [[nodiscard]] bool belongs(const transport::Received<M>& received) {
     if (received.from != epoch_->server) {
@@ -218,20 +220,20 @@ class ClientCore {
   Statistics statistics_;
   StatusReport status_report_;
   SentInputs sent_;
-  std::vector<InputOutcome> outcomes_;  ///< not yet told to the listener
+  std::vector<InputOutcome> outcomes_;  ///< outcomes that the listener was not told yet
   Inbox inbox_;
 
   PictureExchange pictures_;
-  Sampler sampler_;  ///< in turns: while reading a picture
+  Sampler sampler_;  ///< used only while a picture is being read, so by one thread at a time
   bool shows_uncorrected_ = false;
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   transport::ParticipantId session_from_;
-  std::string refusal_;                   ///< why it is not
+  std::string refusal_;                   ///< why the session is not playable
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
-  std::optional<StreamChooser> chooser_;  ///< of that session
-  std::optional<double> own_step_ns_;     ///< once it was measured
-  std::uint32_t join_attempts_ = 0;       ///< of the epochs before it
+  std::optional<StreamChooser> chooser_;  ///< chooses among the streams of that session
+  std::optional<double> own_step_ns_;     ///< empty until it was measured
+  std::uint32_t join_attempts_ = 0;       ///< join attempts of earlier epochs
 
   bool server_alive_ = false;
   bool ack_due_ = false;

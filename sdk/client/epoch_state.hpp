@@ -1,5 +1,6 @@
 #pragma once
-// All that a client holds of one epoch. A new epoch is a new object, so nothing can survive from the old one.
+// All data that a client holds for one epoch. A new epoch is a new object, so nothing of the old one can
+// survive.
 
 #include <algorithm>
 #include <cstdint>
@@ -31,14 +32,14 @@ struct EpochState {
 
   transport::SessionMessage session;
   transport::ParticipantId server;
-  std::unique_ptr<Follower> played;    ///< or joined; never null
-  std::optional<StreamChange> change;  ///< to another one, while `played` goes on
-  std::uint32_t lead;                  ///< in force: not above the session's
+  std::unique_ptr<Follower> played;    ///< the stream that is played or joined; never null
+  std::optional<StreamChange> change;  ///< the change to another stream, while `played` goes on
+  std::uint32_t lead;                  ///< in force; not above the session's
   ScheduledInputs scheduled;
   Pacer pacer;
   PictureWriter pictures;
   LocalEcho echo;
-  std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while somebody wants that
+  std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while that is wanted
 
   /// Joins in a row after which the state soon differed from the server's.
   std::uint32_t wrong_joins = 0;
@@ -46,11 +47,11 @@ struct EpochState {
   std::vector<StreamId> unplayable;  ///< streams that this client computes otherwise than the server
 
   bool has_loaded = false;         ///< `played` holds a state that can be drawn
-  std::int64_t silence_ns = 0;     ///< time with polls since anything came from the server
-  std::int64_t join_began_ns = 0;  ///< the session was learned, or something was lost
-  std::int64_t frame_cost_ns = 0;  ///< simulation since the last applied delta
+  std::int64_t silence_ns = 0;     ///< time since anything came from the server, counted only while polled
+  std::int64_t join_began_ns = 0;  ///< when the session was found, or when a loss began a rejoin
+  std::int64_t frame_cost_ns = 0;  ///< simulation time since the last applied delta
   bool told_too_slow = false, told_lag = false;
-  std::optional<transport::ReplyMessage> reply;  ///< newest
+  std::optional<transport::ReplyMessage> reply;  ///< newest reply
 };
 
 }  // namespace tandem::client

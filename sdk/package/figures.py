@@ -20,12 +20,12 @@ LISTS = {
     "each_server_count": "ServerCounts",
     "each_server_figure": "ServerFigures",
 }
-# Which figures a struct of the IDL has, in this order and without others in between.
+# The figures of each IDL struct. They stand there in this order, without others in between.
 MESSAGES = {"TandemClientStatus": "ReportedFigures", "TandemServerStatus": "ServerFigures"}
 IDL_TYPES = {"double": "double", "std::uint32_t": "uint32", "std::uint64_t": "uint64"}
 C_TYPES = {"double": "double", "std::uint32_t": "uint32_t", "std::uint64_t": "uint64_t"}
 PYTHON_TYPES = {"double": "float", "std::uint32_t": "int", "std::uint64_t": "int"}
-# What the bindings have, by the file with the struct.
+# The structs that the bindings have.
 BOUND = ("ClientFigures", "ServerFigures")
 
 
@@ -38,7 +38,7 @@ class Figures:
         for name, base, body in re.findall(r"^struct (\w+)(?: : (\w+))? \{\n(.*?)^\};", text, re.MULTILINE | re.DOTALL):
             self.own[name] = re.findall(r"^  ([\w:]+) (\w+) = 0;(?: +///< (.*))?$", body, re.MULTILINE)
             self.bases[name] = base
-            # A line of another form would be left out without a word.
+            # A line of another form would be skipped silently.
             strange = [line for line in body.splitlines() if line and "operator" not in line and not re.match(r"  [\w:]+ \w+ = 0;(?: +///< |$)", line)]
             self.texts[name] = strange
         self.lists = {}
@@ -51,7 +51,7 @@ class Figures:
         return (self.of(base) if base else []) + self.own[struct]
 
     def listed(self, name):
-        """What a list visits, in order."""
+        """The figures that a list visits, in order."""
         visited = []
         for said, visits, base in re.findall(r'visit\("(\w+)", of\.(\w+)\.\.\.\)|(each_\w+)\(visit, of\.\.\.\)', self.lists[name]):
             if base:
@@ -62,7 +62,7 @@ class Figures:
 
 
 def differences(root, figures):
-    """What of the sources does not agree with the structs."""
+    """Yields one line for each place in the sources that does not agree with the structs."""
     for struct, lines in figures.texts.items():
         for line in lines:
             yield f"{struct}: a figure a line, `type name = 0;  ///< text`, instead of: {line.strip()}"
@@ -92,14 +92,14 @@ def differences(root, figures):
 
 def python(figures):
     lines = ['"""Figures, as sdk/include/tandem/*_figures.hpp has them. Written by sdk/package/figures.py."""', "", "from dataclasses import dataclass", ""]
-    lines += ["", "@dataclass(frozen=True)", "class ClientFigures:", '    """Of a client, since it was made. Times in milliseconds, percentiles over all frames."""', ""]
+    lines += ["", "@dataclass(frozen=True)", "class ClientFigures:", '    """The figures of a client since it was made. Times are in milliseconds. Percentiles are over all frames."""', ""]
     lines += [f"    {name}: {PYTHON_TYPES[kind]}" + (f"  #: {text}" if text else "") for kind, name, text in figures.of("ClientFigures")]
     return "\n".join(lines) + "\n"
 
 
 def typescript(figures):
     lines = ["// Figures, as sdk/include/tandem/*_figures.hpp has them. Written by sdk/package/figures.py."]
-    for struct, of in zip(BOUND, ("Of a client, since it was made; times in milliseconds", "Of a server; rates and durations of the last second")):
+    for struct, of in zip(BOUND, ("The figures of a client since it was made. Times are in milliseconds", "The figures of a server. Rates and durations are of the last second")):
         lines += ["", f"/** {of}. */", f"export interface {struct} {{"]
         for _, name, text in figures.of(struct):
             lines += [f"  /** {text[0].upper()}{text[1:]}. */"] if text else []

@@ -1,6 +1,6 @@
 #pragma once
-// The one byte form of messages: XCDR version 1 (plain CDR) of the types in idl/tandem.idl, little-endian,
-// behind an encapsulation header. What DDS puts on the wire and what captures hold.
+// The byte form of messages: XCDR version 1 (plain CDR) of the types in idl/tandem.idl, little-endian, after
+// an encapsulation header. DDS and captures use this form.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,19 +11,19 @@
 
 namespace tandem::transport {
 
-/// Before a message: 00 01 for little-endian CDR, then two bytes of options.
+/// The header before a message: 00 01 for little-endian CDR, then two bytes of options.
 inline constexpr std::size_t kCdrHeaderBytes = 4;
 
 /// Appends header and message to `out`. Texts end at their first NUL.
 template <class M>
 void write_cdr(const M& message, Bytes& out);
 
-/// Whether bytes that fill up the last word may follow a message without being announced by the options.
+/// Whether bytes that fill up the last word may follow a message if the options do not announce them.
 enum class Padding : std::uint8_t { kAnnounced, kAny };
 
-/// Reads one message from untrusted bytes, which it must fill but for padding.
-/// Allocates no more than a small multiple of what is there. Says nothing about values: see within_limits().
-/// Errors: kUnsupported (another encapsulation), kMalformed.
+/// Reads one message from untrusted bytes. The message must fill the bytes, except for padding. Allocates at
+/// most a small multiple of their size. Does not check values: see within_limits(). Errors: kUnsupported
+/// (another encapsulation), kMalformed.
 template <class M>
 [[nodiscard]] Result<M> read_cdr(std::span<const std::byte> bytes, Padding padding = Padding::kAnnounced);
 

@@ -1,6 +1,6 @@
 #pragma once
-// Messages between a gateway and its viewers: one byte that tells the kind, behind it the message's CDR
-// bytes. idl/PROTOCOL.md, "WebSocket".
+// Messages between a gateway and its viewers: one byte for the kind, then the message's CDR bytes.
+// idl/PROTOCOL.md, "WebSocket".
 
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace tandem::transport {
 
-/// What an envelope's first byte may be. Kinds below 16 come from the gateway, the others from a viewer.
+/// The values of an envelope's first byte. Kinds below 16 come from the gateway, the others from a viewer.
 enum class MessageKind : std::uint8_t {
   kSession = 1,
   kDelta = 2,
@@ -28,12 +28,12 @@ enum class MessageKind : std::uint8_t {
   kClientStatus = 18,
 };
 
-/// The session's server is gone: what was announced last does not count any more. No body.
+/// The session's server is gone: its last announcement is void. No body.
 struct AbsentMessage {
   bool operator==(const AbsentMessage&) const = default;
 };
 
-/// Of a kind that this build does not know: a reader goes on with the next message.
+/// A message of a kind that this build does not know: a reader goes on with the next message.
 struct UnknownMessage {
   std::uint8_t kind = 0;
   bool operator==(const UnknownMessage&) const = default;
@@ -47,12 +47,12 @@ using ViewerMessage = std::variant<AckMessage, InputMessage, ClientStatusMessage
 template <class M>
 void write_envelope(const M& message, Bytes& out);
 
-/// Reads what a gateway sent. Bytes are not trusted: allocates no more than a small multiple of what is
-/// there, and what breaks a size or shape (within_limits()) is refused. Errors: kMalformed, kUnsupported
+/// Reads a message of a gateway. The bytes are untrusted: allocates at most a small multiple of their size,
+/// and refuses messages that break a size or shape (within_limits()). Errors: kMalformed, kUnsupported
 /// (another encapsulation).
 [[nodiscard]] Result<GatewayMessage> read_gateway_envelope(std::span<const std::byte> bytes,
                                                            const Limits& limits = {});
-/// Reads what a viewer sent, likewise. Errors: also kUnsupported for an unknown kind.
+/// Reads a message of a viewer in the same way. Errors: also kUnsupported for an unknown kind.
 [[nodiscard]] Result<ViewerMessage> read_viewer_envelope(std::span<const std::byte> bytes);
 
 extern template void write_envelope(const SessionMessage&, Bytes&);

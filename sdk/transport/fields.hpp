@@ -1,6 +1,6 @@
 #pragma once
-// Each message, field by field in the order of idl/tandem.idl: what CDR goes through, and what fills the
-// messages by which tests compare that with DDS's own (dds/convert.cpp).
+// The fields of each message in the order of idl/tandem.idl. CDR visits them. Tests fill messages through
+// them and compare the bytes with those of DDS (dds/convert.cpp).
 //
 // A visitor has primitive(value), text(string), sequence(bytes), sequence(values, each) and a function
 // parameters(visitor, StreamParameters).

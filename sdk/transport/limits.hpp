@@ -1,6 +1,6 @@
 #pragma once
-// Sizes and shapes that a received sample must have. Every transport applies them before it hands a sample
-// on.
+// The sizes and shapes that a received sample must have. Every transport checks them before it passes a
+// sample on.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,11 +10,12 @@
 
 namespace tandem::transport {
 
-/// No sample is larger, whatever a session declares; transports refuse it on the wire where they can.
+/// Maximum size of a sample, whatever a session declares; transports refuse larger ones on the wire where
+/// they can.
 inline constexpr std::uint32_t kMaxSampleBytes = 64U << 20U;
 inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
-inline constexpr std::uint32_t kMaxParts = 4096;           ///< of one delta
-inline constexpr std::uint32_t kMaxSnapshotParts = 65536;  ///< of one snapshot
+inline constexpr std::uint32_t kMaxParts = 4096;           ///< maximum parts of one delta
+inline constexpr std::uint32_t kMaxSnapshotParts = 65536;  ///< maximum parts of one snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
 inline constexpr std::size_t kMaxHullValues = 768;
@@ -27,14 +28,14 @@ inline constexpr std::size_t kMaxInputValues = 16;
 inline constexpr std::size_t kMaxInputBytes = 1024;
 inline constexpr std::size_t kMaxMissingRuns = 32;  ///< in an acknowledgement
 
-/// What the stream declares; until one is known, the fixed maximum.
+/// The limits that the stream declares; until a stream is known, the fixed maximum.
 struct Limits {
   std::uint32_t max_delta_bytes = kMaxSampleBytes;
   std::uint32_t max_snapshot_bytes = kMaxSampleBytes;
 };
 
-/// True when lengths, counts and enumerations are in range. Says nothing about epochs, numbers or values:
-/// those are answered, not dropped.
+/// True if lengths, counts and enumerations are in range. Does not check epochs, numbers or values: a message
+/// with wrong ones is answered, not dropped.
 [[nodiscard]] bool within_limits(const SessionMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const DeltaMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const ScheduledInputMessage& message, const Limits& limits);
@@ -45,24 +46,25 @@ struct Limits {
 [[nodiscard]] bool within_limits(const ServerStatusMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const ClientStatusMessage& message, const Limits& limits);
 
-/// The same of an announcement, saying what breaks which limit: whoever announces it asks first, as those who
-/// receive it only count. Errors: kInvalidArgument.
+/// Does the same check for an announcement and says what breaks which limit. A server calls it before it
+/// announces, because receivers only count refused messages. Errors: kInvalidArgument.
 [[nodiscard]] Result<void> check_announcement(const SessionMessage& message);
 
-/// A participant acknowledges at least as often as the smaller of these: frames, and time.
+/// A participant acknowledges after this number of frames or after kAckSpacingNs, whichever comes first.
 [[nodiscard]] constexpr std::uint32_t ack_spacing(std::uint32_t window_ceiling) {
   return window_ceiling < 8 ? 1 : window_ceiling / 4;
 }
 inline constexpr std::int64_t kAckSpacingNs = 200'000'000;
 
-/// Payloads and snapshots are cut into parts of at most so many bytes; a reader takes parts of any size.
+/// Maximum size of the parts into which payloads and snapshots are cut; a reader takes parts of any size.
 inline constexpr std::size_t kPartBytes = 60'000;
-/// So long a link may be lost without a snapshot being needed. The lease of participants outlasts it.
+/// Time for which a link may be lost without a snapshot being needed. The lease of participants is longer.
 inline constexpr double kHistorySeconds = 30;
 
-/// Samples of TandemDelta that writer and reader keep: kHistorySeconds of frames, at least two windows and
-/// 64, each of as many parts as the largest, but no more than `memory_bytes` of them (never below one window,
-/// or a suspended server could overwrite what a participant still needs).
+/// Number of TandemDelta samples that writer and reader keep: kHistorySeconds of frames, at least two windows
+/// and 64, each counted with the number of parts of the largest delta. The samples take at most
+/// `memory_bytes`, but there are always enough for one window; otherwise a suspended server could overwrite
+/// what a participant still needs.
 [[nodiscard]] std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling,
                                         std::size_t largest_delta_bytes,
                                         std::uint64_t memory_bytes = 256ULL << 20U);

@@ -1,6 +1,6 @@
 #pragma once
-// What travels on the topics, as plain structs. The DDS types are generated from idl/tandem.idl and stay in
-// dds/. Field meanings, ranges and QoS: idl/PROTOCOL.md.
+// The messages of the topics as plain structs. The DDS types are generated from idl/tandem.idl and stay in
+// dds/. Meanings, ranges and QoS of the fields: idl/PROTOCOL.md.
 
 #include <array>
 #include <cstdint>
@@ -15,24 +15,24 @@
 
 namespace tandem::transport {
 
-/// Why a server answered as it did; in Reply.reason and, for inputs, in a ReplyEntry's code.
+/// Why a server answered as it did. Used in Reply.reason and, for inputs, in a ReplyEntry's code.
 enum class Reason : std::uint32_t {
-  kNone = 0,      ///< all well, or the input was applied
+  kNone = 0,      ///< no error, or the input was applied
   kObserver = 1,  ///< observers may not send input
-  kDemoted = 2,   ///< caused more suspension than stall_timeout within 10 s
-  kInvalid = 3,   ///< not finite, out of range, or of an unknown kind
+  kDemoted = 2,   ///< the client caused more suspension than stall_timeout within 10 s
+  kInvalid = 3,   ///< the input is not finite, out of range, or of an unknown kind
   kRateLimited = 4,
   kStaleEpoch = 5,
-  kDuplicate = 6,      ///< a number already handled, or lower than one
+  kDuplicate = 6,      ///< the number, or a higher one, was handled before
   kNotPlaying = 7,     ///< the client has not finished joining
   kForeignClient = 8,  ///< the client id belongs to another DDS participant
   kProtocolVersion = 9,
   kFull = 10,       ///< the server's client limit is reached
-  kNoStream = 11,   ///< the stream or generation named is not played here
-  kRecording = 12,  ///< the session is a recording: nothing can act on it
+  kNoStream = 11,   ///< the named stream or generation is not played here
+  kRecording = 12,  ///< the session is a recording: inputs cannot act on it
 };
 
-// After Reason, or g++ 12 warns that its enumerator shadows this.
+// Declared after Reason; otherwise g++ 12 warns that its enumerator shadows this.
 inline constexpr std::uint32_t kProtocolVersion = 1;
 using ClientId = std::uint64_t;  ///< random, never 0
 using Bytes = std::vector<std::byte>;
@@ -56,15 +56,15 @@ struct BodyType {
   bool operator==(const BodyType&) const = default;
 };
 
-/// One way of telling the session's world. All streams share epoch, rate, lead, lattice, slots and inputs.
+/// One stream of the session's world. All streams share epoch, rate, lead, lattice, slots and inputs.
 struct StreamMessage {
   StreamId id;
-  std::uint32_t client_cost_ns = 0;      ///< of a client's predicted step and hash, per body and frame
-  std::uint32_t max_delta_bytes = 0;     ///< of a whole payload
-  std::uint32_t max_snapshot_bytes = 0;  ///< of a whole snapshot
+  std::uint32_t client_cost_ns = 0;      ///< cost of a client's predicted step and hash, per body and frame
+  std::uint32_t max_delta_bytes = 0;     ///< maximum size of a whole payload
+  std::uint32_t max_snapshot_bytes = 0;  ///< maximum size of a whole snapshot
   std::uint64_t layout_hash = 0;         ///< see layout_hash() in port.hpp
-  /// With the session's capacity, lead and number of types. Received parameters that are not all there, or
-  /// out of range, read as CodecParameters{}, which no layout may have.
+  /// Includes the session's capacity, lead and number of types. Received parameters that are incomplete or
+  /// out of range read as CodecParameters{}, which no layout may have.
   Layout layout;
   bool operator==(const StreamMessage&) const = default;
 };
@@ -77,12 +77,12 @@ struct SessionMessage {
   std::uint32_t capacity = 0;  ///< slots
   double frame_rate_hz = 30;
   double lattice_unit = 0;  ///< scene units per lattice unit
-  std::uint32_t lead = 1;   ///< frames a client may simulate beyond its last delta, 0 or 1
+  std::uint32_t lead = 1;   ///< frames that a client may simulate beyond its last delta, 0 or 1
   std::uint32_t window_ceiling = 24;
   std::string scene;              ///< name
   std::string scene_description;  ///< the geometry as protobuf text (idl/scene.proto), for drawing
   std::vector<BodyType> types;
-  std::vector<StreamMessage> streams;  ///< at least one; a client chooses of those that it can play
+  std::vector<StreamMessage> streams;  ///< at least one; a client chooses among those that it can play
   bool operator==(const SessionMessage&) const = default;
 };
 
@@ -121,7 +121,7 @@ struct SnapshotMessage {
   StreamId stream;
   Frame frame = 0;
   std::uint32_t part = 0, parts = 1;
-  std::uint32_t total_bytes = 0;  ///< of all parts together
+  std::uint32_t total_bytes = 0;  ///< size of all parts together
   Bytes bytes;
   bool operator==(const SnapshotMessage&) const = default;
 };
@@ -131,7 +131,7 @@ enum class Phase : std::uint32_t { kJoining = 0, kPlaying = 1 };
 
 struct ReplyEntry {
   std::uint64_t number = 0;  ///< the client's input number
-  Frame frame = 0;           ///< the frame it acted on, when code is kNone
+  Frame frame = 0;           ///< the frame that the input acted on, if code is kNone
   std::uint32_t code = 0;    ///< Reason
   bool operator==(const ReplyEntry&) const = default;
 };
@@ -144,17 +144,17 @@ struct ReplyMessage {
   Role role = Role::kObserver;
   Phase phase = Phase::kJoining;
   std::uint32_t reason = 0;          ///< Reason
-  std::uint64_t highest_input = 0;   ///< highest input number handled
+  std::uint64_t highest_input = 0;   ///< highest input number that was handled
   std::int64_t client_clock_ns = 0;  ///< echo of the client's clock from its last acknowledgement
   std::int64_t server_time_ns = 0;
-  std::vector<ReplyEntry> entries;  ///< the last 32 at most, oldest first
+  std::vector<ReplyEntry> entries;  ///< at most the last 32, oldest first
   bool operator==(const ReplyMessage&) const = default;
 };
 
 enum class InputKind : std::uint32_t {
   kGravity = 1,       ///< values: x, y, z in scene units / s^2 (scheduled)
   kPush = 2,          ///< values: centre x, y, z; radius; velocity change x, y, z (immediate)
-  kSeek = 3,          ///< values: seconds into the recording that is replayed, at which it goes on
+  kSeek = 3,          ///< values: the time to seek to, seconds into the replayed recording
   kApplication = 16,  ///< bytes for the engine (immediate)
 };
 
@@ -173,18 +173,19 @@ struct InputMessage {
 struct AckMessage {
   static constexpr const char* kTopic = "TandemAck";
   ClientId client = 0;  ///< key
-  Epoch epoch = 0;      ///< 0: looks for the session
+  Epoch epoch = 0;      ///< 0: the client looks for the session
   std::uint32_t protocol_version = kProtocolVersion;
   StreamId stream;  ///< played or joined
   Phase phase = Phase::kJoining;
   Frame applied = 0;
   Frame simulated = 0;
   Role role_wanted = Role::kObserver;
-  std::uint32_t join_attempt = 0;    ///< counts this client's requests for a snapshot; a new value asks again
-  std::int64_t clock_ns = 0;         ///< the client's steady clock
-  Frame snapshot_frame = 0;          ///< while joining: of the snapshot that is coming in
-  std::uint32_t snapshot_parts = 0;  ///< of how many parts it is; 0: none has come yet
-  std::vector<std::uint32_t> missing;  ///< of these, not received: runs of first part and count, ascending
+  std::uint32_t join_attempt = 0;      ///< counts this client's requests for a snapshot; a new value is a new
+                                       ///< request
+  std::int64_t clock_ns = 0;           ///< the client's steady clock
+  Frame snapshot_frame = 0;            ///< while joining: frame of the snapshot that is coming in
+  std::uint32_t snapshot_parts = 0;    ///< number of its parts; 0: no part has come
+  std::vector<std::uint32_t> missing;  ///< parts not received: pairs of first part and count, ascending
   bool operator==(const AckMessage&) const = default;
 };
 
@@ -213,7 +214,7 @@ struct ClientStatusMessage : ReportedFigures {
   bool operator==(const ClientStatusMessage&) const = default;
 };
 
-/// Gives the layout of every stream what the session holds for all of them.
+/// Copies into every stream's layout what the session holds for all of them.
 void complete_layouts(SessionMessage& session);
 
 }  // namespace tandem::transport

@@ -1,5 +1,5 @@
 #pragma once
-// The session announcements a port has seen, by participant: which one is current, and what to report.
+// The session announcements that a port has seen, by participant: which one is current, and what to report.
 
 #include <cstdint>
 #include <functional>
@@ -10,25 +10,25 @@
 
 namespace tandem::transport {
 
-/// How a writer of announcements stands. A silent one may come back; a gone one has to be discovered again.
+/// The state of a writer of announcements. A silent one may come back; a gone one has to be discovered again.
 enum class WriterState : std::uint8_t { kLive, kSilent, kGone };
 
-/// Remembers each participant's newest announcement, because a transport hands out a sample once, while a
-/// server that was silent for a while (stopped, cut off) comes back without announcing itself again. Not
+/// Remembers each participant's newest announcement. A transport hands out a sample only once, but a server
+/// that was silent for a while (stopped, cut off) comes back without announcing itself again. Not
 /// thread-safe.
 ///
-/// One of them is current: the one seen first among those that live and were not passed over. It stays so for
-/// as long as it lives, whatever others announce.
+/// One of them is current: the one seen first among those that are alive and were not passed over. It stays
+/// current as long as it is alive, whatever others announce.
 class SessionBook {
  public:
   using StateOf = std::function<WriterState(std::uint64_t writer, const ParticipantId& participant)>;
 
-  /// `writer` is any id that a transport never reuses.
+  /// Stores an announcement. `writer` is an id that the transport never reuses.
   void put(std::uint64_t writer, Received<SessionMessage> announcement);
-  /// Forgets writers that are gone and takes note of who lives.
+  /// Forgets writers that are gone and notes which are alive.
   void update(const StateOf& state_of);
 
-  /// Appends the current announcement, when it is not the one appended before.
+  /// Appends the current announcement if it is not the one appended before.
   void take_current(std::vector<Received<SessionMessage>>& out);
   void pass_over_current(PassOver until);
   /// Appends all live announcements in the order they were first seen.
@@ -39,7 +39,7 @@ class SessionBook {
  private:
   struct Entry {
     std::uint64_t writer = 0;
-    std::uint64_t version = 0;  // of all announcements, counted
+    std::uint64_t version = 0;  // counts up over all announcements
     bool live = true;
     std::optional<PassOver> passed_over = {};
     Received<SessionMessage> announcement;
@@ -48,7 +48,7 @@ class SessionBook {
 
   std::vector<Entry> entries_;  // in the order in which they are considered
   std::uint64_t versions_ = 0;
-  std::optional<std::uint64_t> current_;  // its writer
+  std::optional<std::uint64_t> current_;  // writer of the current announcement
   std::uint64_t reported_ = 0;            // version of the announcement appended last; 0: none
 };
 

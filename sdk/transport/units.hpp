@@ -1,5 +1,5 @@
 #pragma once
-// What clocks and rates count in.
+// The units of clocks and rates.
 
 #include <cstdint>
 
@@ -8,7 +8,7 @@ namespace tandem {
 inline constexpr std::int64_t kMillisecond = 1'000'000;  ///< nanoseconds
 inline constexpr std::int64_t kSecond = 1000 * kMillisecond;
 
-/// As in the thesis.
+/// The thesis's Mbit.
 inline constexpr double kBitsPerMbit = 1048576.0;
 
 }  // namespace tandem

@@ -1,5 +1,5 @@
 #pragma once
-// A world as the constants of the predictors that compute contacts.
+// Turns a world into the constants of the predictors that compute contacts.
 
 #include <cstdint>
 #include <string_view>

@@ -8,7 +8,7 @@
 
 namespace tandem::planning {
 
-/// The number that the whole of `text` is.
+/// The number that `text` consists of; empty if it is none.
 template <class T>
 [[nodiscard]] std::optional<T> number(std::string_view text) {
   T value{};

@@ -1,6 +1,7 @@
 #pragma once
-// From a world and wishes to a host's configuration: lattice, streams with codec, predictor and tables, and
-// what clients are told. A scene, tandem::Server, the benches and the tests all come through here.
+// Turns a world and an operator's wishes into a host's configuration: lattice, streams with codec, predictor
+// and tables, and what clients are told. A scene, tandem::Server, the benches and the tests all use these
+// functions.
 
 #include <vector>
 
@@ -11,25 +12,25 @@
 
 namespace tandem::planning {
 
-/// The stream that follows from world and wishes. Where nothing was trained for this size and threshold, the
-/// nearest table is used, and the built-in one for a world that was never trained. Errors: kInvalidArgument
-/// (the threshold, a world too large for it, or a body type that turns and has no radius), kUnsupported
-/// (codec, predictor).
+/// The stream that follows from world and wishes. If nothing was trained for this size and threshold, it uses
+/// the nearest table; for a world that was never trained, the built-in one. Errors: kInvalidArgument (the
+/// threshold, a world too large for it, or a body type that turns and has no radius), kUnsupported (codec,
+/// predictor).
 [[nodiscard]] Result<host::StreamConfig> plan_stream(const World& world, const Wishes& wishes);
 
-/// The streams of a session where nobody wished any: where the automatic predictor is not the basic one,
-/// `thin` with the basic one and `rich` with that; else none, which means one without a name. Errors: as
-/// plan_stream().
+/// The default streams of a session. If the automatic predictor is not the basic one, they are `thin` with
+/// the basic predictor and `rich` with the automatic one. Otherwise the result is empty, which means one
+/// stream without a name. Errors: as plan_stream().
 [[nodiscard]] Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes& wishes);
 
-/// A host's configuration with the streams wished, on the lattice of the finest threshold among them, the
-/// world's frame rate, types and names; the rest keeps its defaults. Errors: as plan_stream(), naming the
-/// stream where it has a name; also kInvalidArgument for a stream that the lattice cannot hold, for what
-/// check_stream() refuses, and as host::check_stream_names().
+/// A host's configuration with the wished streams, on the lattice of the minimum threshold among them, and
+/// with the world's frame rate, types and names. The rest keeps its defaults. Errors: as plan_stream(),
+/// naming the stream if it has a name; also kInvalidArgument for a stream that the lattice cannot hold and
+/// for what check_stream() refuses; and as host::check_stream_names().
 [[nodiscard]] Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes);
 
-/// The same for a server that begins now: with the usual streams where none are wished, and served as
-/// `service` says. Errors: as plan_session().
+/// Does the same for a server: uses the default streams if none are wished, and serves them as `service`
+/// says. Errors: as plan_session().
 [[nodiscard]] Result<host::HostConfig> plan_server(const World& world, Wishes wishes,
                                                    const ServiceWishes& service);
 

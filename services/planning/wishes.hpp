@@ -1,5 +1,5 @@
 #pragma once
-// What an operator wishes of a server: of its streams, and of how it serves.
+// What an operator wishes: the streams of a server, and how it serves them.
 
 #include <array>
 #include <cstddef>
@@ -16,33 +16,34 @@
 
 namespace tandem::planning {
 
-/// As a predictor's name: the first of predictors() that suits codec and world.
+/// This name of a predictor stands for the first of predictors() that suits codec and world.
 inline constexpr std::string_view kAutomaticPredictor = "auto";
-/// Below, a frame has hardly room for one body.
+/// With a smaller budget a frame has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
 inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
 
-/// What one of several streams is to have of its own; the rest it takes from Wishes.
+/// The settings of one of several streams; the others come from Wishes.
 struct StreamWishes {
   std::string name = {};  ///< see host::check_stream_names()
-  /// Keys of kStreamOptions and their values.
+  /// Pairs of a key of kStreamOptions and its value.
   std::vector<std::pair<std::string, std::string>> settings = {};
 };
 
-/// What is wished on top of the world.
+/// What an operator wishes for a world's streams.
 struct Wishes {
   std::string codec = "tracker";
   std::string predictor{kAutomaticPredictor};
   std::optional<double> threshold_m = {};  ///< empty: the world's, times threshold_scale
   double threshold_scale = 1;
-  bool automatic = false;        ///< quality follows the world at run time, from a quarter of that threshold
+  bool automatic = false;        ///< quality follows the world at run time, from a quarter of the threshold
   double target_mbit_per_s = 0;  ///< with `automatic`; 0: the threshold stays
   std::optional<double> max_error_m = {};  ///< with `automatic`; empty: four times the threshold
-  /// Of corrections per frame, for codecs that take one; empty: CodecTraits::usual_budget.
+  /// Maximum size of the corrections of a frame, for codecs that take a budget; empty:
+  /// CodecTraits::usual_budget.
   std::optional<std::size_t> budget_bytes = {};
-  std::uint32_t threads = 1;               ///< of the codec, where a session has several blocks
-  std::vector<StreamWishes> streams = {};  ///< empty: one without a name, as wished above
+  std::uint32_t threads = 1;               ///< threads of the codec, if a session has several blocks
+  std::vector<StreamWishes> streams = {};  ///< empty: one stream without a name, as wished above
 };
 
 /// A key of `--stream NAME:key=value,...`, of a stream in a configuration file, and of
@@ -59,7 +60,7 @@ struct StreamOption {
   bool steers = false;                 ///< goes with an automatic threshold alone
 };
 
-/// A new option is a field above and in idl/server.proto, a line here, and its use in plan.cpp.
+/// A new option needs a field above and in idl/server.proto, a line here, and its use in plan.cpp.
 inline constexpr std::array kStreamOptions{
     StreamOption{.key = "codec", .file_field = "codec", .field = &Wishes::codec},
     StreamOption{.key = "predictor", .file_field = "predictor", .field = &Wishes::predictor},
@@ -93,12 +94,12 @@ inline constexpr std::array kStreamOptions{
                  .takes = "at least 64 bytes"},
 };
 
-/// Reads NAME:ITEM,ITEM..., where an item is key=value, or a predictor alone. Errors: kInvalidArgument, in
-/// one line, for keys that there are not and numbers that are none.
+/// Reads NAME:ITEM,ITEM..., in which an item is key=value or only a predictor. Errors: kInvalidArgument, in
+/// one line, for unknown keys and values that are not numbers.
 [[nodiscard]] Result<StreamWishes> read_stream(const std::string& text);
 
-/// What is wished for one of several streams, all told. Errors: kInvalidArgument for a setting that cannot be
-/// read.
+/// All wishes for one of several streams: the common ones and its own. Errors: kInvalidArgument for a setting
+/// that cannot be read.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
 /// Checks what is said for all streams. Errors: kInvalidArgument, which begins with the option's key and a
@@ -114,13 +115,13 @@ inline constexpr std::uint32_t kMostClients = 65'536;
 /// How the session is served, whatever its streams.
 struct ServiceWishes {
   std::string session = "default";
-  std::uint32_t lead = 1;  ///< frames clients may simulate beyond the last delta, 0 or 1
+  std::uint32_t lead = 1;  ///< frames that clients may simulate beyond the last delta, 0 or 1
   std::uint32_t client_limit = 256;
   std::uint32_t wait_for = 0;                   ///< participants that must play before frame 1
-  std::optional<std::uint32_t> window = {};     ///< empty: automatic
-  std::optional<double> rate_hz = {};           ///< empty: the world's
+  std::optional<std::uint32_t> window = {};     ///< empty: chosen at run time
+  std::optional<double> rate_hz = {};           ///< empty: the rate of the world
   bool free_rate = false;                       ///< as fast as window and queue allow
-  std::optional<double> stall_timeout_s = 0.5;  ///< empty: off
+  std::optional<double> stall_timeout_s = 0.5;  ///< empty: no limit
 };
 
 }  // namespace tandem::planning

@@ -1,5 +1,5 @@
 #pragma once
-// A world as streams see it: what bodies are, how far they go, and what they meet.
+// A world as streams need it: its bodies, its size, and what bodies meet.
 
 #include <cstdint>
 #include <optional>
@@ -12,11 +12,11 @@
 
 namespace tandem::planning {
 
-/// Lengths in scene units.
+/// A type of bodies. Lengths are in scene units.
 struct BodyType {
   std::string name = {};
-  double bounding_radius = 0;  ///< of the sphere around it
-  double contact_radius = 0;   ///< of the sphere that predictors of contacts take it for
+  double bounding_radius = 0;  ///< radius of the sphere around the body
+  double contact_radius = 0;   ///< radius of the sphere that stands for the body in contacts
   double mass = 1;
   std::uint32_t colour_rgba = 0xFFFFFFFF;
   BodyShape shape = BodyShape::kSphere;
@@ -24,16 +24,16 @@ struct BodyType {
 };
 
 struct World {
-  std::string name = {};         ///< to show
-  std::string description = {};  ///< for clients to draw: protobuf text of idl/scene.proto
+  std::string name = {};         ///< a name to display
+  std::string description = {};  ///< what clients draw: protobuf text of idl/scene.proto
   std::uint32_t capacity = 0;
   double dt_s = 0;
-  double extent = 0;     ///< largest |coordinate|
-  double threshold = 0;  ///< error threshold where nobody wishes another
+  double extent = 0;     ///< maximum |coordinate|
+  double threshold = 0;  ///< error threshold unless the operator wishes another
   bool turns = false;    ///< bodies have orientations
   std::vector<BodyType> types = {};
   std::optional<Scenery> scenery = {};     ///< empty: contacts cannot be predicted
-  std::vector<TrainedTable> trained = {};  ///< of the paper's codecs
+  std::vector<TrainedTable> trained = {};  ///< tables of the thesis's codecs
 };
 
 }  // namespace tandem::planning

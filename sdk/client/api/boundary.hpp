@@ -1,5 +1,5 @@
 #pragma once
-// Where C calls C++: results, their texts, and no exception beyond.
+// The boundary from C to C++: results and their texts. No exception crosses it.
 
 #include <exception>
 #include <new>
@@ -12,12 +12,12 @@ namespace tandem::api {
 
 inline constexpr tandem_result kOk = TANDEM_OK;
 
-/// Keeps the text for tandem_error_text() of this thread and returns the code.
+/// Stores the text for tandem_error_text() of this thread and returns the code.
 tandem_result refuse(tandem_result code, const char* text) noexcept;
 tandem_result refuse(const Error& error) noexcept;
 [[nodiscard]] const char* refusal_text() noexcept;
 
-/// In this thread an application's callback runs for as long as it lives.
+/// Marks that an application's callback runs in this thread while the object lives.
 class CallbackScope {
  public:
   CallbackScope();
@@ -26,12 +26,12 @@ class CallbackScope {
   CallbackScope& operator=(const CallbackScope&) = delete;
   CallbackScope(CallbackScope&&) = delete;
   CallbackScope& operator=(CallbackScope&&) = delete;
-  /// Whether one lives in this thread.
+  /// True if a CallbackScope lives in this thread.
   [[nodiscard]] static bool active();
 };
 
-/// Runs the body of a function of tandem.h that has to do with handles: a function without arguments that
-/// returns a tandem_result.
+/// Runs the body of a function of tandem.h that uses handles. `body` takes no arguments and returns a
+/// tandem_result.
 template <class Body>
 tandem_result call(Body&& body) noexcept {
   if (CallbackScope::active()) {
@@ -48,7 +48,7 @@ tandem_result call(Body&& body) noexcept {
   }
 }
 
-/// What a forked child gets that asks for a client or browser of its own.
+/// The result for a forked child that asks for a client or browser.
 inline tandem_result forked_child() noexcept {
   return refuse(TANDEM_TRANSPORT,
                 "a child of fork() cannot use DDS: its parent did; start a program with exec()");

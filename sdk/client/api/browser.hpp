@@ -1,5 +1,5 @@
 #pragma once
-// The sessions on a domain, as whoever chooses one wants to see them: what a tandem_browser stands for.
+// The sessions on a domain, with what is needed to choose one. A tandem_browser is a handle of a Browser.
 
 #include <cstdint>
 #include <map>
@@ -15,18 +15,18 @@ namespace tandem::api {
 
 struct FoundSession {
   transport::SessionMessage announced;
-  /// Of its streams, the one that a client would play; null: none can be played.
+  /// The stream that a client would play; null if none can be played.
   const transport::StreamMessage* stream = nullptr;
-  transport::ServerStatusMessage status;  ///< of this epoch, or empty
+  transport::ServerStatusMessage status;  ///< the status of this epoch, or empty
 };
 
-/// Keeps of each live session what was heard last. Thread-safe.
+/// Keeps the last messages of each live session. Thread-safe.
 class Browser {
  public:
   explicit Browser(std::unique_ptr<transport::Monitor> monitor) : monitor_(std::move(monitor)) {}
 
-  /// Takes in what arrived and calls `see(found)` for each live session, by name; of several servers of one
-  /// name for the first that was seen, which is the one that clients follow.
+  /// Takes what arrived and calls `see(found)` for each live session, sorted by name. If several servers have
+  /// one name, it shows the one that was seen first, because clients follow that one.
   template <class See>
   void list(std::int64_t now_ns, See&& see) {
     const std::lock_guard lock(mutex_);
@@ -50,7 +50,8 @@ class Browser {
   std::unique_ptr<transport::Monitor> monitor_;
   std::map<std::string, FoundSession> sessions_;
   std::map<std::string, Heard> heard_;   // by session
-  std::map<Run, std::size_t> playable_;  // of the live ones: finding out takes as much memory as playing
+  std::map<Run, std::size_t> playable_;  // of the live sessions; kept because finding out takes as much
+                                         // memory as playing
 };
 
 }  // namespace tandem::api

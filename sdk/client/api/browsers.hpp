@@ -9,7 +9,7 @@
 
 namespace tandem::api {
 
-/// tandem_browser_open() over any monitor.
+/// tandem_browser_open() for any monitor.
 tandem_result browse_over(std::unique_ptr<transport::Monitor> monitor, tandem_browser* browser) noexcept;
 
 }  // namespace tandem::api

@@ -1,5 +1,5 @@
 #pragma once
-// Who a client is.
+// The id of a client.
 
 #include <cstdint>
 #include <random>
@@ -8,7 +8,7 @@
 
 namespace tandem::client {
 
-/// 64 random bits of the operating system's, never 0: two clients that share an id are refused by the server.
+/// 64 random bits from the operating system, never 0. The server refuses two clients that share an id.
 [[nodiscard]] inline transport::ClientId random_client_id() {
   std::random_device device;
   transport::ClientId id = 0;

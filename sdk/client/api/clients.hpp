@@ -7,7 +7,7 @@
 
 namespace tandem::api {
 
-/// Never destroyed, so that a client held by a static object may still be closed.
+/// The registry of clients. It is never destroyed, so that a static object can still close its client.
 [[nodiscard]] Registry<RunningClient>& clients();
 
 /// Runs the body of a function of tandem.h: `body(client)` returns a tandem_result.

@@ -1,5 +1,5 @@
 #pragma once
-// Both clocks at once, as a ClientCore wants them.
+// Reads both clocks at once, as a ClientCore needs them.
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/clock.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// What happens to a client, in a queue that an application empties when it likes.
+// A queue of a client's events, which the application empties when it likes.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,24 +15,24 @@ namespace tandem::api {
 struct Event {
   tandem_event_kind kind = 0;
   std::uint32_t reason = 0;   ///< transport::Reason
-  std::uint32_t dropped = 0;  ///< older ones, since the one taken before
+  std::uint32_t dropped = 0;  ///< number of events dropped since the previously taken one
   std::uint64_t number = 0;
   Frame frame = 0;
   Epoch epoch = 0;
   std::int64_t at_ns = 0;
-  std::string text;  ///< where there is no reason
+  std::string text;  ///< used if there is no reason
 };
 
-/// Listens to a core and remembers. Bounded; allocates where an event has a text. Not thread-safe.
+/// Listens to a core and stores events. Bounded; allocates only if an event has a text. Not thread-safe.
 class EventLog final : public client::CoreListener {
  public:
   static constexpr std::size_t kMost = 256;
 
   EventLog();
 
-  /// Before each poll: what comes is of this time.
+  /// Call before each poll: events of the poll get this time.
   void begin(std::int64_t steady_ns) { now_ns_ = steady_ns; }
-  /// After each poll: what a core does not tell by itself.
+  /// Call after each poll: adds the events that a core does not report itself.
   void end(const client::ClientCore& core);
 
   [[nodiscard]] std::optional<Event> take();

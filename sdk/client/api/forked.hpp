@@ -1,11 +1,12 @@
 #pragma once
-// fork() copies the calling thread alone: in the child the clients' threads and locks are those of nobody.
+// fork() copies only the calling thread. In the child the clients' threads do not exist and their locks have
+// no owner.
 
 namespace tandem::api {
 
-/// From now on in_forked_child() tells. Called before there is a handle.
+/// Makes in_forked_child() work from now on. Call it before there is a handle.
 void watch_forks();
-/// This process came out of fork() after watch_forks(), and holds nothing of its parent's.
+/// True if this process was made by fork() after watch_forks(). It holds nothing of its parent.
 [[nodiscard]] bool in_forked_child();
 
 }  // namespace tandem::api

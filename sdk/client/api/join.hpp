@@ -1,5 +1,5 @@
 #pragma once
-// Clients behind handles, over any port.
+// Makes clients with handles for any port.
 
 #include <memory>
 
@@ -8,7 +8,7 @@
 
 namespace tandem::api {
 
-/// tandem_join() where port and clock are the caller's. `clock`: null for the system's.
+/// tandem_join() with the caller's port and clock. `clock`: null for the system's.
 tandem_result join_over(std::unique_ptr<transport::ClientPort> port, RunningClient::Clock clock,
                         const tandem_options* options, tandem_client* client) noexcept;
 

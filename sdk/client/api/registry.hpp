@@ -1,6 +1,5 @@
 #pragma once
-// What handles stand for. A handle is never used twice, and what it names lives for as long as a call uses
-// it.
+// Maps handles to objects. A handle is never used twice. An object lives while a call uses it.
 
 #include <atomic>
 #include <cstdint>
@@ -16,10 +15,11 @@ namespace tandem::api {
 
 using Handle = std::uint64_t;  ///< 0: none
 
-/// Of all registries of a process. Thread-safe.
+/// Returns a handle that is unique among all registries of the process. Thread-safe.
 [[nodiscard]] Handle next_handle();
 
-/// Thread-safe. The lock is held for a look-up only. In a forked child it finds nothing.
+/// Maps handles to objects of one type. Thread-safe; the lock is held only during a look-up. In a forked
+/// child it finds nothing.
 template <class T>
 class Registry {
  private:
@@ -29,7 +29,7 @@ class Registry {
   };
 
  public:
-  /// Keeps the object alive; false where there is none.
+  /// Keeps the object alive; converts to false if there is no object.
   class Use {
    public:
     explicit Use(std::shared_ptr<Slot> slot) : slot_(std::move(slot)) {}
@@ -67,8 +67,8 @@ class Registry {
     return Use(found->second);
   }
 
-  /// From now on nobody finds it. Calls `end(object)`, which makes uses that last long end, waits for all of
-  /// them and returns it; null where there is none.
+  /// Removes the object so that it is not found any more. Calls `end(object)`, which makes long uses end,
+  /// waits for all uses and returns the object; null if there is none.
   template <class End>
   [[nodiscard]] std::unique_ptr<T> remove(Handle handle, End&& end) {
     if (in_forked_child()) return nullptr;

@@ -1,5 +1,5 @@
 #pragma once
-// A ClientCore with a clock, a port and, if wanted, a thread: what a tandem_client stands for.
+// A ClientCore with a clock, a port and optionally a thread. A tandem_client is a handle of it.
 
 #include <atomic>
 #include <condition_variable>
@@ -17,19 +17,19 @@
 
 namespace tandem::api {
 
-/// A session's scene, and whose it is.
+/// The scene of a session, and the epoch that it belongs to.
 struct KnownScene {
   Epoch epoch = 0;
   Result<SceneText> scene;
 };
 
-/// All members may be called from any thread, end() and the destructor too. The port waits without the lock,
-/// so that nobody waits for the network.
+/// All members may be called from any thread, including end() and the destructor. The port waits without the
+/// lock, so no thread waits for the network.
 class RunningClient {
  public:
   using Clock = client::Now (*)();
 
-  /// `background`: a thread of its own does the work.
+  /// `background`: the client has a thread that does its work.
   RunningClient(client::CoreOptions options, std::unique_ptr<transport::ClientPort> port, Clock clock,
                 bool background);
   ~RunningClient();
@@ -38,10 +38,10 @@ class RunningClient {
   RunningClient(RunningClient&&) = delete;
   RunningClient& operator=(RunningClient&&) = delete;
 
-  /// Calls in work that wait end with kInvalidHandle, and soon.
+  /// Makes calls that are waiting return kInvalidHandle soon.
   void end();
 
-  /// One round of work, and a wait for the next. Errors: kWrongThread, and what failed() says.
+  /// Does one round of work and waits for the next. Errors: kWrongThread, and those of usable().
   Result<void> update(double wait_s);
   /// Errors: also kTimeout.
   Result<void> wait_until_playing(double timeout_s);
@@ -58,17 +58,17 @@ class RunningClient {
     const std::lock_guard lock(mutex_);
     return look(core_.session());
   }
-  /// What was read last; null before that.
+  /// The scene that was read last; null before the first.
   [[nodiscard]] std::shared_ptr<const KnownScene> scene() const;
   void hold_scene(std::shared_ptr<const KnownScene> scene);
   [[nodiscard]] ClientPhase phase() const { return phase_; }
-  /// Without the lock, but for the first call. Errors: kNotReady, kCapacity (`frame` has capacity, epoch and
-  /// has_orientations).
+  /// Samples. Only the first call takes the lock. Errors: kNotReady, kCapacity (`frame` has capacity, epoch
+  /// and has_orientations).
   Result<void> sample(const tandem_sample_options& options, const tandem_columns& columns,
                       tandem_frame& frame);
 
  private:
-  /// Errors: what went wrong within a round, once and for all: the core may have been left half-way.
+  /// Errors: what went wrong in a round. The error stays, because the core may have been left half-way.
   [[nodiscard]] Result<void> usable() const;
   Result<void> round(std::int64_t longest_ns);
   Result<void> poll(std::int64_t& due_ns);
@@ -79,7 +79,7 @@ class RunningClient {
   const bool participant_;
   std::unique_ptr<transport::ClientPort> port_;
   EventLog events_;
-  mutable std::mutex mutex_;  // guards core_ but for its sample(), events_, fault_ and scene_
+  mutable std::mutex mutex_;  // guards core_ except its sample(), events_, fault_ and scene_
   std::condition_variable phase_changed_;
   client::ClientCore core_;
   std::optional<ErrorCode> fault_;
@@ -87,7 +87,7 @@ class RunningClient {
   std::atomic<ClientPhase> phase_ = ClientPhase::kSearching;
   std::atomic<bool> sampling_ = false;
   std::atomic<bool> ending_ = false;
-  std::atomic<bool> updating_ = false;  // without a thread: somebody is in round()
+  std::atomic<bool> updating_ = false;  // without a thread: a caller is in round()
   std::thread thread_;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Structs of tandem.h, whose `size` may be that of an older or a newer header.
+// Reads and writes structs of tandem.h whose `size` may be that of an older or a newer header.
 
 #include <algorithm>
 #include <cstddef>
@@ -38,7 +38,7 @@ inline constexpr std::size_t kFirstSize<tandem_body_type> = offsetof(tandem_body
 template <>
 inline constexpr std::size_t kFirstSize<tandem_session_info> = offsetof(tandem_session_info, predictor) + 72;
 
-/// No struct will ever be larger: a size beyond is garbage.
+/// No struct will ever be larger; a larger size is garbage.
 inline constexpr std::uint32_t kLargestStruct = 4096;
 
 [[nodiscard]] inline std::uint32_t size_of(const void* theirs) {
@@ -47,7 +47,7 @@ inline constexpr std::uint32_t kLargestStruct = 4096;
   return size;
 }
 
-/// Errors: TANDEM_INVALID_ARGUMENT (null, or a size that no header has).
+/// Checks a struct's pointer and size. Errors: TANDEM_INVALID_ARGUMENT (null, or a size that no header has).
 template <class T>
 [[nodiscard]] tandem_result check_struct(const T* theirs) {
   if (theirs == nullptr) return refuse(TANDEM_INVALID_ARGUMENT, "a pointer to a struct is null");
@@ -59,8 +59,8 @@ template <class T>
   return kOk;
 }
 
-/// Reads a struct over `ours`, which holds the defaults of what theirs does not have. Errors: also
-/// TANDEM_UNSUPPORTED (something set that this library does not know).
+/// Reads a struct into `ours`, which holds the defaults of fields that their struct does not have. Errors:
+/// also TANDEM_UNSUPPORTED (a field is set that this library does not know).
 template <class T>
 [[nodiscard]] tandem_result read_struct(const T* theirs, T& ours) {
   if (const tandem_result checked = check_struct(theirs); checked != TANDEM_OK) return checked;
@@ -77,8 +77,8 @@ template <class T>
   return kOk;
 }
 
-/// Writes what fits into their struct, which was checked; the rest of it becomes 0. `size`: theirs, which
-/// stays, as it is the stride of an array that the caller may hand over again.
+/// Writes the fields that fit into their struct, which was checked; the rest of it becomes 0. `size`: their
+/// size. It is not changed, because it is the stride of an array that the caller may pass again.
 template <class T>
 void write_struct(const T& ours, void* theirs, std::size_t size) {
   std::memset(theirs, 0, size);
@@ -91,7 +91,7 @@ void write_struct(const T& ours, T* theirs) {
   write_struct(ours, theirs, size_of(theirs));
 }
 
-/// Cuts what is too long, at a character's end.
+/// Copies a text. A text that is too long is cut at the end of a character.
 template <std::size_t kSize>
 void write_text(std::string_view text, char (&to)[kSize]) {  // NOLINT(*-avoid-c-arrays): C's
   std::size_t length = std::min(text.size(), kSize - 1);

@@ -1,5 +1,5 @@
 #pragma once
-// An app's own gravity, shown before the session has it.
+// An application's own gravity, shown before the session has it.
 
 #include <cstdint>
 #include <optional>
@@ -11,7 +11,7 @@ namespace tandem::client {
 /// The newest gravity that this client sent, until it acts, is refused or is lost. Not thread-safe.
 class LocalEcho {
  public:
-  /// `gravity`: 1/64 lattice unit per frame^2. `frame`: the server's at this moment.
+  /// `gravity`: 1/64 lattice unit per frame^2. `frame`: the server's frame at this moment.
   void on_sent(std::uint64_t number, const std::array<float, 3>& gravity, double frame) {
     number_ = number;
     acts_.reset();
@@ -21,11 +21,11 @@ class LocalEcho {
   void on_scheduled(std::uint64_t number, Frame acts) {
     if (number == number_) acts_ = acts;
   }
-  /// It acted, was refused or is lost.
+  /// The input acted, was refused or is lost.
   void on_over(std::uint64_t number) {
     if (number == number_) clear();
   }
-  /// From the frame it acts on the motion itself shows it.
+  /// From the frame that the input acts on, the motion itself shows it.
   void on_simulated(Frame now) {
     if (acts_ && now >= *acts_) clear();
   }

@@ -1,6 +1,6 @@
 #pragma once
-// The inner loops of sampling: one axis of a run of slots. Floats: a place needs no more digits than the
-// caller's own have. Lattice units, and those per frame.
+// The inner loops of sampling: one axis of a run of slots. They compute in floats, because a drawn place
+// needs no more digits than the caller's floats have. Units are lattice units and lattice units per frame.
 
 #include <array>
 #include <cstddef>
@@ -10,34 +10,34 @@
 
 namespace tandem::client {
 
-/// Slots are worked on in runs that stay in the first cache.
+/// Number of slots processed together; a run stays in the first-level cache.
 inline constexpr std::size_t kRun = 256;
 using Numbers = std::array<float, kRun>;
 
-/// Spans of a SampledMoment that all bodies share.
+/// Times of a SampledMoment that are the same for all bodies.
 struct Span {
   float after = 0, since = 0, gap = 0, pace = 1;
 };
 
-/// What some bodies' motion has beyond its velocity, at this moment: place and velocity, and how far that
-/// carried it since the previous sample.
+/// The part of some bodies' motion at this moment that their velocity does not contain: place, velocity, and
+/// how far it moved the body since the previous sample.
 struct Extra {
   Numbers place, way, speed;
 };
 
-/// Velocities as they are foreseen: 1/64 unit per frame.
+/// Reads the predicted velocities: 1/64 unit per frame.
 void read_speeds(const std::int32_t* v, std::size_t count, float* speeds);
-/// Those of the way between two frames; none where the counts of jumps differ: what spawned or teleported in
-/// between was never on the way from one place to the other.
+/// Computes velocities from the way between two frames. The velocity is 0 if the counts of jumps differ,
+/// because a body that spawned or teleported in between never moved from one place to the other.
 void read_ways(const std::int32_t* from, const std::int32_t* to, const std::uint8_t* jumps_from,
                const std::uint8_t* jumps_to, std::size_t count, float* speeds);
 
-/// Takes `shown_place` and `shown_speed` from the previous sample to this one. What was drawn, carried on
-/// with the motion, is where the eye expects it; the rest is a correction. `extra` may be null.
+/// Advances `shown_place` and `shown_speed` from the previous sample to this one. The eye expects the drawn
+/// place to move on with the motion; the difference to the true place is a correction. `extra` may be null.
 void show(const std::int32_t* places, const float* speeds, const Extra* extra, std::size_t count,
           const Span& span, const Smoothing& smoothing, float* shown_place, float* shown_speed);
 
-/// x y z x y z ..., scaled. `stride` in bytes, any alignment.
+/// Writes vectors x y z, scaled. `stride` is in bytes; any alignment.
 void put_vectors(const float* x, const float* y, const float* z, float scale, std::size_t count,
                  std::byte* to, std::size_t stride);
 

@@ -1,5 +1,5 @@
 #pragma once
-// What guards the little that threads share, and is nothing where there are none.
+// A mutex for the little data that threads share. It does nothing in builds without threads.
 
 #if defined(__wasm__) && !defined(__wasm_atomics__)
 #define TANDEM_ONE_THREAD
@@ -16,7 +16,7 @@ struct Lock {
 };
 #else
 using Mutex = std::mutex;
-using Lock = std::lock_guard<Mutex>;  ///< holds it for as long as it lives
+using Lock = std::lock_guard<Mutex>;  ///< holds the mutex while it lives
 #endif
 
 }  // namespace tandem::client

@@ -1,5 +1,5 @@
 #pragma once
-// What is drawn of the client state, handed from the thread that applies to those that sample.
+// The drawn part of the client state, handed from the thread that applies to the threads that sample.
 
 #include <array>
 #include <atomic>
@@ -19,20 +19,21 @@ namespace tandem::client {
 struct DrawnFrame {
   Frame frame = 0;
   std::array<std::vector<std::int32_t>, kPositionChannels> p;
-  std::array<std::vector<std::int32_t>, kPositionChannels> v;    ///< from this frame to the next, as foreseen
+  std::array<std::vector<std::int32_t>, kPositionChannels> v;    ///< predicted velocity from this frame to
+                                                                 ///< the next
   std::array<std::vector<std::int32_t>, kQuaternionChannels> q;  ///< empty without orientations
-  std::array<std::vector<std::int32_t>, kSpinChannels> w;        ///< likewise
+  std::array<std::vector<std::int32_t>, kSpinChannels> w;        ///< empty without orientations
   std::vector<std::uint8_t> alive;
   std::vector<std::uint8_t> reuse;
   std::vector<TypeId> type;
   std::vector<std::uint8_t> motion;  ///< kMoves, kFalls
-  std::vector<std::uint8_t> jumps;   ///< counts the bodies' spawns and teleports since the snapshot, wraps
+  std::vector<std::uint8_t> jumps;   ///< counts spawns and teleports in the slot since the snapshot, wraps
 
   std::uint32_t alive_count = 0;
   Vec3i gravity{};  ///< 1/64 lattice unit per frame^2
 
   static constexpr std::uint8_t kMoves = 1;  ///< a body that is not at rest
-  static constexpr std::uint8_t kFalls = 2;  ///< and whose velocity gravity alone changes
+  static constexpr std::uint8_t kFalls = 2;  ///< a moving body whose velocity only gravity changes
 
   [[nodiscard]] bool has_orientations() const { return !q[0].empty(); }
   [[nodiscard]] Quaternion quaternion(Slot slot) const {
@@ -41,61 +42,62 @@ struct DrawnFrame {
   [[nodiscard]] Spin spin(Slot slot) const { return {w[0][slot], w[1][slot], w[2][slot]}; }
 };
 
-/// How velocities are going to change, as the last predicted step changed them. A step that changed one by
-/// more than gravity does in 1.5 frames was a collision, which tells nothing of the next.
+/// The expected change of velocities, learned from the last predicted step. A step that changed a velocity by
+/// more than gravity does in 1.5 frames was a collision, which says nothing about the next step.
 struct Accelerations {
   std::array<std::vector<std::int32_t>, kPositionChannels> a;  ///< 1/64 lattice unit per frame^2
-  std::vector<std::uint8_t> falls;                             ///< 1: as gravity does
+  std::vector<std::uint8_t> falls;                             ///< 1: the velocity changes as by gravity
   Vec3i gravity{};
 
   void forget(std::size_t capacity);
   void learn(const State& before, const State& after, const Vec3i& drive);
 };
 
-/// Copies what sampling reads of `state`, the one of `frame`. `jumps`: a count a slot. Allocates where
-/// `drawn` held fewer slots.
+/// Copies the part of `state`, the state of `frame`, that sampling reads. `jumps`: one count per slot.
+/// Allocates if `drawn` held fewer slots.
 void draw(const State& state, Frame frame, std::span<const std::uint8_t> jumps,
           const Accelerations& accelerations, DrawnFrame& drawn);
 
-/// A gravity that an app sent and that is not in force yet.
+/// A gravity that the application sent and that is not in force yet.
 struct GravityEcho {
   std::array<float, kPositionChannels> gravity{};  ///< 1/64 lattice unit per frame^2
   double frame = 0;                                ///< when it was sent
 };
 
-/// All that one sample() reads, of one moment. The frames belong to a PictureExchange.
+/// All data of one moment that sample() reads. The frames belong to a PictureExchange.
 struct Picture {
   Epoch epoch = 0;
   double lattice_unit = 0;               ///< scene units
-  std::uint64_t load = 0;                ///< number of the snapshot: across two, every body may have jumped
+  std::uint64_t load = 0;                ///< number of the snapshot; every body may have jumped between two
+                                         ///< snapshots
   const DrawnFrame* before = nullptr;    ///< the agreed frame before `agreed`; null right after a snapshot
   const DrawnFrame* agreed = nullptr;    ///< the last frame agreed with the server
-  const DrawnFrame* ahead = nullptr;     ///< the last frame simulated; `agreed` when nothing is ahead of it
-  std::int64_t agreed_ns = 0;            ///< steady time at which `agreed` was
-  std::optional<GravityEcho> echo = {};  ///< to be shown
+  const DrawnFrame* ahead = nullptr;     ///< the last frame simulated; equal to `agreed` if nothing is ahead
+  std::int64_t agreed_ns = 0;            ///< steady time at which `agreed` was reached
+  std::optional<GravityEcho> echo = {};  ///< the echo to show
   Pacer pacer;
 };
 
-/// One thread shows pictures, any number read the last one. The mutex between the two sides is held while a
-/// picture's few values are copied, never while the columns of a frame are written or read, so nobody waits
-/// for the other side's work. Readers wait for each other.
+/// Hands pictures from one thread to any number of readers of the last one. The mutex between the two sides
+/// is held while a picture's few values are copied, never while the columns of a frame are written or read.
+/// So neither side waits for the other's work. Readers wait for each other.
 class PictureExchange {
  public:
-  /// Somebody samples: from now on pictures have to be shown.
+  /// A reader samples: from now on pictures have to be shown.
   void want() { wanted_ = true; }
   [[nodiscard]] bool wanted() const { return wanted_; }
 
   // For the thread that shows.
 
-  /// A frame to write into, that no reader sees and that neither the last picture nor `next` uses.
+  /// A frame to write into. No reader sees it, and neither the last picture nor `next` uses it.
   [[nodiscard]] DrawnFrame& unused(const Picture& next);
   /// A new number for Picture::load; never the same twice.
   [[nodiscard]] std::uint64_t count_load() { return ++loads_; }
   void show(const Picture& picture);
-  /// There is nothing to draw any more.
+  /// Removes the picture: there is nothing to draw any more.
   void clear();
 
-  /// Holds the last picture still, for as long as it lives. Made and destroyed by one thread.
+  /// Keeps the last picture unchanged while the object lives. The same thread must make and destroy it.
   class Reading {
    public:
     explicit Reading(PictureExchange& exchange);
@@ -104,7 +106,7 @@ class PictureExchange {
     Reading& operator=(const Reading&) = delete;
     Reading(Reading&&) = delete;
     Reading& operator=(Reading&&) = delete;
-    /// Null when there is nothing to draw.
+    /// The picture; null if there is nothing to draw.
     [[nodiscard]] const Picture* picture() const;
 
    private:
@@ -113,12 +115,12 @@ class PictureExchange {
   };
 
  private:
-  // Three of the last picture, three of the one being read, two of the next.
+  // Three frames of the last picture, three of the one being read, two of the next.
   static constexpr std::size_t kFrames = 8;
 
   std::atomic<bool> wanted_ = false;
   std::uint64_t loads_ = 0;
-  std::array<DrawnFrame, kFrames> frames_;  // each takes memory when it is first used
+  std::array<DrawnFrame, kFrames> frames_;  // each allocates when it is first used
   Mutex readers_;                           // held while reading
   Mutex mutex_;                             // guards what follows
   std::optional<Picture> last_;

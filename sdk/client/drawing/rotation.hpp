@@ -1,6 +1,6 @@
 #pragma once
-// Orientations as they are drawn: floats, which never enter the agreed state. Inline: sampling takes a dozen
-// of these steps a body.
+// Drawn orientations. They are floats and never enter the agreed state. The functions are inline because
+// sampling calls about a dozen for each body.
 
 #include <array>
 #include <cmath>
@@ -10,29 +10,29 @@
 
 namespace tandem::client {
 
-/// x, y, z, w of norm 1. q and -q are the same orientation, and every function takes either.
+/// A quaternion x, y, z, w of norm 1. q and -q are the same orientation, and every function takes either.
 using Rotation = std::array<float, 4>;
 
 [[nodiscard]] inline float dot(const Rotation& a, const Rotation& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
 
-/// Of norm 1 within float's precision. Not of zeros.
+/// Scales `q` to norm 1 within float's precision. `q` must not be 0.
 [[nodiscard]] inline Rotation normalised(const Rotation& q) {
   const float scale = 1 / std::sqrt(dot(q, q));
   return {q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale};
 }
 
-/// A valid quaternion.
+/// Converts a valid quaternion.
 [[nodiscard]] inline Rotation to_rotation(const Quaternion& q) {
   constexpr float kScale = 1.0F / kQuaternionOne;
   return normalised({kScale * static_cast<float>(q[0]), kScale * static_cast<float>(q[1]),
                      kScale * static_cast<float>(q[2]), kScale * static_cast<float>(q[3])});
 }
 
-/// From `a` (share 0) to `b` (share 1) the shorter way at a constant rate: slerp. Where the two are less than
-/// 0.1 rad apart the chord stands for the arc, which needs no sine: with a the angle it is a^3 / 24 t (1 - t)
-/// (1 - 2 t) beside the arc at share t, at most 4e-6 rad.
+/// Interpolates from `a` (share 0) to `b` (share 1) the shorter way at a constant rate (slerp). If the two
+/// are less than 0.1 rad apart, it interpolates along the chord instead of the arc, which needs no sine. With
+/// a the angle, the error at share t is a^3 / 24 t (1 - t) (1 - 2 t), at most 4e-6 rad.
 [[nodiscard]] inline Rotation between(const Rotation& a, const Rotation& b, float share) {
   constexpr float kClose = 0.99875F;  // cosine of half of 0.1 rad
   const float cosine = dot(a, b);
@@ -50,14 +50,14 @@ using Rotation = std::array<float, 4>;
 
 /// `q` after `frames` frames, -2 .. 2, at the angular velocity `spin`.
 [[nodiscard]] inline Rotation turned_on(const Rotation& q, const Spin& spin, float frames) {
-  if (spin == Spin{}) return q;  // most bodies of most scenes
+  if (spin == Spin{}) return q;  // true for most bodies of most scenes
   constexpr float kHalfSpin = 0.5F / (1 << 28);
   const float half = kHalfSpin * frames;
   float x = static_cast<float>(spin[0]) * half;
   float y = static_cast<float>(spin[1]) * half;
   float z = static_cast<float>(spin[2]) * half;
-  // Of half the angle, 2 rad at most: its square, its cosine, and its sine over itself. The series end where
-  // the next term is below 2e-8.
+  // h is the square of half the angle, which is at most 2 rad. w becomes its cosine, `sine` its sine divided
+  // by it. The series end where the next term is below 2e-8.
   const float h = x * x + y * y + z * z;
   float w = 1, sine = 1;
   for (const float d : {210.0F, 156.0F, 110.0F, 72.0F, 42.0F, 20.0F, 6.0F}) sine = 1 - sine * (h * (1 / d));

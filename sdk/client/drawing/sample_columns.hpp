@@ -1,5 +1,5 @@
 #pragma once
-// What one sample() is asked for, and where it puts it: columns in the caller's own memory.
+// The request of one sample() and the columns in the caller's memory that it writes.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,27 +9,29 @@
 
 namespace tandem::client {
 
-/// One value a slot, or one vector: its numbers side by side. Any alignment will do.
+/// One value or one vector per slot; the numbers of a vector are adjacent. Any alignment.
 template <class T>
 struct Column {
   T* first = nullptr;      ///< of slot 0; null: not wanted
   std::size_t stride = 0;  ///< bytes from one slot's to the next's
 };
 
-/// `numbers` a slot, without gaps.
+/// A column with `numbers` numbers per slot and no gaps.
 template <class T>
 [[nodiscard]] Column<T> packed(T* first, std::size_t numbers = 1) {
   return {first, numbers * sizeof(T)};
 }
 
-/// Columns do not overlap, and hold `capacity` slots each. Slots that hold no body get unspecified values,
-/// but for `alive` and `changes`.
+/// Columns must not overlap. Each has room for `capacity` slots. Slots without a body get unspecified values,
+/// except in `alive` and `changes`.
 struct SampleColumns {
   std::size_t capacity = 0;
-  Column<float> positions = {};     ///< x y z, scene units
-  Column<float> velocities = {};    ///< x y z, scene units/s: how fast `positions` move, correction included
-  Column<float> orientations = {};  ///< x y z w of norm 1; left as they are where a session has none
-  Column<float> angular_velocities = {};  ///< x y z, rad/s, world's frame; without corrections; likewise
+  Column<float> positions = {};           ///< x y z, scene units
+  Column<float> velocities = {};          ///< x y z, scene units/s: how fast `positions` move, including
+                                          ///< corrections
+  Column<float> orientations = {};        ///< x y z w of norm 1; not written if the session has none
+  Column<float> angular_velocities = {};  ///< x y z, rad/s, world's frame, without corrections; not written
+                                          ///< without orientations
   Column<std::uint16_t> types = {};       ///< index into the session's types
   Column<std::uint8_t> alive = {};        ///< 0 or 1
   Column<std::uint8_t> reuse = {};        ///< counts the bodies that the slot has held, wraps
@@ -38,10 +40,10 @@ struct SampleColumns {
 
 struct SampleRequest {
   SampleMode mode = SampleMode::kExtrapolate;
-  /// By this client's steady clock; 0: now. Of a moment that is not held the nearest is given.
+  /// The moment by this client's steady clock; 0: now. For a moment that is not held, the nearest is sampled.
   std::int64_t at_ns = 0;
-  /// Time constant of the offset that takes up a correction, at most 10. Negative: the default. 0: none, so
-  /// that corrections show as jumps.
+  /// Time constant of the offset that blends in a correction, seconds, at most 10. Negative: the default. 0:
+  /// corrections show as jumps.
   double smoothing_s = -1;
 };
 
@@ -51,10 +53,10 @@ struct SampledFrame {
   std::uint32_t capacity = 0;  ///< slots that were written
   std::uint32_t alive = 0;     ///< bodies among them
   bool has_orientations = false;
-  double since_delta_s = 0;  ///< from the last frame that was agreed, or from the snapshot, to now
+  double since_delta_s = 0;  ///< time from the last agreed frame, or from the snapshot, to now
 };
 
-/// What there is to draw, for who has to make room first.
+/// What there is to draw, for a caller that has to make room first.
 struct Drawable {
   Epoch epoch = 0;
   std::uint32_t capacity = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// What to draw: the client state at any moment, without the jerks of frames and corrections.
+// Computes what to draw: the client state at any moment, without the jerks of frames and corrections.
 
 #include <array>
 #include <cstddef>
@@ -16,11 +16,12 @@
 
 namespace tandem::client {
 
-/// Remembers what it drew last, 27 bytes a slot or 43 with orientations, and so can tell what changed and
-/// blend corrections in. Not thread-safe.
+/// Remembers what it drew last, 27 bytes per slot or 43 with orientations. So it can report changes and blend
+/// corrections in. Not thread-safe.
 class Sampler {
  public:
-  /// Time constant of the blend after a correction. Shorter shows jerks, longer shows bodies off their place.
+  /// Time constant of the blend after a correction. A shorter one shows jerks, a longer one shows bodies away
+  /// from their places for longer.
   static constexpr double kSmoothingS = 0.05;
 
   /// Errors: kCapacity (the columns hold fewer slots than the picture).
@@ -41,7 +42,8 @@ class Sampler {
   std::size_t capacity_ = 0;
   Epoch epoch_ = 0;  ///< 0: none
   std::uint64_t load_ = 0;
-  std::int64_t last_ns_ = 0, last_at_ns_ = 0;  ///< when it was taken, and of when it was
+  std::int64_t last_ns_ = 0, last_at_ns_ = 0;  ///< when the last sample was taken, and the moment that it
+                                               ///< showed
   double last_frame_ = 0;
   // As in the last sample.
   std::array<std::vector<float>, kPositionChannels> place_;  // lattice units

@@ -1,5 +1,5 @@
 #pragma once
-// The server's clock as seen from here, and which frame it is at.
+// Estimates the server's clock and the frame that the server is at.
 
 #include <cstdint>
 #include <limits>
@@ -9,13 +9,14 @@
 namespace tandem::client {
 
 /// Estimates offset = server wall clock - client steady clock from one-way stamps. A delta that arrived
-/// proves offset >= sent - received; an echo of our own clock proves offset <= server time - echoed. The
-/// truth lies between; the middle is the guess, as in NTP. Bounds are forgotten after two to four seconds,
-/// which follows drift between the two clocks, and at once when they contradict each other (somebody set the
-/// clock).
+/// proves offset >= sent - received. An echo of this client's clock proves offset <= server time - echoed.
+/// The truth lies between; the estimate is the middle, as in NTP. Bounds are forgotten after two to four
+/// seconds, so that the estimate follows the drift between the two clocks. They are forgotten at once if they
+/// contradict each other, because a clock was set.
 class ServerClock {
  public:
-  /// How long one set of bounds is collected. Shorter follows drift closer, longer filters delay better.
+  /// How long one set of bounds is collected. A shorter time follows drift more closely, a longer one filters
+  /// delay better.
   static constexpr std::int64_t kSpanNs = 2'000'000'000;
 
   void on_message(std::int64_t server_time_ns, std::int64_t now_ns);
@@ -24,9 +25,9 @@ class ServerClock {
 
   [[nodiscard]] bool known() const { return lower() != kNone; }
   [[nodiscard]] std::int64_t offset_ns() const;
-  /// Offset seen through the fastest delivery: what the offset would be if delivery took no time.
+  /// The offset of the fastest delivery: the true offset if delivery took no time.
   [[nodiscard]] std::int64_t arrival_offset_ns() const { return lower(); }
-  /// Time from an acknowledgement to a reply that echoes it, at best; 0 while unknown.
+  /// Minimum time from an acknowledgement to a reply that echoes it; 0 while unknown.
   [[nodiscard]] std::int64_t round_trip_ns() const;
 
  private:
@@ -43,8 +44,8 @@ class ServerClock {
   std::int64_t turned_ns_ = kNone;
 };
 
-/// The frame the server is at, as a fraction, from the times it published deltas. Follows its rate, its drift
-/// and the jitter of its loop; a suspension or a change of rate starts the estimate again.
+/// Estimates the frame that the server is at, as a fraction, from the times at which it published deltas. It
+/// follows the server's rate, drift and jitter. A suspension or a change of rate restarts the estimate.
 class Pacer {
  public:
   explicit Pacer(double frame_rate_hz) : period_ns_(1e9 / frame_rate_hz) {}
@@ -56,8 +57,8 @@ class Pacer {
   [[nodiscard]] bool known() const { return started_; }
   /// The server publishes frame f when this reaches f.
   [[nodiscard]] double server_frame(std::int64_t now_ns) const;
-  /// Frame f is expected to have arrived when this reaches f; behind server_frame by the delivery and the
-  /// jitter.
+  /// Frame f is expected to have arrived when this reaches f. It is behind server_frame by the delivery and
+  /// the jitter.
   [[nodiscard]] double arrived_frame(std::int64_t now_ns) const;
   /// Client time at which the server publishes `frame`.
   [[nodiscard]] std::int64_t due_ns(Frame frame) const;
@@ -69,7 +70,8 @@ class Pacer {
   double period_ns_;
   ServerClock clock_;
   bool started_ = false;
-  // Anchor: frame base_frame_ is published at base_ns_ + phase_ns_. Kept apart, so that doubles stay exact.
+  // Anchor: frame base_frame_ is published at base_ns_ + phase_ns_. The two are separate so that doubles stay
+  // exact.
   Frame base_frame_ = 0;
   std::int64_t base_ns_ = 0;
   double phase_ns_ = 0;

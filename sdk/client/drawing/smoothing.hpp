@@ -1,18 +1,18 @@
 #pragma once
-// How a correction is taken up: what is drawn keeps its place, beside the motion that it should follow, and
-// comes back to it.
+// Blends in a correction: the drawn body keeps its place beside the corrected motion and then returns to it.
 
 #include <cmath>
 
 namespace tandem::client {
 
-/// From the offset at one sample to that at the next, and to its velocity. The same for all bodies.
+/// The step from the offset at one sample to the offset and its velocity at the next. The same for all
+/// bodies.
 struct Smoothing {
-  float place = 0;  ///< what is left of the offset
-  float speed = 0;  ///< how fast it then goes away, per unit of time
+  float place = 0;  ///< the part of the offset that remains
+  float speed = 0;  ///< its rate of change then, per unit of time
 
-  /// An offset that decays by 1/e in `constant` of any unit of time, after `elapsed` of it. With a constant
-  /// of 0 nothing is left.
+  /// An offset that decays to 1/e in the time `constant`, after the time `elapsed`, both in the same unit.
+  /// With a constant of 0 nothing remains.
   [[nodiscard]] static Smoothing exponential(double elapsed, double constant) {
     if (!(constant > 0)) return {};
     const double left = std::exp(-elapsed / constant);

@@ -1,5 +1,5 @@
 #pragma once
-// Deltas from their parts: a bounded queue of complete deltas without a gap.
+// Assembles deltas from their parts: a bounded queue of complete deltas without a gap.
 
 #include <cstddef>
 #include <cstdint>
@@ -17,39 +17,39 @@ struct CompleteDelta {
   std::uint64_t hash = 0;
   transport::Bytes payload;
 };
-/// The same as one message, for who passes it on.
+/// The delta as one message, for a caller that passes it on.
 [[nodiscard]] transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch,
                                                  const StreamId& stream);
 
-/// One writer's samples keep their order, so parts arrive as 0, 1, ... n - 1 and frames one after another;
-/// whatever else arrives means that something was lost. Holds one run of frames without a gap. Not
+/// The samples of one writer keep their order, so parts arrive as 0, 1, ... n - 1 and frames one after
+/// another. Any other order means that something was lost. Holds one run of frames without a gap. Not
 /// thread-safe.
 class DeltaAssembly {
  public:
   struct Limits {
-    std::size_t delta_bytes = 0;           ///< of a whole payload, as the session declares
-    std::size_t frames = 1U << 14U;        ///< complete deltas held
-    std::size_t total_bytes = 64U << 20U;  ///< held payload; at least four deltas are allowed in any case
+    std::size_t delta_bytes = 0;           ///< maximum size of a whole payload, as the session declares
+    std::size_t frames = 1U << 14U;        ///< maximum number of complete deltas held
+    std::size_t total_bytes = 64U << 20U;  ///< maximum payload held; at least four deltas are always allowed
   };
   enum class Outcome : std::uint8_t {
-    kStored,   ///< taken; front() may be ready
-    kIgnored,  ///< a frame that was complete before, or the tail of a frame whose start this reader never saw
-    kLostPart,  ///< a new frame while one was incomplete, or a part was skipped: the run starts again here
-    kGap,       ///< a frame was skipped: the run starts again here
-    kRefused,   ///< breaks a rule of the format or a limit; all is dropped
-    kOverflow,  ///< the queue is full; all is dropped
+    kStored,    ///< the part was taken; front() may be ready
+    kIgnored,   ///< the frame was complete before, or this reader never saw its start
+    kLostPart,  ///< a new frame began while one was incomplete, or a part was skipped: the run restarts here
+    kGap,       ///< a frame was skipped: the run restarts here
+    kRefused,   ///< the part breaks a rule of the format or a limit; everything is dropped
+    kOverflow,  ///< the queue is full; everything is dropped
   };
 
   explicit DeltaAssembly(const Limits& limits) : limits_(limits) {}
 
   /// Takes one sample of the session's epoch. Untrusted.
   Outcome add(transport::DeltaMessage&& part);
-  /// Oldest complete delta, or null.
+  /// The oldest complete delta, or null.
   [[nodiscard]] const CompleteDelta* front() const { return size() == 0 ? nullptr : &queue_[first_]; }
   void pop();
   /// Drops complete deltas up to and including `frame`.
   void drop_through(Frame frame);
-  /// Forgets everything, the expected frame too.
+  /// Forgets everything, including the expected frame.
   void clear();
 
   [[nodiscard]] std::size_t size() const { return queue_.size() - first_; }
@@ -62,12 +62,12 @@ class DeltaAssembly {
   Outcome finish();
 
   Limits limits_;
-  std::vector<CompleteDelta> queue_;  // from first_ on; what is before it was popped
+  std::vector<CompleteDelta> queue_;  // begins at first_; the elements before were popped
   std::size_t first_ = 0;
   std::size_t queued_bytes_ = 0;
   std::size_t high_water_ = 0;
   std::optional<Frame> last_complete_;
-  // The frame being put together; parts_ is 0 when there is none.
+  // The frame that is being assembled; parts_ is 0 if there is none.
   CompleteDelta open_;
   std::uint32_t parts_ = 0;
   std::uint32_t next_part_ = 0;

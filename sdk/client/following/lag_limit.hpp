@@ -1,5 +1,5 @@
 #pragma once
-// Tells a client that stays behind from one that catches up.
+// Distinguishes a client that stays behind from one that catches up.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,20 +8,19 @@
 
 namespace tandem::client {
 
-/// After a lost link a client has many deltas to apply and is soon through with them; one that is too slow
-/// for the session never is, and sees a world that gets older and older. A snapshot brings it back. Not
-/// thread-safe.
+/// After a lost link a client has many deltas to apply and soon catches up. A client that is too slow for the
+/// session never does, and its world gets older and older; a snapshot brings it back. Not thread-safe.
 class LagLimit {
  public:
-  /// So many seconds of frames may wait for as long as they like. Below the depth of the delta history, or
-  /// gaps come first.
+  /// Seconds of frames that may wait without a time limit. The value is below the depth of the delta history;
+  /// otherwise gaps would come first.
   static constexpr double kWaitingS = 5;
-  /// What is more has to become half as much within this time.
+  /// A longer queue must halve within this time.
   static constexpr std::int64_t kPatienceNs = 5 * kSecond;
 
   explicit LagLimit(double frame_rate_hz) : most_(static_cast<std::size_t>(kWaitingS * frame_rate_hz)) {}
 
-  /// `waiting`: complete deltas not yet applied. Returns true when it is time to join again.
+  /// `waiting`: complete deltas not yet applied. Returns true if it is time to rejoin.
   [[nodiscard]] bool exceeded(std::size_t waiting, std::int64_t now_ns) {
     if (waiting <= most_) {
       reset();
@@ -37,7 +36,7 @@ class LagLimit {
 
  private:
   std::size_t most_;
-  std::size_t waiting_then_ = 0;  // 0: not more than may wait
+  std::size_t waiting_then_ = 0;  // 0: the queue is not too long
   std::int64_t since_ns_ = 0;
 };
 

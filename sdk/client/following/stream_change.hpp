@@ -1,5 +1,5 @@
 #pragma once
-// The way from one stream into another while the first is played: idl/STATES.md, "Changing the stream".
+// Changes from one stream to another while the first is played: idl/STATES.md, "Changing the stream".
 
 #include <cstdint>
 #include <memory>
@@ -10,13 +10,14 @@
 
 namespace tandem::client {
 
-/// Holds the other stream until both are at the same frame. The one that is played is only looked at:
-/// whatever becomes of the change, it goes on. Not thread-safe.
+/// Holds the other stream until both are at the same frame. It only reads the one that is played, which goes
+/// on whatever happens to the change. Not thread-safe.
 class StreamChange {
  public:
-  /// A change that gets nowhere for so long is given up.
+  /// A change without progress for this time is given up.
   static constexpr std::int64_t kPatienceNs = 10 * kSecond;
-  /// Frames of the other stream that one poll applies, beside those of the one that is played.
+  /// Maximum number of frames of the other stream that one poll applies, besides those of the stream that is
+  /// played.
   static constexpr int kFramesPerPoll = 16;
 
   /// `to`: not null.
@@ -25,13 +26,14 @@ class StreamChange {
 
   [[nodiscard]] Follower& to() { return *to_; }
   [[nodiscard]] const Follower& to() const { return *to_; }
-  /// Takes to() out, which ends the change.
+  /// Moves to() out, which ends the change.
   [[nodiscard]] std::unique_ptr<Follower> take() { return std::move(to_); }
 
   /// True when it is to be given up: nothing of its snapshot or its deltas has come for so long.
   /// `last_applied_ns`: when the stream that is played had its last frame.
   [[nodiscard]] bool gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_ns);
-  /// Once it plays: frame by frame behind the one that is played. Done: to() can take its place.
+  /// When to() plays: applies its frames up to that of the stream that is played. Done: to() can replace that
+  /// stream.
   [[nodiscard]] Follower::Step catch_up(const Follower& played, const ScheduledInputs& scheduled);
 
  private:

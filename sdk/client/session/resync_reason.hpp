@@ -1,5 +1,5 @@
 #pragma once
-// Why a client had to join again.
+// The reasons why a client rejoins.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,7 @@ enum class ResyncReason : std::uint8_t {
   kLag = 6,           ///< too far behind for too long
 };
 inline constexpr std::size_t kResyncReasons = 7;
-/// For a human, in few words.
+/// A short text for a human.
 [[nodiscard]] const char* describe(ResyncReason reason);
 
 }  // namespace tandem::client

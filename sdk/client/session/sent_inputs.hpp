@@ -1,5 +1,5 @@
 #pragma once
-// Inputs sent in this epoch, and what became of them.
+// The inputs sent in this epoch, and their outcomes.
 
 #include <array>
 #include <cstdint>
@@ -11,12 +11,13 @@
 
 namespace tandem::client {
 
-/// What became of one input. Nothing is sent twice: an input that is late is worth less than the next one.
+/// The outcome of one input. No input is sent twice, because an input that is late is worth less than the
+/// next one.
 struct InputOutcome {
   enum class Kind : std::uint8_t {
     kActed,    ///< acted on `frame`, which this client has applied
-    kRefused,  ///< by the server, for `reason`
-    kUnknown,  ///< lost on the way, or its answer was overwritten by 32 later ones
+    kRefused,  ///< the server refused it for `reason`
+    kUnknown,  ///< it was lost, or 32 later answers overwrote its answer
   };
   Kind kind = Kind::kActed;
   std::uint64_t number = 0;
@@ -28,15 +29,15 @@ struct InputOutcome {
 /// Numbers inputs 1, 2, ... and matches the replies with them. Bounded. Not thread-safe.
 class SentInputs {
  public:
-  /// Unanswered inputs held; beyond it the oldest counts as unknown.
+  /// Maximum number of unanswered inputs held; beyond it the oldest counts as unknown.
   static constexpr std::size_t kMaxPending = 256;
 
   std::uint64_t next_number() const { return last_number_ + 1; }
   void on_sent(std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
   void on_reply(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
   void on_applied(Frame frame, std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
-  /// A new epoch: everything unanswered counts as unknown. Numbers go on: should an earlier server come back,
-  /// it remembers what became of those it knows.
+  /// A new epoch begins: unanswered inputs count as unknown. The numbers continue, because an earlier server
+  /// that comes back remembers the outcomes of the numbers it knows.
   void clear(std::vector<InputOutcome>& outcomes);
   [[nodiscard]] std::size_t pending() const { return pending_.size(); }
 
@@ -44,7 +45,7 @@ class SentInputs {
   struct Pending {
     std::uint64_t number = 0;
     std::int64_t sent_ns = 0;
-    Frame frame = 0;  ///< 0 until the reply tells
+    Frame frame = 0;  ///< 0 until the reply names it
   };
   struct Applied {
     Frame frame = 0;
@@ -54,7 +55,8 @@ class SentInputs {
 
   std::uint64_t last_number_ = 0;
   std::deque<Pending> pending_;
-  // When the last frames were applied, by frame modulo its size: a reply may come after the frame it names.
+  // When the last frames were applied, indexed by frame modulo the array's size: a reply may come after the
+  // frame that it names.
   std::array<Applied, 256> applied_at_{};
   Applied last_applied_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// Figures of one client.
+// The figures of one client.
 
 #include <array>
 #include <cstddef>
@@ -12,27 +12,27 @@
 
 namespace tandem::client {
 
-/// What playing took since the first applied frame, by kind. Zero without CoreOptions::measure_ns.
+/// Time that playing took since the first applied frame, by kind. Zero without CoreOptions::measure_ns.
 struct CostTotals {
-  std::int64_t receive_ns = 0;      ///< taking what the port holds
+  std::int64_t receive_ns = 0;      ///< taking messages from the port
   std::int64_t predict_ns = 0;      ///< predicted steps
-  std::int64_t decode_ns = 0;       ///< decoding deltas and correcting by them
+  std::int64_t decode_ns = 0;       ///< decoding deltas and applying corrections
   std::int64_t hash_ns = 0;         ///< checking the agreed states
   std::int64_t acknowledge_ns = 0;  ///< writing acknowledgements
 };
 
-/// Counts since the client was made; they survive rejoins and epochs. Those of ClientFigures are counted in
-/// place; what is in there of durations and rates comes with figures().
+/// Counts since the client was made; they survive rejoins and epochs. The counts of ClientFigures are updated
+/// in place; its durations and rates are filled in by figures().
 struct Statistics : ClientFigures {
   std::array<std::uint64_t, kResyncReasons> resyncs_by_reason{};
   std::uint64_t epochs = 0;
   std::uint64_t stale_messages = 0;    ///< of another epoch
   std::uint64_t foreign_messages = 0;  ///< not from the participant that announced the session
   std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
-  std::int64_t join_ns = 0;                                ///< last join
-  double smoothed_latency_ns = 0;   ///< publish to applied, over about the last half second
-  DurationHistogram latency;        ///< publish to applied
-  DurationHistogram input_latency;  ///< sent to the frame it acted on applied
+  std::int64_t join_ns = 0;                                ///< duration of the last join
+  double smoothed_latency_ns = 0;   ///< from publishing to applying, over about the last half second
+  DurationHistogram latency;        ///< from publishing to applying
+  DurationHistogram input_latency;  ///< from sending to applying the frame that the input acted on
   DurationHistogram frame_cost;     ///< decode, apply and simulate, per applied frame
   DurationHistogram recent_cost;    ///< the same since the last status report
   CostTotals costs;
@@ -42,14 +42,14 @@ struct Statistics : ClientFigures {
     const double gain = latency.count() == 1 ? 1 : 1.0 / 16;
     smoothed_latency_ns += (static_cast<double>(latency_ns) - smoothed_latency_ns) * gain;
   }
-  /// Payload since the first applied frame; 2^20 bits to the Mbit.
+  /// Payload rate since the first applied frame; 1 Mbit = 2^20 bits.
   [[nodiscard]] double mean_mbit_per_s() const {
     const auto span_ns = static_cast<double>(last_applied_ns - first_applied_ns);
     return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / kBitsPerMbit / (span_ns / 1e9) : 0;
   }
 };
 
-/// The part of a client's status that is figures; the rest is left at its defaults.
+/// The figures of a client's status; the other fields have their defaults.
 [[nodiscard]] ClientStatus figures(const Statistics& statistics);
 
 }  // namespace tandem::client

@@ -1,5 +1,5 @@
 #pragma once
-// The figures that a client sends to whoever watches the session, once a second.
+// The figures that a client publishes once a second for those who watch the session.
 
 #include <cstdint>
 
@@ -8,13 +8,13 @@
 
 namespace tandem::client {
 
-/// Knows when the next report is due, and the bandwidth since the last one. Not thread-safe.
+/// Decides when the next report is due, and computes the bandwidth since the last one. Not thread-safe.
 class StatusReport {
  public:
   explicit StatusReport(std::int64_t period_ns) : period_ns_(period_ns) {}
 
   [[nodiscard]] std::int64_t due_ns() const { return last_ns_ + period_ns_; }
-  /// The figures alone: who reports, and of which session and epoch, is the caller's to fill in.
+  /// The figures only: the caller fills in the client, the session and the epoch.
   [[nodiscard]] transport::ClientStatusMessage next(const Statistics& statistics, std::int64_t now_ns);
 
  private:

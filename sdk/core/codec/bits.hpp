@@ -7,7 +7,7 @@
 
 namespace tandem {
 
-/// Writes bits into memory that is known to be large enough; the last byte is padded with zeros.
+/// Writes bits into memory that the caller knows to be large enough. The last byte is padded with zeros.
 class BitWriter {
  public:
   explicit BitWriter(std::byte* to) : to_(to) {}
@@ -35,7 +35,7 @@ class BitWriter {
 class BitReader {
  public:
   explicit BitReader(std::span<const std::byte> in) : at_(in.data()), end_(in.data() + in.size()) {}
-  /// Afterwards at least 56 bits are held, or all that are left.
+  /// Fills the window: afterwards it holds at least 56 bits, or all that are left.
   void refill() {
     if (end_ - at_ >= 8) {
       std::uint64_t next = 0;
@@ -51,12 +51,12 @@ class BitReader {
     }
   }
   [[nodiscard]] std::uint64_t window() const { return window_; }
-  /// `length` < 64 bits that the caller knows to be held.
+  /// Skips `length` < 64 bits, which the caller knows to be held.
   void skip(unsigned length) {
     window_ <<= length;
     held_ -= length;
   }
-  /// The next `length` <= 32 bits as a number. The caller knows them to be held.
+  /// Takes the next `length` <= 32 bits as a number. The caller knows them to be held.
   [[nodiscard]] std::uint32_t take(unsigned length) {
     if (length == 0) return 0;
     const auto bits = static_cast<std::uint32_t>(window_ >> (64U - length));
@@ -64,7 +64,7 @@ class BitReader {
     return bits;
   }
   [[nodiscard]] unsigned held() const { return held_; }
-  /// True when only padding is left: fewer than eight bits, all zero.
+  /// True if only padding is left: fewer than eight bits, all zero.
   [[nodiscard]] bool at_end() const {
     return at_ == end_ && held_ < 8 && (held_ == 0 || (window_ >> (64U - held_)) == 0);
   }

@@ -1,5 +1,5 @@
 #pragma once
-// The codec interface: what turns the difference between a predicted and a target state into bytes.
+// The codec interface: turns the difference between a predicted and a target state into bytes.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,29 +18,32 @@
 
 namespace tandem {
 
-/// Budget that never binds.
+/// A budget that is never reached.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
 
-/// A frame before its corrections, as a codec sees it.
+/// The input of a codec: a frame before its corrections.
 struct CodecFrame {
-  /// An encoder's has the delta's lifecycle records applied; a decoder's does not, so that bodies of
-  /// `renewed` must not be read from it.
+  /// The predicted state. An encoder's has the delta's lifecycle records applied; a decoder's does not, so
+  /// bodies of `renewed` must not be read from it.
   const State& predicted;
   std::span<const std::uint8_t> alive;  ///< the column after the records
-  std::span<const Slot> renewed;        ///< spawned, despawned or teleported by them; ascending, each once
+  std::span<const Slot> renewed;        ///< slots spawned, despawned or teleported by the records; ascending,
+                                        ///< each once
   const CodecParameters& parameters;
-  Vec3i gravity{};             ///< of the drive in force at this frame: what c of a body at rest holds up
-  unsigned position_bits = 0;  ///< rounded to multiples of 2^n: an encoder's p are, and `tracker` keeps it so
+  Vec3i gravity{};             ///< gravity of the drive in force at this frame; c of a body at rest balances
+                               ///< it
+  unsigned position_bits = 0;  ///< n: p is rounded to multiples of 2^n in an encoder's state, and `tracker`
+                               ///< keeps it so
 };
 
-/// One corrections section: a block that exists, and what the codec says of it.
+/// One corrections section: the number of an existing block, and the codec's bytes for it.
 struct Section {
   std::uint32_t block = 0;
   std::span<const std::byte> body;
 };
 
-/// Which bodies a delta corrects; by how much stands in the codec until its next encode() or decode(), and so
-/// do the spans.
+/// The bodies that a delta corrects. The codec stores by how much, and what the spans show, until its next
+/// encode() or decode().
 struct Corrections {
   std::span<const Slot> slots;    ///< each once, ascending
   std::span<const Slot> renewed;  ///< as in the frame
@@ -49,56 +52,61 @@ struct Corrections {
   unsigned position_bits = 0;     ///< as in the frame
 };
 
-/// The corrections part of a delta: one implementation a codec name (paper, sections 3.3.1 and 3.3.2).
+/// The corrections part of a delta; one implementation for each codec name (thesis, sections 3.3.1 and
+/// 3.3.2).
 ///
-/// The server encodes and applies, a client decodes and applies; both end with the same state. Only the first
-/// encode() allocates (a decoder needs no encoder's memory), and the message of a refusal. Not thread-safe.
+/// The server encodes and applies, a client decodes and applies; both end with the same state. Memory is
+/// allocated only by the first encode() (a decoder does not need the encoder's memory) and for the message of
+/// a refusal. Not thread-safe.
 class Codec {
  public:
   virtual ~Codec() = default;
   [[nodiscard]] virtual std::string_view name() const = 0;
-  /// Most bytes encode() can write for this session's capacity.
+  /// Maximum number of bytes that encode() can write for this session's capacity.
   [[nodiscard]] virtual std::size_t bound() const = 0;
 
-  /// Writes sections that move the predicted state towards `target`, which has the same alive slots; changes
-  /// no state yet. Never writes more than `budget` bytes, section headers included, nor beyond the end of
-  /// `out`; where that binds, the largest errors go first, ties by slot, up to the first body that does not
-  /// fit (`tracker`: see tracker.hpp). `observer` may be null.
+  /// Writes sections that move the predicted state towards `target`, which has the same alive slots. Does not
+  /// change a state yet. Writes at most `budget` bytes, including section headers, and never beyond the end
+  /// of `out`. If that does not suffice, the bodies with the largest errors go first, ties by slot, up to the
+  /// first body that does not fit (`tracker`: see tracker.hpp). `observer` may be null.
   virtual Corrections encode(const CodecFrame& frame, const State& target, std::size_t budget,
                              ByteWriter& out, EncodeObserver* observer) = 0;
 
-  /// Validates all corrections sections of a delta, whose blocks ascend; changes no state yet. Errors:
-  /// kMalformed with the reason.
+  /// Validates all corrections sections of a delta; their blocks must ascend. Does not change a state yet.
+  /// Errors: kMalformed with the reason.
   virtual Result<Corrections> decode(const CodecFrame& frame, std::span<const Section> sections) = 0;
 
-  /// Does what the last encode() or decode() returned to the frame's state, lifecycle records applied. Once a
-  /// frame, also where nothing is corrected: codecs that learn learn here.
+  /// Applies the result of the last encode() or decode() to the frame's state, which has the lifecycle
+  /// records applied. Call it once a frame, even without corrections, because codecs that learn do so here.
   virtual void apply(const Corrections& corrections, State& state) = 0;
 
-  /// The codec's own columns, part of the state hash and of snapshots: one byte a slot, one column after
-  /// another; zero for dead slots. Empty for the paper's codecs.
+  /// The codec's own columns, which are part of the state hash and of snapshots: one byte per slot, one
+  /// column after another; zero for dead slots. Empty for the thesis's codecs.
   [[nodiscard]] virtual std::span<const std::byte> columns() const { return {}; }
-  /// What else lives across frames, as it goes into a snapshot. Nothing for the paper's codecs.
+  /// Writes the codec's other state that lives across frames into a snapshot. Nothing for the thesis's
+  /// codecs.
   virtual void save_models(NumberEncoder& /*out*/) const {}
-  /// Most bits that save_models() writes.
+  /// Maximum number of bits that save_models() writes.
   [[nodiscard]] virtual std::size_t models_bits_bound() const { return 0; }
-  /// `columns`: as many as columns() has, zero for dead slots. `models`: what save_models() wrote, and
-  /// nothing behind it. Errors: kMalformed for what this codec would not have written; then nothing changed.
+  /// Loads the state of a snapshot. `columns`: as many bytes as columns() has, zero for dead slots. `models`:
+  /// exactly what save_models() wrote. Errors: kMalformed for bytes that this codec would not have written;
+  /// then nothing changed.
   [[nodiscard]] virtual Result<void> load(std::span<const std::byte> /*columns*/, NumberDecoder& models) {
     if (!models.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length");
     return {};
   }
 };
 
-/// All that a codec needs to know. Views are read by its constructor alone.
+/// Everything that a codec needs to know. Only its constructor reads the views.
 struct CodecSetup {
   std::string_view name;
   std::uint32_t capacity = 0;                ///< 1 .. kMaxCapacity
-  std::span<const std::byte> tables = {};    ///< as the session has them; empty without takes_tables
+  std::span<const std::byte> tables = {};    ///< the session's tables; empty without takes_tables
   TrackerKind tracker = {};                  ///< of the session's predictor
   Groups groups = {};                        ///< of the stream's states
   std::span<const std::int32_t> radii = {};  ///< lattice units, by type; with orientations
-  RunBlocks run_blocks = {};  ///< how to code blocks side by side, where a codec can; empty: one by one
+  RunBlocks run_blocks = {};  ///< how to code blocks in parallel, if the codec can; empty: one after the
+                              ///< other
 };
 
 }  // namespace tandem

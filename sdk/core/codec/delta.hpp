@@ -1,5 +1,5 @@
 #pragma once
-// A delta's payload: typed sections. Lifecycle records first, then parameters in force, rounding,
+// A delta's payload consists of typed sections: lifecycle records first, then parameters in force, rounding,
 // corrections.
 
 #include <cstdint>
@@ -16,18 +16,18 @@ namespace tandem {
 
 enum class LifecycleKind : std::uint8_t { kDespawn = 0, kSpawn = 1, kTeleport = 2, kTypeChange = 3 };
 
-/// One explicit change of a slot. Within a delta: ascending by slot; for one slot the only pair allowed is
-/// despawn then spawn (reuse within a frame).
+/// One explicit change of a slot. The records of a delta ascend by slot. A slot may have two records only for
+/// a reuse within a frame: despawn, then spawn.
 struct LifecycleRecord {
   LifecycleKind kind = LifecycleKind::kDespawn;
   Slot slot = 0;
   std::uint8_t reuse = 0;                ///< spawn only
   TypeId type = 0;                       ///< spawn and type change
-  BodyState body;                        ///< spawn, and of a teleport what `groups` says
+  BodyState body;                        ///< spawn; for a teleport the groups in `groups`
   std::uint8_t groups = kMovesPosition;  ///< teleport only: at least one of the stream's
 };
 
-/// What a payload says. Spans stay valid until the next encode() or decode() of the codec that read it.
+/// The content of a payload. Spans are valid until the next encode() or decode() of the codec that read it.
 struct Delta {
   std::span<const LifecycleRecord> lifecycle;
   StreamParameters parameters;  ///< in force from this delta on
@@ -35,9 +35,9 @@ struct Delta {
   Corrections corrections;
 };
 
-/// Encodes and decodes whole payloads around a codec. One per side and session. Not thread-safe. encode() and
-/// decode() allocate only on the first call, for more lifecycle records than ever before, and for the message
-/// of a refusal.
+/// Encodes and decodes whole payloads with a codec. There is one per side and session. Not thread-safe.
+/// encode() and decode() allocate only on the first call, for more lifecycle records than ever before, and
+/// for the message of a refusal.
 class DeltaCodec {
  public:
   /// `codec` must be made for `capacity`.
@@ -49,42 +49,42 @@ class DeltaCodec {
   DeltaCodec& operator=(const DeltaCodec&) = delete;
   ~DeltaCodec();
 
-  /// Most bytes encode() writes: lifecycle of every slot, parameters and the codec's bound.
+  /// Maximum number of bytes that encode() writes: lifecycle of every slot, parameters and the codec's bound.
   [[nodiscard]] std::size_t bound() const;
 
   struct Encoded {
-    std::size_t size_bytes = 0;        ///< of the payload
-    std::size_t correction_bytes = 0;  ///< of the correction sections, headers included
-    std::uint32_t corrected = 0;       ///< bodies
+    std::size_t size_bytes = 0;        ///< size of the payload
+    std::size_t correction_bytes = 0;  ///< size of the correction sections, including headers
+    std::uint32_t corrected = 0;       ///< number of corrected bodies
   };
   /// Server side: applies `lifecycle`, rounding and corrections to `state` (predicted) and writes them to
-  /// `out`, which holds at least bound() bytes. `target` is the full simulation on the lattice. No more than
-  /// `budget` bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
+  /// `out`, which holds at least bound() bytes. `target` is the full simulation on the lattice. Writes at
+  /// most `budget` bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
                  std::size_t budget, std::span<std::byte> out, EncodeObserver* observer = nullptr);
 
-  /// Server side: parameters from the next encode() on; sent in that delta.
+  /// Server side: sets the parameters from the next encode() on; they are sent in that delta.
   void set_parameters(const StreamParameters& parameters);
   [[nodiscard]] const StreamParameters& parameters() const;
-  /// Server side: the next encode() also rounds every body, as far as its threshold permits. What is encoded
-  /// still holds the threshold.
+  /// Server side: the next encode() also rounds every body, as far as its threshold permits. Encoded bodies
+  /// still keep to the threshold.
   void round_next();
-  /// Gravity of the drive in force at the frame that is encoded or decoded next, 1/64 unit per frame^2; stays
-  /// until the next call. Zero at first.
+  /// Sets the gravity of the drive in force at the frame that is encoded or decoded next, 1/64 unit per
+  /// frame^2. It stays until the next call. Zero at first.
   void set_gravity(const Vec3i& gravity);
-  /// Client side, from a snapshot: parameters in force, nothing is sent.
+  /// Client side: sets the parameters in force from a snapshot; sends nothing.
   void restore_parameters(const StreamParameters& parameters);
 
-  /// Client side: validates all of `payload`, the delta of the frame that is `predicted`; changes nothing.
+  /// Client side: validates all of `payload`, the delta of the frame that is `predicted`. Changes nothing.
   /// Errors: kMalformed, kUnsupported (unknown critical section).
   [[nodiscard]] Result<Delta> decode(const State& predicted, std::span<const std::byte> payload);
-  /// Client side: does what the last decode() returned to the state that it saw.
+  /// Client side: applies the result of the last decode() to the state that decode() read.
   void apply(const Delta& delta, State& state);
 
-  /// Of the last encode() or apply(), none since a decode(): slots that records or corrections named, or all
-  /// where it rounded, each once, ascending; the records.
+  /// Results of the last encode() or apply(), empty after a decode(). touched(): the slots that records or
+  /// corrections named, or all if it rounded; each once, ascending. lifecycle(): the records.
   [[nodiscard]] std::span<const Slot> touched() const;
-  /// Those of them that corrections named.
+  /// The slots that corrections named.
   [[nodiscard]] std::span<const Slot> corrected() const;
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;
   [[nodiscard]] Codec& codec();

@@ -1,5 +1,5 @@
 #pragma once
-// How far bodies are off, and which are off by more than the threshold.
+// Computes the errors of bodies, and finds the bodies whose error is above the threshold.
 
 #include <bit>
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace tandem {
 
-/// |a - b| exactly; up to 2^31.
+/// The exact value of |a - b|; up to 2^31.
 [[nodiscard]] inline std::uint32_t magnitude(std::int32_t a, std::int32_t b) {
   const auto d = static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b);
   return a < b ? 0U - d : d;
 }
 
-/// Exact squared position error of a body.
+/// The exact squared position error of a body.
 [[nodiscard]] inline std::uint64_t error_squared(const State& state, const State& target, Slot slot) {
   std::uint64_t sum = 0;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -40,9 +40,9 @@ void for_each_surface_beyond(const State& state, const State& target, const Bloc
   }
 }
 
-/// Marks (1) the slots of a block that may be off by more than `threshold`, and none of the others (0) is.
-/// `marks` holds kBlockSlots bytes; the last eight are padded with zeros. Plain loop over columns,
-/// vectorised.
+/// Marks with 1 the slots of a block whose error may be above `threshold`. All slots marked 0 are certainly
+/// within it. `marks` holds kBlockSlots bytes; the last eight are padded with zeros. A plain loop over
+/// columns, vectorised.
 void mark_suspects(const State& state, const State& target, const Block& block, std::int32_t threshold,
                    std::span<std::uint8_t, kBlockSlots> marks);
 

@@ -10,13 +10,13 @@
 
 namespace tandem {
 
-/// Despawn and spawn of one slot: the most that a slot can cost.
+/// Maximum number of bytes for one slot: a despawn and a spawn.
 [[nodiscard]] inline std::size_t most_lifecycle_bytes_per_slot(const Groups& groups) {
   return 4 + 4 + 1 + 3 + body_bytes(bits_of(groups));
 }
 
-/// Why `records` break the rules (order, alive and dead slots, ranges) on top of the `alive` column; null if
-/// they do not. Leaves in `alive` the column after the records.
+/// Checks `records` against the rules (order, alive and dead slots, ranges), given the `alive` column.
+/// Returns why they break a rule, or null. Leaves in `alive` the column after the records.
 [[nodiscard]] const char* check_lifecycle(std::span<const LifecycleRecord> records,
                                           std::span<std::uint8_t> alive, TypeId type_count);
 
@@ -27,7 +27,7 @@ void write_lifecycle(std::span<const LifecycleRecord> records, const Groups& gro
 [[nodiscard]] Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& groups,
                                           std::vector<LifecycleRecord>& records);
 
-/// Does what the records say. They must have passed check_lifecycle().
+/// Applies the records, which must have passed check_lifecycle().
 void apply_lifecycle(std::span<const LifecycleRecord> records, State& state);
 
 }  // namespace tandem

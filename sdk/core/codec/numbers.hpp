@@ -1,6 +1,6 @@
 #pragma once
-// Numbers in a range code whose models learn from every decision: what snapshots are made of. Most numbers
-// are small, or close to one that both sides can guess. idl/PROTOCOL.md, "Numbers".
+// Codes numbers with a range coder whose models learn from every decision. Snapshots are made of such
+// numbers. Most numbers are small, or close to one that both sides can guess. idl/PROTOCOL.md, "Numbers".
 
 #include <algorithm>
 #include <array>
@@ -12,8 +12,8 @@
 
 namespace tandem {
 
-/// The probability of a 1, in 1/65536. Learns fast at first, then slower: after 64 decisions the past fades
-/// by 1/128 with each.
+/// The probability of a 1, in 1/65536. It learns fast at first, then slower: after 64 decisions the past
+/// fades by 1/128 with each decision.
 struct LearningModel {
   void learn(bool bit) {
     const auto rate = static_cast<unsigned>(std::bit_width(unsigned{seen}));
@@ -26,16 +26,17 @@ struct LearningModel {
   std::uint8_t seen = 1;
 };
 
-/// What is likely for numbers of one kind, by how many bits they have.
+/// The probabilities for numbers of one kind, by their number of bits.
 struct NumberModels {
-  static constexpr std::size_t kShort = 8;  ///< longer numbers are about as likely as others of their length
-  LearningModel some;                       ///< is it other than 0?
-  std::array<LearningModel, 32> length;     ///< bits - 1, a binary tree from [1] on
+  static constexpr std::size_t kShort = 8;  ///< all longer numbers of one length are about equally likely
+  LearningModel some;                       ///< is the number different from 0?
+  std::array<LearningModel, 32> length;     ///< bits - 1, a binary tree with its root at [1]
   std::array<LearningModel, kShort + 1> sign;
-  std::array<std::array<LearningModel, 4>, kShort + 1> next;  ///< the two bits below the highest, from [1] on
+  std::array<std::array<LearningModel, 4>, kShort + 1> next;  ///< the two bits below the highest, a tree with
+                                                              ///< its root at [1]
 };
 
-/// Writes numbers into caller memory; past its end overflow() is set.
+/// Writes numbers into caller memory; beyond its end overflow() is set.
 class NumberEncoder {
  public:
   explicit NumberEncoder(std::span<std::byte> out) : range_(out) {}
@@ -48,7 +49,7 @@ class NumberEncoder {
     range_.put_even(value, count);
     return value;
   }
-  /// Returns the size; zeros at the end are left out.
+  /// Returns the size. Zeros at the end are left out.
   std::size_t finish() { return range_.finish(); }
   [[nodiscard]] bool overflow() const { return range_.overflow(); }
 
@@ -56,8 +57,8 @@ class NumberEncoder {
   RangeEncoder range_;
 };
 
-/// Reads them from untrusted bytes; past their end it reads something. Arguments that name what to write mean
-/// nothing.
+/// Reads numbers from untrusted bytes. Beyond their end it reads arbitrary values. It ignores arguments that
+/// an encoder would write.
 class NumberDecoder {
  public:
   explicit NumberDecoder(std::span<const std::byte> in) : range_(in) {}
@@ -67,20 +68,22 @@ class NumberDecoder {
     return bit;
   }
   std::uint32_t even(std::uint32_t /*value*/, unsigned count) { return range_.get_even(count); }
-  /// True when every byte was used, and none is a zero that could have been left out.
+  /// True if every byte was used and the last is not a zero that could have been left out.
   [[nodiscard]] bool at_end() const { return range_.at_end(); }
 
  private:
   RangeDecoder range_;
 };
 
-/// Most bits of one of many numbers, none larger. Models cannot be misled for more: each of the nine
-/// decisions takes about a bit where they are all that is unlikely, and then numbers are not all large.
+/// Maximum mean number of bits per number for many numbers, all at most `magnitude`. Models cannot be misled
+/// into more. Each of the nine decisions takes about one bit if all are unlikely, and then not all numbers
+/// are large.
 [[nodiscard]] constexpr std::size_t most_number_bits(std::uint32_t magnitude) {
   return 6 + static_cast<std::size_t>(std::bit_width(magnitude));
 }
 
-/// Codes x, |x| < 2^32; returns it. `Coder`: NumberEncoder, or NumberDecoder, for which x means nothing.
+/// Codes x, |x| < 2^32, and returns it. `Coder`: NumberEncoder, or NumberDecoder, which ignores the argument
+/// x.
 template <class Coder>
 [[gnu::always_inline]] inline std::int64_t code_number(Coder& coder, NumberModels& models, std::int64_t x) {
   if (!coder.decide(x != 0, models.some)) return 0;

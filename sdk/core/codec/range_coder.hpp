@@ -1,15 +1,15 @@
 #pragma once
-// Binary range coder: one decision at a time, each with a 16-bit probability (G. N. N. Martin 1979; carries
-// are carried into bytes already written, as in LZMA). Integers only; bytes in idl/PROTOCOL.md.
+// Binary range coder: it codes one decision at a time, each with a 16-bit probability (G. N. N. Martin 1979).
+// Carries are added to bytes already written, as in LZMA. Integers only; the bytes are in idl/PROTOCOL.md.
 //
 // All decisions so far stand for an interval [low, low + range) of fractions below 1. A decision with
-// probability P / 2^16 of a 1 takes the first P / 2^16 of it for a 1 and the rest for a 0, so the interval
-// shrinks by the factor of what was decided and -log2 of it, the ideal length, is what the decision costs. In
-// the end any number within the interval says all decisions; the one with the fewest bytes is written.
+// probability P / 2^16 of a 1 takes the first P / 2^16 of the interval for a 1 and the rest for a 0. So the
+// interval shrinks by the probability of the decision, and the decision costs -log2 of it, the ideal length.
+// In the end any number within the interval encodes all decisions; the one with the fewest bytes is written.
 //
-// Only 32 bits of range are held. Once it is below 2^24 the leading byte of the number is settled, but for a
-// carry, and both are shifted by a byte. So range is at least 2^24 when a decision is made: rounding
-// (range * P) >> 16 takes less than 1/256 of a 1's share even at P = 1, which is 0.006 bits, and neither
+// Only 32 bits of range are held. When range is below 2^24, the leading byte of the number is settled, except
+// for a carry, and both are shifted by a byte. So range is at least 2^24 when a decision is made. Rounding
+// (range * P) >> 16 then takes less than 1/256 of a 1's share even at P = 1, which is 0.006 bits, and neither
 // share is ever empty for P in 1 .. 65535.
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace tandem {
 
-/// Writes decisions into caller memory. Past its end nothing is written and overflow() is set.
+/// Writes decisions into caller memory. Beyond its end nothing is written and overflow() is set.
 class RangeEncoder {
  public:
   explicit RangeEncoder(std::span<std::byte> out)
@@ -29,14 +29,15 @@ class RangeEncoder {
   void put(bool bit, std::uint32_t p1) {
     const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
     const std::uint32_t rest = range_ - bound;
-    const std::uint32_t one = 0U - static_cast<std::uint32_t>(bit);  // a mask: bits are hard to guess
+    const std::uint32_t one = 0U - static_cast<std::uint32_t>(bit);  // a mask instead of a branch: bits are
+                                                                     // hard to predict
     low_ += bound & ~one;
     range_ = rest ^ ((rest ^ bound) & one);
     shift_out();
   }
 
-  /// `count` bits (at most 16), each as likely 0 as 1, in one step: `value` < 2^count. The highest value has
-  /// what the division leaves over too.
+  /// Writes `count` bits (at most 16), each equally likely 0 or 1, in one step: `value` < 2^count. The
+  /// highest value also gets the remainder of the division.
   void put_even(std::uint32_t value, unsigned count) {
     const std::uint32_t share = range_ >> count;
     const bool is_last = value == (1U << count) - 1;
@@ -45,7 +46,8 @@ class RangeEncoder {
     shift_out();
   }
 
-  /// Fewest bytes that decode to what was put, zeros at the end left out. Returns the size.
+  /// Ends the code with the fewest bytes that decode to what was put, without zeros at the end. Returns the
+  /// size.
   std::size_t finish() {
     for (unsigned bytes = 0; bytes <= 4; ++bytes) {
       const std::uint64_t mask = std::uint64_t{0xFFFFFFFFU} >> (8U * bytes);
@@ -85,7 +87,7 @@ class RangeEncoder {
     }
     *at_++ = byte;
   }
-  // What was written plus range is below 1, so a carry always finds a byte that is not 0xFF.
+  // The number written plus range is below 1, so a carry always finds a byte that is not 0xFF.
   void carry() {
     if (overflow_) return;
     std::byte* at = at_;
@@ -99,15 +101,15 @@ class RangeEncoder {
   std::byte* begin_;
   std::byte* at_;
   std::byte* end_;
-  // From the top: a carry, held_ bytes that are not written yet, 32 bits. Written are three bytes at once.
+  // From the top: a carry, held_ bytes that are not written yet, 32 bits. Three bytes are written at once.
   std::uint64_t low_ = 0;
   std::uint32_t held_ = 0;
   std::uint32_t range_ = 0xFFFFFFFFU;
   bool overflow_ = false;
 };
 
-/// Reads decisions from untrusted bytes; past their end it reads zeros. Never fails: whether the bytes were
-/// meant so is the caller's to check, with at_end() last.
+/// Reads decisions from untrusted bytes; beyond their end it reads zeros. It never fails: the caller checks
+/// whether the bytes make sense, with at_end() last.
 class RangeDecoder {
  public:
   explicit RangeDecoder(std::span<const std::byte> in) : at_(in.data()), end_(in.data() + in.size()) {
@@ -124,7 +126,7 @@ class RangeDecoder {
     return bit;
   }
 
-  /// The same without a branch on the bit, for bits that are hard to guess and decide little.
+  /// Does the same without a branch on the bit, for bits that are hard to predict and decide little.
   bool get_masked(std::uint32_t p1) {
     const auto bound = static_cast<std::uint32_t>((std::uint64_t{range_} * p1) >> 16U);
     const std::uint32_t rest = range_ - bound;
@@ -135,7 +137,7 @@ class RangeDecoder {
     return (one & 1U) != 0;
   }
 
-  /// What put_even() put.
+  /// Reads what put_even() wrote.
   std::uint32_t get_even(unsigned count) {
     const std::uint32_t share = range_ >> count;
     const std::uint32_t last = (1U << count) - 1;
@@ -146,7 +148,7 @@ class RangeDecoder {
     return value;
   }
 
-  /// True when every byte was used and the last one is not a zero that could have been left out.
+  /// True if every byte was used and the last one is not a zero that could have been left out.
   [[nodiscard]] bool at_end() const { return at_ == end_ && !padded_; }
 
  private:

@@ -1,5 +1,6 @@
 #pragma once
-// Which slots of a block a corrections section is about: index list, bit mask, or all alive ones.
+// Selects the slots of a block that a corrections section corrects: as an index list, a bit mask, or all
+// alive slots.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,8 +14,8 @@ namespace tandem {
 
 enum class SelectionForm : std::uint8_t {
   kList = 0,  ///< u16 count, count x u16 local indices, ascending
-  kMask = 1,  ///< one bit a slot of the block, least significant first
-  kAll = 2,   ///< nothing: every alive slot of the block
+  kMask = 1,  ///< one bit for each slot of the block, least significant first
+  kAll = 2,   ///< no bytes: every alive slot of the block
 };
 
 /// A run of slots that is coded on its own.
@@ -24,17 +25,17 @@ struct Block {
   std::uint32_t slots = 0;
 };
 [[nodiscard]] Block block_at(std::uint32_t index, std::uint32_t capacity);
-/// Those of ascending slots that are in the block.
+/// The part of the ascending `slots` that is in the block.
 [[nodiscard]] std::span<const Slot> within(std::span<const Slot> slots, const Block& block);
 
-/// Form with the fewest bytes; `chosen` of the block's `alive` slots are selected.
+/// The form with the fewest bytes if `chosen` of the block's `alive` slots are selected.
 [[nodiscard]] SelectionForm smallest_form(std::uint32_t slots, std::uint32_t chosen, std::uint32_t alive);
 [[nodiscard]] std::size_t selection_bytes(SelectionForm form, std::uint32_t slots, std::uint32_t chosen);
 /// `chosen` are slots of the block, ascending.
 void write_selection(SelectionForm form, const Block& block, std::span<const Slot> chosen, ByteWriter& out);
 
-/// Reads a selection into `chosen`, which holds at least block.slots; returns how many. All are alive, at
-/// least one, ascending. Errors: kMalformed.
+/// Reads a selection into `chosen`, which holds at least block.slots. Returns the number of slots. They are
+/// alive, ascending and at least one. Errors: kMalformed.
 [[nodiscard]] Result<std::uint32_t> parse_selection(SelectionForm form, const Block& block,
                                                     std::span<const std::uint8_t> alive, ByteReader& in,
                                                     std::span<Slot> chosen);

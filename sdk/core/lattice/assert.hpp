@@ -1,5 +1,5 @@
 #pragma once
-// TANDEM_ASSERT: broken invariants of our own, never of received bytes. On in Debug and RelWithDebInfo.
+// TANDEM_ASSERT checks invariants of this code, never received bytes. On in Debug and RelWithDebInfo.
 
 #include <cstdio>
 #include <cstdlib>

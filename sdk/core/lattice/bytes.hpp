@@ -1,5 +1,5 @@
 #pragma once
-// Little-endian reading and writing of network bytes. The reader is bounded and never throws.
+// Reads and writes network bytes, little-endian. The reader is bounded and never throws.
 
 #include <algorithm>
 #include <concepts>
@@ -10,14 +10,14 @@
 
 namespace tandem {
 
-/// Bytes that `value` takes as LEB128 of the shortest form.
+/// The number of bytes of `value` as LEB128 in its shortest form.
 [[nodiscard]] constexpr std::size_t leb128_bytes(std::uint64_t value) {
   std::size_t bytes = 1;
   while ((value >>= 7U) != 0) ++bytes;
   return bytes;
 }
 
-/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
+/// Maps 0, -1, 1, -2, ... to 0, 1, 2, 3, ...
 [[nodiscard]] constexpr std::uint32_t zigzag(std::int32_t value) {
   return (static_cast<std::uint32_t>(value) << 1U) ^ static_cast<std::uint32_t>(value >> 31);
 }
@@ -25,7 +25,7 @@ namespace tandem {
   return static_cast<std::int32_t>((value >> 1U) ^ (0U - (value & 1U)));
 }
 
-/// Appends to caller memory. Writing past the end sets `overflow()` and drops the bytes.
+/// Appends to caller memory. Writing beyond the end sets `overflow()` and drops the bytes.
 class ByteWriter {
  public:
   explicit ByteWriter(std::span<std::byte> out) : out_(out) {}
@@ -45,12 +45,12 @@ class ByteWriter {
     std::copy(bytes.begin(), bytes.end(), out_.begin() + static_cast<std::ptrdiff_t>(size_));
     size_ += bytes.size();
   }
-  /// Seven bits a byte, lowest first; bit 7 set in all but the last.
+  /// Writes seven bits per byte, lowest first; bit 7 is set in all bytes but the last.
   void put_leb128(std::uint64_t value) {
     for (; value >= 0x80U; value >>= 7U) put(static_cast<std::uint8_t>(value | 0x80U));
     put(static_cast<std::uint8_t>(value));
   }
-  /// Puts, as LEB128, the number of bytes written since size() was `at` before them.
+  /// Inserts at `at` the number of bytes written since size() was `at`, as LEB128.
   void put_length_before(std::size_t at) {
     const std::size_t length = size_ - at;
     const std::size_t header = leb128_bytes(length);
@@ -64,7 +64,7 @@ class ByteWriter {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool overflow() const { return overflow_; }
   [[nodiscard]] std::span<std::byte> rest() const { return out_.subspan(size_); }
-  /// Counts bytes that somebody wrote into rest().
+  /// Counts bytes that the caller wrote into rest().
   void advance(std::size_t count) {
     if (reserve(count)) size_ += count;
   }
@@ -80,7 +80,7 @@ class ByteWriter {
   bool overflow_ = false;
 };
 
-/// Reads from untrusted bytes. Reading past the end yields zero and clears `ok()` for good.
+/// Reads from untrusted bytes. Reading beyond the end gives zero and clears `ok()` for good.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> in) : in_(in) {}
@@ -95,8 +95,8 @@ class ByteReader {
     at_ += sizeof(T);
     return static_cast<T>(static_cast<std::make_unsigned_t<T>>(bits));
   }
-  /// LEB128 of the shortest form and at most `most_bytes` (at most 9); anything else reads as zero and clears
-  /// ok().
+  /// Reads LEB128 of the shortest form and at most `most_bytes` (at most 9). Anything else reads as zero and
+  /// clears ok().
   [[nodiscard]] std::uint64_t get_leb128(std::size_t most_bytes) {
     std::uint64_t value = 0;
     for (std::size_t i = 0; i < most_bytes; ++i) {

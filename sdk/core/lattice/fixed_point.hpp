@@ -1,5 +1,5 @@
 #pragma once
-// Arithmetic that predicted steps and filters share.
+// Arithmetic for predicted steps and filters.
 
 #include <algorithm>
 #include <bit>
@@ -20,8 +20,8 @@ namespace tandem {
 /// The square root, rounded down.
 [[nodiscard]] constexpr std::uint64_t square_root(std::uint64_t x) {
   if (x == 0) return 0;
-  // From a power of two, at most twice too small, Newton's iteration needs four steps to 64 bits; from then
-  // on it falls until it is there.
+  // The start is one Newton step from a power of two, which is at most twice too small. From there the
+  // iteration falls until it reaches the root; it needs four steps for 64 bits.
   const unsigned half = (static_cast<unsigned>(std::bit_width(x)) - 1U) / 2U;
   std::uint64_t root = ((x >> half) + (std::uint64_t{1} << half)) / 2 + 1;
   for (std::uint64_t next = (root + x / root) / 2; next < root; next = (root + x / root) / 2) root = next;

@@ -1,6 +1,6 @@
 #pragma once
-// Channel groups: all that the core has to know of one, a line each of kChannelGroups. What else a new one
-// needs stands in README.md.
+// Channel groups. Everything that the core has to know about a group is one line of kChannelGroups. README.md
+// says what else a new one needs.
 
 #include <array>
 #include <cstddef>
@@ -21,21 +21,21 @@ using Vec3i = std::array<std::int32_t, 3>;
 inline constexpr std::int32_t kPositionLimit = 1 << 30;
 inline constexpr std::int32_t kVelocityLimit = 1 << 28;
 
-/// Their names in a layout: p, v and c; the quaternion and the angular velocity.
+/// The names of the groups in a layout: p, v and c; the quaternion and the angular velocity.
 inline constexpr const char* kPositionGroup = "position";
 inline constexpr const char* kOrientationGroup = "orientation";
 
-/// Their bits in teleports.
+/// The bits of the groups in teleports.
 inline constexpr std::uint8_t kMovesPosition = 1, kMovesOrientation = 2;
 
-/// Which of them a stream has beside position, which every stream has.
+/// The groups that a stream has besides position, which every stream has.
 struct Groups {
   bool orientation = false;
   friend bool operator==(const Groups&, const Groups&) = default;
 };
 
-/// One body's place and speed. `p` in lattice units, |p| <= 2^30; `v` in 1/64 unit per frame, |v| <= 2^28.
-/// `q` and `w`, valid ones, where the stream has orientations.
+/// The place and speed of one body. `p` in lattice units, |p| <= 2^30; `v` in 1/64 unit per frame, |v| <=
+/// 2^28. `q` and `w` are valid if the stream has orientations.
 struct BodyState {
   Vec3i p{};
   Vec3i v{};
@@ -44,30 +44,31 @@ struct BodyState {
   friend bool operator==(const BodyState&, const BodyState&) = default;
 };
 
-/// What a snapshot expects a body's number to be.
+/// The value that a snapshot expects for a body's number.
 enum class Guess : std::uint8_t {
   kZero,
-  kBefore,  ///< that of the body before: slots were filled side by side
-  kHalf,    ///< half way from the guess before to that number
+  kBefore,  ///< the number of the previous body: adjacent slots hold adjacent bodies
+  kHalf,    ///< half way from the previous guess to that number
 };
 
 /// Columns of a state that are alike, such as those of a vector.
 struct ColumnRun {
   std::uint8_t columns = 0;
-  std::int32_t limit = 0;  ///< of their magnitudes, in a snapshot
+  std::int32_t limit = 0;  ///< maximum magnitude in a snapshot
   Guess guess = Guess::kZero;
 };
 
 struct ChannelGroup {
-  std::string_view name;            ///< in a layout
-  std::uint8_t bit = 0;             ///< in teleports
-  bool Groups::*listed = nullptr;   ///< null: in every stream
-  bool needs_radii = false;         ///< Layout::radii
-  std::size_t first_column = 0;     ///< of State's: behind those of the groups before
-  std::array<ColumnRun, 3> runs{};  ///< from there on; also in hash and snapshots
+  std::string_view name;            ///< its name in a layout
+  std::uint8_t bit = 0;             ///< its bit in teleports
+  bool Groups::*listed = nullptr;   ///< null: every stream has the group
+  bool needs_radii = false;         ///< the group needs Layout::radii
+  std::size_t first_column = 0;     ///< number of its first column in State, after those of the previous
+                                    ///< groups
+  std::array<ColumnRun, 3> runs{};  ///< its columns in State, in the hash and in snapshots
 };
 
-/// In the order of layouts, hashes, records and snapshots.
+/// All groups, in the order of layouts, hashes, records and snapshots.
 inline constexpr std::array<ChannelGroup, 2> kChannelGroups{{
     {.name = kPositionGroup,
      .bit = kMovesPosition,
@@ -81,25 +82,25 @@ inline constexpr std::array<ChannelGroup, 2> kChannelGroups{{
      .first_column = 9,
      .runs = {{{kQuaternionChannels, kQuaternionOne}, {kSpinChannels, kSpinLimit}}}},  // q, w
 }};
-inline constexpr std::size_t kColumns = 16;  ///< of all groups
+inline constexpr std::size_t kColumns = 16;  ///< columns of all groups
 
-/// Whether all values may be in a delta or a snapshot; those of groups that a stream has not are, as they are
-/// made.
+/// True if all values may be in a delta or a snapshot. Default values of groups that a stream does not have
+/// are valid.
 [[nodiscard]] bool valid_body(const BodyState& body);
 
-/// How far a point of the surface of a body may be off: the distance of the centres and 2 r sin(angle / 2),
-/// lattice units, rounded up; at most a lattice unit more than it is. States with orientations.
+/// The maximum error of a point of a body's surface: the distance of the centres plus 2 r sin(angle / 2),
+/// lattice units, rounded up; at most one lattice unit above the true value. For states with orientations.
 [[nodiscard]] std::uint64_t surface_error(const BodyState& body, const BodyState& target,
                                           std::int32_t radius);
 
-/// The part of a predicted step that all predictors share, after they have written to.rest(): turns every
-/// body that is not at rest by its angular velocity, which stays (idl/PROTOCOL.md, "Turn"). Nothing in a
-/// stream of positions. `from` and `to` may be the same object.
+/// The part of a predicted step that all predictors share; call it after to.rest() is written. Turns every
+/// body that is not at rest by its angular velocity, which does not change (idl/PROTOCOL.md, "Turn"). Does
+/// nothing in a stream of positions. `from` and `to` may be the same object.
 void step_groups(const State& from, State& to);
-/// The same for the listed slots only.
+/// Does the same for the listed slots only.
 void step_groups(const State& from, State& to, std::span<const Slot> slots);
 
-// From here on nothing names a group.
+// The following functions name no group.
 
 template <class Visit>
 constexpr void for_each_group(const Groups& groups, const Visit& visit) {
@@ -117,11 +118,11 @@ constexpr void for_each_column(const ChannelGroup& group, const Visit& visit) {
   }
 }
 
-/// Of all that a stream has, as bits.
+/// The groups of a stream as bits.
 [[nodiscard]] std::uint8_t bits_of(const Groups& groups);
 
-/// What a lifecycle record says of a body with these groups (bits): p and v, q and w. As bytes; how many; and
-/// from one body to another.
+/// The part of a body that a lifecycle record holds for these groups (bits): p and v, q and w. The functions
+/// write it, read it, give its size in bytes, and copy it from one body to another.
 void put_body(unsigned groups, const BodyState& body, ByteWriter& out);
 void get_body(unsigned groups, ByteReader& in, BodyState& body);
 [[nodiscard]] std::size_t body_bytes(unsigned groups);

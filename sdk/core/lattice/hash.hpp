@@ -11,14 +11,15 @@
 
 namespace tandem {
 
-/// Columns beside the state's own: one byte a slot, one column after another. Part of hash and snapshot.
+/// Columns in addition to the state's own: one byte per slot, one column after another. They are part of hash
+/// and snapshot.
 struct ExtraColumns {
   std::span<const std::byte> codec;
   std::span<const std::byte> predictor;
 };
 
-/// Hashes block by block, so that blocks can be hashed side by side: idl/PROTOCOL.md, "State hash". Keeps its
-/// working memory, so only the first call for more blocks than ever before allocates. Not thread-safe.
+/// Hashes a state block by block, so that blocks can be hashed in parallel: idl/PROTOCOL.md, "State hash". It
+/// keeps its working memory, so only a call for more blocks than ever before allocates. Not thread-safe.
 class StateHasher {
  public:
   StateHasher();
@@ -28,10 +29,10 @@ class StateHasher {
   StateHasher& operator=(const StateHasher&) = delete;
   ~StateHasher();
 
-  /// Of a state with one region. `run` changes no bit of the result.
+  /// The hash of a state with one region. `run` changes no bit of the result.
   [[nodiscard]] std::uint64_t hash(const State& state, const ExtraColumns& extra = {},
                                    const RunBlocks& run = {});
-  /// Of that region, as the last hash() found it.
+  /// The hash of that region, from the last hash().
   [[nodiscard]] std::uint64_t region_hash() const;
 
  private:
@@ -39,7 +40,7 @@ class StateHasher {
   std::unique_ptr<Impl> impl_;
 };
 
-/// XXH3-64 of a byte range (layout hashes, tables).
+/// The XXH3-64 of a byte range (layout hashes, tables).
 [[nodiscard]] std::uint64_t hash_bytes(std::span<const std::byte> bytes);
 
 /// 16 lower-case hex digits, as in hash logs.

@@ -1,13 +1,13 @@
 #pragma once
-// How work on blocks is spread over threads, without knowing any.
+// Spreads work on blocks over threads, which the caller supplies.
 
 #include <cstdint>
 #include <functional>
 
 namespace tandem {
 
-/// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done. Empty: one
-/// after the other on the caller's thread.
+/// Calls job(0) .. job(count - 1), in any order and on any threads, and returns when all are done. Empty: the
+/// caller's thread runs one after the other.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
 }  // namespace tandem

@@ -15,27 +15,27 @@ using Frame = std::uint64_t;
 using Epoch = std::uint64_t;
 using TypeId = std::uint16_t;
 
-/// Channels of the group that every stream has.
+/// Number of channels of the group that every stream has.
 inline constexpr std::size_t kPositionChannels = 3;
 inline constexpr std::uint32_t kMaxCapacity = 1U << 20U;
-/// Slots are cut into runs of this many; each run is coded on its own, with indices local to it.
+/// Number of slots of a block. Each block is coded on its own, with local indices.
 inline constexpr std::uint32_t kBlockSlots = 16384;
 
 [[nodiscard]] constexpr std::uint32_t block_count(std::uint32_t capacity) {
   return (capacity + kBlockSlots - 1) / kBlockSlots;
 }
 
-/// Structure of arrays over `capacity` slots. Invariant: every column of a dead slot is zero.
+/// A structure of arrays over `capacity` slots. Invariant: every column of a dead slot is zero.
 ///
-/// Columns: alive (0 or 1), reuse (counts the bodies a slot has held, wraps), type, rest (1: does not move
-/// until it is corrected or the drive changes), per position channel p (lattice units), v (1/64 unit per
-/// frame) and c (1/64 unit per frame^2), and with orientations the quaternion q and the angular velocity w
-/// per frame (turn.hpp). Copying between equal capacities does not allocate. Not thread-safe; distinct
+/// Columns: alive (0 or 1); reuse (counts the bodies that a slot has held, wraps); type; rest (1: the body
+/// does not move until it is corrected or the drive changes); per position channel p (lattice units), v (1/64
+/// unit per frame) and c (1/64 unit per frame^2); with orientations the quaternion q and the angular velocity
+/// w per frame (turn.hpp). Copying between equal capacities does not allocate. Not thread-safe; distinct
 /// objects are independent.
 class State {
  public:
   State() = default;
-  /// All slots dead. `capacity` in [1, kMaxCapacity].
+  /// Makes a state with all slots dead. `capacity` in [1, kMaxCapacity].
   explicit State(std::uint32_t capacity, const Groups& groups = {});
 
   [[nodiscard]] std::uint32_t capacity() const { return static_cast<std::uint32_t>(alive_.size()); }
@@ -50,7 +50,8 @@ class State {
   [[nodiscard]] std::span<const TypeId> type() const { return type_; }
   std::span<std::uint8_t> rest() { return rest_; }
   [[nodiscard]] std::span<const std::uint8_t> rest() const { return rest_; }
-  /// Any of the groups' columns, in the order of kChannelGroups; empty where the stream has not its group.
+  /// One of the groups' columns, numbered in the order of kChannelGroups; empty if the stream does not have
+  /// its group.
   std::span<std::int32_t> column(std::size_t number) { return columns_[number]; }
   [[nodiscard]] std::span<const std::int32_t> column(std::size_t number) const { return columns_[number]; }
   std::span<std::int32_t> p(std::size_t channel) { return columns_[kP + channel]; }
@@ -66,18 +67,19 @@ class State {
   [[nodiscard]] std::span<const std::int32_t> w(std::size_t channel) const { return columns_[kW + channel]; }
 
   [[nodiscard]] BodyState body(Slot slot) const;
-  /// With orientations alone.
+  /// Only with orientations.
   [[nodiscard]] Quaternion quaternion(Slot slot) const {
     return {q(0)[slot], q(1)[slot], q(2)[slot], q(3)[slot]};
   }
   void set_quaternion(Slot slot, const Quaternion& turn) {
     for (std::size_t i = 0; i < kQuaternionChannels; ++i) q(i)[slot] = turn[i];
   }
-  /// Sets p, v, clamped to their limits, q and w, c = 0 and rest = 0. The slot's alive bit is left as it is.
+  /// Sets p and v, clamped to their limits, q and w, c = 0 and rest = 0. The slot's alive bit does not
+  /// change.
   void set_body(Slot slot, const BodyState& body);
   /// Brings a slot to life with c = 0 and rest = 0.
   void spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& body);
-  /// Kills a slot and zeroes all of its columns.
+  /// Kills a slot and zeroes all its columns.
   void despawn(Slot slot);
   [[nodiscard]] std::uint32_t alive_count() const;
   [[nodiscard]] std::uint32_t rest_count() const;
@@ -96,7 +98,7 @@ class State {
   std::array<std::vector<std::int32_t>, kColumns> columns_;
 };
 
-/// Euclidean length squared of a - b, exact: |components| are at most 2^30, so the sum fits 64 bits.
+/// The exact squared length of a - b: |components| are at most 2^30, so the sum fits 64 bits.
 [[nodiscard]] inline std::uint64_t distance_squared(const Vec3i& a, const Vec3i& b) {
   std::uint64_t sum = 0;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -1,6 +1,6 @@
 #pragma once
-// Orientations on the lattice: quaternions, and how an angular velocity turns them. All integers, the same to
-// the last bit everywhere; idl/PROTOCOL.md, "Turn", has the same formulas.
+// Orientations on the lattice: quaternions, and how an angular velocity turns them. All are integers, the
+// same to the last bit everywhere. idl/PROTOCOL.md, "Turn", has the same formulas.
 
 #include <array>
 #include <cstddef>
@@ -9,40 +9,41 @@
 
 namespace tandem {
 
-/// x, y, z, w in 1/2^30, of norm 1; turns from the body's frame to the world's. q and -q are the same turn.
+/// x, y, z, w in 1/2^30, of norm 1: the turn from the body's frame to the world's. q and -q are the same
+/// turn.
 using Quaternion = std::array<std::int32_t, 4>;
 /// A rotation vector, or an angular velocity per frame: world frame, 2^-28 rad, at most 2 rad long.
 using Spin = std::array<std::int32_t, 3>;
 
 inline constexpr std::size_t kQuaternionChannels = 4, kSpinChannels = 3;
 inline constexpr std::int32_t kQuaternionOne = 1 << 30;
-inline constexpr std::int32_t kSpinLimit = 1 << 29;  ///< of the vector's length
+inline constexpr std::int32_t kSpinLimit = 1 << 29;  ///< maximum length of the vector
 inline constexpr Quaternion kNoTurn{0, 0, 0, kQuaternionOne};
 
-/// Of length 1 within 2^-10, so that the turn keeps it there.
+/// True if the norm is 1 within 2^-10, so that turns keep it there.
 [[nodiscard]] bool valid_quaternion(const Quaternion& q);
-/// No longer than kSpinLimit.
+/// True if the vector is not longer than kSpinLimit.
 [[nodiscard]] bool valid_spin(const Spin& spin);
-/// The vector, all of it halved until it is valid. |components| < 2^62.
+/// The vector, halved until it is valid. |components| < 2^62.
 [[nodiscard]] Spin limited_spin(std::array<std::int64_t, 3> spin);
 
-/// `q` turned by a valid `spin`. The norm stays within 1e-8 of 1, from an inexact one it moves there.
+/// `q` turned by a valid `spin`. The norm stays within 1e-8 of 1; an inexact norm moves towards 1.
 [[nodiscard]] Quaternion turned(const Quaternion& q, const Spin& spin);
 
-/// sin(angle / 2) of the turn from one to the other, 2^-30, rounded up or one above.
+/// sin(angle / 2) of the turn from one to the other, in 2^-30, rounded up or one above.
 [[nodiscard]] std::uint64_t half_sine(const Quaternion& from, const Quaternion& to);
-/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length; where it takes
-/// more than 2 rad, 2 rad of it.
+/// The rotation vector (2^-28 rad) that turns `from` into `to`, within 1e-4 of its length. If that takes more
+/// than 2 rad, the result is 2 rad long.
 [[nodiscard]] Spin turn_between(const Quaternion& from, const Quaternion& to);
 
-/// Columns of many bodies, each as long as `still`.
+/// The columns of many bodies, each as long as `still`.
 struct TurnColumns {
   std::array<const std::int32_t*, kQuaternionChannels> from;
   std::array<std::int32_t*, kQuaternionChannels> to;  ///< may be `from`
   std::array<const std::int32_t*, kSpinChannels> spin;
 };
-/// turned() of every body; one with 1 in `still` stays as it is. A quaternion of zeros (a dead slot)
-/// stays so.
+/// Computes turned() of every body. A body with 1 in `still` does not change. A quaternion of zeros (a dead
+/// slot) stays zero.
 void turn_all(const TurnColumns& columns, std::span<const std::uint8_t> still);
 
 }  // namespace tandem

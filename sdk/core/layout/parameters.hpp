@@ -1,6 +1,6 @@
 #pragma once
-// What may change between frames: each delta that changes something says so. Two types, for two readers who
-// start to read at different frames.
+// The parameters that may change between frames; a delta that changes one says so. There are two types,
+// because decoder and predicted step begin to use a change at different frames.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,27 +13,29 @@
 
 namespace tandem {
 
-/// What the decoder reads besides its bytes: a change in delta f is in force from delta f on.
+/// What the decoder uses besides its bytes: a change in delta f is in force from delta f on.
 struct CodecParameters {
-  std::int32_t threshold = 0;      ///< lattice units; bodies further off than this are corrected. 1 .. 2^30
+  std::int32_t threshold = 0;      ///< lattice units; bodies with a larger error are corrected. 1 .. 2^30
   std::int32_t position_step = 1;  ///< lattice units per quantisation step (range / 127). 1 .. 2^24
   std::int32_t velocity_step = 1;  ///< 1/64 unit per frame per quantisation step (range / 127). 1 .. 2^24
-  // For codecs that steer a filter (`tracker`); nothing to the others. Any value is valid.
-  std::uint16_t velocity_gain = 26214;     ///< beta, in 1/32768: share of a correction that is an error of v
-  std::uint16_t acceleration_gain = 9830;  ///< gamma, in 1/65536: share of that that is an error of c
-  // Listed where codec and groups of the stream need both, 0 in all others.
+  // For codecs that steer a filter (`tracker`); the others ignore them. Any value is valid.
+  std::uint16_t velocity_gain = 26214;     ///< beta, in 1/32768: share of a correction that counts as an
+                                           ///< error of v
+  std::uint16_t acceleration_gain = 9830;  ///< gamma, in 1/65536: share of that error that counts as an error
+                                           ///< of c
+  // Listed if codec and groups of the stream need both; 0 otherwise.
   std::int32_t turn_step = 0;  ///< 2^-28 rad per quantisation step of a rotation vector. 1 .. 2^24
   std::int32_t spin_step = 0;  ///< 2^-28 rad per frame per step of an angular velocity. 1 .. 2^24
   friend bool operator==(const CodecParameters&, const CodecParameters&) = default;
 };
-/// What the predicted step reads besides state and drive: a change in delta f is in force from the step that
-/// produces f + 1 on, since the one that produced f came before the delta. Any value is valid.
+/// What the predicted step uses besides state and drive: a change in delta f is in force from the step that
+/// produces f + 1 on, because the step that produced f came before the delta. Any value is valid.
 struct StepParameters {
   std::uint16_t decay = 0;  ///< E: share of c lost per frame, in 1/65536
   friend bool operator==(const StepParameters&, const StepParameters&) = default;
 };
 
-/// All that a delta may change of its stream.
+/// All parameters of a stream that a delta may change.
 struct StreamParameters {
   CodecParameters codec = {};
   StepParameters step = {};
@@ -43,12 +45,12 @@ struct StreamParameters {
 /// 127 steps of this size span the lattice from end to end.
 inline constexpr std::int32_t kMaxStep = 1 << 24;
 
-/// Whether the steps of turns are listed. Never changes within a stream.
+/// True if the steps of turns are listed. Never changes within a stream.
 [[nodiscard]] constexpr bool has_turn_steps(const CodecParameters& parameters) {
   return parameters.turn_step != 0 || parameters.spin_step != 0;
 }
 
-/// True when all parameters that are listed are in their ranges.
+/// True if all listed parameters are in their ranges.
 [[nodiscard]] constexpr bool valid_parameters(const CodecParameters& parameters) {
   const auto in = [](std::int32_t value, std::int32_t most) { return value >= 1 && value <= most; };
   return in(parameters.threshold, kPositionLimit) && in(parameters.position_step, kMaxStep) &&
@@ -57,7 +59,7 @@ inline constexpr std::int32_t kMaxStep = 1 << 24;
           (in(parameters.turn_step, kMaxStep) && in(parameters.spin_step, kMaxStep)));
 }
 
-/// As they are named in sessions, deltas and snapshots: idl/PROTOCOL.md, "Parameters".
+/// The ids of parameters in sessions, deltas and snapshots: idl/PROTOCOL.md, "Parameters".
 enum class ParameterId : std::uint8_t {
   kThreshold = 1,
   kPositionStep = 2,
@@ -68,18 +70,18 @@ enum class ParameterId : std::uint8_t {
   kTurnStep = 7,
   kSpinStep = 8,
 };
-/// Of any stream, and of one with steps of turns.
+/// Number of parameters of any stream, and of one with steps of turns.
 inline constexpr std::uint32_t kCommonParameters = 6, kParameterCount = 8;
-/// How many a stream lists: the ids from 1 on.
+/// Number of parameters that a stream lists: the ids from 1 on.
 [[nodiscard]] constexpr std::uint32_t parameter_count(const StreamParameters& values) {
   return has_turn_steps(values.codec) ? kParameterCount : kCommonParameters;
 }
 inline constexpr std::size_t kMostParameterValueBytes = 5;
-/// Most bytes that write_parameters() writes.
+/// Maximum number of bytes that write_parameters() writes.
 inline constexpr std::size_t kMostParametersBytes = kParameterCount * (1 + kMostParameterValueBytes);
 
 [[nodiscard]] std::int32_t parameter(const StreamParameters& values, ParameterId id);
-/// Errors: kUnsupported (unknown id), kMalformed (out of range); then nothing changed.
+/// Sets one parameter. Errors: kUnsupported (unknown id), kMalformed (out of range); then nothing changed.
 [[nodiscard]] Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int32_t value);
 
 struct Parameter {
@@ -87,16 +89,16 @@ struct Parameter {
   std::int32_t value = 0;
   friend bool operator==(const Parameter&, const Parameter&) = default;
 };
-/// All that the stream has, ascending by id, as a session lists them.
+/// All parameters of the stream, ascending by id, as a session lists them.
 [[nodiscard]] std::vector<Parameter> list_parameters(const StreamParameters& values);
-/// From such a list, untrusted. Errors: kMalformed (out of order, repeated, missing, out of range),
+/// Reads such a list. Untrusted. Errors: kMalformed (out of order, repeated, missing, out of range),
 /// kUnsupported (unknown id).
 [[nodiscard]] Result<StreamParameters> parameters_from(std::span<const Parameter> list);
 
-/// Writes those of `values` that differ from what is in force; all of them where `in_force` is null.
+/// Writes the parameters of `values` that differ from `in_force`; all of them if that is null.
 void write_parameters(const StreamParameters& values, const StreamParameters* in_force, ByteWriter& out);
-/// Reads untrusted bytes into `values`, those that are named. Returns how many were; whether the stream lists
-/// them is the caller's to check. Errors: kMalformed, kUnsupported (unknown id); then `values` is as before.
+/// Reads untrusted bytes into `values`, only the named parameters. Returns their number; the caller checks
+/// whether the stream lists them. Errors: kMalformed, kUnsupported (unknown id); then `values` is as before.
 [[nodiscard]] Result<std::uint32_t> read_parameters(std::span<const std::byte> section,
                                                     StreamParameters& values);
 

@@ -1,5 +1,5 @@
 #pragma once
-// How payloads and snapshots are framed: typed sections. idl/PROTOCOL.md, "Payload".
+// Payloads and snapshots consist of typed sections. idl/PROTOCOL.md, "Payload".
 
 #include <cstddef>
 #include <cstdint>
@@ -11,30 +11,31 @@
 
 namespace tandem {
 
-/// A reader that does not know a type refuses the whole if this bit is set, else it skips the section.
+/// A reader that does not know a type refuses the whole payload or snapshot if this bit is set; otherwise it
+/// skips the section.
 inline constexpr std::uint8_t kCriticalSection = 0x80;
 enum class SectionType : std::uint8_t {
   kLifecycle = 0x81,
   kParameters = 0x82,
   kCorrections = 0x83,
-  kInputs = 0x84,  ///< snapshots only, as regions
+  kInputs = 0x84,  ///< snapshots only, as kRegion
   kRegion = 0x85,
-  kLastCorrections = 0x86,  ///< has no length: its body goes on to the payload's end
+  kLastCorrections = 0x86,  ///< has no length: its body extends to the payload's end
   kRounding = 0x87,
 };
 inline constexpr std::size_t kMostSectionLengthBytes = 4;
-/// Most bytes before a section's body.
+/// Maximum number of bytes before a section's body.
 inline constexpr std::size_t kMostSectionHeaderBytes = 1 + kMostSectionLengthBytes;
 
-/// Of a block number, as LEB128.
+/// Maximum size of a block number as LEB128.
 inline constexpr std::size_t kMostBlockNumberBytes = 4;
 
-/// Bytes of a section whose body takes `body_bytes`.
+/// The size of a section whose body takes `body_bytes`.
 [[nodiscard]] constexpr std::size_t section_bytes(std::size_t body_bytes) {
   return 1 + leb128_bytes(body_bytes) + body_bytes;
 }
 
-/// One of a payload or a snapshot.
+/// One section of a payload or a snapshot.
 struct TypedSection {
   std::uint8_t type = 0;
   std::span<const std::byte> body;
@@ -53,7 +54,7 @@ struct TypedSection {
   return section;
 }
 
-/// Success for a section that may be skipped. Errors: kUnsupported.
+/// Succeeds for a section that may be skipped. Errors: kUnsupported.
 [[nodiscard]] inline Result<void> skip_section(std::uint8_t type) {
   if ((type & kCriticalSection) == 0) return {};
   return fail(ErrorCode::kUnsupported,

@@ -1,5 +1,5 @@
 #pragma once
-// What the predicted step reads besides the state.
+// The input of the predicted step besides the state.
 
 #include <cstdint>
 
@@ -8,17 +8,18 @@
 
 namespace tandem {
 
-/// The forces on all bodies, converted once by the server from scene units. Changes by scheduled input only.
+/// The forces on all bodies. The server converts them once from scene units. Only scheduled inputs change
+/// them.
 struct Drive {
   Vec3i gravity{};            ///< 1/64 lattice unit per frame^2, |g| <= 2^28
   std::uint16_t damping = 0;  ///< D: share of v lost per frame, in 1/65536
   friend bool operator==(const Drive&, const Drive&) = default;
 };
 
-/// Of one step.
+/// The input of one step.
 struct StepInput {
-  Drive drive;                ///< of the frame that the step produces
-  StepParameters parameters;  ///< of the delta before
+  Drive drive;                ///< drive of the frame that the step produces
+  StepParameters parameters;  ///< parameters of the previous delta
   friend bool operator==(const StepInput&, const StepInput&) = default;
 };
 

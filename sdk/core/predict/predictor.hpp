@@ -12,24 +12,24 @@
 
 namespace tandem {
 
-/// A predicted step, all in integers. One object per timeline: it may keep scratch memory between calls.
+/// A predicted step in integers only. There is one object per timeline; it may keep scratch memory between
+/// calls.
 class Predictor {
  public:
   virtual ~Predictor() = default;
-  /// The tier whose steps these are: `field` in a world of one sub-step is `contact`.
+  /// The tier whose steps are computed. `field` in a world of one sub-step is `contact`.
   [[nodiscard]] virtual std::string_view name() const = 0;
 
-  /// Writes into `to` the state that follows `from`. Both have the same capacity; they may be the same
-  /// object. Allocates nothing. Dead slots stay all zero.
+  /// Writes into `to` the state that follows `from`. Both have the same capacity and may be the same object.
+  /// Allocates nothing. Dead slots stay zero.
   virtual void step(const State& from, State& to, const StepInput& input) = 0;
 
-  /// The same for the listed slots only; other slots of `to` keep what they hold. Called only where
-  /// `interacts()` is false, after a delta touched a few bodies of an earlier frame.
+  /// Does the same for the listed slots only; other slots of `to` do not change. Called only if `interacts()`
+  /// is false, after a delta changed a few bodies of an earlier frame.
   virtual void step_slots(const State& from, State& to, const StepInput& input,
                           std::span<const Slot> slots) = 0;
 
-  /// True where a body's next state depends on other bodies, so that a late correction re-simulates all of
-  /// them.
+  /// True if a body's next state depends on other bodies, so that a late correction re-simulates all of them.
   [[nodiscard]] virtual bool interacts() const = 0;
 };
 

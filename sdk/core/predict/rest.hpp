@@ -1,18 +1,18 @@
 #pragma once
-// Bodies at rest: the one rule that all predicted steps share. idl/PROTOCOL.md, "Predicted step".
+// The rule for bodies at rest, which all predicted steps share. idl/PROTOCOL.md, "Predicted step".
 
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
 
 namespace tandem {
 
-/// Whether a body with this c stays at rest under the drive: c holds it up on every axis.
+/// True if a body with this c stays at rest under the drive: c holds it up on every axis.
 [[nodiscard]] inline bool holds_still(const Vec3i& c, const Drive& drive) {
   return c[0] == -drive.gravity[0] && c[1] == -drive.gravity[1] && c[2] == -drive.gravity[2];
 }
 
-/// Before a step: writes to `to` who of `from` is still at rest; they may be the same object. True if anybody
-/// is. Next to nothing where nobody was.
+/// Call before a step: writes to `to` which bodies of `from` are still at rest. `from` and `to` may be the
+/// same. Returns true if there are any. It costs almost nothing if none was at rest.
 bool keep_at_rest(const State& from, State& to, const Drive& drive);
 
 }  // namespace tandem

@@ -1,5 +1,5 @@
 #pragma once
-// The table of codecs: all that anybody has to know of one by its name.
+// The table of codecs: what other code has to know about a codec, by its name.
 
 #include <cstddef>
 #include <memory>
@@ -11,29 +11,30 @@
 
 namespace tandem {
 
-/// `limited`: 0.05 Mbit per frame (paper, table 5.1), 2^20 bits to the Mbit.
+/// The budget of `limited`: 0.05 Mbit per frame (thesis, table 5.1); 1 Mbit = 2^20 bits.
 inline constexpr std::size_t kPaperBudgetBytes = 6553;
 
-/// What a codec is like, for those who choose, configure or compare codecs.
+/// The properties of a codec, for code that chooses, configures or compares codecs.
 struct CodecTraits {
-  bool is_baseline = false;      ///< of the paper: compared as the paper has it, with its predicted step
-  bool reads_threshold = false;  ///< the others send every body
-  bool reads_steps = false;      ///< quantisation steps
-  bool reads_gains = false;      ///< and the decay that goes with them
-  bool takes_tables = false;     ///< code lengths (code_tables.hpp)
-  bool keeps_rounding = false;   ///< corrected bodies stay round: CodecFrame::position_bits
-  bool turns = false;            ///< codes orientations too
-  bool takes_budget = false;     ///< is meant to have one; any codec obeys it
-  std::size_t usual_budget = kNoBudget;  ///< bytes a frame
+  bool is_baseline = false;      ///< a codec of the thesis; compared as in the thesis, with its predicted
+                                 ///< step
+  bool reads_threshold = false;  ///< false: the codec sends every body
+  bool reads_steps = false;      ///< reads quantisation steps
+  bool reads_gains = false;      ///< reads gains and the decay that belongs to them
+  bool takes_tables = false;     ///< has code lengths (code_tables.hpp)
+  bool keeps_rounding = false;   ///< corrected bodies stay rounded: CodecFrame::position_bits
+  bool turns = false;            ///< also codes orientations
+  bool takes_budget = false;     ///< is meant to have a budget; every codec obeys one
+  std::size_t usual_budget = kNoBudget;  ///< bytes per frame
 };
-/// Errors: kUnsupported for a name that make_codec() does not know.
+/// The properties of the codec `name`. Errors: kUnsupported for a name that make_codec() does not know.
 [[nodiscard]] Result<CodecTraits> codec_traits(std::string_view name);
 
-/// Makes the codec a session names. Errors: kUnsupported for an unknown name, kMalformed for tables that do
-/// not fit it, kInvalidArgument for the capacity.
+/// Makes the codec that a session names. Errors: kUnsupported for an unknown name, kMalformed for tables that
+/// do not fit it, kInvalidArgument for the capacity.
 [[nodiscard]] Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup);
 
-/// The names make_codec() knows: those of the paper's table 5.1 in its order, then ours.
+/// The names that make_codec() knows: those of the thesis's table 5.1 in its order, then Tandem's own.
 [[nodiscard]] std::span<const std::string_view> codec_names();
 
 }  // namespace tandem

@@ -1,5 +1,5 @@
 #pragma once
-// The table of predictors: all that anybody has to know of one by its name.
+// The table of predictors: what other code has to know about a predictor, by its name.
 
 #include <cstdint>
 #include <memory>
@@ -14,23 +14,25 @@
 
 namespace tandem {
 
-/// Decay and gains of the first frame, as in StreamParameters; they suit most scenes.
+/// The decay and gains of the first frame, as in StreamParameters. They suit most scenes.
 struct FirstGains {
   std::uint16_t decay = 0, beta = 0, gamma = 0;
 };
 
-/// Mean cosines, see GainEvidence, at which bits are fewest, in 1/100. Not 0, as corrections come late, when
-/// a body is beyond the threshold, or early, where the encoder likes to be.
+/// Mean cosines (see GainEvidence), in 1/100, at which a stream needs the fewest bits. They are not 0,
+/// because corrections come late, when a body is beyond the threshold, or early, where the encoder likes to
+/// be.
 struct GainAim {
   std::int32_t agreement = 25;
   std::int32_t forwardness = 20;
 };
 
-/// A new predictor is a line of predictor_table.cpp, and a folder with its step.
+/// The properties of a predictor. A new predictor needs a line in predictor_table.cpp and a folder with its
+/// step.
 struct PredictorTraits {
   std::string_view name;
-  /// `--predictor auto` chooses this predictor for worlds with at most this many bodies; 0: never. Where
-  /// `only_spheres` is set, they must be spheres of about one size: others cost it more than it gains.
+  /// `--predictor auto` chooses this predictor for worlds with at most this many bodies; 0: never. With
+  /// `only_spheres` they must be spheres of about one size, because others cost it more than it gains.
   std::uint32_t most_bodies = 0;
   bool only_spheres = false;
   /// Its constants are the world's geometry and materials (ContactConstants); otherwise it has none.
@@ -38,12 +40,12 @@ struct PredictorTraits {
   TrackerKind tracker;
   FirstGains first_gains;
   GainAim gain_aim;
-  /// As make_predictor(), of which `capacity` was checked.
+  /// Makes the predictor, as make_predictor(); `capacity` was checked.
   Result<std::unique_ptr<Predictor>> (*make)(std::uint32_t capacity, std::span<const std::int32_t> constants);
 };
 
-/// Those that this build knows, from the one with the fewest bits where it suits to the one that suits any
-/// world, basic_predictor().
+/// The predictors of this build. The first has the fewest bits in worlds that suit it; the last,
+/// basic_predictor(), suits any world.
 [[nodiscard]] std::span<const PredictorTraits> predictors();
 
 /// The last of predictors().
@@ -52,11 +54,11 @@ struct PredictorTraits {
 /// The names of predictors(), the basic one first.
 [[nodiscard]] std::vector<std::string> predictor_names();
 
-/// By name. Errors: kUnsupported, naming those that there are.
+/// Finds a predictor by name. Errors: kUnsupported, naming the predictors that there are.
 [[nodiscard]] Result<const PredictorTraits*> find_predictor(std::string_view name);
 
-/// Makes the predictor a session names, with the constants the session carries.
-/// Errors: kUnsupported for a name this build does not know, kMalformed for constants that do not fit it.
+/// Makes the predictor that a session names, with the session's constants. Errors: kUnsupported for a name
+/// that this build does not know, kMalformed for constants that do not fit it.
 [[nodiscard]] Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
                                                                 std::span<const std::int32_t> constants);
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a timeline of either side is made of.
+// The parts of a timeline of either side.
 
 #include <memory>
 
@@ -13,7 +13,8 @@ struct TimelineParts {
   RunBlocks run_blocks;
   StateHasher hasher;
 
-  /// Of a state right after the delta codec was through with it. No predictor has columns of its own yet.
+  /// The hash of a state right after the delta codec has applied to it. No predictor has columns of its own
+  /// yet.
   [[nodiscard]] std::uint64_t hash(const State& state) {
     return hasher.hash(state, {.codec = delta.codec().columns(), .predictor = {}}, run_blocks);
   }

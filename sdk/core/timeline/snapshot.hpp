@@ -1,5 +1,5 @@
 #pragma once
-// All that a joiner needs to start at one frame, as bytes: idl/PROTOCOL.md, "Snapshot".
+// The bytes that a joining client needs to start at one frame: idl/PROTOCOL.md, "Snapshot".
 
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace tandem {
 
-/// One cut right after delta `frame`.
+/// A snapshot cut right after delta `frame`.
 struct Snapshot {
   Epoch epoch = 0;
   StreamId stream;
@@ -18,24 +18,24 @@ struct Snapshot {
   std::uint64_t last_input = 0;
   Drive drive;
   StreamParameters parameters;
-  std::uint64_t hash = 0;               ///< of the state
-  std::uint64_t region_hash = 0;        ///< of region 0
+  std::uint64_t hash = 0;               ///< hash of the state
+  std::uint64_t region_hash = 0;        ///< hash of region 0
   std::vector<ScheduledDrive> pending;  ///< ascending by number, all <= last_input, frames beyond `frame`
 };
 
-/// Most bytes write_snapshot() writes.
+/// Maximum number of bytes that write_snapshot() writes.
 [[nodiscard]] std::size_t snapshot_bytes_bound(const State& state, const Codec& codec);
 
 /// Writes `snapshot`, `state` and the codec's state.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out);
 
-/// The same into a vector, whose content it replaces.
+/// Does the same into a vector and replaces its content.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
                     std::vector<std::byte>& out);
 
 /// Reads untrusted bytes: fills `state` (whose capacity must match) and loads `codec`. Checks every range;
-/// the hashes are the caller's to check. On error `state` and `codec` hold anything. Errors: kMalformed,
-/// kUnsupported (version).
+/// the caller checks the hashes. After an error the content of `state` and `codec` is undefined. Errors:
+/// kMalformed, kUnsupported (version).
 [[nodiscard]] Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count,
                                              State& state, Codec& codec);
 

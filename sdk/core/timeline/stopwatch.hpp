@@ -1,5 +1,5 @@
 #pragma once
-// Stretches of time by a clock that the caller owns; nothing where there is none.
+// Measures durations with a clock that the caller owns. Without a clock they are 0.
 
 #include <cstdint>
 #include <utility>
@@ -10,7 +10,7 @@ class Stopwatch {
  public:
   using Clock = std::int64_t (*)();  ///< monotonic, nanoseconds; may be null
   explicit Stopwatch(Clock clock) : clock_(clock), last_ns_(clock != nullptr ? clock() : 0) {}
-  /// Since construction or the last lap; 0 without a clock.
+  /// The time since construction or the last lap; 0 without a clock.
   std::int64_t lap_ns() {
     if (clock_ == nullptr) return 0;
     const std::int64_t now_ns = clock_();

@@ -1,5 +1,5 @@
 #pragma once
-// Frames in order, on both sides: predicted steps, deltas, scheduled inputs, snapshots.
+// The order of frames on both sides: predicted steps, deltas, scheduled inputs, snapshots.
 
 #include <cstdint>
 #include <memory>
@@ -15,9 +15,9 @@
 
 namespace tandem {
 
-/// What one side decides for itself, beside the layout: the other never learns of it, and no byte changes.
+/// Options of one side, in addition to the layout. The other side never learns them, and they change no byte.
 struct LocalOptions {
-  RunBlocks run_blocks;  ///< how this side codes blocks side by side; see Codec
+  RunBlocks run_blocks;  ///< how this side codes blocks in parallel; see Codec
 };
 
 /// An input that changes the predicted step. `number` counts 1, 2, ... within an epoch.
@@ -28,7 +28,7 @@ struct ScheduledDrive {
   friend bool operator==(const ScheduledDrive&, const ScheduledDrive&) = default;
 };
 
-/// Scheduled inputs still to act at most; more is refused (kCapacity).
+/// Maximum number of scheduled inputs that have not acted yet; more are refused (kCapacity).
 inline constexpr std::size_t kMaxPendingInputs = 256;
 
 /// The server's side: predicts, encodes and applies, one frame at a time. Not thread-safe.
@@ -37,7 +37,7 @@ class ServerTimeline {
   /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
   static Result<ServerTimeline> create(const Layout& layout, Epoch epoch, const LocalOptions& local = {},
                                        StreamId stream = {});
-  /// With a predictor of the caller's own; the one that `layout` names is not looked at.
+  /// Uses the caller's predictor; the one that `layout` names is ignored.
   static Result<ServerTimeline> create(const Layout& layout, Epoch epoch,
                                        std::unique_ptr<Predictor> predictor, const LocalOptions& local = {},
                                        StreamId stream = {});
@@ -47,45 +47,47 @@ class ServerTimeline {
   ServerTimeline& operator=(const ServerTimeline&) = delete;
   ~ServerTimeline();
 
-  /// The agreed state at `frame` (frame 0: the start block), before the first advance(). Of a session that
-  /// went on before: `last_input`, the last number issued, and those up to it that are still to act.
+  /// Sets the agreed state at `frame` (frame 0: the start block); call it before the first advance(). For a
+  /// session that has run before: `last_input` is the last number issued, `pending` has the inputs up to it
+  /// that have not acted yet.
   void start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input = 0,
              std::span<const ScheduledDrive> pending = {});
-  /// Numbers must follow one another and frames must lie in the future. The last number issued for a frame
-  /// wins. Errors: kOutOfOrder, kCapacity, kInvalidArgument (gravity out of range).
+  /// Schedules an input. Numbers must be consecutive and frames must lie in the future. The last number for a
+  /// frame wins. Errors: kOutOfOrder, kCapacity, kInvalidArgument (gravity out of range).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
 
   struct FrameResult {
     Frame frame = 0;
-    std::uint64_t last_input = 0;        ///< highest number scheduled before this delta
-    std::uint64_t hash = 0;              ///< of the agreed state
+    std::uint64_t last_input = 0;        ///< highest input number scheduled before this delta
+    std::uint64_t hash = 0;              ///< hash of the agreed state
     std::span<const std::byte> payload;  ///< valid until the next advance()
     std::size_t correction_bytes = 0;
     std::uint32_t corrected = 0;
-    /// Encoding applies as it goes. Filled only when a clock was given: set_clock().
+    /// Durations, filled only with a clock: set_clock(). Encoding includes applying.
     std::int64_t predict_ns = 0, encode_ns = 0, hash_ns = 0;
   };
-  /// Predicts the next frame, encodes towards `target` and applies; tells `observer`, if any. Allocates
-  /// nothing after the first few frames.
+  /// Predicts the next frame, encodes towards `target` and applies. Tells `observer`, if there is one.
+  /// Allocates nothing after the first few frames.
   FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
                       std::size_t budget = kNoBudget, EncodeObserver* observer = nullptr);
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
-  /// In force from the next advance() on; travels in that delta.
+  /// Sets the parameters from the next advance() on; they travel in that delta.
   void set_parameters(const StreamParameters& parameters);
 
-  /// The next advance() rounds every body, on both sides, so that a snapshot cut right after it is smaller.
-  /// No body gets further from `target` than without; see idl/PROTOCOL.md, "Rounding".
+  /// Makes the next advance() round every body, on both sides, so that a snapshot cut right after it is
+  /// smaller. No body gets further from `target` than without rounding; see idl/PROTOCOL.md, "Rounding".
   void round_next();
 
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] const State& state() const;
   [[nodiscard]] const Drive& drive() const;                  ///< in force at frame()
   [[nodiscard]] const StreamParameters& parameters() const;  ///< in force at frame()
-  [[nodiscard]] std::uint64_t hash() const;                  ///< of state()
+  [[nodiscard]] std::uint64_t hash() const;                  ///< hash of state()
   [[nodiscard]] std::uint64_t last_input() const;
   [[nodiscard]] std::size_t payload_bound() const;
-  /// One cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content of `out`.
+  /// Writes a snapshot cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content
+  /// of `out`.
   void snapshot(std::vector<std::byte>& out);
   [[nodiscard]] std::size_t snapshot_bound() const;
 
@@ -100,7 +102,7 @@ class ClientTimeline {
  public:
   /// Errors: kUnsupported, kMalformed, kInvalidArgument (capacity, parameters, lead).
   static Result<ClientTimeline> create(const Layout& layout, const LocalOptions& local = {});
-  /// With a predictor of the caller's own; the one that `layout` names is not looked at.
+  /// Uses the caller's predictor; the one that `layout` names is ignored.
   static Result<ClientTimeline> create(const Layout& layout, std::unique_ptr<Predictor> predictor,
                                        const LocalOptions& local = {});
   ClientTimeline(ClientTimeline&&) noexcept;
@@ -109,48 +111,51 @@ class ClientTimeline {
   ClientTimeline& operator=(const ClientTimeline&) = delete;
   ~ClientTimeline();
 
-  /// Starts over from a snapshot. Errors: kMalformed, kOutOfOrder (another epoch or stream), kMismatch (its
-  /// own hash); on error `playing()` is false, and of all states that of applied() is still there.
+  /// Starts anew from a snapshot. Errors: kMalformed, kOutOfOrder (another epoch or stream), kMismatch (its
+  /// own hash). After an error `playing()` is false, and of all states only that of applied() remains.
   [[nodiscard]] Result<void> load(std::span<const std::byte> snapshot, Epoch epoch, StreamId stream = {});
   [[nodiscard]] bool playing() const;
 
-  /// Scheduled inputs in any order, after load(); duplicates and numbers the snapshot already counts are
-  /// ignored. A frame that was simulated but not applied is simulated again, and all after it. Errors:
-  /// kCapacity; kMalformed; kOutOfOrder before load() and for a frame that was already applied (a gap in the
-  /// server's promise).
+  /// Takes scheduled inputs in any order, after load(). Duplicates and numbers that the snapshot already
+  /// counts are ignored. If the input acts on a frame that was simulated but not applied, that frame and all
+  /// after it are simulated again. Errors: kCapacity; kMalformed; kOutOfOrder before load() and for a frame
+  /// that was already applied (the server broke its promise).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
-  /// Every input number up to here is held, counted from the snapshot's.
+  /// Every input number up to this one is held, counted from the snapshot's.
   [[nodiscard]] std::uint64_t inputs_held() const;
 
-  /// Applies delta `frame` == applied() + 1, simulating up to it first if need be, checks the hash and
-  /// re-simulates what was simulated beyond it. Needs inputs_held() >= last_input. Errors: kOutOfOrder,
-  /// kMalformed, kUnsupported: state untouched. kMismatch: applied but wrong; load() again.
+  /// Applies delta `frame` == applied() + 1. Simulates up to it first if necessary, checks the hash, and
+  /// re-simulates the frames beyond it. Needs inputs_held() >= last_input. Errors: kOutOfOrder, kMalformed,
+  /// kUnsupported: the state does not change. kMismatch: applied but wrong; load() again.
   [[nodiscard]] Result<void> apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload);
-  /// The agreed state at applied(), as the server would cut it there: for who serves further clients. While
-  /// playing() only. Replaces the content of `out`.
+  /// Writes a snapshot of the agreed state at applied(), as the server would cut it there, for a caller that
+  /// serves further clients. Only while playing(). Replaces the content of `out`.
   void snapshot(std::vector<std::byte>& out) const;
-  /// What snapshot() says from now on until load(), for who serves them as a session of his own.
+  /// Sets the epoch and stream that snapshot() writes until the next load(), for a caller that serves them as
+  /// its own session.
   void rename(Epoch epoch, StreamId stream);
-  /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead); returns whether it did.
+  /// Simulates one frame ahead if now() < applied() + lead (clamped to max_lead). Returns whether it did.
   bool step(std::uint32_t lead);
-  /// Simulates the frame after applied() unless that is done, while its state is still in the caches; now()
-  /// stays. The next apply() or step() finds it ready.
+  /// Simulates the frame after applied(), unless that is done, while its state is still in the caches. now()
+  /// does not change. The next apply() or step() then uses the result.
   void prepare();
 
-  [[nodiscard]] Frame applied() const;  ///< last frame whose delta is in
+  [[nodiscard]] Frame applied() const;  ///< last frame whose delta was applied
   [[nodiscard]] Frame now() const;      ///< last frame stepped to, applied() .. applied() + max_lead
-  /// State of a frame from applied() to now(); valid until the next call that is not const.
+  /// The state of a frame from applied() to now(); valid until the next call that is not const.
   [[nodiscard]] const State& state(Frame frame) const;
-  [[nodiscard]] std::uint64_t hash() const;                          ///< of state(applied()), as last checked
+  [[nodiscard]] std::uint64_t hash() const;                          ///< hash of state(applied()), as last
+                                                                     ///< checked
   [[nodiscard]] const Drive& drive() const;                          ///< in force at applied()
-  [[nodiscard]] std::span<const Slot> touched() const;               ///< by the last apply()
-  [[nodiscard]] std::span<const Slot> corrected() const;             ///< by the last apply()'s corrections
-  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< of the last apply()
+  [[nodiscard]] std::span<const Slot> touched() const;               ///< slots that the last apply() touched
+  [[nodiscard]] std::span<const Slot> corrected() const;             ///< slots that the last apply()
+                                                                     ///< corrected
+  [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< records of the last apply()
   [[nodiscard]] const StreamParameters& parameters() const;          ///< in force at applied()
 
-  /// Of the last apply(): simulating up to the frame, where step() had not, and again beyond it; decoding and
-  /// correcting; checking its hash. Zero without a clock.
+  /// Durations of the last apply(): simulating up to the frame, if step() had not done so, and again beyond
+  /// it; decoding and correcting; checking its hash. Zero without a clock.
   struct Timings {
     std::int64_t predict_ns = 0, decode_ns = 0, hash_ns = 0;
   };

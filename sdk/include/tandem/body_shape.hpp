@@ -1,14 +1,15 @@
 #pragma once
-// What a body looks like.
+// The shapes that a body can be drawn as.
 
 #include <cstdint>
 
 namespace tandem {
 
-/// Says what a type's shape values are: in the body's frame, scene units.
+/// The shape of a body type. It decides the meaning of the type's shape values, which are in the body's frame
+/// and in scene units.
 enum class BodyShape : std::uint32_t {
   kNone = 0,
-  kSphere = 1,    ///< no values: the radius
+  kSphere = 1,    ///< no values: the type's radius is the sphere's
   kBox = 2,       ///< half sizes x, y, z
   kCapsule = 3,   ///< radius, half of the length between the centres of the caps, along y
   kCylinder = 4,  ///< radius, half of the height, along y

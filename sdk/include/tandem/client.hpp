@@ -1,6 +1,6 @@
 #pragma once
-// tandem::Client: the functions of tandem/tandem.h, which says what each of them does, for C++20. Header
-// only: what is linked is the C library.
+// tandem::Client: the functions of tandem/tandem.h for C++20. That header describes what each of them does.
+// This one is header-only; an application links the C library.
 
 #include <array>
 #include <chrono>
@@ -25,35 +25,36 @@
 
 namespace tandem {
 
-/// What Client::connect() is told.
+/// Options of Client::connect().
 struct ClientOptions {
   std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
   std::uint32_t domain = 0;         ///< DDS domain, 0..230
   ClientRole role = ClientRole::kParticipant;
   std::uint32_t lead = 1;  ///< frames to simulate beyond the last delta; clamped to what the session allows
-  /// True: a thread of the client's own does the work. False: the application calls update() often (at least
-  /// once a frame), and everything happens in there.
+  /// True: the client has a thread that does its work. False: the application calls update() at least once a
+  /// frame, and all work is done in that call.
   bool background = true;
-  /// EXPERIMENTAL. sample() shows the application's own gravity before the server has said when it acts.
+  /// EXPERIMENTAL. sample() shows the gravity that this application sent at once, before the server has said
+  /// on which frame it acts.
   bool echo = false;
-  /// Of the session's streams: "auto", "bandwidth", "computing", "error" or a name; see
+  /// Which of the session's streams to play: "auto", "bandwidth", "computing", "error" or a name; see
   /// tandem_options::prefer.
   std::string prefer = "auto";
-  /// One line for a human. Called from the thread that does the work; must return soon, and must not call the
-  /// client. What it throws is dropped.
+  /// Receives one line for a human. It is called by the thread that does the client's work. It must return
+  /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
 };
 
-/// What a type of bodies looks like.
+/// The appearance of the bodies of a type.
 struct BodyTypeInfo {
   std::string name;
-  float radius = 0;               ///< of the sphere that holds the body; scene units
+  float radius = 0;               ///< radius of the sphere around the body; scene units
   std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
   BodyShape shape = BodyShape::kSphere;
-  std::vector<float> shape_values = {};  ///< as the shape says
+  std::vector<float> shape_values = {};  ///< see BodyShape
 };
 
-/// One piece of a scene that does not move; see tandem_solid.
+/// One part of the scene that does not move; see tandem_solid.
 struct Solid {
   enum class Shape : std::int32_t {
     kPlane = TANDEM_SHAPE_PLANE,
@@ -61,44 +62,46 @@ struct Solid {
     kSphere = TANDEM_SHAPE_SPHERE
   };
   Shape shape = Shape::kPlane;
-  std::array<float, 3> centre{};                 ///< of a plane: a point of it
-  std::array<float, 4> orientation{0, 0, 0, 1};  ///< of a box: x, y, z, w
-  std::array<float, 3> half_size{};              ///< of a box
-  std::array<float, 3> normal{};                 ///< of a plane: of norm 1, to where the bodies are
-  float radius = 0;                              ///< of a sphere
+  std::array<float, 3> centre{};                 ///< centre; for a plane: any point on it
+  std::array<float, 4> orientation{0, 0, 0, 1};  ///< box: x, y, z, w
+  std::array<float, 3> half_size{};              ///< box: half sizes x, y, z
+  std::array<float, 3> normal{};                 ///< plane: norm 1; points to the side where the bodies are
+  float radius = 0;                              ///< sphere only
 };
 
-/// What a session plays in; see tandem_scene.
+/// The scene of a session; see tandem_scene.
 struct Scene {
   std::string name;
   std::uint32_t capacity = 0;  ///< slots
   double frame_rate_hz = 0;
-  std::array<double, 3> gravity{};       ///< at the start; scene units / s^2
-  double max_gravity = 0, max_push = 0;  ///< beyond, the server refuses it; 0: not told
-  std::array<float, 3> low{}, high{};    ///< bounds; all 0: not told
+  std::array<double, 3> gravity{};       ///< gravity at the start; scene units / s^2
+  double max_gravity = 0, max_push = 0;  ///< the server refuses more; 0: unknown
+  std::array<float, 3> low{}, high{};    ///< bounds; all 0: unknown
   std::vector<Solid> solids;
 };
 
 /// A session on a domain; see tandem_session_info.
 struct SessionInfo {
   std::string name, scene, codec, predictor;
-  bool playable = false;  ///< by this build
+  bool playable = false;  ///< this build can play it
   std::uint64_t epoch = 0;
   std::uint32_t capacity = 0, bodies = 0, participants = 0, observers = 0;
   double frame_rate_hz = 0;
-  double client_ms = 0;   ///< what a client computes in a frame, on the server's processor
-  double mbit_per_s = 0;  ///< of payload, now
+  double client_ms = 0;   ///< computing time of a client for one frame, measured on the server's processor
+  double mbit_per_s = 0;  ///< current payload rate
 };
 
-/// Where Client::sample() puts one value of each body: a plain array, or a member of an array of structs.
-/// Empty: not wanted.
+/// Where Client::sample() writes one kind of value of each body: a plain array, or a member of an array of
+/// structs. An empty column is not written.
 template <class T>
 class Column {
  public:
   Column() = default;
-  /// `first`: of the first body; `stride_bytes` from one body's to the next's, 0: side by side.
+  /// `first`: where the first body's value goes. `stride_bytes`: distance to the next body's; 0: the values
+  /// are side by side.
   Column(T* first, std::size_t stride_bytes = 0) : first_(first), stride_(stride_bytes) {}
-  /// A member of each struct: a T, or a struct or array that begins with as many T as a body has of them.
+  /// A member of each struct. The member is a T, or a struct or array that begins with as many T as a body
+  /// has of them.
   template <class Struct, class Member>
   Column(std::span<Struct> bodies, Member Struct::*member)
       : first_(bodies.empty() ? nullptr : reinterpret_cast<T*>(&(bodies.front().*member))),
@@ -112,27 +115,27 @@ class Column {
   std::size_t stride_ = 0;
 };
 
-/// As tandem_columns.
+/// See tandem_columns.
 struct Columns {
-  std::size_t capacity = 0;  ///< bodies that every column has room for
+  std::size_t capacity = 0;  ///< number of bodies that every column has room for
   Column<float> positions = {}, velocities = {}, orientations = {}, angular_velocities = {};
   Column<std::uint16_t> types = {};
   Column<std::uint8_t> alive = {}, reuse = {}, changes = {};
 };
 
-/// As tandem_sample_options.
+/// See tandem_sample_options.
 struct SampleOptions {
   SampleMode mode = SampleMode::kExtrapolate;
   std::int64_t at_ns = 0;   ///< by tandem_clock_ns(); 0: now
   double smoothing_s = -1;  ///< below 0: the default; 0: corrections show as jumps
 };
 
-/// One client of one session. Movable. All members may be called from any thread; all but sample() may have
-/// to wait until the frame in work is applied. A moved-from client answers kInvalidHandle.
+/// One client of one session. Movable; a moved-from client answers kInvalidHandle. All members may be called
+/// from any thread. All but sample() may wait until the current frame is applied.
 class Client {
  public:
-  /// Starts looking for the session; returns at once, whether a server is there or not.
-  /// Errors: kInvalidArgument (session name, domain, lead), kTransport (DDS could not start).
+  /// Starts looking for the session. Returns at once, even if there is no server. Errors: kInvalidArgument
+  /// (session name, domain, lead), kTransport (DDS could not start).
   [[nodiscard]] static Result<Client> connect(const ClientOptions& options) {
     Client client;
     tandem_options c = TANDEM_OPTIONS_INIT;
@@ -164,40 +167,42 @@ class Client {
   }
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
-  /// Leaves the session; waits for calls of other threads.
+  /// Leaves the session. Waits for calls of other threads.
   ~Client() {
     if (handle_ == 0 || tandem_leave(handle_) != TANDEM_IN_CALLBACK) return;
-    // Within the log function of another client. This one's must outlive it.
+    // This destructor runs in the log function of another client. This client's own log function must outlive
+    // it.
     std::thread([handle = handle_, log = std::move(log_)] { tandem_leave(handle); }).detach();
   }
 
-  /// For the functions of tandem/tandem.h; 0 when moved from.
+  /// The handle for the functions of tandem/tandem.h; 0 if this client was moved from.
   [[nodiscard]] tandem_client handle() const { return handle_; }
 
-  /// Without a thread: takes what arrived, follows the session, and waits at most `wait_s` for something to
-  /// do. Errors: kWrongThread.
+  /// Updates a client that has no thread: takes what arrived, follows the session, and waits at most `wait_s`
+  /// seconds for something to do. Errors: kWrongThread.
   Result<void> update(double wait_s = 0) { return checked(tandem_update(handle_, wait_s)); }
-  /// Lets the session go on for `seconds`: updates, or sleeps when a thread does the work.
+  /// Lets the session go on for `seconds`: updates the client, or sleeps if a thread does its work.
   void run_for(double seconds);
-  /// Blocks until playing, or `timeout_s` passed. Updates itself when there is no thread. Errors: kTimeout.
+  /// Blocks until the client plays or `timeout_s` seconds have passed. Updates the client if it has no
+  /// thread. Errors: kTimeout.
   Result<void> wait_until_playing(double timeout_s) {
     return checked(tandem_wait_until_playing(handle_, timeout_s));
   }
-  /// Of streams, as ClientOptions::prefer, from now on.
+  /// Changes ClientOptions::prefer.
   [[nodiscard]] Result<void> prefer(const std::string& preference) {
     return checked(tandem_prefer(handle_, preference.c_str()));
   }
   [[nodiscard]] Result<ClientStatus> status() const;
-  /// The oldest event that was not taken yet; empty: there is none.
+  /// Takes the oldest event; empty if there is none.
   [[nodiscard]] std::optional<tandem_event> next_event() {
     tandem_event event = TANDEM_EVENT_INIT;
     if (tandem_next_event(handle_, &event) != TANDEM_OK) return std::nullopt;
     return event;
   }
 
-  /// Sends an input and returns its number. It acts on the same frame everywhere; an event tells which.
-  /// Errors: kNotReady while not playing, kOutOfOrder as an observer, kInvalidArgument (not finite, above
-  /// 1,024 bytes), kTransport.
+  /// Sends an input and returns its number. The input acts on the same frame everywhere; an event tells
+  /// which. Errors: kNotReady (not playing), kOutOfOrder (joined as an observer), kInvalidArgument (not
+  /// finite, more than 1,024 bytes), kTransport.
   [[nodiscard]] Result<std::uint64_t> send_gravity(std::array<double, 3> metres_per_s2) {
     std::uint64_t number = 0;
     return numbered(tandem_send_gravity(handle_, metres_per_s2.data(), &number), number);
@@ -208,29 +213,29 @@ class Client {
     std::uint64_t number = 0;
     return numbered(tandem_send_push(handle_, centre.data(), radius, velocity.data(), &number), number);
   }
-  /// Bytes for the engine.
+  /// Sends bytes whose meaning only the server's simulation knows.
   [[nodiscard]] Result<std::uint64_t> send_bytes(std::span<const std::byte> bytes) {
     std::uint64_t number = 0;
     return numbered(tandem_send_bytes(handle_, bytes.data(), bytes.size(), &number), number);
   }
 
-  /// EXPERIMENTAL. Of a session that replays a recording: goes on at so many seconds after its first message,
-  /// for everybody, under another epoch; TANDEM_EVENT_NEW_EPOCH tells that it does. Refused beyond the
-  /// recording, in a session that is no replay, and less than a second after another.
+  /// EXPERIMENTAL. Moves the replay of a recording to `seconds` after its first message, for all clients and
+  /// under a new epoch; TANDEM_EVENT_NEW_EPOCH tells that it has moved. The server refuses it if the time is
+  /// beyond the recording, if the session is not a replay, and less than a second after another seek.
   [[nodiscard]] Result<std::uint64_t> send_seek(double seconds) {
     std::uint64_t number = 0;
     return numbered(tandem_send_seek(handle_, seconds, &number), number);
   }
 
-  /// The bodies as they should be drawn, straight into the application's memory. Errors: kNotReady (nothing
-  /// to draw yet), kCapacity (the session has more slots), kInvalidArgument.
+  /// Writes the bodies as they should be drawn straight into the application's memory. Errors: kNotReady
+  /// (nothing to draw yet), kCapacity (the session has more slots), kInvalidArgument.
   Result<tandem_frame> sample(const Columns& columns, const SampleOptions& options = {}) {
     tandem_frame frame = TANDEM_FRAME_INIT;
     if (const auto sampled = checked(sample_into(columns, options, frame)); !sampled)
       return unexpected(sampled);
     return frame;
   }
-  /// Which moment it would be, and how many bodies; a sample without columns.
+  /// Returns the moment that would be drawn and the number of bodies, without writing columns.
   Result<tandem_frame> sample_frame(const SampleOptions& options = {}) {
     tandem_frame frame = TANDEM_FRAME_INIT;
     const tandem_sample_options how = to_c(options);
@@ -239,11 +244,11 @@ class Client {
     }
     return frame;
   }
-  /// The same into arrays that grow with the session. Returns false, and leaves `out` as it is, where there
-  /// is nothing to draw. Allocates when the capacity changed only.
+  /// Does the same with arrays that grow with the session. Returns false and leaves `out` as it is if there
+  /// is nothing to draw. Allocates only when the capacity changed.
   bool sample(Sample& out, SampleMode mode = SampleMode::kExtrapolate);
 
-  /// Body types of the session joined; empty before.
+  /// The body types of the session; empty before one is joined.
   [[nodiscard]] std::vector<BodyTypeInfo> types() const;
   /// Geometry, gravity and bounds. Errors: kNotReady (no session is known yet), kMalformed.
   [[nodiscard]] Result<Scene> scene() const;
@@ -256,7 +261,7 @@ class Client {
   static void call_log(void* user, tandem_log_level level, const char* line) {
     try {
       (*static_cast<Log*>(user))(static_cast<LogLevel>(level), line);
-    } catch (...) {  // C is between here and whoever could catch it
+    } catch (...) {  // an exception must not cross the C functions
     }
   }
   [[nodiscard]] static Result<void> checked(tandem_result result) {
@@ -284,8 +289,7 @@ class Client {
   bool background_ = true;
 };
 
-/// Watches the sessions of a domain, without taking part in any. Movable. All members may be called from any
-/// thread.
+/// Watches the sessions of a domain without joining any. Movable. All members may be called from any thread.
 class Browser {
  public:
   /// Errors: kInvalidArgument (domain), kTransport (DDS could not start).
@@ -307,7 +311,8 @@ class Browser {
     std::thread([handle = handle_] { tandem_browser_close(handle); }).detach();
   }
 
-  /// What is there now, by name. Does not wait: a session is known within a second or two of open().
+  /// The sessions that are on the domain now, sorted by name. Does not wait: a session is found within one or
+  /// two seconds after open().
   [[nodiscard]] Result<std::vector<SessionInfo>> sessions() const;
 
  private:
@@ -408,7 +413,7 @@ inline tandem_result Client::sample_into(const Columns& columns, const SampleOpt
                                          tandem_frame& frame) {
   const tandem_sample_options how = to_c(options);
   tandem_columns c = TANDEM_COLUMNS_INIT;
-  const auto count = [](std::size_t n) {  // more than that is as good as that
+  const auto count = [](std::size_t n) {  // larger values mean the same as the maximum
     constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
     return static_cast<std::uint32_t>(n < kMost ? n : kMost);
   };
@@ -455,7 +460,7 @@ inline bool Client::sample(Sample& out, SampleMode mode) {
     const bool missed = turning < quaternions;
     out.orientations.resize(4 * quaternions);
     if (result == TANDEM_OK && !missed) break;
-    told = told || result == TANDEM_OK;  // changes are told once
+    told = told || result == TANDEM_OK;  // changes are reported only once
   }
   out.epoch = frame.epoch;
   out.frame = frame.frame;

@@ -20,9 +20,9 @@ enum class ErrorCode : std::uint8_t {
   kConflict = 8,         ///< somebody else owns the name
   kTransport = 9,        ///< the middleware reported an error
   kIo = 10,              ///< a file could not be read or written
-  // Of the functions in tandem/tandem.h only.
+  // Only the functions in tandem/tandem.h return the following.
   kInvalidHandle = 11,  ///< closed, or never made
-  kNotReady = 12,       ///< nothing to draw, not playing, not known, or no event, yet
+  kNotReady = 12,       ///< not yet: nothing to draw, not playing, not known, or no event
   kInCallback = 13,     ///< called from a callback
   kWrongThread = 14,    ///< another thread does this already
   kOutOfMemory = 15,

@@ -1,51 +1,52 @@
 #pragma once
-// The figures of a server. Each is written once, here: a line in a struct and a line in the list behind it.
-// The status message, the host's totals, tandem::Server, `tandemd --json`, the browser and `tandem top` go
-// through the lists. Where else a new one has to be named, and what then checks it: CONTRIBUTING.md, "Where a
-// new thing goes".
+// The figures of a server. Each figure is written here once: as a line in a struct and as a line in the list
+// below the struct. The status message, the host's totals, tandem::Server, `tandemd --json`, the browser and
+// `tandem top` use the lists. CONTRIBUTING.md, "Where a new thing goes", says where else a new figure has to
+// be named and what checks it.
 
 #include <cstdint>
 
 namespace tandem {
 
-// sdk/package/figures.py reads the structs: a figure a line, with its text behind it.
+// sdk/package/figures.py reads the structs: each figure is one line, followed by its text.
 
-/// Counts since the start, of all streams together where streams differ.
+/// Counts since the start. They are sums over all streams where streams differ.
 struct ServerCounts {
-  std::uint64_t reply_bytes = 0;       ///< of replies as messages
-  std::uint64_t input_bytes = 0;       ///< of scheduled inputs as messages
-  std::uint64_t snapshot_bytes = 0;    ///< of the snapshots themselves, repetitions too
+  std::uint64_t reply_bytes = 0;       ///< size of replies as messages
+  std::uint64_t input_bytes = 0;       ///< size of scheduled inputs as messages
+  std::uint64_t snapshot_bytes = 0;    ///< size of the snapshots, including repetitions
   std::uint64_t stalls = 0;            ///< suspensions that a participant caused
-  std::uint64_t suspended_ms = 0;      ///< waiting past due, for participants or for the queue
-  std::uint64_t refused_inputs = 0;    ///< by rule, rate or simulation
-  std::uint64_t refused_messages = 0;  ///< that broke a rule of the protocol
-  std::uint64_t snapshots = 0;         ///< made for those who join
+  std::uint64_t suspended_ms = 0;      ///< time that due frames waited for participants or the queue
+  std::uint64_t refused_inputs = 0;    ///< refused by a rule, by the rate limit or by the simulation
+  std::uint64_t refused_messages = 0;  ///< messages that broke a rule of the protocol
+  std::uint64_t snapshots = 0;         ///< snapshots made for joining clients
   bool operator==(const ServerCounts&) const = default;
 };
 
-/// What TandemServerStatus tells of one stream, once a second: rates and durations of the last second, bytes
-/// handed to the writers since the start, once each however many readers there are.
+/// What TandemServerStatus tells about one stream once a second. Rates and durations are of the last second.
+/// Bytes are counted since the start, as handed to the writers: once, however many readers there are.
 struct ServerFigures : ServerCounts {
   double uptime_s = 0;                 ///< since the start
-  double frame_rate_hz = 0;            ///< as it is kept
-  double mbit_per_s = 0;               ///< of payload; 2^20 bits to the Mbit
-  double raw_mbit_per_s = 0;           ///< what positions and velocities would need uncompressed
+  double frame_rate_hz = 0;            ///< as achieved
+  double mbit_per_s = 0;               ///< payload rate; 1 Mbit = 2^20 bits
+  double raw_mbit_per_s = 0;           ///< rate that positions and velocities would need uncompressed
   double frame_ms_p50 = 0;             ///< step, predict, encode, apply
   double frame_ms_p99 = 0;             ///< as frame_ms_p50
   double corrected_per_frame = 0;      ///< bodies that a delta corrects
   double threshold = 0;                ///< in force, scene units
-  std::uint32_t bodies = 0;            ///< alive
-  std::uint32_t at_rest = 0;           ///< of the bodies
-  std::uint32_t participants = 0;      ///< that play
-  std::uint32_t observers = 0;         ///< that play
-  std::uint32_t window = 0;            ///< frames that a participant may be behind
-  std::uint32_t queue_high_water = 0;  ///< messages that waited at once, at most
-  std::uint64_t delta_bytes = 0;       ///< of the deltas' payload
+  std::uint32_t bodies = 0;            ///< bodies alive
+  std::uint32_t at_rest = 0;           ///< bodies at rest
+  std::uint32_t participants = 0;      ///< participants that play
+  std::uint32_t observers = 0;         ///< observers that play
+  std::uint32_t window = 0;            ///< maximum number of frames that a participant may be behind
+  std::uint32_t queue_high_water = 0;  ///< maximum number of messages that waited at once
+  std::uint64_t delta_bytes = 0;       ///< size of the deltas' payload
   bool operator==(const ServerFigures&) const = default;
 };
 
-/// Calls visit("name", that figure of each of `of`) one by one, in the order of idl/tandem.idl. What is in
-/// `of` may be any struct with these members: of the IDL, several to copy from one to the other.
+/// Calls visit("name", that figure of each of `of`) for one figure after the other, in the order of
+/// idl/tandem.idl. The structs in `of` may be of any type with these members: of the IDL, or several to copy
+/// from one to the other.
 template <class Visit, class... Of>
 constexpr void each_server_count(const Visit& visit, Of&... of) {
   visit("reply_bytes", of.reply_bytes...);
@@ -58,7 +59,7 @@ constexpr void each_server_count(const Visit& visit, Of&... of) {
   visit("snapshots", of.snapshots...);
 }
 
-/// The same for all.
+/// Does the same for all figures.
 template <class Visit, class... Of>
 constexpr void each_server_figure(const Visit& visit, Of&... of) {
   visit("uptime_s", of.uptime_s...);

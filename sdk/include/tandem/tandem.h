@@ -6,9 +6,9 @@
 
 /**
  * @file
- * Tandem: holds a physical simulation that runs on a server, body by body and bit by bit as the server has
- * it, to draw it and to act on it. This header is the manual of the client SDK; every other language stands
- * on it.
+ * Tandem follows a physical simulation that runs on a server. A client holds every body exactly as the server
+ * agreed on it, bit by bit; it draws the bodies and acts on them. This header is the manual of the client
+ * SDK; every other language uses it.
  *
  *     tandem_client client;
  *     tandem_join(NULL, &client);                      // session "default" on DDS domain 0
@@ -21,35 +21,36 @@
  *     tandem_sample(client, NULL, &columns, NULL);     // at any rate
  *     tandem_leave(client);
  *
- * Handles   A client or browser is a number that is never used twice in a process; 0 is none. A call with one
- *           that was closed, or never was, returns TANDEM_INVALID_HANDLE, also while others close it. Close
- *           them before main() returns.
- * Results   Functions return TANDEM_OK (0) or what went wrong; tandem_error_text() has a line for a human, of
- *           the last failure in the calling thread. Where a call fails, its outputs are as they were, unless
- *           its text says otherwise. No C++ exception leaves a function; without memory it is
- *           TANDEM_OUT_OF_MEMORY. Every function may return TANDEM_INVALID_ARGUMENT (a null pointer where the
- *           text does not allow it, a size or number out of range), TANDEM_INVALID_HANDLE,
- *           TANDEM_IN_CALLBACK, TANDEM_OUT_OF_MEMORY and TANDEM_INTERNAL; the texts name the others.
- * Structs   begin with `size`: set it with the struct's ..._INIT; no function changes it. Of an array of
- *           structs the first one's counts for all. A program built against an older header runs with a newer
- *           library, and the other way round where it leaves zero what the older library does not know
- *           (TANDEM_UNSUPPORTED otherwise); what that library cannot fill in is zero.
+ * Handles   A client or browser is a number that is never used twice in a process; 0 is none. A call with a
+ *           handle that is closed or was never made returns TANDEM_INVALID_HANDLE, also while another thread
+ *           closes it. Close all handles before main() returns.
+ * Results   Functions return TANDEM_OK (0) or what went wrong. tandem_error_text() describes the last failure
+ *           in the calling thread. A call that fails leaves its outputs as they were, unless its text says
+ *           otherwise. No C++ exception leaves a function. Every function may return
+ *           TANDEM_INVALID_ARGUMENT (a null pointer where the text does not allow it, a size or number out
+ *           of range), TANDEM_INVALID_HANDLE, TANDEM_IN_CALLBACK, TANDEM_OUT_OF_MEMORY and TANDEM_INTERNAL;
+ *           the texts name the others.
+ * Structs   Each struct begins with `size`. Set it with the struct's ..._INIT; no function changes it. In an
+ *           array of structs the size of the first counts for all. A program built with an older header runs
+ *           with a newer library. A program built with a newer header runs with an older library if it
+ *           leaves zero what that library does not know (otherwise: TANDEM_UNSUPPORTED); outputs that the
+ *           library does not know are zero.
  * Threads   All functions may be called from any thread, unless they say otherwise. tandem_sample() never
- *           waits for the network, for decoding or for applying; the others may wait until the frame in work
- *           is applied. From a callback only tandem_error_text(), tandem_result_text(), tandem_clock_ns() and
- *           the version's functions may be called: all others return TANDEM_IN_CALLBACK.
- * Memory    Arrays and structs are the caller's; nothing of them is kept after the call. Texts in structs end
- *           with 0 and are cut where they are too long. What is buffered is bounded, however seldom a client
- *           is updated.
- * Processes Clients of one process and domain share the DDS domain: its sockets, threads and discovery. Each
- *           has a participant and endpoints of its own. After fork() the child has none of its parent's
- *           clients, and cannot join (TANDEM_TRANSPORT) before it has called exec().
- * Units     Scene units (metres, as a rule), seconds, radians; right-handed as the scene. Frames begin at 1.
+ *           waits for the network, for decoding or for applying. The others may wait until the current frame
+ *           is applied. A callback may call only tandem_error_text(), tandem_result_text(),
+ *           tandem_clock_ns() and the version's functions; all others return TANDEM_IN_CALLBACK.
+ * Memory    The caller owns arrays and structs; the library keeps no pointer to them after the call. Texts in
+ *           structs end with 0 and are cut if they are too long. Buffers are bounded, even if a client is
+ *           seldom updated.
+ * Processes The clients of one process and domain share the DDS domain: its sockets, threads and discovery.
+ *           Each client has its own participant and endpoints. After fork() the child has none of its
+ *           parent's clients, and it cannot join (TANDEM_TRANSPORT) before it has called exec().
+ * Units     Scene units (usually metres), seconds, radians; right-handed as the scene. Frames begin at 1.
  *
- * What is not marked EXPERIMENTAL keeps its meaning and binary form until the next major version.
+ * Everything that is not marked EXPERIMENTAL keeps its meaning and binary form until the next major version.
  */
 
-/* Set before this is included where the static library is linked or the symbols are wrapped. */
+/* Define TANDEM_API before the include if the static library is linked or the symbols are wrapped. */
 #ifndef TANDEM_API
 #define TANDEM_API __attribute__((visibility("default")))
 #endif
@@ -62,50 +63,51 @@ extern "C" {
 #endif
 
 /** @name Version
- * Of the API, by semantic versioning, and the one place where it is written down.
+ * The API follows semantic versioning. Its version is written down only here.
  * @{ */
-#define TANDEM_VERSION_MAJOR 0 /**< a new one may break programs */
-#define TANDEM_VERSION_MINOR 1 /**< a new one adds */
-#define TANDEM_VERSION_PATCH 0 /**< a new one mends */
-/** Of this header, to compare with tandem_version_number(). */
+#define TANDEM_VERSION_MAJOR 0 /**< a new major version may break programs */
+#define TANDEM_VERSION_MINOR 1 /**< a new minor version adds to the API */
+#define TANDEM_VERSION_PATCH 0 /**< a new patch version repairs faults */
+/** The version of this header, to compare with tandem_version_number(). */
 #define TANDEM_VERSION_NUMBER \
   (TANDEM_VERSION_MAJOR * 10000 + TANDEM_VERSION_MINOR * 100 + TANDEM_VERSION_PATCH)
 
-/** Of the library at run time: "MAJOR.MINOR.PATCH". Lives for ever. */
+/** Returns the version of the loaded library, "MAJOR.MINOR.PATCH". The text stays valid for ever. */
 TANDEM_API const char* tandem_version(void) TANDEM_NOEXCEPT;
-/** Of the library at run time, as TANDEM_VERSION_NUMBER. */
+/** Returns the version of the loaded library in the form of TANDEM_VERSION_NUMBER. */
 TANDEM_API uint32_t tandem_version_number(void) TANDEM_NOEXCEPT;
 /** @} */
 
 /** @name Results
  * @{ */
-/** What a call came to: one of the constants below. Their values never change; new ones are appended. */
+/** The result of a call: one of the constants below. Their values never change; new ones are appended. */
 typedef int32_t tandem_result;
 /** Values of tandem_result; see "Results" above for those that every function may return. */
 enum {
   TANDEM_OK = 0,
   TANDEM_INVALID_ARGUMENT = 1, /**< the caller passed something out of range */
   TANDEM_MALFORMED = 2,        /**< received bytes do not parse, or break a rule of the format */
-  TANDEM_UNSUPPORTED = 3,      /**< of a version, or with a value, that this library does not know */
+  TANDEM_UNSUPPORTED = 3,      /**< a version or a value that this library does not know */
   TANDEM_MISMATCH = 4,         /**< applied, but the state hash differs from the sender's */
   TANDEM_OUT_OF_ORDER = 5,     /**< not possible in this role or at this moment */
   TANDEM_CAPACITY = 6,         /**< an array is too short, or a limit would be exceeded */
-  TANDEM_TIMEOUT = 7,          /**< it did not come about in time */
+  TANDEM_TIMEOUT = 7,          /**< it did not happen in time */
   TANDEM_CONFLICT = 8,         /**< somebody else owns the name */
   TANDEM_TRANSPORT = 9,        /**< DDS reported an error */
   TANDEM_IO = 10,              /**< a file could not be read or written */
   TANDEM_INVALID_HANDLE = 11,  /**< closed, never made, or of another kind */
-  TANDEM_NOT_READY = 12,       /**< nothing to draw, not playing, not known, or no event, yet */
+  TANDEM_NOT_READY = 12,       /**< not yet: nothing to draw, not playing, not known, or no event */
   TANDEM_IN_CALLBACK = 13,     /**< called from a callback */
   TANDEM_WRONG_THREAD = 14,    /**< another thread does this already */
   TANDEM_OUT_OF_MEMORY = 15,
   TANDEM_INTERNAL = 16 /**< a fault of this library: please report its error text */
 };
 
-/** The name of a result, such as "TANDEM_TIMEOUT"; never null, lives for ever. */
+/** Returns the name of a result, such as "TANDEM_TIMEOUT". The name is never null and stays valid for ever.
+ */
 TANDEM_API const char* tandem_result_text(tandem_result result) TANDEM_NOEXCEPT;
-/** Says what went wrong in this thread's last call that failed, in one line of at most 511 bytes; empty
- * before the first. Valid until the next call of this thread that fails. */
+/** Describes this thread's last failed call in one line of at most 511 bytes. The line is empty before the
+ * first failure. It is valid until the next call of this thread fails. */
 TANDEM_API const char* tandem_error_text(void) TANDEM_NOEXCEPT;
 /** @} */
 
@@ -114,127 +116,129 @@ TANDEM_API const char* tandem_error_text(void) TANDEM_NOEXCEPT;
 /** A client of one session. */
 typedef uint64_t tandem_client;
 
-/** Of a client, in a session: one of the constants below. */
+/** The role of a client in a session: one of the constants below. */
 typedef int32_t tandem_role;
 /** Values of tandem_role. */
 enum {
   TANDEM_OBSERVER = 0,   /**< only watches; the server never waits for it */
-  TANDEM_PARTICIPANT = 1 /**< may send input, and the server waits for it, within limits */
+  TANDEM_PARTICIPANT = 1 /**< may send input; within limits the server waits for it */
 };
 
-/** Where a client stands: one of the constants below. */
+/** What a client is doing: one of the constants below. */
 typedef int32_t tandem_phase;
 /** Values of tandem_phase. */
 enum {
-  TANDEM_SEARCHING = 0, /**< no live server of that session seen */
-  TANDEM_REFUSED = 1, /**< a session is there that this client cannot play; tandem_status::reason says why */
-  TANDEM_JOINING = 2, /**< waiting for a snapshot */
-  TANDEM_PLAYING = 3  /**< holds the agreed state and follows it */
+  TANDEM_SEARCHING = 0, /**< has not seen a live server of that session */
+  TANDEM_REFUSED = 1,   /**< cannot play the session that is there; tandem_status::reason says why */
+  TANDEM_JOINING = 2,   /**< waiting for a snapshot */
+  TANDEM_PLAYING = 3    /**< holds the agreed state and follows it */
 };
 
-/** Of a line of the log: one of the constants below. */
+/** The level of a line of the log: one of the constants below. */
 typedef int32_t tandem_log_level;
 /** Values of tandem_log_level. */
 enum { TANDEM_LOG_INFO = 0, TANDEM_LOG_WARNING = 1, TANDEM_LOG_ERROR = 2 };
 
-/** Gets one line for a human, without a line end, valid during the call. Called from the thread that does the
- * client's work, while the client is locked: return soon, throw nothing, and do not wait for a thread that
- * may be in a call with this client. */
+/** Receives one line for a human, without a line end. The line is valid during the call. The function is
+ * called by the thread that does the client's work, while the client is locked: it must return soon, throw
+ * nothing, and not wait for a thread that may be in a call with this client. */
 typedef void (*tandem_log)(void* user, tandem_log_level level, const char* line);
 
-/** What tandem_join() is told. */
+/** Options of tandem_join(). */
 typedef struct tandem_options {
   uint32_t size;
   uint32_t domain;     /**< DDS domain, 0..230 */
   const char* session; /**< 1..64 characters of [A-Za-z0-9._-]; null: "default" */
   tandem_role role;
   uint32_t lead; /**< frames to simulate beyond the last delta, 0 or 1; clamped to what the session allows */
-  /** 1: a thread of the client's own does the work. 0: the application calls tandem_update(), at least once a
-   * frame, and everything happens in there; the only threads are those of Cyclone DDS. */
+  /** 1: the client has a thread that does its work. 0: the application calls tandem_update() at least once a
+   * frame, and all work is done in that call; the only threads are those of Cyclone DDS. */
   uint32_t background;
-  /** EXPERIMENTAL. 1: tandem_sample() shows the application's own gravity at once, before the server has said
-   * when it acts. */
+  /** EXPERIMENTAL. 1: tandem_sample() shows the gravity that this application sent at once, before the server
+   * has said on which frame it acts. */
   uint32_t echo;
   tandem_log log; /**< may be null */
   void* user;     /**< handed to `log` */
-  /** Of the session's streams: "auto" (fewest bits, where that costs this processor little), "bandwidth"
-   * (fewest bits), "computing" (cheapest), "error" (smallest), or a stream's name. A stream is changed while
-   * it is played when processor or link cannot follow it, or another suits better, but for one that was
-   * named. Null: "auto". */
+  /** Which of the session's streams to play: "auto" (the fewest bits, if that costs this processor little),
+   * "bandwidth" (the fewest bits), "computing" (the least computing), "error" (the smallest error), or a
+   * stream's name. While it plays, the client changes to another stream if processor or link cannot follow,
+   * or if another stream suits the preference better. It never leaves a stream that was named. Null: "auto".
+   */
   const char* prefer;
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
   { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL }
 
-/** Starts looking for a session; returns at once, whether a server is there or not.
+/** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults
  * @param client   the new client, to be closed by tandem_leave()
  * @return also TANDEM_TRANSPORT (DDS could not start) */
 TANDEM_API tandem_result tandem_join(const tandem_options* options, tandem_client* client) TANDEM_NOEXCEPT;
 
-/** Leaves the session and frees all that the client holds. Waits for calls of other threads with this client,
- * which end soon: tandem_update() and tandem_wait_until_playing() return TANDEM_INVALID_HANDLE.
+/** Leaves the session and frees everything that the client holds. Waits for calls of other threads with this
+ * client; tandem_update() and tandem_wait_until_playing() then end soon and return TANDEM_INVALID_HANDLE.
  *
- * For the last client of a process Cyclone DDS stops too, and 0.10 then waits for a packet to itself: where
- * the network interface is gone, this call does not return. An application that must not wait ends its process
- * without this call, or sets Internal/MultipleReceiveThreads to false in CYCLONEDDS_URI, with which DDS needs
- * no packet to stop. */
+ * When the last client of a process leaves, Cyclone DDS stops too. Version 0.10 then waits for a packet that
+ * it sends to itself: if the network interface is gone, this call does not return. An application that must
+ * not wait can end its process without this call. Or it can set Internal/MultipleReceiveThreads to false in
+ * CYCLONEDDS_URI; DDS then needs no packet to stop. */
 TANDEM_API tandem_result tandem_leave(tandem_client client) TANDEM_NOEXCEPT;
 
-/** For a client without a thread: takes what arrived, follows the session, and waits for the next thing to
- * do.
- * @param wait_s  at most so long, seconds; 0 or less: not at all
- * @return also TANDEM_WRONG_THREAD (the client has a thread of its own, or another thread is in here) */
+/** Updates a client that has no thread: takes what arrived, follows the session, and waits for the next thing
+ * to do.
+ * @param wait_s  maximum wait, seconds; 0 or less: no wait
+ * @return also TANDEM_WRONG_THREAD (the client has its own thread, or another thread is in this call) */
 TANDEM_API tandem_result tandem_update(tandem_client client, double wait_s) TANDEM_NOEXCEPT;
 
-/** Blocks until the client plays; updates it, where it has no thread.
+/** Blocks until the client plays. Updates the client if it has no thread.
  * @param timeout_s  seconds
- * @return also TANDEM_TIMEOUT, and as tandem_update() where the client has no thread */
+ * @return also TANDEM_TIMEOUT; without a thread also what tandem_update() returns */
 TANDEM_API tandem_result tandem_wait_until_playing(tandem_client client, double timeout_s) TANDEM_NOEXCEPT;
 
-/** Another preference of streams than the one joined with, as tandem_options::prefer: a device that saves its
- * battery, a link that is metered. The stream changes, if it has to, while the client plays. */
+/** Changes tandem_options::prefer, for example when a device saves its battery or a link is metered. If the
+ * new preference needs another stream, the client changes to it while it plays. */
 TANDEM_API tandem_result tandem_prefer(tandem_client client, const char* prefer) TANDEM_NOEXCEPT;
 
-/** Figures since tandem_join(). Times in milliseconds, percentiles over all frames. */
+/** State of a client, and its figures since tandem_join(). Times are in milliseconds. Percentiles are over
+ * all frames. */
 typedef struct tandem_status {
   uint32_t size;
   tandem_phase phase;
   tandem_role role;          /**< as granted by the server */
-  uint32_t lead;             /**< in force; lower than asked for where the session allows less */
+  uint32_t lead;             /**< in force; lower than requested if the session allows less */
   uint32_t server_alive;     /**< 1 or 0 */
-  uint32_t queue_high_water; /**< deltas that waited at once, at most */
+  uint32_t queue_high_water; /**< maximum number of deltas that waited at once */
   uint64_t client_id;        /**< random; kept for as long as the client lives */
-  uint64_t epoch;            /**< of the server's run; 0 before the first */
+  uint64_t epoch;            /**< one run of a server; 0 before the first */
   uint64_t frame;            /**< last frame agreed with the server */
   uint64_t state_hash;       /**< of that frame */
   uint64_t frames_applied;
-  uint64_t resyncs; /**< joins after the first one of an epoch */
+  uint64_t resyncs; /**< rejoins: joins after the first one of an epoch */
   uint64_t hash_mismatches;
   uint64_t refused_messages; /**< bytes that broke a rule of the protocol */
   uint64_t payload_bytes;    /**< of deltas */
   uint64_t inputs_sent;
   uint64_t inputs_acted;
   uint64_t inputs_refused;
-  uint64_t inputs_unknown; /**< lost on the way, or their answer was */
-  uint64_t events_dropped; /**< before tandem_next_event() took them */
+  uint64_t inputs_unknown; /**< the input or its answer was lost */
+  uint64_t events_dropped; /**< events dropped before tandem_next_event() took them */
   double frame_rate_hz;
-  double mbit_per_s;     /**< of payload since the first frame; 2^20 bits to the Mbit */
-  double latency_ms_p50; /**< publish to applied; needs one clock for both hosts */
+  double mbit_per_s;     /**< payload rate since the first frame; 1 Mbit = 2^20 bits */
+  double latency_ms_p50; /**< from publishing to applying; needs a common clock of both hosts */
   double latency_ms_p99;
-  double input_latency_ms_p50; /**< sent until the frame it acted on was applied */
+  double input_latency_ms_p50; /**< from sending to applying the frame that the input acted on */
   double input_latency_ms_p99;
-  double client_ms_p50; /**< decode, apply and simulate, a frame */
+  double client_ms_p50; /**< decode, apply and simulate one frame */
   double client_ms_p99;
-  double join_ms; /**< last join: from learning of the session, or of the loss, to playing */
+  double join_ms; /**< duration of the last join: from finding the session, or from losing it, to playing */
   double round_trip_ms;
   double jitter_ms;
   char scene[72];
-  char reason[256]; /**< why role or phase is not what was asked for; empty where it is */
-  char stream[40];  /**< name of the stream that is played, or joined; its number where it has no name */
-  char stream_reason[152]; /**< why that one, for a human */
-  uint64_t stream_changes; /**< from one stream of a session to another */
+  char reason[256];        /**< why role or phase is not as requested; empty if it is */
+  char stream[40];         /**< name of the stream that is played or joined; its number if it has no name */
+  char stream_reason[152]; /**< why this stream was chosen, for a human */
+  uint64_t stream_changes; /**< changes from one stream of a session to another */
 } tandem_status;
 /** An empty one, to be filled in. */
 #define TANDEM_STATUS_INIT                                                                                  \
@@ -243,61 +247,63 @@ typedef struct tandem_status {
         0, 0, 0, {0}, {0}, {0}, {0}, 0                                                                      \
   }
 
-/** How the client stands. */
+/** Fills in the client's state and figures. */
 TANDEM_API tandem_result tandem_get_status(tandem_client client, tandem_status* status) TANDEM_NOEXCEPT;
 /** @} */
 
 /** @name Drawing
  * @{ */
-/** Which moment is drawn: one of the constants below. */
+/** The moment that is drawn: one of the constants below. */
 typedef int32_t tandem_sample_mode;
 /** Values of tandem_sample_mode. */
 enum {
-  TANDEM_INTERPOLATE = 0, /**< between the last two agreed frames: always true, a frame late */
-  /** At the server's time: predicted, with corrections taken up by an offset that decays. Where nothing comes
-   * from the server bodies go on for a moment, slow down and stand (tandem_frame::seconds_since_delta). */
+  TANDEM_INTERPOLATE = 0, /**< between the last two agreed frames: exact, but one frame late */
+  /** At the server's time: predicted; corrections are blended in by an offset that decays. If nothing comes
+   * from the server, the bodies move on for a moment, slow down and stop
+   * (tandem_frame::seconds_since_delta). */
   TANDEM_EXTRAPOLATE = 1
 };
 
 /** What a body did since the client's previous sample: one of the constants below. */
 enum {
   TANDEM_CHANGE_NONE = 0,
-  TANDEM_CHANGE_NEW = 1,   /**< was not there, or another body took its slot */
-  TANDEM_CHANGE_GONE = 2,  /**< was there in the previous sample */
-  TANDEM_CHANGE_JUMPED = 3 /**< the same body at another place: teleported, or the client had to join again */
+  TANDEM_CHANGE_NEW = 1,   /**< the body was not there before, or another body took its slot */
+  TANDEM_CHANGE_GONE = 2,  /**< the body was there in the previous sample */
+  TANDEM_CHANGE_JUMPED = 3 /**< the same body at another place: it was teleported, or the client rejoined */
 };
 
-/** What tandem_sample() is told. */
+/** Options of tandem_sample(). */
 typedef struct tandem_sample_options {
   uint32_t size;
   tandem_sample_mode mode;
-  /** The moment to draw, by tandem_clock_ns(), such as when the picture will be on the screen; 0: now. Far
-   * past or future gives the nearest that is held, and tandem_frame::frame says which. */
+  /** The moment to draw, by tandem_clock_ns(), for example when the picture will be on the screen; 0: now. A
+   * moment far in the past or future gives the nearest one that is held; tandem_frame::frame says which. */
   int64_t at_ns;
-  /** Time constant of the offset that takes up corrections, seconds, at most 10. 0: they show as jumps; below
-   * 0: the default, 0.05. */
+  /** Time constant of the offset that blends in corrections, seconds, at most 10. 0: corrections show as
+   * jumps. Below 0: the default, 0.05. */
   double smoothing_s;
 } tandem_sample_options;
 /** The defaults. */
 #define TANDEM_SAMPLE_OPTIONS_INIT \
   { sizeof(tandem_sample_options), TANDEM_EXTRAPOLATE, 0, -1.0 }
 
-/** Where the bodies go: an array for each thing that is wanted, null for what is not. Body i of a column
- * begins i strides behind its pointer, so a column may be a member of an array of structs. A stride is in
- * bytes, a multiple of the element's alignment and not shorter than it; 0: packed. Columns must not overlap.
- */
+/** Where tandem_sample() writes the bodies: one array for each kind of value, null for values that are not
+ * wanted. Body i of a column begins i strides after the pointer, so a column may be a member of an array of
+ * structs. A stride is in bytes. It is a multiple of the element's alignment and not shorter than the
+ * element; 0: packed. Columns must not overlap. */
 typedef struct tandem_columns {
   uint32_t size;
-  uint32_t capacity; /**< bodies that every array below has room for */
+  uint32_t capacity; /**< number of bodies that every array below has room for */
   float* positions;  /**< x, y, z; scene units */
-  float* velocities; /**< x, y, z; scene units / s: how fast `positions` move, with a correction that is being
-                        blended in. With `smoothing_s` 0, as the bodies move on the server */
+  float* velocities; /**< x, y, z; scene units / s: how fast `positions` move, including a correction that is
+                        being blended in. With `smoothing_s` 0: as the bodies move on the server */
   float* orientations; /**< quaternion x, y, z, w of norm 1, from the body's frame to the world's; q and -q
-                          are the same. Left as they are where the session has none. Trajectory files have w
-                          first */
-  float* angular_velocities; /**< x, y, z in the world's frame; rad / s; without corrections; likewise */
+                          are the same orientation. Not written if the session has no orientations. Trajectory
+                          files have w first */
+  float* angular_velocities; /**< x, y, z in the world's frame; rad / s; without corrections. Not written if
+                                the session has no orientations */
   uint16_t* types;           /**< for tandem_get_type() */
-  uint8_t* alive;            /**< 1: the slot holds a body. 0: the other columns but `changes` say nothing */
+  uint8_t* alive;            /**< 1: the slot holds a body. 0: only `changes` is meaningful */
   uint8_t* reuse;            /**< counts the bodies that a slot has held; wraps */
   uint8_t* changes;          /**< TANDEM_CHANGE_..., against this client's previous sample */
   uint32_t position_stride;
@@ -309,17 +315,18 @@ typedef struct tandem_columns {
   uint32_t reuse_stride;
   uint32_t change_stride;
 } tandem_columns;
-/** No columns. */
+/** No columns are wanted. */
 #define TANDEM_COLUMNS_INIT \
   { sizeof(tandem_columns), 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 0, 0, 0, 0, 0, 0, 0, 0 }
 
-/** What was sampled. */
+/** What tandem_sample() returned. */
 typedef struct tandem_frame {
   uint32_t size;
-  uint32_t capacity;          /**< slots of the session: this many bodies were written to each column */
-  uint64_t epoch;             /**< of the server's run */
+  uint32_t capacity;          /**< slots of the session: each column received this many bodies */
+  uint64_t epoch;             /**< one run of a server */
   double frame;               /**< the moment that is drawn, in frames */
-  double seconds_since_delta; /**< how long nothing has come from the server: what is drawn is a guess */
+  double seconds_since_delta; /**< time since the last delta from the server: the drawn state is a guess for
+                                 so long */
   uint32_t alive;             /**< slots that hold a body */
   uint32_t has_orientations;  /**< 1: the session has them. 0: its bodies are points */
   tandem_sample_mode mode;    /**< in force */
@@ -329,18 +336,19 @@ typedef struct tandem_frame {
 #define TANDEM_FRAME_INIT \
   { sizeof(tandem_frame), 0, 0, 0, 0, 0, 0, 0, 0 }
 
-/** The clock of tandem_sample_options::at_ns: the system's monotonic one (CLOCK_MONOTONIC), nanoseconds. */
+/** Reads the clock of tandem_sample_options::at_ns: the system's monotonic clock (CLOCK_MONOTONIC),
+ * nanoseconds. */
 TANDEM_API int64_t tandem_clock_ns(void) TANDEM_NOEXCEPT;
 
-/** The bodies as they should be drawn at a moment; never changes what the client holds. At any rate, from any
- * thread; never waits but for other samples of this client. Only the first call waits as other functions do.
- * O(capacity); allocates when the session's capacity changed only.
+/** Writes the bodies as they should be drawn at a moment. It never changes what the client holds. It may be
+ * called at any rate and from any thread. It waits only for other samples of this client; only the first
+ * call waits as other functions do. O(capacity). It allocates only when the session's capacity changed.
  * @param options  null: the defaults
- * @param columns  what is wanted; null: nothing but `frame`
+ * @param columns  where to write; null: only `frame` is filled in
  * @param frame    may be null
  * @return also TANDEM_NOT_READY (nothing to draw yet) and TANDEM_CAPACITY (the session has more slots than
- * the columns have room for: nothing was sampled, but frame->capacity tells how many, frame->has_orientations
- * whether they turn) */
+ * the columns have room for: nothing was sampled, but frame->capacity says how many slots there are and
+ * frame->has_orientations whether the bodies turn) */
 TANDEM_API tandem_result tandem_sample(tandem_client client, const tandem_sample_options* options,
                                        const tandem_columns* columns, tandem_frame* frame) TANDEM_NOEXCEPT;
 /** @} */
@@ -351,30 +359,31 @@ TANDEM_API tandem_result tandem_sample(tandem_client client, const tandem_sample
 typedef int32_t tandem_event_kind;
 /** Values of tandem_event_kind. */
 enum {
-  TANDEM_EVENT_PLAYING = 1,        /**< first in this epoch: `frame` is held */
-  TANDEM_EVENT_LOST = 2,           /**< plays no more and joins again; `text` says why */
+  TANDEM_EVENT_PLAYING = 1,        /**< plays for the first time in this epoch: `frame` is held */
+  TANDEM_EVENT_LOST = 2,           /**< plays no longer and joins again; `text` says why */
   TANDEM_EVENT_REJOINED = 3,       /**< plays again, in the same epoch: `frame` is held */
   TANDEM_EVENT_REFUSED = 4,        /**< the session cannot be played; `text` says why */
-  TANDEM_EVENT_DEMOTED = 5,        /**< a participant that became an observer; `text` says why */
-  TANDEM_EVENT_PROMOTED = 6,       /**< is a participant now */
+  TANDEM_EVENT_DEMOTED = 5,        /**< changed from participant to observer; `text` says why */
+  TANDEM_EVENT_PROMOTED = 6,       /**< changed from observer to participant */
   TANDEM_EVENT_INPUT_ACTED = 7,    /**< input `number` acted on `frame`, which is held */
-  TANDEM_EVENT_INPUT_REFUSED = 8,  /**< input `number`, by the server; `reason`, `text` */
-  TANDEM_EVENT_INPUT_UNKNOWN = 9,  /**< nobody will know what became of input `number` */
+  TANDEM_EVENT_INPUT_REFUSED = 8,  /**< the server refused input `number`; see `reason` and `text` */
+  TANDEM_EVENT_INPUT_UNKNOWN = 9,  /**< the outcome of input `number` will never be known */
   TANDEM_EVENT_SESSION_ENDED = 10, /**< the server is gone; the last state stays */
-  TANDEM_EVENT_NEW_EPOCH = 11,     /**< another run of a server: `epoch`. Nothing of the old one counts */
-  TANDEM_EVENT_SESSION_BACK = 12   /**< the server that was gone is there again, in the same epoch */
+  TANDEM_EVENT_NEW_EPOCH = 11,     /**< another run of a server: `epoch`. The old epoch's state is void */
+  TANDEM_EVENT_SESSION_BACK = 12   /**< the server that was gone is back, in the same epoch */
 };
 
-/** One event. What its kind does not name is 0. */
+/** One event. Fields that its kind does not mention are 0. */
 typedef struct tandem_event {
   uint32_t size;
   tandem_event_kind kind;
-  uint64_t number; /**< of the input, as its sender was told */
+  uint64_t number; /**< the input's number, as tandem_send_...() returned it */
   uint64_t frame;
   uint64_t epoch;
-  int64_t at_ns;    /**< when the client noted it, by tandem_clock_ns() */
-  uint32_t reason;  /**< the server's: "Reasons" in idl/PROTOCOL.md */
-  uint32_t dropped; /**< older events that the queue had no room for since the one taken before */
+  int64_t at_ns;    /**< when the client recorded it, by tandem_clock_ns() */
+  uint32_t reason;  /**< the server's reason: "Reasons" in idl/PROTOCOL.md */
+  uint32_t dropped; /**< events dropped between the previously taken one and this one, because the queue was
+                       full */
   char text[256];   /**< for a human; may be empty */
 } tandem_event;
 /** An empty one, to be filled in. */
@@ -383,52 +392,53 @@ typedef struct tandem_event {
     sizeof(tandem_event), 0, 0, 0, 0, 0, 0, 0, { 0 } \
   }
 
-/** Takes the oldest event from the client's queue, which holds 256; beyond, the oldest are dropped and
- * counted.
- * @return also TANDEM_NOT_READY: there is none */
+/** Takes the oldest event from the client's queue. The queue holds 256 events; when it is full, the oldest
+ * are dropped and counted.
+ * @return also TANDEM_NOT_READY: there is no event */
 TANDEM_API tandem_result tandem_next_event(tandem_client client, tandem_event* event) TANDEM_NOEXCEPT;
 /** @} */
 
 /** @name Acting
- * An input acts on the same frame everywhere; an event tells on which, or why not. Numbers count up for as
- * long as the client lives. Each of these also returns TANDEM_NOT_READY (not playing), TANDEM_OUT_OF_ORDER
- * (joined as an observer) and TANDEM_TRANSPORT; values that are not finite are TANDEM_INVALID_ARGUMENT.
+ * An input acts on the same frame everywhere. An event tells on which frame, or why it was refused. The
+ * numbers of a client's inputs count up as long as the client lives. Each of these functions also returns
+ * TANDEM_NOT_READY (not playing), TANDEM_OUT_OF_ORDER (joined as an observer) and TANDEM_TRANSPORT. Values
+ * that are not finite are TANDEM_INVALID_ARGUMENT.
  * @{ */
-/** Gravity from now on.
+/** Changes the gravity.
  * @param scene_units_per_s2  x, y, z
- * @param number              the input's; may be null */
+ * @param number              receives the input's number; may be null */
 TANDEM_API tandem_result tandem_send_gravity(tandem_client client, const double scene_units_per_s2[3],
                                              uint64_t* number) TANDEM_NOEXCEPT;
 /** Adds a velocity to the bodies around a point.
  * @param centre    x, y, z; scene units
  * @param radius    scene units
  * @param velocity  x, y, z; scene units / s
- * @param number    the input's; may be null */
+ * @param number    receives the input's number; may be null */
 TANDEM_API tandem_result tandem_send_push(tandem_client client, const double centre[3], double radius,
                                           const double velocity[3], uint64_t* number) TANDEM_NOEXCEPT;
-/** Bytes for the server's simulation, which knows what they mean.
- * @param bytes   may be null where count is 0
+/** Sends bytes whose meaning only the server's simulation knows.
+ * @param bytes   may be null if count is 0
  * @param count   0..1,024
- * @param number  the input's; may be null */
+ * @param number  receives the input's number; may be null */
 TANDEM_API tandem_result tandem_send_bytes(tandem_client client, const void* bytes, size_t count,
                                            uint64_t* number) TANDEM_NOEXCEPT;
 /** @} */
 
 /** @name What a session is made of
- * All of these also return TANDEM_NOT_READY before a session is known. With another epoch
- * (TANDEM_EVENT_NEW_EPOCH) everything may be another.
+ * All of these functions also return TANDEM_NOT_READY before a session is known. A new epoch
+ * (TANDEM_EVENT_NEW_EPOCH) may change everything that they return.
  * @{ */
 /** The form of a type of bodies, or of a solid: one of the constants below. */
 typedef int32_t tandem_shape;
 /** Values of tandem_shape: in the body's frame, scene units. */
 enum {
   TANDEM_SHAPE_NONE = 0,
-  TANDEM_SHAPE_SPHERE = 1,   /**< no values: the radius */
+  TANDEM_SHAPE_SPHERE = 1,   /**< no values: the type's radius is the sphere's */
   TANDEM_SHAPE_BOX = 2,      /**< half sizes x, y, z */
   TANDEM_SHAPE_CAPSULE = 3,  /**< radius, half of the length between the centres of the caps, along y */
   TANDEM_SHAPE_CYLINDER = 4, /**< radius, half of the height, along y */
   TANDEM_SHAPE_HULL = 5,     /**< convex: points x, y, z, at least four */
-  TANDEM_SHAPE_PLANE = 6     /**< of solids alone */
+  TANDEM_SHAPE_PLANE = 6     /**< for solids only */
 };
 
 /** The scene of a session. */
@@ -438,10 +448,10 @@ typedef struct tandem_scene {
   uint32_t type_count;  /**< for tandem_get_type() */
   uint32_t solid_count; /**< for tandem_get_geometry() */
   double frame_rate_hz;
-  double gravity[3];  /**< at the start; scene units / s^2 */
-  double max_gravity; /**< beyond, the server refuses it; 0: not told */
-  double max_push;    /**< scene units / s; beyond, the server refuses it; 0: not told */
-  float low[3];       /**< bodies outside of low..high are removed; all 0: not told */
+  double gravity[3];  /**< gravity at the start; scene units / s^2 */
+  double max_gravity; /**< scene units / s^2; the server refuses more; 0: unknown */
+  double max_push;    /**< scene units / s; the server refuses more; 0: unknown */
+  float low[3];       /**< bodies outside of low..high are removed; all 0: unknown */
   float high[3];
   char name[72];
 } tandem_scene;
@@ -451,41 +461,42 @@ typedef struct tandem_scene {
     sizeof(tandem_scene), 0, 0, 0, 0, {0, 0, 0}, 0, 0, {0, 0, 0}, {0, 0, 0}, { 0 } \
   }
 
-/** The scene of the session.
- * @return also TANDEM_MALFORMED (the server describes it in a way that cannot be read) */
+/** Fills in the scene of the session.
+ * @return also TANDEM_MALFORMED (the server's description of the scene cannot be read) */
 TANDEM_API tandem_result tandem_get_scene(tandem_client client, tandem_scene* scene) TANDEM_NOEXCEPT;
 
-/** One piece of a scene that does not move. What its shape does not name is 0, orientation 0, 0, 0, 1. */
+/** One part of the scene that does not move. Fields that its shape does not use are 0, orientation 0, 0, 0,
+ * 1. */
 typedef struct tandem_solid {
   uint32_t size;
   tandem_shape shape;   /**< TANDEM_SHAPE_PLANE, _BOX or _SPHERE */
-  float centre[3];      /**< of a plane: a point of it */
-  float orientation[4]; /**< of a box: quaternion x, y, z, w, from its frame to the world's */
-  float half_size[3];   /**< of a box */
-  float normal[3];      /**< of a plane: of norm 1; bodies are on the side that it points to */
-  float radius;         /**< of a sphere */
+  float centre[3];      /**< centre; for a plane: any point on it */
+  float orientation[4]; /**< box: quaternion x, y, z, w, from its frame to the world's */
+  float half_size[3];   /**< box: half sizes x, y, z */
+  float normal[3];      /**< plane: norm 1; points to the side where the bodies are */
+  float radius;         /**< sphere only */
 } tandem_solid;
 /** An empty one, to be filled in. */
 #define TANDEM_SOLID_INIT \
   { sizeof(tandem_solid), 0, {0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0 }
 
-/** The geometry of the scene.
- * @param solids    `capacity` structs, the first with its size; may be null where capacity is 0
- * @param capacity  at most so many are written
- * @param count     how many the scene has; filled in with TANDEM_CAPACITY too
+/** Writes the geometry of the scene.
+ * @param solids    `capacity` structs, the first with its size; may be null if capacity is 0
+ * @param capacity  maximum number of structs to write
+ * @param count     receives how many the scene has, also with TANDEM_CAPACITY
  * @return also TANDEM_MALFORMED, as tandem_get_scene(), and TANDEM_CAPACITY: there are more than `capacity`,
  * which is not 0; the first ones were written */
 TANDEM_API tandem_result tandem_get_geometry(tandem_client client, tandem_solid* solids, size_t capacity,
                                              size_t* count) TANDEM_NOEXCEPT;
 
-/** What bodies of a type look like. */
+/** The appearance of the bodies of a type. */
 typedef struct tandem_body_type {
   uint32_t size;
   tandem_shape shape;
   float radius;         /**< of the sphere around the body; scene units */
   uint32_t colour_rgba; /**< 0xRRGGBBAA */
-  uint32_t value_count; /**< of the shape's values, for tandem_get_type_values() */
-  float values[3];      /**< the first of them: all, but of a hull */
+  uint32_t value_count; /**< number of values of the shape, for tandem_get_type_values() */
+  float values[3];      /**< the first of those values: all of them, except for a hull */
   char name[72];
 } tandem_body_type;
 /** An empty one, to be filled in. */
@@ -494,13 +505,13 @@ typedef struct tandem_body_type {
     sizeof(tandem_body_type), 0, 0, 0, 0, {0, 0, 0}, { 0 } \
   }
 
-/** A type of bodies; tandem_scene::type_count tells how many there are.
+/** Fills in a type of bodies; tandem_scene::type_count says how many types there are.
  * @param index  as in tandem_columns::types */
 TANDEM_API tandem_result tandem_get_type(tandem_client client, uint32_t index,
                                          tandem_body_type* type) TANDEM_NOEXCEPT;
-/** All values of a type's shape, such as the points of a hull.
- * @param values    `capacity` floats; may be null where that is 0
- * @param count     how many there are; filled in with TANDEM_CAPACITY too
+/** Writes all values of a type's shape, such as the points of a hull.
+ * @param values    `capacity` floats; may be null if capacity is 0
+ * @param count     receives how many there are, also with TANDEM_CAPACITY
  * @return also TANDEM_CAPACITY: there are more than `capacity`, which is not 0; the first ones were written
  */
 TANDEM_API tandem_result tandem_get_type_values(tandem_client client, uint32_t index, float* values,
@@ -509,21 +520,22 @@ TANDEM_API tandem_result tandem_get_type_values(tandem_client client, uint32_t i
 
 /** @name Finding sessions
  * @{ */
-/** Watches a DDS domain. */
+/** A watcher of a DDS domain. */
 typedef uint64_t tandem_browser;
 
-/** A session on a domain. What is not known yet is 0 or empty: status comes once a second. */
+/** A session on a domain. What is not known yet is 0 or empty; the server publishes its status once a second.
+ */
 typedef struct tandem_session_info {
   uint32_t size;
-  uint32_t playable; /**< 1: tandem_join() can play it. 0: another version, or a codec unknown here */
-  uint64_t epoch;    /**< of the server's run */
+  uint32_t playable; /**< 1: tandem_join() can play it. 0: its version or codec is unknown here */
+  uint64_t epoch;    /**< one run of a server */
   uint32_t capacity; /**< slots */
-  uint32_t bodies;   /**< alive; from status, as are the next two */
+  uint32_t bodies;   /**< bodies alive; this and the next two come from the status */
   uint32_t participants;
   uint32_t observers;
   double frame_rate_hz;
-  double client_ms;  /**< what a client computes in a frame, on the server's processor */
-  double mbit_per_s; /**< of payload, now; from status */
+  double client_ms;  /**< computing time of a client for one frame, measured on the server's processor */
+  double mbit_per_s; /**< current payload rate; from the status */
   uint32_t protocol_version;
   uint32_t reserved; /**< 0 */
   char name[72];     /**< for tandem_options::session */
@@ -537,32 +549,33 @@ typedef struct tandem_session_info {
     sizeof(tandem_session_info), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, {0}, { 0 } \
   }
 
-/** Starts watching a domain, without taking part in anything.
+/** Starts watching a domain without joining anything.
  * @param domain   0..230
- * @param browser  to be closed by tandem_browser_close()
+ * @param browser  the new browser, to be closed by tandem_browser_close()
  * @return also TANDEM_TRANSPORT (DDS could not start) */
 TANDEM_API tandem_result tandem_browser_open(uint32_t domain, tandem_browser* browser) TANDEM_NOEXCEPT;
-/** What is on the domain now, by name. Does not wait: right after tandem_browser_open() nothing is known; a
- * session is, within a second or two.
- * @param sessions  `capacity` structs, the first with its size; may be null where capacity is 0
- * @param capacity  at most so many are written
- * @param count     how many there are; filled in with TANDEM_CAPACITY too
+/** Writes the sessions that are on the domain now, sorted by name. Does not wait: right after
+ * tandem_browser_open() no session is known; each is found within one or two seconds.
+ * @param sessions  `capacity` structs, the first with its size; may be null if capacity is 0
+ * @param capacity  maximum number of structs to write
+ * @param count     receives how many there are, also with TANDEM_CAPACITY
  * @return also TANDEM_CAPACITY: there are more than `capacity`, which is not 0; the first ones were written
  */
 TANDEM_API tandem_result tandem_browser_list(tandem_browser browser, tandem_session_info* sessions,
                                              size_t capacity, size_t* count) TANDEM_NOEXCEPT;
-/** Frees all that the browser holds; waits for calls of other threads with it. */
+/** Frees everything that the browser holds. Waits for calls of other threads with it. */
 TANDEM_API tandem_result tandem_browser_close(tandem_browser browser) TANDEM_NOEXCEPT;
 /** @} */
 
 /** @name Replays
  * @{ */
-/** EXPERIMENTAL. An input, as those of "Acting" and with their results: the replay of a recording goes on at
- * another time, for everybody, under another epoch. TANDEM_EVENT_NEW_EPOCH tells that it does; as that ends
- * the epoch of the input, its own event may be TANDEM_EVENT_INPUT_UNKNOWN. It is refused with reason 3 beyond
- * the recording, or where the session is no replay; with 4 less than a second after another seek.
+/** EXPERIMENTAL. Sends an input that moves the replay of a recording to another time, for all clients and
+ * under a new epoch. The results are those of "Acting". TANDEM_EVENT_NEW_EPOCH tells that the replay has
+ * moved; because that event ends the epoch of the input, the input's own event may be
+ * TANDEM_EVENT_INPUT_UNKNOWN. The server refuses the input with reason 3 if the time is beyond the recording
+ * or the session is not a replay, and with reason 4 less than a second after another seek.
  * @param seconds  since the first message of the recording, 0 up to its length
- * @param number   the input's; may be null */
+ * @param number   receives the input's number; may be null */
 TANDEM_API tandem_result tandem_send_seek(tandem_client client, double seconds,
                                           uint64_t* number) TANDEM_NOEXCEPT;
 /** @} */

@@ -5,26 +5,26 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ClientFigures:
-    """Of a client, since it was made. Times in milliseconds, percentiles over all frames."""
+    """The figures of a client since it was made. Times are in milliseconds. Percentiles are over all frames."""
 
-    client_ms_p50: float  #: decode, apply and simulate, a frame
-    mbit_per_s: float  #: of payload since the first frame; 2^20 bits to the Mbit
-    frames_applied: int  #: deltas
-    resyncs: int  #: joins after the first one of an epoch
-    hash_mismatches: int  #: frames whose state was not the server's
-    inputs_sent: int  #: whatever became of them
-    inputs_refused: int  #: by the server
+    client_ms_p50: float  #: decode, apply and simulate one frame
+    mbit_per_s: float  #: payload rate since the first frame; 1 Mbit = 2^20 bits
+    frames_applied: int  #: deltas that were applied
+    resyncs: int  #: rejoins: joins after the first one of an epoch
+    hash_mismatches: int  #: frames whose state differed from the server's
+    inputs_sent: int  #: whatever their outcome
+    inputs_refused: int  #: refused by the server
     refused_messages: int  #: bytes that broke a rule of the protocol
     payload_bytes: int  #: of deltas
-    latency_ms_p50: float  #: publish to applied; needs one clock for both hosts
+    latency_ms_p50: float  #: from publishing to applying; needs a common clock of both hosts
     latency_ms_p99: float  #: as latency_ms_p50
-    input_latency_ms_p50: float  #: sent until the frame it acted on was applied
+    input_latency_ms_p50: float  #: from sending to applying the frame that the input acted on
     input_latency_ms_p99: float  #: as input_latency_ms_p50
     client_ms_p99: float  #: as client_ms_p50
-    join_ms: float  #: last join: from knowing the session, or the loss, to playing
+    join_ms: float  #: last join: from finding the session, or from losing it, to playing
     round_trip_ms: float  #: to the server and back
-    jitter_ms: float  #: by which deltas come late
-    stream_changes: int  #: from one stream of a session to another
-    inputs_acted: int  #: on a frame that was applied
-    inputs_unknown: int  #: lost on the way, or their answer was
-    queue_high_water: int  #: deltas that waited at once, at most
+    jitter_ms: float  #: mean deviation of the times at which deltas are published
+    stream_changes: int  #: changes from one stream of a session to another
+    inputs_acted: int  #: acted on a frame that was applied
+    inputs_unknown: int  #: the input or its answer was lost
+    queue_high_water: int  #: maximum number of deltas that waited at once

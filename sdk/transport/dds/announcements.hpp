@@ -1,5 +1,5 @@
 #pragma once
-// Which servers there are, and which of them live.
+// Tracks the servers and which of them are alive.
 
 #include <atomic>
 #include <string>
@@ -10,13 +10,14 @@
 
 namespace tandem::transport::dds {
 
-/// Readers of TandemSession and, as a sign of life, of TandemServerStatus.
+/// Reads TandemSession and, as a sign of life, TandemServerStatus.
 ///
-/// Cyclone DDS declares all writers of a silent participant dead, but each of them alive again only with its
-/// next sample. A session is announced once, so a server lives as long as any of its writers does.
+/// Cyclone DDS declares all writers of a silent participant dead. It declares each of them alive again only
+/// with that writer's next sample. A session is announced once, so a server counts as alive as long as any of
+/// its writers is.
 class Announcements {
  public:
-  /// `options.watched`: whoever waits calls refresh() each time.
+  /// `options.watched`: the waiting caller calls refresh() each time.
   static Result<Announcements> create(Node& node, const ReaderOptions& options = {}) {
     auto sessions = node.reader<SessionMessage>("sessions", options);
     if (!sessions) return tl::unexpected(sessions.error());
@@ -25,8 +26,8 @@ class Announcements {
     return Announcements(std::move(*sessions), std::move(*status));
   }
 
-  /// Takes what came. `name` is the session's, empty for all; others are counted in `dropped`.
-  /// `alive(participant)` may know of further signs of life.
+  /// Takes what came. `name`: the session's name, empty for all sessions; other sessions are counted in
+  /// `dropped`. `alive(participant)` may know further signs of life.
   template <class Alive>
   void refresh(const std::string& name, std::atomic<std::uint64_t>& dropped, Alive&& alive) {
     sessions_.take(dropped, [&](dds_instance_handle_t writer, Received<SessionMessage>&& received) {
@@ -47,7 +48,7 @@ class Announcements {
   }
 
   [[nodiscard]] SessionBook& book() { return book_; }
-  /// The newest status samples that nobody took from here.
+  /// The newest status samples that were not taken from here yet.
   [[nodiscard]] std::vector<Received<ServerStatusMessage>>& statuses() { return statuses_; }
 
  private:

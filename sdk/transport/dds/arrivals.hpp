@@ -1,5 +1,5 @@
 #pragma once
-// Samples between DDS and whoever takes them, kept apart by writer.
+// Samples between DDS and the thread that takes them, kept separately for each writer.
 
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
@@ -20,18 +20,18 @@
 
 namespace tandem::transport::dds {
 
-/// A sample has no more bytes than this, with its header, if it keeps to `limits`.
+/// Maximum size of a sample, with its header, that keeps to `limits`.
 template <class M>
 [[nodiscard]] std::size_t most_bytes(const Limits& limits) {
-  constexpr std::size_t kFieldBytes = 2048;  // without a payload; several times what there is
+  constexpr std::size_t kFieldBytes = 2048;  // size without a payload; several times what is needed
   if constexpr (std::is_same_v<M, SessionMessage>) return kMaxSampleBytes;
   if constexpr (std::is_same_v<M, DeltaMessage>) return kFieldBytes + limits.max_delta_bytes;
   if constexpr (std::is_same_v<M, SnapshotMessage>) return kFieldBytes + limits.max_snapshot_bytes;
   return kFieldBytes;
 }
 
-/// Takes every sample of a reader as it arrives, in a thread of Cyclone DDS. A writer can push out its own
-/// samples only. What is larger than its topic allows is dropped before it is copied. Thread-safe.
+/// Takes every sample of a reader as it arrives, in a thread of Cyclone DDS. A writer can displace only its
+/// own samples. A sample that is larger than its topic allows is dropped before it is copied. Thread-safe.
 template <class M>
 class Arrivals {
  public:
@@ -41,7 +41,7 @@ class Arrivals {
     M message;
   };
 
-  /// Keeps `of_writer` samples of each writer. `bell`: rung by each arrival; may be null.
+  /// Keeps at most `of_writer` samples of each writer. `bell`: rung by each arrival; may be null.
   Arrivals(std::size_t of_writer, Doorbell* bell) : of_writer_(of_writer), bell_(bell) {}
 
   void set_limits(const Limits& limits) {
@@ -49,11 +49,11 @@ class Arrivals {
     limits_ = limits;
   }
 
-  /// For the creation of the reader, which must not outlive this object.
+  /// Needed to create the reader, which must not outlive this object.
   [[nodiscard]] dds_rhc* cache() { return &cache_; }
 
-  /// Puts all that came since the last call into `out`, oldest first, in place of what was there. `dropped`
-  /// grows by what broke a limit.
+  /// Replaces `out` by all samples that came since the last call, oldest first. Adds to `dropped` the number
+  /// of samples that broke a limit.
   void take(std::deque<Arrival>& out, std::uint64_t& dropped) {
     out.clear();
     const std::lock_guard lock(mutex_);
@@ -68,7 +68,7 @@ class Arrivals {
   struct Held {
     std::size_t samples = 0, bytes = 0;
   };
-  // Of all writers together; beyond it the one that holds the most makes room.
+  // Limits of all writers together; beyond them the writer that holds the most makes room.
   static constexpr std::size_t kMostSamples = 4096;
   static constexpr std::size_t kMostBytes = 256U << 20U;
 
@@ -87,7 +87,7 @@ class Arrivals {
     }
     ddsrt_iovec_t bytes{};
     ddsi_serdata* const held = ddsi_serdata_to_ser_ref(&sample, 0, size, &bytes);
-    // Not every DDS announces the bytes with which it fills up the last word.
+    // Some DDS implementations do not announce the bytes that fill up the last word.
     auto message = read_cdr<M>({static_cast<const std::byte*>(bytes.iov_base), bytes.iov_len}, Padding::kAny);
     ddsi_serdata_to_ser_unref(held, &bytes);
     if (!message || !within_limits(*message, limits_)) {

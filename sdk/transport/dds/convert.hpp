@@ -1,5 +1,5 @@
 #pragma once
-// From the plain messages to the types generated from idl/tandem.idl.
+// Converts plain messages to the types generated from idl/tandem.idl.
 
 #include <dds/dds.h>
 

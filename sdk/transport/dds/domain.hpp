@@ -8,20 +8,20 @@
 
 namespace tandem::transport::dds {
 
-/// How soon a reader asks again for what it asked for already. What is missing is asked for at once either
-/// way.
+/// How soon a reader repeats a request for missing samples. The first request is always sent at once.
 enum class Repeat : std::uint8_t {
-  kSoon,    ///< 10 ms: a server's readers, of inputs and acknowledgements, which are small
-  kSeldom,  ///< 100 ms: a client's; each question brings all of it again, which a thin link has no room for
+  kSoon,    ///< 10 ms: for a server's readers of inputs and acknowledgements, which are small
+  kSeldom,  ///< 100 ms: for a client's readers; each request brings all missing samples again, and a thin
+            ///< link has no room for that
 };
 
-/// Keeps a domain alive. The first use in a process creates it from our defaults and then CYCLONEDDS_URI, so
-/// that the user's settings win; the last one ends it. A domain that the application created itself is used
-/// as it is. Thread-safe.
+/// Keeps a domain alive. The first use in a process creates the domain from Tandem's defaults and then
+/// CYCLONEDDS_URI, so that the user's settings win. The last use ends it. A domain that the application
+/// created itself is used as it is. Thread-safe.
 class DomainUse {
  public:
-  /// Errors: kTransport when no domain can be made, as when an interface that CYCLONEDDS_URI names is not
-  /// there (yet).
+  /// Errors: kTransport if no domain can be made, for example if an interface that CYCLONEDDS_URI names does
+  /// not exist (yet).
   static Result<DomainUse> acquire(std::uint32_t domain, Repeat repeat);
   DomainUse(DomainUse&& other) noexcept;
   DomainUse& operator=(DomainUse&&) = delete;
@@ -35,7 +35,7 @@ class DomainUse {
   bool held_;
 };
 
-/// The configuration that acquire() hands to Cyclone DDS.
+/// The configuration that acquire() passes to Cyclone DDS.
 [[nodiscard]] std::string domain_configuration(Repeat repeat);
 
 }  // namespace tandem::transport::dds

@@ -1,5 +1,5 @@
 #pragma once
-// What threads of the middleware wake a waiting thread by.
+// Wakes a waiting thread from threads of the middleware.
 
 #include <semaphore.h>
 #include <time.h>
@@ -9,8 +9,8 @@
 
 namespace tandem::transport::dds {
 
-/// Rung once or often, it ends one wait. A semaphore, because it enters the kernel once to wake and once to
-/// wait, and only where somebody really waits; a condition variable's mutex takes two more calls.
+/// One or more rings end one wait. It is a semaphore, because that enters the kernel once to wake and once to
+/// wait, and only if a thread really waits; the mutex of a condition variable takes two more calls.
 /// Thread-safe; one thread waits.
 class Doorbell {
  public:
@@ -24,10 +24,10 @@ class Doorbell {
   void ring() {
     if (!rung_.exchange(true)) sem_post(&rings_);
   }
-  /// Until it rings, at once if it has rung since the last wait; or for so long.
+  /// Waits until it rings, at most `timeout`. Returns at once if it has rung since the last wait.
   void wait(std::chrono::nanoseconds timeout) {
-    // Before whoever waited looks at what came: a ring from here on counts for the next wait. An exchange, so
-    // that what a ring without a post announced is seen.
+    // This happens before the waiting thread looks at what came, so a later ring counts for the next wait. It
+    // is an exchange, so that the thread sees what a ring without a post announced.
     if (rang_within(timeout)) rung_.exchange(false);
   }
 

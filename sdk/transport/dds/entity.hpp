@@ -12,7 +12,7 @@
 
 namespace tandem::transport::dds {
 
-/// Owns an entity and deletes it with all of its children.
+/// Owns an entity and deletes it with all its children.
 class Entity {
  public:
   Entity() = default;
@@ -45,13 +45,13 @@ struct QosDeleter {
 };
 using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-/// "creating the delta writer: Bad Parameter"
+/// An error such as "creating the delta writer: Bad Parameter".
 [[nodiscard]] inline tl::unexpected<Error> dds_failure(const std::string& doing, dds_return_t code) {
   return fail(code == DDS_RETCODE_TIMEOUT ? ErrorCode::kTimeout : ErrorCode::kTransport,
               doing + ": " + dds_strretcode(code));
 }
 
-/// Takes over what a dds_create_... function returned.
+/// Takes ownership of the result of a dds_create_... function.
 [[nodiscard]] inline Result<Entity> own(dds_entity_t created, const std::string& doing) {
   if (created < 0) return dds_failure("creating " + doing, created);
   return Entity(created);

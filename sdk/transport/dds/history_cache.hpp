@@ -9,9 +9,10 @@
 
 namespace tandem::transport::dds {
 
-/// Hands on every sample with data as it arrives. The cache that Cyclone DDS makes by itself shares a history
-/// among all who write a key, so that one of them can push out the samples of the others, and remembers every
-/// key for as long as its writer lives: half a kilobyte for each number that a stranger makes up.
+/// Passes on every sample with data as it arrives. The default cache of Cyclone DDS has two faults. All
+/// writers of a key share one history, so that one of them can displace the samples of the others. And it
+/// remembers every key while its writer lives, which is half a kilobyte for each number that a stranger makes
+/// up.
 class HistoryCache : public dds_rhc {
  public:
   /// Called in threads of Cyclone DDS, several at once.
@@ -36,9 +37,9 @@ class HistoryCache : public dds_rhc {
 
   OnSample call_;
   void* argument_;
-  ddsi_tkmap* instances_ = nullptr;  // of the domain
-  // The instance of the last sample. One that nobody holds is freed after each sample and made anew for the
-  // next, which wakes Cyclone's collector each time.
+  ddsi_tkmap* instances_ = nullptr;  // the instances of the domain
+  // The instance of the last sample. An instance that is not held is freed after each sample and made again
+  // for the next, which wakes Cyclone's collector each time.
   std::atomic<ddsi_tkmap_instance*> held_ = nullptr;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Who writes to a reader, and which participants these writers belong to.
+// The writers of a reader, and their participants.
 
 #include <dds/dds.h>
 
@@ -14,10 +14,10 @@
 
 namespace tandem::transport::dds {
 
-/// Tracks the liveliness of every writer matched with one reader. Thread-safe.
+/// Tracks the liveliness of every writer that is matched with one reader. Thread-safe.
 ///
-/// DDS itself only tells how many writers live; a listener is the one way to learn which. It does nothing but
-/// note.
+/// DDS itself only tells how many writers are alive; only a listener learns which. The listener does nothing
+/// but record that.
 class LiveWriters {
  public:
   /// `bell`: rung by each change; may be null.
@@ -28,10 +28,10 @@ class LiveWriters {
   LiveWriters& operator=(LiveWriters&&) = delete;
   ~LiveWriters() = default;
 
-  /// For the creation of the reader, which must not outlive this object.
+  /// Needed to create the reader, which must not outlive this object.
   [[nodiscard]] const dds_listener_t* listener() const { return listener_.get(); }
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const;
-  /// All that are matched, and whether they live.
+  /// All matched writers, and whether they are alive.
   [[nodiscard]] std::map<dds_instance_handle_t, bool> matched() const;
 
  private:
@@ -49,7 +49,7 @@ class LiveWriters {
 /// Finds the participant behind a writer handle, and remembers it. Not thread-safe.
 class Participants {
  public:
-  /// Empty when the writer is not matched with `reader` any more.
+  /// Empty if the writer is not matched with `reader` any more.
   [[nodiscard]] std::optional<ParticipantId> of_writer(dds_entity_t reader, dds_instance_handle_t writer);
 
  private:

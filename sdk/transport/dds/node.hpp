@@ -1,6 +1,6 @@
 #pragma once
-// A participant with its publisher, subscriber, readers and writers: what the ports and the monitor have in
-// common.
+// A participant with its publisher, subscriber, readers and writers: the common part of the ports and the
+// monitor.
 
 #include <atomic>
 #include <chrono>
@@ -19,7 +19,7 @@
 
 namespace tandem::transport::dds {
 
-/// Writes one topic. A write that the middleware could not take in time reached nobody, so it is repeated.
+/// Writes one topic. A write that the middleware could not take in time reached no reader, so it is repeated.
 template <class M>
 class Writer {
  public:
@@ -56,7 +56,7 @@ class Writer {
 template <class M>
 class Reader {
  public:
-  /// `subscriber`: the reader's own, if it has one. `arrivals` and `writers` are what it calls.
+  /// `subscriber`: the reader's own, if it has one. The entity calls `arrivals` and `writers`.
   Reader(std::unique_ptr<Arrivals<M>> arrivals, std::unique_ptr<LiveWriters> writers, Entity topic,
          Entity subscriber, Entity entity)
       : arrivals_(std::move(arrivals)),
@@ -65,12 +65,12 @@ class Reader {
         subscriber_(std::move(subscriber)),
         entity_(std::move(entity)) {}
 
-  /// Of what arrives from now on; at first the fixed maximum.
+  /// Sets the limits for samples that arrive from now on; at first they are the fixed maximum.
   void set_limits(const Limits& limits) { arrivals_->set_limits(limits); }
 
-  /// Calls `sink(writer, Received<M>&&)` for each sample in order; counts in `dropped` what broke a limit.
-  /// A sample whose writer has left the participant's endpoints in between cannot be attributed and is passed
-  /// over.
+  /// Calls `sink(writer, Received<M>&&)` for each sample in order. Counts in `dropped` the samples that broke
+  /// a limit. A sample whose writer has meanwhile left the participant's endpoints cannot be attributed and
+  /// is skipped.
   template <class Sink>
   void take(std::atomic<std::uint64_t>& dropped, Sink&& sink) {
     std::uint64_t broke_limits = 0;
@@ -87,7 +87,7 @@ class Reader {
   }
 
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const { return writers_->state(writer); }
-  /// Of that participant's writers together: live if one of them is, gone if none is matched.
+  /// The state of that participant's writers together: live if one of them is, gone if none is matched.
   [[nodiscard]] WriterState state_of(const ParticipantId& participant) {
     WriterState state = WriterState::kGone;
     for (const auto& [writer, live] : writers_->matched()) {
@@ -112,12 +112,13 @@ class Reader {
   std::deque<typename Arrivals<M>::Arrival> taken_;  // kept to reuse its memory
 };
 
-/// How a reader differs from its topic's.
+/// How a reader differs from the defaults of its topic.
 struct ReaderOptions {
-  std::optional<std::int32_t> depth = {};    ///< of its history, and what is kept of each writer
-  bool ignore_own = false;                   ///< not what its own participant writes
-  bool watched = true;                       ///< what comes ends Node::wait()
-  std::vector<std::string> partitions = {};  ///< through a subscriber of its own; none: the node's
+  std::optional<std::int32_t> depth = {};    ///< depth of its history, and number of samples kept of each
+                                             ///< writer
+  bool ignore_own = false;                   ///< ignores what its own participant writes
+  bool watched = true;                       ///< arrivals end Node::wait()
+  std::vector<std::string> partitions = {};  ///< uses a subscriber of its own for them; empty: the node's
 };
 
 class Node {
@@ -126,7 +127,8 @@ class Node {
   static Result<Node> create(const DdsOptions& options, const std::string& name, const std::string& partition,
                              Repeat repeat = Repeat::kSeldom);
 
-  /// In `partition`, through a publisher of its own; where that is empty, in the node's.
+  /// Makes a writer in `partition`, with a publisher of its own; if `partition` is empty, with the node's
+  /// publisher.
   template <class M>
   Result<Writer<M>> writer(const std::string& name, std::int32_t depth = Topic<M>::kQos.writer_depth,
                            const std::string& partition = {}) {
@@ -135,8 +137,8 @@ class Node {
     auto publisher = partition.empty() ? Result<Entity>() : make_publisher({partition});
     if (!publisher) return tl::unexpected(publisher.error());
     const Entity& parent = *publisher ? *publisher : publisher_;
-    // The status writer's short lease only paces the liveliness messages of its participant, at 0.8 of it:
-    // one of them may be lost before the other writers' lease runs out.
+    // The status writer's short lease only sets the interval of its participant's liveliness messages, which
+    // is 0.8 of the lease. So one of them may be lost before the lease of the other writers ends.
     const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ / 2;
     const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
     dds_qset_entity_name(qos.get(), name.c_str());
@@ -170,8 +172,8 @@ class Node {
   }
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
-  /// Until something arrived at a watched reader created here, or a writer of it came to life or died; wake()
-  /// was called; or the timeout.
+  /// Waits until something arrives at a watched reader created here, one of its writers comes to life or
+  /// dies, wake() is called, or the timeout passes.
   void wait(std::chrono::nanoseconds timeout) { bell_->wait(timeout); }
   void wake() { bell_->ring(); }
 
@@ -182,7 +184,7 @@ class Node {
   Result<Entity> make_topic(const dds_topic_descriptor_t& descriptor, const char* name);
 
   // Destroyed in reverse: children before the participant, the participant before the domain.
-  std::unique_ptr<Doorbell> bell_ = std::make_unique<Doorbell>();  // what arrives rings it, and wake()
+  std::unique_ptr<Doorbell> bell_ = std::make_unique<Doorbell>();  // arrivals and wake() ring it
   DomainUse domain_;
   DdsOptions options_;
   dds_duration_t lease_;

@@ -1,5 +1,5 @@
 #pragma once
-// The nine topics: generated type and QoS of each. Reasons: idl/PROTOCOL.md, "Topics".
+// The nine topics, each with its generated type and QoS. Reasons: idl/PROTOCOL.md, "Topics".
 
 #include <dds/dds.h>
 
@@ -10,15 +10,18 @@
 
 namespace tandem::transport::dds {
 
-/// What a topic's endpoints ask for. Keep-last always: a KEEP_ALL writer loses samples to one frozen reader.
+/// The QoS that a topic's endpoints request. It is always keep-last, because a KEEP_ALL writer loses samples
+/// to one frozen reader.
 struct TopicQos {
   bool reliable = true;
   bool transient_local = false;
   std::int32_t writer_depth = 1;
   std::int32_t reader_depth = 1;           ///< per instance
-  std::int32_t kept = 1;                   ///< of one writer until they are taken from a reader: see Arrivals
-  std::int32_t durable_depth = 0;          ///< of the writer's history, what late readers get; 0: all of it
-  dds_duration_t lifespan = DDS_INFINITY;  ///< a sample older than that is not repeated
+  std::int32_t kept = 1;                   ///< samples of one writer that are kept until they are taken: see
+                                           ///< Arrivals
+  std::int32_t durable_depth = 0;          ///< part of the writer's history that late readers get; 0: all of
+                                           ///< it
+  dds_duration_t lifespan = DDS_INFINITY;  ///< an older sample is not repeated
 };
 
 template <class M>
@@ -27,13 +30,13 @@ struct Topic;
 template <>
 struct Topic<SessionMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSession_desc; }
-  // Two servers that start at once share the instance; a reader must see both.
+  // Two servers that start at the same time share the instance; a reader must see both.
   static constexpr TopicQos kQos{true, true, 1, 8, 8};
 };
 template <>
 struct Topic<DeltaMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemDelta_desc; }
-  static constexpr TopicQos kQos{true, false, 64, 64, 64};  // the options say how deep
+  static constexpr TopicQos kQos{true, false, 64, 64, 64};  // the options set the depth
 };
 template <>
 struct Topic<ScheduledInputMessage> {
@@ -43,8 +46,8 @@ struct Topic<ScheduledInputMessage> {
 template <>
 struct Topic<SnapshotMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemSnapshot_desc; }
-  // On a thin link a part may queue for longer than a reader waits before it asks again. Without this limit
-  // the repetitions would fill the link.
+  // On a thin link a part may be queued for longer than a reader waits before it repeats its request. Without
+  // this limit the repetitions would fill the link.
   static constexpr TopicQos kQos{true, false, 64, 4096, 4096, 0, DDS_MSECS(300)};
 };
 template <>
@@ -73,7 +76,7 @@ struct Topic<ClientStatusMessage> {
   static constexpr TopicQos kQos{false, false, 1, 1, 8};
 };
 
-/// QoS of a writer (`depth` samples of history) or of a reader; a reader leaves `lease` infinite and so
+/// The QoS of a writer (`depth` samples of history) or of a reader. A reader leaves `lease` infinite and so
 /// accepts any.
 [[nodiscard]] Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease);
 

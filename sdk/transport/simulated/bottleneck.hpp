@@ -1,6 +1,6 @@
 #pragma once
-// One direction of a slow link, as arithmetic: no clock and no packets of its own.
-// Several paths of a simulated network may share one, as the users behind a home router do.
+// One direction of a slow link, computed without a clock or packets of its own. Several paths of a simulated
+// network may share one, as the users behind a home router do.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace tandem::transport::simulated {
 struct BottleneckOptions {
   double bits_per_s = 15e6;
   std::int64_t delay_ns = 5'000'000;   ///< one way
-  std::int64_t queue_ns = 50'000'000;  ///< what would wait longer than this for its turn is dropped
+  std::int64_t queue_ns = 50'000'000;  ///< a packet that would wait longer than this is dropped
 };
 
 /// Packets leave one after the other at the link's rate and arrive a delay later.
@@ -19,7 +19,7 @@ class Bottleneck {
  public:
   explicit Bottleneck(const BottleneckOptions& options) : options_(options) {}
 
-  /// A packet of `bytes` reaches the link: when it arrives at the other end, or nothing when it is dropped.
+  /// A packet of `bytes` reaches the link. Returns when it arrives at the other end; empty if it is dropped.
   /// `now_ns` never goes back.
   [[nodiscard]] std::optional<std::int64_t> offer(std::int64_t now_ns, std::size_t bytes) {
     const std::int64_t starts_ns = free_ns_ > now_ns ? free_ns_ : now_ns;
@@ -31,12 +31,12 @@ class Bottleneck {
     bytes_ += bytes;
     return free_ns_ + options_.delay_ns;
   }
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }      ///< let through so far
-  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< packets
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }      ///< bytes let through so far
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< packets dropped so far
 
  private:
   BottleneckOptions options_;
-  std::int64_t free_ns_ = 0;  // the last packet has left by then
+  std::int64_t free_ns_ = 0;  // when the last packet has left
   std::uint64_t bytes_ = 0, dropped_ = 0;
 };
 

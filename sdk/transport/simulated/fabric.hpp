@@ -1,5 +1,5 @@
 #pragma once
-// The inside of the simulated network: participants, endpoints, samples on their way.
+// The inside of the simulated network: participants, endpoints, and samples on their way.
 
 #include <cstdint>
 #include <deque>
@@ -47,19 +47,19 @@ class Fabric {
   using Index = std::uint32_t;
   explicit Fabric(const NetworkOptions& options) : options_(options), random_(options.seed) {}
 
-  // What ports do.
+  // Functions for ports.
   Index add_participant(const std::string& session);
-  /// `partition`: of its own within the session; empty: the session's, which readers read by default.
+  /// `partition`: the writer's own within the session; empty: the session's, which readers read by default.
   Index add_writer(Index participant, std::size_t topic, std::uint32_t depth, std::string partition = {});
   Index add_reader(Index participant, std::size_t topic, std::uint32_t depth,
                    std::vector<std::string> partitions = {{}});
   void close_writer(Index writer);
   void close_reader(Index reader);
   void close_participant(Index participant);
-  /// Drops what a writer keeps of a key.
+  /// Drops the samples that a writer keeps for a key.
   void forget(Index writer, std::uint64_t key) { writers_[writer].history.erase(key); }
   [[nodiscard]] Result<void> write(Index writer, std::uint64_t key, AnyMessage message);
-  /// Calls `sink(participant, message)` for all that arrived.
+  /// Calls `sink(participant, message)` for all messages that arrived.
   template <class Sink>
   void take(Index reader, Sink&& sink) {
     for (const Arrived& arrived : std::exchange(readers_[reader].arrived, {})) {
@@ -70,16 +70,16 @@ class Fabric {
   [[nodiscard]] bool killed(Index participant) const {
     return participants_[participant].killed_ns != kNever;
   }
-  /// How `observer` sees the other.
+  /// The state of `other` as `observer` sees it.
   [[nodiscard]] WriterState state(Index observer, Index other) const;
-  /// A reader in `participant` has been matched.
+  /// True if a reader in `participant` has been matched.
   [[nodiscard]] bool reaches(Index writer, const ParticipantId& participant) const;
-  /// A live writer in `participant` has been matched.
+  /// True if a live writer in `participant` has been matched.
   [[nodiscard]] bool hears(Index reader, const ParticipantId& participant) const;
-  /// It ended properly; whoever was killed is silent for ever.
+  /// True if the participant ended properly; one that was killed is only silent.
   [[nodiscard]] bool ended(const ParticipantId& participant) const;
 
-  // What the network does.
+  // Functions for the network.
   [[nodiscard]] std::int64_t now_ns() const { return now_ns_; }
   void advance_to(std::int64_t now_ns);
   [[nodiscard]] std::optional<std::int64_t> next_event_ns() const;
@@ -157,7 +157,7 @@ class Fabric {
   void schedule(Index pair, std::int64_t at_ns);
   /// Draws how long endpoints take to find each other.
   [[nodiscard]] std::int64_t match_ns(Index writer, Index reader);
-  /// Draws how long a message takes that DDS repeats until it arrives.
+  /// Draws how long a message takes if DDS repeats it until it arrives.
   [[nodiscard]] std::int64_t told_ns(Index from, Index to);
   void send(Index pair, const Sample& sample);
   void process(Index pair);
@@ -170,8 +170,8 @@ class Fabric {
   [[nodiscard]] bool loses(Index from, Index to);
   /// Draws how long it takes until a lost sample comes again.
   [[nodiscard]] std::int64_t repair_ns(Index from, Index to);
-  /// Through the path's bottleneck, a duplicate behind it: how long that takes from now, or nothing when it
-  /// is dropped there.
+  /// Sends a message and perhaps a duplicate through the path's bottleneck. Returns how long that takes from
+  /// now; empty if the message is dropped there.
   [[nodiscard]] std::optional<std::int64_t> squeeze_ns(const LinkModel& model, const AnyMessage& message);
   [[nodiscard]] bool is_cut(Index a, Index b) const;
   [[nodiscard]] bool gone(Index participant) const;
@@ -185,9 +185,11 @@ class Fabric {
   std::vector<Reader> readers_;
   std::vector<Pair> pairs_;
   std::map<std::pair<Index, Index>, LinkModel> links_;
-  std::map<std::pair<Index, Index>, std::int64_t> cuts_;    // since when, lower index first
+  std::map<std::pair<Index, Index>, std::int64_t> cuts_;    // by pair, lower index first: since when it is
+                                                            // cut
   std::map<std::pair<Index, Index>, std::int64_t> met_ns_;  // lower index first
-  std::map<std::pair<Index, Index>, bool> bursts_;          // whether all is being lost on this way
+  std::map<std::pair<Index, Index>, bool> bursts_;          // whether everything is lost on this way at
+                                                            // present
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   NetworkCounts counts_;
 };

@@ -1,76 +1,76 @@
 // Figures, as sdk/include/tandem/*_figures.hpp has them. Written by sdk/package/figures.py.
 
-/** Of a client, since it was made; times in milliseconds. */
+/** The figures of a client since it was made. Times are in milliseconds. */
 export interface ClientFigures {
-  /** Decode, apply and simulate, a frame. */
+  /** Decode, apply and simulate one frame. */
   clientMsP50: number;
-  /** Of payload since the first frame; 2^20 bits to the Mbit. */
+  /** Payload rate since the first frame; 1 Mbit = 2^20 bits. */
   mbitPerS: number;
-  /** Deltas. */
+  /** Deltas that were applied. */
   framesApplied: number;
-  /** Joins after the first one of an epoch. */
+  /** Rejoins: joins after the first one of an epoch. */
   resyncs: number;
-  /** Frames whose state was not the server's. */
+  /** Frames whose state differed from the server's. */
   hashMismatches: number;
-  /** Whatever became of them. */
+  /** Whatever their outcome. */
   inputsSent: number;
-  /** By the server. */
+  /** Refused by the server. */
   inputsRefused: number;
   /** Bytes that broke a rule of the protocol. */
   refusedMessages: number;
   /** Of deltas. */
   payloadBytes: number;
-  /** Publish to applied; needs one clock for both hosts. */
+  /** From publishing to applying; needs a common clock of both hosts. */
   latencyMsP50: number;
   /** As latency_ms_p50. */
   latencyMsP99: number;
-  /** Sent until the frame it acted on was applied. */
+  /** From sending to applying the frame that the input acted on. */
   inputLatencyMsP50: number;
   /** As input_latency_ms_p50. */
   inputLatencyMsP99: number;
   /** As client_ms_p50. */
   clientMsP99: number;
-  /** Last join: from knowing the session, or the loss, to playing. */
+  /** Last join: from finding the session, or from losing it, to playing. */
   joinMs: number;
   /** To the server and back. */
   roundTripMs: number;
-  /** By which deltas come late. */
+  /** Mean deviation of the times at which deltas are published. */
   jitterMs: number;
-  /** From one stream of a session to another. */
+  /** Changes from one stream of a session to another. */
   streamChanges: number;
-  /** On a frame that was applied. */
+  /** Acted on a frame that was applied. */
   inputsActed: number;
-  /** Lost on the way, or their answer was. */
+  /** The input or its answer was lost. */
   inputsUnknown: number;
-  /** Deltas that waited at once, at most. */
+  /** Maximum number of deltas that waited at once. */
   queueHighWater: number;
 }
 
-/** Of a server; rates and durations of the last second. */
+/** The figures of a server. Rates and durations are of the last second. */
 export interface ServerFigures {
-  /** Of replies as messages. */
+  /** Size of replies as messages. */
   replyBytes: number;
-  /** Of scheduled inputs as messages. */
+  /** Size of scheduled inputs as messages. */
   inputBytes: number;
-  /** Of the snapshots themselves, repetitions too. */
+  /** Size of the snapshots, including repetitions. */
   snapshotBytes: number;
   /** Suspensions that a participant caused. */
   stalls: number;
-  /** Waiting past due, for participants or for the queue. */
+  /** Time that due frames waited for participants or the queue. */
   suspendedMs: number;
-  /** By rule, rate or simulation. */
+  /** Refused by a rule, by the rate limit or by the simulation. */
   refusedInputs: number;
-  /** That broke a rule of the protocol. */
+  /** Messages that broke a rule of the protocol. */
   refusedMessages: number;
-  /** Made for those who join. */
+  /** Snapshots made for joining clients. */
   snapshots: number;
   /** Since the start. */
   uptimeS: number;
-  /** As it is kept. */
+  /** As achieved. */
   frameRateHz: number;
-  /** Of payload; 2^20 bits to the Mbit. */
+  /** Payload rate; 1 Mbit = 2^20 bits. */
   mbitPerS: number;
-  /** What positions and velocities would need uncompressed. */
+  /** Rate that positions and velocities would need uncompressed. */
   rawMbitPerS: number;
   /** Step, predict, encode, apply. */
   frameMsP50: number;
@@ -80,18 +80,18 @@ export interface ServerFigures {
   correctedPerFrame: number;
   /** In force, scene units. */
   threshold: number;
-  /** Alive. */
+  /** Bodies alive. */
   bodies: number;
-  /** Of the bodies. */
+  /** Bodies at rest. */
   atRest: number;
-  /** That play. */
+  /** Participants that play. */
   participants: number;
-  /** That play. */
+  /** Observers that play. */
   observers: number;
-  /** Frames that a participant may be behind. */
+  /** Maximum number of frames that a participant may be behind. */
   window: number;
-  /** Messages that waited at once, at most. */
+  /** Maximum number of messages that waited at once. */
   queueHighWater: number;
-  /** Of the deltas' payload. */
+  /** Size of the deltas' payload. */
   deltaBytes: number;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Which streams are worth making.
+// Decides which streams are computed.
 
 #include <array>
 #include <cstdint>
@@ -11,17 +11,19 @@
 
 namespace tandem::host {
 
-/// A stream is made while somebody plays it or was served its snapshot, and for a while after, so that a
-/// client which loses its way for a moment costs no new start. Not thread-safe.
+/// Decides which streams are computed. A stream is computed while a client plays it or was served its
+/// snapshot, and for kLingerNs after that, so that a client that is lost for a moment does not cost a new
+/// start. Not thread-safe.
 class Audience {
  public:
   static constexpr std::int64_t kLingerNs = 5 * kSecond;
 
-  /// The streams to make now; with nobody there the first alone.
+  /// The streams to compute now. Without clients it is only the first.
   [[nodiscard]] StreamSet wanted(Roster& roster, std::int64_t now_ns);
 
  private:
-  std::array<std::optional<std::int64_t>, transport::kMaxStreams> needed_ns_{};  // last
+  std::array<std::optional<std::int64_t>, transport::kMaxStreams> needed_ns_{};  // by stream: when it was
+                                                                                 // last needed
 };
 
 }  // namespace tandem::host

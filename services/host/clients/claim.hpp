@@ -1,5 +1,5 @@
 #pragma once
-// Who owns a session name.
+// Decides which server owns a session name.
 
 #include <cstdint>
 #include <map>
@@ -12,27 +12,30 @@
 
 namespace tandem::host {
 
-/// Looks for other servers of the same session. Before announcing, any live one wins. Afterwards the one with
-/// more followers does: DDS participants whose clients acknowledge its epoch. So neither a server that was
-/// away while another took over ends that one, nor an announcement that nobody follows anybody.
+/// Looks for other servers of the same session. Before this server announces, any live server keeps the
+/// session. Afterwards the server with more followers keeps it, even if it started later. A follower is a DDS
+/// participant whose clients acknowledge the server's epoch. So a server that was away while another took
+/// over does not end the other, and an announcement without followers ends nobody.
 class Claim {
  public:
-  /// Two that started at once may both have announced by now: one of them leaves, followed or not.
+  /// Two servers that started at the same time may both have announced by then: one of them leaves, even if
+  /// it has followers.
   static constexpr std::int64_t kSettledNs = 2'000'000'000;
-  /// An acknowledgement counts for so long; each client repeats it four times a second.
+  /// How long an acknowledgement counts; each client repeats it four times a second.
   static constexpr std::int64_t kFollowedNs = 1'000'000'000;
-  /// Behind another for so long: time to leave. Followers of both are discovered one by one.
+  /// A server that has had fewer followers than another for so long leaves. The delay is needed because
+  /// followers of both are discovered one by one.
   static constexpr std::int64_t kBehindNs = 1'000'000'000;
-  /// Epochs closer than this tell nothing about who was first.
+  /// Epochs that are closer than this do not tell which server was first.
   static constexpr std::int64_t kOlderMs = 2000;
 
   Claim(Epoch epoch, const transport::ParticipantId& self) : epoch_(epoch), self_(self) {}
 
   void announced(std::int64_t now_ns) { announced_ns_ = now_ns; }
-  /// Any acknowledgement that came, whatever it says.
+  /// Notes an acknowledgement, whatever its content.
   void acknowledged(Epoch epoch, const transport::ParticipantId& from, std::int64_t now_ns);
-  /// kConflict, naming the other server, when this one has to give way. To whom it does not give way it notes
-  /// once.
+  /// Returns kConflict, naming the other server, if this server has to give way. A server that this one does
+  /// not give way to is noted once.
   [[nodiscard]] std::optional<Error> check(transport::ServerPort& port, Notices& notices,
                                            std::int64_t now_ns);
 
@@ -50,7 +53,8 @@ class Claim {
   Epoch epoch_;
   transport::ParticipantId self_;
   std::optional<std::int64_t> announced_ns_;
-  std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each, not older than kFollowedNs
+  std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
+                                                                // kFollowedNs
   std::map<transport::ParticipantId, std::int64_t> behind_since_;
   std::vector<transport::ParticipantId> noted_;
   std::vector<Other> others_;

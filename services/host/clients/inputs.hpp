@@ -1,5 +1,5 @@
 #pragma once
-// What clients may do to a session.
+// Accepts or refuses the inputs of clients.
 
 #include <cstdint>
 
@@ -10,13 +10,13 @@
 
 namespace tandem::host {
 
-/// Keeps the accounts of inputs: what a client may send, and what became of it. Not thread-safe.
+/// Decides inputs and keeps their accounts: what a client may send, and the outcomes. Not thread-safe.
 class InputDesk {
  public:
   InputDesk(Epoch epoch, FrameSource& source, Outbox& outbox)
       : epoch_(epoch), source_(&source), outbox_(&outbox) {}
 
-  /// Decides one input of a known client; the outcome stands in its account and is what this returns.
+  /// Decides one input of a known client. Returns the outcome and records it in the account.
   transport::Reason handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns);
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
 

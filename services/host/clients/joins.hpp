@@ -1,5 +1,5 @@
 #pragma once
-// Snapshots on demand.
+// Snapshots for joining clients.
 
 #include <cstdint>
 #include <map>
@@ -13,22 +13,22 @@
 
 namespace tandem::host {
 
-/// Decides when a snapshot of one stream is made, and for whom.
+/// Decides when a snapshot of one stream is made, and for which clients.
 class JoinDesk {
  public:
   explicit JoinDesk(std::uint32_t stream) : stream_(stream) {}
 
-  /// True when the time has come to make one snapshot for all who are ready: they say `joining` and
-  /// name the stream, all writers that they need have matched their participant, they are not being sent one,
-  /// they were not served for this attempt, and where they were served before, their participant has not
-  /// asked too often. While `transfer` has no memory for another there is none.
+  /// True if it is time to make one snapshot for all clients that are ready. A ready client says `joining`
+  /// and names the stream; all writers that it needs have matched its participant; it is not being sent a
+  /// snapshot; it was not served for this attempt; and if it was served before, its participant has not asked
+  /// too often. There is no snapshot while `transfer` has no memory for another.
   [[nodiscard]] bool due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
                          std::int64_t now_ns);
-  /// Who was ready at the last due().
+  /// The clients that were ready at the last due().
   [[nodiscard]] std::span<const transport::ClientId> ready() const { return ready_; }
-  /// One was made for them.
+  /// Notes that a snapshot was made for the ready clients.
   void served(Roster& roster, std::int64_t now_ns);
-  /// When the joiners collected so far get theirs.
+  /// When the joiners that were collected so far get their snapshot.
   [[nodiscard]] std::optional<std::int64_t> due_ns(const SnapshotTransfer& transfer,
                                                    std::int64_t now_ns) const;
 

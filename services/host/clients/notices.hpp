@@ -1,5 +1,5 @@
 #pragma once
-// Lines for a log, no more than it can bear for months.
+// Lines for a log, limited so that a log of months fits a disk.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,23 +11,26 @@
 
 namespace tandem::host {
 
-/// What one client may say: by joining and leaving in turn it would fill a disk.
+/// Lines that one client may cause. Without the limit a client that joins and leaves in turn would fill a
+/// disk.
 inline constexpr accounts::TokenBucket kNoticesOfClient{0.1, 8};
 
-/// Collects lines until somebody takes them; what is too much is counted, and a line says how much. Not
-/// thread-safe.
+/// Collects lines until they are taken. Lines above the limit are counted, and one line says how many were
+/// left out. Not thread-safe.
 class Notices {
  public:
-  /// Of all clients together, and of the server. 17 MB a day at most.
+  /// Limit of all clients and the server together; at most 17 MB a day.
   static constexpr double kPerSecond = 2;
   static constexpr double kBurst = 256;
-  static constexpr std::size_t kMostLines = 256;                  ///< that wait to be taken
-  static constexpr std::int64_t kTellLeftOutNs = 10'000'000'000;  ///< between two lines about lines left out
+  static constexpr std::size_t kMostLines = 256;                  ///< maximum number of lines that wait to be
+                                                                  ///< taken
+  static constexpr std::int64_t kTellLeftOutNs = 10'000'000'000;  ///< minimum time between two lines about
+                                                                  ///< lines left out
 
   void add(std::string line, std::int64_t now_ns);
-  /// A line about a client, which `of_client` has to permit, too.
+  /// Adds a line about a client; `of_client` has to permit it too.
   void add(std::string line, accounts::TokenBucket& of_client, std::int64_t now_ns);
-  /// Oldest first; forgets them.
+  /// Returns the lines, oldest first, and forgets them.
   [[nodiscard]] std::vector<std::string> take();
 
  private:

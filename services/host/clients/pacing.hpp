@@ -1,26 +1,26 @@
 #pragma once
-// When the next frame is due.
+// Decides when the next frame is due.
 
 #include <cstdint>
 #include <string>
 
 namespace tandem::host {
 
-/// Absolute deadlines, one period apart, so that errors do not add up. After a suspension there is no
-/// catch-up; a slow step is caught up with if it costs less than four periods.
+/// Keeps absolute deadlines one period apart, so that errors do not add up. After a suspension the lost time
+/// is not caught up. After a slow step it is, if the step cost less than four periods.
 class Pacing {
  public:
-  /// `free_rate`: always due; the nominal period still decides when waiting becomes a suspension.
+  /// `free_rate`: a frame is always due. The nominal period still decides when waiting becomes a suspension.
   Pacing(double frame_rate_hz, bool free_rate);
 
   void start(std::int64_t now_ns);
   [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= deadline_ns_; }
   [[nodiscard]] std::int64_t deadline_ns() const { return deadline_ns_; }
-  /// From here on waiting is a suspension: one nominal period after the last frame.
+  /// From this time on waiting is a suspension: one nominal period after the last frame.
   [[nodiscard]] std::int64_t suspended_from_ns() const { return suspended_from_ns_; }
-  /// A frame starts now; `suspended`: after a suspension.
+  /// A frame starts now; `suspended`: it starts after a suspension.
   void frame_started(std::int64_t now_ns, bool suspended);
-  /// Nominal, or as measured at a free rate.
+  /// The nominal period; at a free rate the measured one.
   [[nodiscard]] std::int64_t period_ns() const { return free_rate_ ? measured_ns_ : nominal_ns_; }
 
  private:
@@ -32,21 +32,21 @@ class Pacing {
   std::int64_t suspended_from_ns_ = 0;
 };
 
-/// Tells when frames take longer than their period, second by second, and when that is over.
+/// Tells when frames begin to take longer than their period, checked every second, and when that is over.
 class Overrun {
  public:
-  static constexpr std::int64_t kTellNs = 10'000'000'000;  ///< between two lines that tell that they do
+  static constexpr std::int64_t kTellNs = 10'000'000'000;  ///< minimum time between two such lines
 
   explicit Overrun(double frame_rate_hz) : rate_hz_(frame_rate_hz) {}
-  /// After a frame that took so long, in the step of the simulation and in all. A line for a log, mostly
-  /// empty.
+  /// Call after each frame with the duration of the simulation's step and of the whole frame. Returns a line
+  /// for a log; usually it is empty.
   [[nodiscard]] std::string frame_took(std::int64_t step_ns, std::int64_t frame_ns, std::int64_t now_ns);
 
  private:
   double rate_hz_;
-  double step_ns_ = 0, frame_ns_ = 0, frames_ = 0;  // of this second, sums
+  double step_ns_ = 0, frame_ns_ = 0, frames_ = 0;  // sums over the current second
   std::int64_t since_ns_ = INT64_MIN, told_ns_ = INT64_MIN / 2;
-  bool told_ = false;  // and not yet that it is over
+  bool told_ = false;  // it was told, but not yet that it is over
 };
 
 }  // namespace tandem::host

@@ -1,5 +1,5 @@
 #pragma once
-// What clients are told.
+// Replies to clients.
 
 #include <array>
 #include <cstdint>
@@ -13,18 +13,19 @@
 
 namespace tandem::host {
 
-/// Queues replies when they are due (accounts::ReplySchedule). A reply that finds no room is tried again.
-/// A client with an account has writers of its own, opened with its first reply.
+/// Queues replies when they are due (accounts::ReplySchedule). If the outbox has no room, a reply is tried
+/// again. A client with an account has writers of its own, which are opened with its first reply.
 class ReplyDesk {
  public:
-  static constexpr std::int64_t kStrangerNs = kSecond;  ///< between two answers to the same one
-  static constexpr double kStrangersPerSecond = 20;     ///< and as many at once
+  static constexpr std::int64_t kStrangerNs = kSecond;  ///< minimum time between two answers to the same
+                                                        ///< client
+  static constexpr double kStrangersPerSecond = 20;     ///< also the maximum burst
 
   ReplyDesk(Epoch epoch, Outbox& outbox) : epoch_(epoch), outbox_(&outbox) {}
 
   void send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns);
-  /// Answers somebody without an account, at most once a second each, and 20 a second all together: every
-  /// client reads it.
+  /// Answers a client without an account. Each gets at most one answer a second and all together 20 a second,
+  /// because every client reads these answers.
   void refuse(transport::ClientId client, transport::Reason reason, std::int64_t now_ns,
               std::int64_t wall_ns);
 
@@ -37,7 +38,7 @@ class ReplyDesk {
   };
   Epoch epoch_;
   Outbox* outbox_;
-  std::array<Stranger, 64> strangers_{};  // the longest silent one makes room
+  std::array<Stranger, 64> strangers_{};  // the one that was silent the longest makes room
   accounts::TokenBucket strangers_rate_{kStrangersPerSecond, kStrangersPerSecond};
 };
 

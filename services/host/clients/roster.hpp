@@ -1,5 +1,5 @@
 #pragma once
-// The clients of a session: who they are, whether the server waits for them, and what they did to deserve it.
+// The clients of a session: their ids, whether the server waits for them, and what they have cost.
 
 #include <cstdint>
 #include <map>
@@ -21,9 +21,9 @@
 
 namespace tandem::host {
 
-/// The last outcomes of a client's inputs, and how fast it may send.
+/// The last outcomes of a client's inputs, and its rate limit.
 struct InputAccount {
-  std::uint64_t highest = 0;  ///< highest number handled, whatever the outcome
+  std::uint64_t highest = 0;  ///< highest input number that was decided, whatever the outcome
   accounts::Outcomes outcomes;
   accounts::TokenBucket rate = accounts::kInputs;
 };
@@ -36,27 +36,27 @@ struct JoinAccount {
 
 struct ReplyAccount {
   accounts::ReplySchedule schedule;
-  transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
+  transport::Reason once = transport::Reason::kNone;  ///< sent only with the next reply
 };
 
-/// One client id. Survives rejoins; forgotten with its DDS participant, or a minute after the client was last
-/// heard of.
+/// The account of one client id. It survives rejoins. It is forgotten with its DDS participant, or a minute
+/// after the last message of the client.
 struct Account {
   transport::ClientId id = 0;
   transport::ParticipantId from;
   transport::Phase phase = transport::Phase::kJoining;
   transport::Role wanted = transport::Role::kObserver;
-  std::uint32_t stream = 0;                  ///< that it plays, or joins
-  std::optional<std::uint32_t> next_stream;  ///< that it joins while it goes on playing `stream`
+  std::uint32_t stream = 0;                  ///< the stream that it plays or joins
+  std::optional<std::uint32_t> next_stream;  ///< the stream that it joins while it plays `stream`
   bool open = false;                         ///< the client has writers of its own
-  bool asked = false;                        ///< it named this session, and does not only look for it
-  bool present = true;                       ///< its participant lives and it was heard of lately
+  bool asked = false;                        ///< it asked to join this session; false: it only looks for it
+  bool present = true;                       ///< its participant is alive and it was heard lately
   bool counted = false;  ///< a participant that plays and has caught up: the server waits for it
   bool demoted = false;
-  bool kept_up = false;  ///< while demoted: since kept_up_since_ns
+  bool kept_up = false;  ///< while demoted: it has kept up since kept_up_since_ns
   std::int64_t kept_up_since_ns = 0;
   Frame applied = 0;
-  Frame timed_from = 0;  ///< acknowledgements of later frames tell a round trip
+  Frame timed_from = 0;  ///< round trips are measured on frames after this one
   std::uint32_t attempt = 0;
   std::int64_t clock_ns = 0;
   std::int64_t heard_ns = 0;
@@ -70,13 +70,14 @@ struct Account {
   [[nodiscard]] bool plays() const { return present && phase == transport::Phase::kPlaying; }
 };
 
-/// What all clients of one DDS participant may cost together, or ids would multiply it.
+/// Limits of one DDS participant, for all its clients together; otherwise more ids would mean more cost.
 struct Peer {
   StallMeter stalls;
-  accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;  ///< beyond the first of each account
+  accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;  ///< snapshots after the first one of
+                                                                      ///< each account
 };
 
-/// The stream that it is on its way into, from outside or from another.
+/// The stream that the client is joining, from outside or from another stream.
 [[nodiscard]] inline std::optional<std::uint32_t> joined_stream(const Account& account) {
   if (!account.present) return std::nullopt;
   if (account.phase == transport::Phase::kJoining)
@@ -84,25 +85,26 @@ struct Peer {
   return account.next_stream;
 }
 
-/// It was served a snapshot of the stream that it asked for last, since it asked.
+/// True if the client was served a snapshot since it last asked, and of the stream that it asked for.
 [[nodiscard]] inline bool was_served(const Account& account) {
   return account.join.served && account.join.served_attempt == account.attempt &&
          account.join.served_stream == account.next_stream.value_or(account.stream);
 }
 
-/// Whose deltas it applies, or will as soon as it has the snapshot that was cut for it.
+/// True if the client applies the stream's deltas, or will apply them when it has the snapshot that was made
+/// for it.
 [[nodiscard]] inline bool needs(const Account& account, std::uint32_t stream) {
   if (!account.present) return false;
   if (account.phase == transport::Phase::kPlaying && account.stream == stream) return true;
   return joined_stream(account) == stream && was_served(account);
 }
 
-/// Rules of clients, without I/O. Not thread-safe.
+/// The rules for clients, without I/O. Not thread-safe.
 class Roster {
  public:
   struct Rules {
     Epoch epoch = 0;
-    std::vector<std::string> streams = {""};  ///< names by id; all of generation 0
+    std::vector<std::string> streams = {""};  ///< names by id; all have generation 0
     std::uint32_t client_limit = 256;
     std::uint32_t participant_limit = 16;  ///< clients of one DDS participant
     std::optional<std::int64_t> stall_timeout_ns;
@@ -112,54 +114,55 @@ class Roster {
   explicit Roster(Rules rules)
       : rules_(std::move(rules)), window_(rules_.fixed_window.value_or(kSmallestWindow)) {}
 
-  /// Where the server stands when something happens.
+  /// The state of the server when something happens.
   struct Now {
     std::int64_t ns = 0;
-    Frame frame = 0;    ///< last delta made; s is the next
-    Frame written = 0;  ///< last delta that left the queue: nobody is to blame for lacking a later one
+    Frame frame = 0;    ///< frame of the last delta made; frame s is the next
+    Frame written = 0;  ///< last delta that left the queue; clients are not blamed for lacking a later one
     std::int64_t period_ns = 0;
   };
 
-  /// Digests an acknowledgement. kNone: taken. Otherwise why not; what concerns a known account is left as it
-  /// was.
+  /// Handles an acknowledgement. Returns kNone if it was taken, otherwise the reason. A refused
+  /// acknowledgement leaves a known account as it was.
   transport::Reason acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
                                 const PublishTimes& times, const Now& now);
-  /// The account of `id` if it belongs to `from`; null and kForeignClient or kNotPlaying otherwise.
+  /// The account of `id` if it belongs to `from`; otherwise null, and `reason` is kForeignClient or
+  /// kNotPlaying.
   Account* find(transport::ClientId id, const transport::ParticipantId& from, transport::Reason& reason);
 
-  /// Forgets clients whose participant is gone; call now and then, and while suspended.
+  /// Forgets clients whose participant is gone. Call it now and then, and while suspended.
   void look_for_dead(transport::ServerPort& port, const Now& now);
-  /// Who keeps the server from starting frame s = now.frame + 1.
+  /// True if a client keeps the server from starting frame s = now.frame + 1.
   [[nodiscard]] bool blocked(const Now& now) const;
-  /// Whether a client is to blame for that: it lacks a delta that was written.
+  /// True if a client is to blame for that: it lacks a delta that was written.
   [[nodiscard]] bool blamed(const Now& now) const;
-  /// Charges a suspension that lasted `duration_ns` to the DDS participants of all who are to blame, and
-  /// demotes those of them whose participant caused too much.
+  /// Charges a suspension of `duration_ns` to the DDS participants of all clients that are to blame. Demotes
+  /// those clients whose participant has caused too much.
   void charge(std::int64_t duration_ns, const Now& now);
-  /// Shortest time until somebody who is to blame has used up its allowance; nothing if nobody does or may.
+  /// Minimum time until a client that is to blame has used up its allowance; empty if there is no such client
+  /// or no limit.
   [[nodiscard]] std::optional<std::int64_t> patience_ns(const Now& now);
-  /// Frame s = now.frame + 1 starts: notes which demoted clients do not keep up.
+  /// Frame s = now.frame + 1 starts. Notes which demoted clients do not keep up.
   void frame_starts(const Now& now);
-  /// Demoted clients that kept up for 10 s are participants again; caught-up joiners count; the window
-  /// follows.
+  /// Makes demoted clients that kept up for 10 s participants again, counts joiners that have caught up, and
+  /// updates the window.
   void refresh(const Now& now);
 
   [[nodiscard]] std::uint32_t window() const { return window_; }
   [[nodiscard]] std::uint32_t counted() const;
   [[nodiscard]] std::uint32_t counted(std::uint32_t stream) const;
-  [[nodiscard]] std::uint32_t watching() const;  ///< playing and not counted
+  [[nodiscard]] std::uint32_t watching() const;  ///< clients that play and are not counted
   [[nodiscard]] std::uint32_t watching(std::uint32_t stream) const;
   [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
   [[nodiscard]] Peer& peer(const Account& account) { return peers_.at(account.from); }
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
   [[nodiscard]] Notices& notices() { return notices_; }
-  /// Accounts with writers of their own that were forgotten, for whoever ends their writers and removes them
-  /// here.
+  /// Forgotten accounts that have writers of their own. The caller ends their writers and removes them here.
   [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
 
  private:
-  /// Somebody looks for a session: its writers are made before it asks for anything.
+  /// Handles a client that looks for a session: its writers are made before it asks for anything.
   transport::Reason expect(const transport::AckMessage& ack, Account* account,
                            const transport::ParticipantId& from, std::int64_t now_ns);
   Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
@@ -167,17 +170,18 @@ class Roster {
   [[nodiscard]] bool lists(const StreamId& stream) const {
     return stream.id < rules_.streams.size() && stream.generation == 0;
   }
-  /// Which stream it plays and joins; true when it enters the session anew, or another stream without having
-  /// joined that first.
+  /// Updates which stream the client plays and joins. Returns true if it enters the session anew, or enters
+  /// another stream without having joined that stream first.
   bool follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now);
-  /// " of stream NAME"; nothing of a session that has but one.
+  /// Returns " of stream NAME"; empty if the session has only one stream.
   [[nodiscard]] std::string of_stream(std::uint32_t stream) const;
   void note(Account& account, std::string_view what, std::int64_t now_ns);
   Accounts::iterator forget(Accounts::iterator account);
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
     return account.applied + window_ >= now.frame + 1;
   }
-  // While the server waits, whoever lives and lacks nothing says so; not to wait for the silent one by one.
+  // While the server waits, a live client that lacks nothing says so. Silent clients are blamed together, so
+  // that the server need not wait for one after the other.
   [[nodiscard]] static bool silent(const Account& account, const Now& now) {
     return now.ns - account.heard_ns > transport::kAckSpacingNs + account.round_trip.high_ns();
   }
@@ -190,13 +194,13 @@ class Roster {
   std::uint32_t window_;
   std::map<transport::ClientId, Account>
       accounts_;  // ordered, so that rules apply in the same order everywhere
-  std::map<transport::ParticipantId, Peer> peers_;  // those with an account
+  std::map<transport::ParticipantId, Peer> peers_;  // participants that have an account
   std::uint64_t seen_ = 0, demotions_ = 0;
   Notices notices_;
   std::vector<transport::ClientId> forgotten_;
 };
 
-/// Sixteen hex digits, as ids are shown everywhere.
+/// Sixteen hex digits: the form in which ids are shown everywhere.
 [[nodiscard]] std::string client_name(transport::ClientId id);
 
 }  // namespace tandem::host

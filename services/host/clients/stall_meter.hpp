@@ -1,12 +1,13 @@
 #pragma once
-// How much suspension one client caused lately.
+// Measures how much suspension one participant caused lately.
 
 #include <array>
 #include <cstdint>
 
 namespace tandem::host {
 
-/// Sum over a sliding window of 10 s, in steps of 0.1 s: a charge counts for 10.0 to 10.1 s. Constant memory.
+/// The sum over a sliding window of 10 s, in steps of 0.1 s: a charge counts for 10.0 to 10.1 s. Constant
+/// memory.
 class StallMeter {
  public:
   static constexpr std::int64_t kStepNs = 100'000'000;

@@ -1,5 +1,5 @@
 #pragma once
-// How many frames the server may run beyond its slowest participant.
+// Decides how many frames the server may run ahead of its slowest participant.
 
 #include <array>
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace tandem::host {
 
-/// When each of the last frames was queued for publication: what acknowledgements are timed against.
+/// The times at which the last frames were queued for publication. Acknowledgements are timed against them.
 class PublishTimes {
  public:
   static constexpr std::size_t kFrames = 128;
   void published(Frame frame, std::int64_t now_ns);
-  /// Nothing for frames that are too old or were not published.
+  /// Empty for frames that are too old or were not published.
   [[nodiscard]] std::optional<std::int64_t> of(Frame frame) const;
 
  private:
@@ -25,13 +25,12 @@ class PublishTimes {
   std::array<Entry, kFrames> entries_{};  // frame 0 is never published, so a zero entry matches nothing
 };
 
-/// Smoothed time from publishing a frame to the first acknowledgement that covers it, of one client, and its
-/// deviation, estimated as TCP does (Jacobson
-/// 1988).
+/// Estimates one client's time from publishing a frame to the first acknowledgement that covers it: a
+/// smoothed mean and its deviation, as TCP does (Jacobson 1988).
 class RoundTrip {
  public:
   void measured(std::int64_t duration_ns);
-  /// Before the first measurement: what to expect.
+  /// The value to use before the first measurement.
   void expect(std::int64_t duration_ns);
   /// Smoothed + 4 deviations; 0 before the first measurement.
   [[nodiscard]] std::int64_t high_ns() const { return known_ ? smoothed_ + 4 * deviation_ : 0; }
@@ -42,10 +41,10 @@ class RoundTrip {
   std::int64_t deviation_ = 0;
 };
 
-inline constexpr std::uint32_t kSmallestWindow = 2;  ///< the paper's; automatic windows start here
+inline constexpr std::uint32_t kSmallestWindow = 2;  ///< the thesis's window; automatic windows start here
 
-/// Frames that cover a round trip at one frame per `period_ns`, and one to spare; between kSmallestWindow and
-/// `ceiling`.
+/// The number of frames that covers a round trip at one frame per `period_ns`, plus one; between
+/// kSmallestWindow and `ceiling`.
 [[nodiscard]] std::uint32_t window_for(std::int64_t round_trip_ns, std::int64_t period_ns,
                                        std::uint32_t ceiling);
 

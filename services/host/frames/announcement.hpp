@@ -1,5 +1,5 @@
 #pragma once
-// The session as clients are told of it.
+// The session as it is announced to clients.
 
 #include "sdk/transport/messages.hpp"
 #include "services/host/frames/configuration.hpp"
@@ -7,11 +7,11 @@
 
 namespace tandem::host {
 
-/// What a client must know of the session before it plays any of its streams, none of which is listed yet.
+/// What a client must know about the session before it plays any stream. The message lists no stream yet.
 [[nodiscard]] transport::SessionMessage session_message(const HostConfig& config);
 
-/// Lists a stream: what a client must know before it reads a byte of it. Measures a client's cost, which
-/// takes as long as nine frames of a client.
+/// Adds a stream to the message: what a client must know before it reads a byte of it. Measures a client's
+/// cost, which takes as long as nine frames of a client.
 void list_stream(const Stream& stream, transport::SessionMessage& session);
 
 }  // namespace tandem::host

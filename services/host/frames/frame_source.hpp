@@ -1,5 +1,5 @@
 #pragma once
-// Where a host's frames come from: a simulation that runs (live_source.hpp), or a recording of one.
+// The interface of what makes a host's frames: a running simulation (live_source.hpp), or a recording of one.
 
 #include <bitset>
 #include <cstdint>
@@ -17,60 +17,62 @@
 
 namespace tandem::host {
 
-/// Which client's input it is; 0, 0 for the server's own.
+/// The client and number of an input; 0, 0 for an input of the server itself.
 struct InputOrigin {
   transport::ClientId client = 0;
   std::uint64_t number = 0;
 };
 
-/// Some of a session's streams, by their ids.
+/// A subset of a session's streams, by their ids.
 using StreamSet = std::bitset<transport::kMaxStreams>;
 
-/// Frames in order, and what may act on them. A host calls it from one thread.
+/// Makes frames in order and takes the inputs that act on them. A host calls it from one thread.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
-  /// As it is announced; the ids of its streams are 0, 1, ... and their generation 0.
+  /// The session as it is announced. The ids of its streams are 0, 1, ... and their generations are 0.
   [[nodiscard]] virtual const transport::SessionMessage& session() const = 0;
-  [[nodiscard]] virtual Frame frame() const = 0;  ///< of the last deltas
+  [[nodiscard]] virtual Frame frame() const = 0;  ///< frame of the last deltas
 
-  /// The streams that are made; the others cost nothing.
+  /// The streams that are made now; the others cost nothing.
   [[nodiscard]] virtual StreamSet active() const = 0;
-  /// From the next frame on these are made, where the source can choose. One that was not is begun anew at
-  /// frame().
+  /// Makes these streams from the next frame on, if the source can choose. A stream that was not made before
+  /// begins anew at frame().
   virtual void set_active(StreamSet streams) = 0;
-  /// Of a stream that is made.
+  /// The client state of a stream that is made now.
   [[nodiscard]] virtual const State& agreed(std::uint32_t stream) const = 0;
-  [[nodiscard]] virtual std::uint64_t hash(std::uint32_t stream) const = 0;  ///< of agreed()
-  /// Of the next frame; of a stream that is not made: with which it begins.
+  [[nodiscard]] virtual std::uint64_t hash(std::uint32_t stream) const = 0;  ///< hash of agreed()
+  /// The parameters of the next frame. For a stream that is not made now: the parameters with which it
+  /// begins.
   [[nodiscard]] virtual const StreamParameters& parameters(std::uint32_t stream) const = 0;
 
-  /// The next frame; nothing when there is none any more. `snapshots_follow`: of these streams one is cut
-  /// right after it. Queues what has to leave before the deltas.
+  /// Makes the next frame; empty if there is none any more. `snapshots_follow`: the streams of which a
+  /// snapshot is cut right after it. Queues the messages that have to leave before the deltas.
   virtual std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) = 0;
-  /// Of agreed(stream), for joiners. Replaces the content of `out`.
+  /// Writes a snapshot of agreed(stream) for joiners. Replaces the content of `out`.
   virtual void snapshot(std::uint32_t stream, std::vector<std::byte>& out) = 0;
 
-  /// Decides a well-formed input of a client that may send it. kNone: it acts on frame `acts_on`.
+  /// Decides a well-formed input of a client that may send it. Returns kNone if it acts, on frame `acts_on`;
+  /// otherwise the reason.
   virtual transport::Reason accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
                                    Frame& acts_on) = 0;
 
-  // What follows is of a simulation that runs; other sources have none of it.
+  // The following functions are for a running simulation; other sources do not implement them.
 
-  /// Of a stream, for logs and figures; empty: it has none.
+  /// The name of a stream, for logs and figures; empty if it has none.
   [[nodiscard]] virtual std::string name(std::uint32_t stream) const { return std::to_string(stream); }
-  /// Decides an input of the server's own. Returns the frame it acts on. Errors: kInvalidArgument (the
+  /// Decides an input of the server itself. Returns the frame that it acts on. Errors: kInvalidArgument (the
   /// simulation refuses it), kCapacity, kUnsupported.
   virtual Result<Frame> inject(const engine::Input& /*input*/, Outbox& /*outbox*/) { return unsupported(); }
-  /// In force from the next frame on: Stream::set_parameters(). Errors: as that; kOutOfOrder for a stream
-  /// that is not made; kUnsupported.
+  /// Sets parameters from the next frame on, as Stream::set_parameters(). Errors: those of that function;
+  /// kOutOfOrder for a stream that is not made now; kUnsupported.
   virtual Result<void> set_parameters(std::uint32_t /*stream*/, const StreamParameters& /*parameters*/) {
     return unsupported();
   }
-  /// What is worth a line in a log since the last call.
+  /// Lines for a log since the last call.
   [[nodiscard]] virtual std::vector<std::string> take_notices(std::int64_t /*now_ns*/) { return {}; }
-  /// Why there is no next frame, where that is an error.
+  /// The error that ended the frames; empty if they did not end by an error.
   [[nodiscard]] virtual std::optional<Error> error() const { return std::nullopt; }
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// A simulation that runs, as a source of frames: inputs, step, streams.
+// A running simulation as a source of frames: inputs, step, streams.
 
 #include <cstdint>
 #include <memory>
@@ -15,17 +15,19 @@
 
 namespace tandem::host {
 
-inline constexpr std::size_t kMostImmediate = 1024;  ///< waiting for one step, all clients together
-/// Scheduled inputs per frame, all clients together; those of lead + 1 frames fit kMaxPendingInputs.
+inline constexpr std::size_t kMostImmediate = 1024;  ///< maximum number of inputs of all clients that wait
+                                                     ///< for one step
+/// Maximum number of scheduled inputs per frame of all clients together; those of lead + 1 frames fit
+/// kMaxPendingInputs.
 inline constexpr std::uint32_t kMostScheduledPerFrame = 100;
 
-/// Gives inputs their frame, hands them to the simulation in time, and streams what becomes of its bodies:
-/// all streams follow one mirror, side by side, each on a thread of its own where there are cores. Not
+/// Gives inputs their frame, hands them to the simulation in time, and streams the simulation's bodies. All
+/// streams follow one mirror and run in parallel, each on its own thread if there are enough cores. Not
 /// thread-safe.
 class LiveSource final : public FrameSource {
  public:
-  /// `simulation` must outlive it; its bodies now are those of config.start_frame. The first stream is made
-  /// from the start. Errors: as Host::create(), naming the stream where there are several.
+  /// Creates a source. `simulation` must outlive it; its bodies are those of config.start_frame. The first
+  /// stream is made from the start. Errors: as Host::create(), naming the stream if there are several.
   static Result<std::unique_ptr<LiveSource>> create(const HostConfig& config, engine::Simulation& simulation);
 
   [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
@@ -50,7 +52,7 @@ class LiveSource final : public FrameSource {
   struct Lane {
     StreamConfig config;
     std::optional<Stream> stream;
-    bool told_out_of_reach = false;  // of its target of quality
+    bool told_out_of_reach = false;  // it was told that the quality target is out of reach
   };
   struct Waiting {
     ScheduledDrive drive;
@@ -61,7 +63,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
   transport::Reason schedule(const engine::Input& input, const engine::Classification& effect,
                              const InputOrigin& origin, Outbox& outbox, Frame& acts_on);
-  /// Hands the simulation all that acts on frame s, the one about to be stepped.
+  /// Hands the simulation all inputs that act on frame s, the one that is about to be stepped.
   void apply(Frame s);
   void make_deltas();
   void note_refusal(const InputOrigin& origin, const std::string& reason);
@@ -78,11 +80,11 @@ class LiveSource final : public FrameSource {
   double frame_rate_hz_;
   std::int64_t (*clock_ns_)();
   Frame frame_;
-  bool under_way_ = false;                // the simulation was stepped
+  bool under_way_ = false;                // the simulation has been stepped
   Drive drive_;                           // in force at frame_
   std::uint64_t last_input_ = 0;          // number
-  std::vector<MadeDelta> deltas_;         // of the frame at hand
-  std::vector<Waiting> scheduled_;        // in the order of their numbers, so ascending by frame
+  std::vector<MadeDelta> deltas_;         // of the current frame
+  std::vector<Waiting> scheduled_;        // in the order of their numbers and so ascending by frame
   std::vector<engine::Input> immediate_;  // in the order of arrival
   Frame scheduling_frame_ = 0;
   std::uint32_t scheduled_now_ = 0;                // for scheduling_frame_

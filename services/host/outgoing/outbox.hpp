@@ -1,5 +1,6 @@
 #pragma once
-// What the host wants published, in order, bounded. The one place where its thread meets the publisher's.
+// A bounded queue of what the host wants published. It is the only place where the host's thread meets the
+// publisher's.
 
 #include <chrono>
 #include <condition_variable>
@@ -14,60 +15,61 @@
 
 namespace tandem::host {
 
-/// Asks the publisher for a client's own writers.
+/// Asks the publisher to open a client's own writers.
 struct OpenClient {
   transport::ClientId client = 0;
 };
-/// Asks the publisher to end them.
+/// Asks the publisher to close a client's own writers.
 struct CloseClient {
   transport::ClientId client = 0;
 };
-/// Part of a snapshot for one client.
+/// One part of a snapshot for one client.
 struct SnapshotPart {
   transport::ClientId client = 0;
   transport::SnapshotMessage part;
 };
 
-/// All deltas of a frame, one a stream that is made, are in front of this.
+/// Marks the end of a frame: all its deltas, one for each stream that is made, are in front of this.
 struct EndOfFrame {};
 
 using Outgoing = std::variant<transport::SessionMessage, transport::DeltaMessage,
                               transport::ScheduledInputMessage, SnapshotPart, transport::ReplyMessage,
                               transport::ServerStatusMessage, OpenClient, CloseClient, EndOfFrame>;
 
-/// First in, first out over all kinds, so that an input issued before a delta leaves before it. Thread-safe
-/// for one producer and one consumer.
+/// First in, first out over all kinds of messages, so that an input that is issued before a delta leaves
+/// before it. Thread-safe for one producer and one consumer.
 class Outbox {
  public:
   struct Limits {
-    std::uint32_t frames = 8;       ///< whatever their number of streams and parts
+    std::uint32_t frames = 8;       ///< frames, whatever their number of streams and parts
     std::uint32_t snapshots = 512;  ///< parts of snapshots
     std::uint32_t control = 1024;   ///< everything else
   };
   explicit Outbox(const Limits& limits) : limits_(limits) {}
 
-  /// Room for the deltas of one more frame; stays true until the producer pushes its end.
+  /// True if there is room for the deltas of one more frame. It stays true until the producer pushes the
+  /// frame's end.
   [[nodiscard]] bool has_frame_room() const;
   [[nodiscard]] bool has_control_room() const;
   [[nodiscard]] bool has_snapshot_room() const;
-  /// False, and nothing queued, when the message's kind is at its limit. The deltas of a frame count once,
-  /// with its end; check has_frame_room() before the first.
+  /// Queues a message. Returns false and queues nothing if the message's kind is at its limit. The deltas of
+  /// a frame count once, with the frame's end; check has_frame_room() before the first.
   [[nodiscard]] bool push(Outgoing message);
 
-  /// The oldest message, or nothing after `timeout`. Asking for the next says that the one before is written.
+  /// Takes the oldest message; empty after `timeout`. A call means that the message before is written.
   [[nodiscard]] std::optional<Outgoing> pop(std::chrono::nanoseconds timeout);
   /// Wakes a waiting pop().
   void wake();
 
   [[nodiscard]] std::size_t size() const;
-  /// Frames of which some delta is pushed and not yet written.
+  /// Number of frames with a delta that is pushed and not yet written.
   [[nodiscard]] std::uint32_t unwritten_frames() const;
-  /// Of all messages of a kind pushed so far, in their byte form (sdk/transport/cdr.hpp).
+  /// Bytes of all messages of a kind pushed so far, in their byte form (sdk/transport/cdr.hpp).
   struct Traffic {
     std::uint64_t replies = 0, scheduled_inputs = 0;
   };
   [[nodiscard]] Traffic traffic() const;
-  /// Most messages ever queued.
+  /// Maximum number of messages that were queued at once.
   [[nodiscard]] std::size_t high_water() const;
 
  private:
@@ -84,7 +86,7 @@ class Outbox {
   transport::Bytes cdr_;  // kept to reuse its memory
 };
 
-/// Writes one message. Errors: what the port says.
+/// Writes one message. Errors: those of the port.
 [[nodiscard]] Result<void> publish(transport::ServerPort& port, const Outgoing& message);
 
 /// Writes everything that is queued, in the caller's thread: for tests and single-threaded hosts. Stops at

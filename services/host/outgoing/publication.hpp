@@ -1,5 +1,5 @@
 #pragma once
-// The deltas of a frame, cut into parts.
+// Cuts the deltas of a frame into parts.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace tandem::host {
 
-/// One stream's share of a frame that was made.
+/// One stream's part of a frame that was made.
 struct MadeDelta {
   std::uint32_t stream = 0;
   std::uint64_t hash = 0;
@@ -21,8 +21,9 @@ struct MadeDelta {
 struct MadeFrame {
   Frame frame = 0;
   std::uint64_t last_input = 0;
-  std::span<const MadeDelta> deltas;  ///< of each active stream, ascending; until the next frame is made
-  std::int64_t step_ns = 0;           ///< of the engine; 0 without a clock
+  std::span<const MadeDelta> deltas;  ///< one for each active stream, ascending; valid until the next frame
+                                      ///< is made
+  std::int64_t step_ns = 0;           ///< duration of the engine's step; 0 without a clock
 };
 
 /// Queues the deltas of a frame, each cut into parts of kPartBytes. There must be room for a frame.

@@ -1,5 +1,5 @@
 #pragma once
-// The thread that writes what the host queued, so that a slow write never holds up the simulation.
+// A thread that writes what the host queued, so that a slow write never delays the simulation.
 
 #include <atomic>
 #include <chrono>
@@ -14,10 +14,10 @@
 
 namespace tandem::host {
 
-/// Drains an outbox into a port from construction to stop(). Deltas, scheduled inputs and the session are
-/// written again until they are accepted, or until the middleware has refused one for 10 s for another reason
-/// than its own congestion: then nothing more is written. Other messages are given up after an error, as they
-/// are either repeated or superseded by the host.
+/// Drains an outbox into a port from construction to stop(). It repeats deltas, scheduled inputs and the
+/// session until they are accepted. If the middleware refuses one for 10 s for a reason other than its own
+/// congestion, nothing more is written. It gives up other messages after an error, because the host repeats
+/// or supersedes them.
 class Publisher {
  public:
   /// Both must outlive the publisher.
@@ -26,13 +26,13 @@ class Publisher {
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
-  /// Waits until the outbox is empty, for a second at most, or until nothing more is written.
+  /// Waits until the outbox is empty or nothing more is written, at most one second.
   void flush() const;
-  /// Ends the thread; what is still queued then is not written. Blocks for one write at most.
+  /// Ends the thread. What is still queued is not written. Blocks for at most one write.
   void stop();
   /// Writes that failed since the start. Thread-safe.
   [[nodiscard]] std::uint64_t failures() const { return failures_.load(std::memory_order_relaxed); }
-  /// The last failure's text, empty without one. Thread-safe.
+  /// The last failure's text; empty if there was none. Thread-safe.
   [[nodiscard]] std::string last_failure() const;
   /// True once nothing more is written: the session cannot go on. Thread-safe.
   [[nodiscard]] bool gave_up() const { return gave_up_.load(std::memory_order_relaxed); }
@@ -42,7 +42,7 @@ class Publisher {
 
   void run(const std::stop_token& stop);
   void insist(const Outgoing& message, const std::stop_token& stop);
-  /// What went wrong, if anything.
+  /// Writes one message; returns the error, if any.
   std::optional<ErrorCode> write(const Outgoing& message);
 
   Outbox* outbox_;

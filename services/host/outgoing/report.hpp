@@ -1,5 +1,5 @@
 #pragma once
-// What a host tells its operator of what it did.
+// What a host tells its operator about its work.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace tandem::host {
 
-/// A stream's share of a frame.
+/// One stream's part of a frame.
 struct DeltaReport {
   std::uint32_t stream = 0;
   std::uint64_t hash = 0;
@@ -19,23 +19,24 @@ struct DeltaReport {
   std::uint32_t corrected = 0;
 };
 
-/// One frame that was just produced.
+/// The frame that was produced last.
 struct FrameReport {
   Frame frame = 0;
-  std::vector<DeltaReport> deltas;   ///< of each stream that was made, ascending
-  double frame_ms = 0, step_ms = 0;  ///< whole frame (step, quantise, predict, encode, apply); engine alone
+  std::vector<DeltaReport> deltas;   ///< one for each stream that was made, ascending
+  double frame_ms = 0, step_ms = 0;  ///< the whole frame (step, quantise, predict, encode, apply); the
+                                     ///< engine's step alone
 };
 
 /// Counts of one stream since the start.
 struct StreamTotals {
   std::string name;
-  bool made = false;  ///< now
+  bool made = false;  ///< the stream is made now
   std::uint64_t frames = 0, corrected = 0, payload_bytes = 0;
   std::uint64_t snapshots = 0, snapshot_bytes = 0;
-  std::uint32_t participants = 0, observers = 0;  ///< now
+  std::uint32_t participants = 0, observers = 0;  ///< now, of the stream
 };
 
-/// Counts since the start, of all streams together where streams differ.
+/// Counts since the start. They are sums over all streams where streams differ.
 struct HostTotals : ServerCounts {
   std::uint64_t frames = 0, corrected = 0;
   std::uint64_t payload_bytes = 0;  ///< of the deltas themselves

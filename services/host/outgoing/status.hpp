@@ -1,5 +1,5 @@
 #pragma once
-// Figures of a stream for any DDS monitor, once a second.
+// Publishes a stream's figures once a second, for any DDS monitor.
 
 #include <cstdint>
 #include <string>
@@ -22,15 +22,16 @@ class StatusDesk {
   void frame_took(std::int64_t duration_ns) { durations_.add(duration_ns); }
 
   [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
-  /// What is so at the moment.
+  /// The state at the moment.
   struct Present {
     Frame frame = 0;
     std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0;
-    bool made = true;        ///< the stream is; if not, its figures of the last second in which it was stay
+    bool made = true;        ///< the stream is made now; if not, the figures of the last second in which it
+                             ///< was made stay
     double threshold_m = 0;  ///< in force
     std::string_view codec, predictor;
   };
-  /// Best effort: without room in the outbox this second's figures are lost.
+  /// Publishes the figures. If the outbox has no room, the figures of this second are lost.
   void publish(const HostTotals& totals, const Present& present, std::int64_t now_ns);
 
  private:
@@ -39,10 +40,10 @@ class StatusDesk {
   Epoch epoch_;
   Outbox* outbox_;
   std::int64_t started_ns_ = 0, next_ns_ = 0;
-  // Of the last status.
+  // The totals and the time of the last status.
   HostTotals second_;
   std::int64_t second_ns_ = 0;
-  DurationHistogram durations_;  // since then
+  DurationHistogram durations_;  // durations since the last status
   double mbit_per_s_ = 0, corrected_per_frame_ = 0;
 };
 

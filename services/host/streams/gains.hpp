@@ -1,6 +1,6 @@
 #pragma once
-// Gains at run time: chooses how the tracker's filter learns from its corrections, so that no scene has to be
-// trained for it. The choice travels in the deltas.
+// Chooses gains at run time: how much the tracker's filter learns from its corrections, so that no scene has
+// to be trained for it. The choice travels in the deltas.
 
 #include <cstdint>
 
@@ -9,7 +9,7 @@
 
 namespace tandem::host {
 
-/// Mean cosines at which bits are fewest; see GainAim.
+/// Mean cosines at which a stream needs the fewest bits; see GainAim.
 struct GainGoal {
   double agreement = 0.25;
   double forwardness = 0.2;
@@ -20,25 +20,24 @@ struct GainGoal {
 /// Sets decay and gains of the first frame.
 void set_first_gains(const PredictorTraits& predictor, StreamParameters& parameters);
 
-/// Looks at every frame and decides every fifteen. Deterministic; no clock. Not thread-safe.
+/// Observes every frame and decides after every fifteenth. Deterministic; reads no clock. Not thread-safe.
 ///
-/// Where corrections agree with the one before more than the goal says, velocities learn more from them,
-/// where less, less; where they agree with c, it is kept for longer. RESEARCH.md
-/// has the measurements.
+/// If corrections agree with the previous correction more than the goal says, velocities learn more from
+/// them; if less, less. If corrections agree with c, c is kept for longer. RESEARCH.md has the measurements.
 class GainControl {
  public:
-  /// `parameters`: those in force at the start.
+  /// `parameters`: the parameters in force at the start.
   GainControl(const GainGoal& goal, std::uint32_t bodies, const StreamParameters& parameters);
 
-  /// What an encoder's observer is told.
+  /// Takes what an encoder tells its observer.
   void observe(const GainEvidence& evidence) { evidence_.add(evidence); }
-  /// After each frame; true when it changed decay and gains.
+  /// Call after each frame. Returns true if it changed decay and gains.
   bool after_frame(StreamParameters& parameters);
 
  private:
   GainGoal goal_;
-  double enough_;        // corrections in one decision, to believe them
-  double decay_, gain_;  // E in 1/65536, beta
+  double enough_;        // number of corrections that a decision needs
+  double decay_, gain_;  // E in units of 1/65536; beta
   std::uint32_t frames_ = 0;
   GainEvidence evidence_;
 };

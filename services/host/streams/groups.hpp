@@ -1,5 +1,5 @@
 #pragma once
-// Which channel groups a stream has.
+// Chooses a stream's channel groups.
 
 #include <span>
 #include <string_view>
@@ -12,15 +12,15 @@
 
 namespace tandem::host {
 
-/// Of a body type: the sphere around a body, scene units.
+/// A body type with the radius of the sphere around a body, scene units.
 struct BodySize {
   std::string_view name;
   double radius = 0;
 };
 
-/// Sets groups and radii of `layout`: orientations where the bodies turn and a codec with these traits codes
-/// them, else positions alone. Radii are rounded up to the lattice. Errors: kInvalidArgument for a type
-/// without a radius, or one that does not fit the lattice.
+/// Sets groups and radii of `layout`: orientations if the bodies turn and a codec with these traits codes
+/// them, otherwise only positions. Radii are rounded up to the lattice. Errors: kInvalidArgument for a type
+/// without a radius, or with one that does not fit the lattice.
 [[nodiscard]] Result<void> choose_groups(bool turns, std::span<const BodySize> types, const Lattice& lattice,
                                          const CodecTraits& traits, Layout& layout);
 

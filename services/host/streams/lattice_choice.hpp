@@ -1,5 +1,5 @@
 #pragma once
-// Scene units to lattice units: which lattice a session uses, and everything that is converted to it once.
+// Chooses a session's lattice and converts scene units to lattice units, once for each value.
 
 #include <cstdint>
 
@@ -22,28 +22,30 @@ struct Lattice {
   bool operator==(const Lattice&) const = default;
 };
 
-inline constexpr int kMostHalvings = 12;   ///< finer gains nothing
-inline constexpr int kFewestHalvings = 8;  ///< coarser would show in the error
+inline constexpr int kMostHalvings = 12;   ///< a finer lattice gains nothing
+inline constexpr int kFewestHalvings = 8;  ///< a coarser lattice would show in the error
 
-/// Picks the unit: smallest permitted threshold / 2^s, s as large as the bounds allow with a factor of four
-/// to spare, at most 12. `extent` is the largest |coordinate| inside the world's bounds; all in scene units.
-/// Errors: kInvalidArgument for values that are not finite and positive, or when s would be below 8.
+/// Chooses the unit: smallest permitted threshold / 2^s, with the maximum s, up to 12, that leaves a factor
+/// of four to the bounds. `extent` is the maximum |coordinate| inside the world's bounds. All values are in
+/// scene units. Errors: kInvalidArgument for values that are not finite and positive, or if s would be below
+/// 8.
 [[nodiscard]] Result<Lattice> choose_lattice(double smallest_threshold, double extent, double dt_s);
 
-/// Threshold and quantisation ranges (scene units; per second for velocity) as integers. A range of 0 means
-/// untrained and stands for eight thresholds (per frame for velocity). Steps are rounded up so that 127 of
-/// them cover the range. Errors: kInvalidArgument for what is negative, not finite or finer than the lattice.
+/// Converts threshold and quantisation ranges (scene units; per second for velocity) to integers. A range of
+/// 0 means untrained and stands for eight thresholds (per frame for velocity). Steps are rounded up so that
+/// 127 of them cover the range. Errors: kInvalidArgument for values that are negative, not finite or finer
+/// than the lattice.
 [[nodiscard]] Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshold,
                                                        double position_range, double velocity_range);
 
-/// Sets the steps of turns: `turn_range` (rad) and `spin_range` (rad/s) as codec_parameters() has its ranges;
-/// 0 stands for turns that move the surface of a body of `radius` (scene units) by eight thresholds (per
-/// frame). Errors: kInvalidArgument for what is negative or not finite.
+/// Sets the steps of turns. `turn_range` (rad) and `spin_range` (rad/s) are ranges as in codec_parameters().
+/// A range of 0 stands for turns that move the surface of a body of `radius` (scene units) by eight
+/// thresholds (per frame). Errors: kInvalidArgument for values that are negative or not finite.
 [[nodiscard]] Result<void> set_turn_steps(const Lattice& lattice, double turn_range, double spin_range,
                                           double radius, CodecParameters& parameters);
 
-/// Gravity (scene units / s^2) and damping (1/s) as the integers of the predicted step. Errors:
-/// kInvalidArgument for what is not finite or does not fit (|g| <= 2^28, 0 <= D < 2^16).
+/// Converts gravity (scene units / s^2) and damping (1/s) to the integers of the predicted step. Errors:
+/// kInvalidArgument for values that are not finite or do not fit (|g| <= 2^28, 0 <= D < 2^16).
 [[nodiscard]] Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity,
                                      double damping_per_s);
 

@@ -1,6 +1,6 @@
 #pragma once
-// The engine's bodies on the lattice, frame by frame: what all streams encode towards, and what happened to
-// the slots.
+// The engine's bodies on the lattice, frame by frame, and what happened to the slots. All streams encode
+// towards this state.
 
 #include <cstdint>
 #include <limits>
@@ -16,41 +16,43 @@
 
 namespace tandem::host {
 
-/// Rounds one column of floats (times `scale`) to integers, saturating at +-limit; `off` is set to 1 (never
-/// cleared) where a value is NaN or its magnitude exceeds `off_bound` (units of `in`). Spans have equal
+/// Rounds one column of floats (times `scale`) to integers, saturating at +-limit. Sets `off` to 1 (never
+/// clears it) if a value is NaN or its magnitude exceeds `off_bound` (units of `in`). Spans have equal
 /// length. Plain loops that vectorise.
 void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
                      std::span<std::int32_t> out, std::span<std::int32_t> off);
 
-/// Follows a simulation. A body is shown to clients while it is alive, finite, within extent and lattice and
-/// of a listed type; one that stops being so is despawned and stays away until the engine despawns, spawns or
-/// teleports it. Velocities saturate, and what turns by more than kMaxTurn in a step is slowed. With
-/// orientations they must be some too: a quaternion that is not finite or far from norm 1 takes a body off.
-/// Allocates nothing after construction but the text of last_removed(). Not thread-safe.
+/// Follows a simulation. A body is shown to clients while it is alive, finite, within extent and lattice, and
+/// of a listed type. A body that stops being so is despawned and stays away until the engine despawns, spawns
+/// or teleports it. Velocities saturate, and a body that turns by more than kMaxTurn in a step is slowed. If
+/// the groups include orientations, a body whose quaternion is not finite or far from norm 1 is removed too.
+/// Nothing is allocated after construction except the text of last_removed(). Not thread-safe.
 class Mirror {
  public:
   static constexpr double kNoExtent = std::numeric_limits<double>::infinity();
 
-  /// `type_count`: types the session lists, 1 or more. `groups`: those of all its streams together. `extent`:
-  /// beyond it, scene units, or beyond the lattice, whichever is nearer, a body is not shown.
+  /// `type_count`: types that the session lists, 1 or more. `groups`: the groups of all its streams together.
+  /// `extent`: a body beyond it, scene units, or beyond the lattice is not shown.
   Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {},
          double extent = kNoExtent);
 
-  /// That it can take these. Errors: kInvalidArgument (columns not as long as the capacity).
+  /// Checks that the mirror can take these bodies. Errors: kInvalidArgument (columns not as long as the
+  /// capacity).
   [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
-  /// The start state: everything shown is simply there, in generation 0.
+  /// Sets the start state: everything shown is in generation 0, without records.
   void start(const engine::Bodies& bodies);
-  /// After a step, of bodies that check() takes. `events` may be incomplete: births, deaths and types are
-  /// read off the bodies themselves; only reuse of a slot within the step and teleports need their event.
-  /// Events out of range are ignored.
+  /// Call after a step, with bodies that check() accepts. `events` may be incomplete: births, deaths and
+  /// types are read from the bodies themselves. Only teleports and the reuse of a slot within the step need
+  /// their event. Events out of range are ignored.
   void update(const engine::Bodies& bodies, std::span<const engine::Event> events);
 
   [[nodiscard]] const State& target() const { return target_; }
-  /// Of the last update(): ascending by slot, despawn before spawn.
+  /// The records of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
-  /// The body that was taken off last and the reason, as "slot 3 (its x is not a number)". Empty: none yet.
+  /// The body that was removed last and the reason, such as "slot 3 (its x is not a number)"; empty if there
+  /// is none.
   [[nodiscard]] const std::string& last_removed() const { return last_removed_; }
-  /// What it mended since the start: bodies taken off, and turns that were slowed, each once a frame.
+  /// Repairs since the start: bodies removed, and turns slowed, each counted once a frame.
   [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
 
  private:
@@ -64,12 +66,12 @@ class Mirror {
   Lattice lattice_;
   double extent_;  // scene units
   TypeId type_count_;
-  State target_;                           // p and v are written whole, the other columns by records
-  std::vector<std::int32_t> off_;          // 1: not finite or off the lattice, this frame
-  std::vector<std::uint8_t> shown_;        // 1: clients shall see it, this frame
-  std::vector<std::uint8_t> expelled_;     // 1: the engine keeps it, clients lost it
-  std::vector<std::uint8_t> marks_;        // bits of Event::Kind, this frame
-  std::vector<std::uint8_t> generations_;  // of the next spawn in the slot
+  State target_;                           // p and v are written completely, the other columns by records
+  std::vector<std::int32_t> off_;          // 1: not finite or off the lattice in this frame
+  std::vector<std::uint8_t> shown_;        // 1: clients see it in this frame
+  std::vector<std::uint8_t> expelled_;     // 1: the engine has it, clients do not
+  std::vector<std::uint8_t> marks_;        // bits of Event::Kind in this frame
+  std::vector<std::uint8_t> generations_;  // generation of the next spawn in the slot
   std::vector<LifecycleRecord> lifecycle_;
   engine::Mishaps mishaps_;
   std::string last_removed_;

@@ -1,7 +1,6 @@
 #pragma once
-// Automatic quality: chooses what the decoder reads (threshold, quantisation ranges) at run time, so that
-// nobody has to (paper, section 6, names it as future work). The choice travels in the deltas; clients need
-// no configuration.
+// Automatic quality chooses what the decoder reads (threshold, quantisation ranges) at run time. The thesis,
+// section 6, names it as future work. The choice travels in the deltas; clients need no configuration.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,51 +13,53 @@
 
 namespace tandem::host {
 
-/// What automatic quality may do.
+/// The limits of automatic quality.
 struct QualityGoal {
-  /// Of payload at the nominal rate; 0: the threshold stays, only ranges follow.
+  /// Payload rate at the nominal frame rate; 0: the threshold stays, only ranges follow.
   double target_mbit_per_s = 0;
-  std::int32_t smallest_threshold = 1;  ///< lattice units; no finer than this, whatever there is room for
-  std::int32_t largest_threshold = 1;   ///< the stated maximum error; no coarser, even above the target
+  std::int32_t smallest_threshold = 1;  ///< lattice units; the threshold is never smaller, even far below the
+                                        ///< target
+  std::int32_t largest_threshold = 1;   ///< the stated maximum error; the threshold is never larger, even
+                                        ///< above the target
 };
 
-/// Where nobody says otherwise automatic quality moves between these multiples of the stated threshold.
+/// By default automatic quality moves between these multiples of the stated threshold.
 inline constexpr double kFinestShare = 0.25, kCoarsestShare = 4;
 
-/// The goal with thresholds in scene units, as far as the lattice has them.
+/// The goal from thresholds in scene units, rounded and clamped to the lattice.
 [[nodiscard]] QualityGoal quality_goal(const Lattice& lattice, double target_mbit_per_s, double finest,
                                        double coarsest);
 
 /// How quantisation steps follow what is corrected.
 enum class StepRule : std::uint8_t {
   kLeave,        ///< the codec does not read them
-  kFollow,       ///< up and down
-  kFollowAbove,  ///< down to those of the start at most: its code tables were trained for them
+  kFollow,       ///< steps follow up and down
+  kFollowAbove,  ///< steps never fall below those of the start, because the code tables were trained for them
 };
 [[nodiscard]] StepRule step_rule(const CodecTraits& traits);
 
-/// True when the limits are in order and permit `parameters`.
+/// True if the limits are in order and permit `parameters`.
 [[nodiscard]] bool valid_goal(const QualityGoal& goal, const CodecParameters& parameters);
-/// Least budget, in bytes a frame, with which the target can be steered for: a tighter one would hold the
-/// rate below the target, where it looks like room for a finer threshold. 0 without a target.
+/// Minimum budget, in bytes per frame, with which the target can be reached. A smaller budget would hold the
+/// rate below the target, which would look like room for a finer threshold. 0 without a target.
 [[nodiscard]] std::size_t least_budget(const QualityGoal& goal, double frame_rate_hz);
 
-/// Looks at every frame and decides four times a second. Deterministic; no clock. Not thread-safe.
+/// Observes every frame and decides four times a second. Deterministic; reads no clock. Not thread-safe.
 class QualityControl {
  public:
-  /// `start`: the parameters of the first frame, of `bodies` bodies. `radii`: Layout::radii.
+  /// `start`: the parameters of the first frame, which has `bodies` bodies. `radii`: Layout::radii.
   QualityControl(const QualityGoal& goal, StepRule steps, const CodecParameters& start, std::uint32_t bodies,
                  double frame_rate_hz, std::vector<std::int32_t> radii = {});
 
-  /// What an encoder's observer is told.
+  /// Takes what an encoder tells its observer.
   void observe(const State& predicted, const State& target, const CodecParameters& parameters) {
     if (steps_ != StepRule::kLeave) statistics_.frame(predicted, target, parameters);
   }
-  /// After each frame; true when it changed threshold or steps. The goal must be valid for `parameters`,
-  /// which are those of the next frame.
+  /// Call after each frame. Returns true if it changed threshold or steps. The goal must be valid for
+  /// `parameters`, which are those of the next frame.
   bool after_frame(std::size_t payload_bytes, std::uint32_t corrected, CodecParameters& parameters);
-  /// Above the target for two seconds although the threshold is the largest; false again after two seconds of
-  /// the contrary.
+  /// True if the rate was above the target for two seconds although the threshold is at its maximum; false
+  /// again after two seconds of the contrary.
   [[nodiscard]] bool out_of_reach() const { return out_of_reach_; }
 
  private:
@@ -77,7 +78,7 @@ class QualityControl {
   std::uint32_t frames_ = 0;
   std::uint64_t bytes_ = 0;
   std::uint64_t corrected_ = 0;
-  int pressed_ = 0;  // decisions above the target at the largest threshold, less the others
+  int pressed_ = 0;  // decisions above the target at the maximum threshold, minus the others
   bool out_of_reach_ = false;
   ResidualStatistics statistics_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// What the paper's codecs learn from corrections: quantisation ranges and Huffman code lengths.
+// What the thesis's codecs learn from corrections: quantisation ranges and Huffman code lengths.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,9 +11,10 @@
 
 namespace tandem::host {
 
-/// Residuals of the bodies beyond the threshold, with orientations those whose surface is, summed over the
-/// frames observed. Two passes over the same inputs: the first with `selective` for the largest residuals,
-/// the second with `quantized` and the ranges found for the symbol counts.
+/// Residuals of the bodies beyond the threshold, summed over the observed frames; with orientations, of
+/// bodies whose surface is beyond it. Training takes two passes over the same inputs. The first, with
+/// `selective`, finds the maximum residuals. The second, with `quantized` and the ranges found, counts the
+/// symbols.
 struct ResidualStatistics final : EncodeObserver {
   ResidualStatistics() = default;
   /// `radii`: Layout::radii of the stream.
@@ -21,12 +22,12 @@ struct ResidualStatistics final : EncodeObserver {
   void frame(const State& predicted, const State& target, const CodecParameters& parameters) override;
 
   std::uint64_t frames = 0;
-  std::uint64_t bodies = 0;            ///< corrected, over all frames
+  std::uint64_t bodies = 0;            ///< corrected bodies, summed over all frames
   std::uint32_t largest_position = 0;  ///< of one component, lattice units
   std::uint32_t largest_velocity = 0;  ///< of one component, 1/64 unit per frame
   SymbolCounts position_counts{};      ///< by residual byte (two's complement), with the parameters in force
   SymbolCounts velocity_counts{};
-  // With orientations alone.
+  // Only with orientations.
   std::uint32_t largest_turn = 0;  ///< of one component of a rotation vector, 2^-28 rad
   std::uint32_t largest_spin = 0;  ///< of one component of an angular velocity, 2^-28 rad per frame
   SymbolCounts turn_counts{};
@@ -40,12 +41,12 @@ struct ResidualStatistics final : EncodeObserver {
   std::vector<std::uint8_t> marks_;
 };
 
-/// Steps whose 127-fold is 1.1 x the largest residual ("slightly exceed the maximum error of experimental
+/// Steps of which 127 are 1.1 x the maximum residual ("slightly exceed the maximum error of experimental
 /// runs").
 [[nodiscard]] CodecParameters trained_parameters(const ResidualStatistics& statistics,
                                                  std::int32_t threshold);
 
-/// Code lengths from the symbol counts: see code_tables.hpp.
+/// The code lengths that follow from the symbol counts: see code_tables.hpp.
 [[nodiscard]] std::vector<std::byte> trained_tables(const ResidualStatistics& statistics);
 
 }  // namespace tandem::host

@@ -1,6 +1,6 @@
 #pragma once
-// One stream: what becomes of the bodies that a mirror shows in a frame, up to the payload that travels. The
-// host publishes it; `tandem bench` measures it.
+// One stream: turns the bodies that a mirror shows in a frame into the payload that travels. The host
+// publishes it; `tandem bench` measures it.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,50 +21,52 @@
 namespace tandem::host {
 
 struct StreamConfig {
-  std::string name;                    ///< see check_stream_names(); empty: it has none
-  Layout layout;                       ///< capacity: that of the bodies
-  Lattice lattice;                     ///< of the session, so the same for all of its streams
-  std::size_t budget = kNoBudget;      ///< bytes of a frame; spawns and parameters go first
+  std::string name;                    ///< see check_stream_names(); empty: no name
+  Layout layout;                       ///< the capacity is that of the bodies
+  Lattice lattice;                     ///< the session's, so the same for all its streams
+  std::size_t budget = kNoBudget;      ///< maximum bytes of a frame; spawns and parameters go first
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
-  std::optional<GainGoal> gains;       ///< empty: so do decay and gains
-  LocalOptions local;                  ///< streams share no threads: they are made side by side
+  std::optional<GainGoal> gains;       ///< empty: decay and gains change only by set_parameters()
+  LocalOptions local;                  ///< streams share no threads, because they run in parallel
 };
 
-/// Checks the names of a session's streams: each its own, of 1 to 32 characters of [a-z0-9_-], none of auto,
-/// bandwidth, computing and error, which clients prefer; a single one needs none. Errors: kInvalidArgument;
-/// also for none and for more than 8.
+/// Checks the names of a session's streams. Names differ and have 1 to 32 characters of [a-z0-9_-]. The names
+/// auto, bandwidth, computing and error are not allowed, because clients use them as preferences. A single
+/// stream needs no name. Errors: kInvalidArgument, also for no stream and for more than 8.
 [[nodiscard]] Result<void> check_stream_names(std::span<const StreamConfig> streams);
 
-/// Sets the decay and gains of the first frame, and what the later ones aim at, for a codec that reads them.
+/// Sets the decay and gains of the first frame and the goal of the later ones, for a codec that reads them.
 /// Errors: those of the layout's predictor.
 [[nodiscard]] Result<void> choose_gains(StreamConfig& config);
 
-/// Most bytes a delta of these streams can take: what a transport must be ready for before the host exists.
-/// Errors: as Stream::create() for codec and predictor.
+/// Maximum size of a delta of these streams. A transport must be ready for it before the host exists. Errors:
+/// as Stream::create() for codec and predictor.
 [[nodiscard]] Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams);
 
-/// The bodies as all of `streams`, at least one, will show them; not stepped yet. `extent`: as a Mirror's.
-/// Errors: kInvalidArgument (another lattice, capacity or number of types than the first stream's; body
-/// columns not `capacity` long; orientations that the bodies do not have).
+/// Makes the mirror of all `streams`, at least one, of a simulation that was not stepped yet. `extent`: as in
+/// Mirror. Errors: kInvalidArgument (another lattice, capacity or number of types than the first stream's;
+/// body columns not `capacity` long; orientations that the bodies do not have).
 [[nodiscard]] Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::Bodies& bodies,
                                          double extent = Mirror::kNoExtent);
 
-/// Where a stream begins: what `mirror` shows at `frame`.
+/// The state in which a stream begins: what `mirror` shows at `frame`.
 struct StreamStart {
-  const Mirror& mirror;  ///< of the stream's lattice and capacity, with its groups or more
+  const Mirror& mirror;  ///< has the stream's lattice and capacity, and at least its groups
   Drive drive;           ///< in force at `frame`
   Epoch epoch = 1;
   StreamId id = {};
   Frame frame = 0;
-  double frame_rate_hz = 30;                     ///< nominal; automatic quality counts in it
-  std::uint64_t last_input = 0;                  ///< number of the last scheduled input before it begins
-  std::span<const ScheduledDrive> pending = {};  ///< of those up to it, still to act; ascending
-  /// The bodies have been moving for a while: those that hardly do begin at rest, where the codec knows that.
+  double frame_rate_hz = 30;                     ///< nominal; automatic quality computes rates with it
+  std::uint64_t last_input = 0;                  ///< number of the last input scheduled before the stream
+                                                 ///< begins
+  std::span<const ScheduledDrive> pending = {};  ///< inputs up to that one that have not acted yet; ascending
+  /// The bodies have been moving for a while: bodies that hardly move begin at rest, if the codec supports
+  /// that.
   bool under_way = false;
 };
 
-/// Predicts, encodes and applies, one frame at a time, and chooses the parameters
-/// of the next. Owns no thread, clock or socket; the same calls give the same bytes. Not thread-safe.
+/// Predicts, encodes and applies one frame at a time, and chooses the parameters of the next. Owns no thread,
+/// clock or socket; the same calls give the same bytes. Not thread-safe.
 class Stream {
  public:
   /// Errors: kInvalidArgument (layout, goals), kUnsupported (codec, predictor), kMalformed (tables,
@@ -76,44 +78,45 @@ class Stream {
   Stream& operator=(const Stream&) = delete;
   ~Stream();
 
-  /// Numbers must follow one another and frames lie in the future. Errors: as ServerTimeline::schedule().
+  /// Schedules an input. Numbers must be consecutive and frames must lie in the future. Errors: as
+  /// ServerTimeline::schedule().
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
 
-  /// Of one frame; spans stay valid until the next.
+  /// The result of one frame. Its spans are valid until the next frame.
   struct FrameResult : ServerTimeline::FrameResult {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
   };
-  /// The next frame, towards what `mirror`, the one of its start, shows after a step; tells `observer`, if
-  /// any. Allocates nothing after the first few frames.
+  /// Makes the next frame, towards what `mirror` (the one of the start) shows after a step. Tells `observer`,
+  /// if there is one. Allocates nothing after the first few frames.
   FrameResult produce(const Mirror& mirror, EncodeObserver* observer = nullptr);
 
-  /// The next frame is rounded, so that a snapshot cut right after it is smaller. Does nothing with
-  /// codecs whose corrections would leave few bodies round: CodecTraits::keeps_rounding.
+  /// Rounds the next frame, so that a snapshot cut right after it is smaller. Does nothing with codecs whose
+  /// corrections would leave few bodies rounded: CodecTraits::keeps_rounding.
   void round_next();
-  /// One cut right after frame(), for joiners. Replaces the content of `out`.
+  /// Writes a snapshot for joiners, cut right after frame(). Replaces the content of `out`.
   void snapshot(std::vector<std::byte>& out);
 
-  /// In force from the next frame on; travels in that frame's delta. With gain goals, gains stay so until the
-  /// next decision. Errors: kInvalidArgument (out of range, or automatic quality decides).
+  /// Sets parameters from the next frame on; they travel in that frame's delta. With gain goals, gains stay
+  /// so until the next decision. Errors: kInvalidArgument (out of range, or automatic quality decides).
   [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
   [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units
-  /// Automatic quality is above its target although the threshold is the largest permitted.
+  /// True if automatic quality is above its target although the threshold is at the permitted maximum.
   [[nodiscard]] bool target_out_of_reach() const;
 
   /// For measurement only: a monotonic clock in nanoseconds.
   void set_clock(std::int64_t (*now_ns)());
-  /// What a client spends on predicted step and hash of agreed(), or of up to 4,096 made-up bodies while it
-  /// has none, ns per body: the median of nine on this machine, on one thread, rounded up. At least 1; 0
-  /// without a clock. Changes nothing.
+  /// Measures what a client spends on predicted step and hash, ns per body. It uses agreed(), or up to 4,096
+  /// made-up bodies while agreed() has none. The result is the median of nine runs on this machine, on one
+  /// thread, rounded up; at least 1, or 0 without a clock. Changes nothing.
   [[nodiscard]] std::uint32_t measure_client_cost() const;
 
   [[nodiscard]] const StreamConfig& config() const;
-  [[nodiscard]] Frame frame() const;               ///< of the last delta
+  [[nodiscard]] Frame frame() const;               ///< frame of the last delta
   [[nodiscard]] const State& agreed() const;       ///< client state at frame()
-  [[nodiscard]] std::uint64_t hash() const;        ///< of agreed()
-  [[nodiscard]] std::uint64_t last_input() const;  ///< highest number scheduled
-  [[nodiscard]] std::uint32_t bodies() const;      ///< alive in agreed()
+  [[nodiscard]] std::uint64_t hash() const;        ///< hash of agreed()
+  [[nodiscard]] std::uint64_t last_input() const;  ///< highest input number scheduled
+  [[nodiscard]] std::uint32_t bodies() const;      ///< bodies alive in agreed()
   [[nodiscard]] std::size_t payload_bound() const;
   [[nodiscard]] std::size_t snapshot_bound() const;
 

@@ -1,6 +1,6 @@
 #pragma once
-// Values as they are: position and velocity, six int32 a body, with orientations also quaternion and angular
-// velocity, seven more (`none`, `selective`; paper, section 3.3.1).
+// Sends absolute values: position and velocity, six int32 per body; with orientations also quaternion and
+// angular velocity, seven more (`none`, `selective`; thesis, section 3.3.1).
 
 #include <array>
 #include <cstring>
@@ -10,7 +10,8 @@
 
 namespace tandem {
 
-/// `EveryBody`: `none` sends all alive bodies, `selective` those beyond the threshold. Applying sets c = 0.
+/// `EveryBody`: true for `none`, which sends all alive bodies; false for `selective`, which sends those
+/// beyond the threshold. Applying sets c = 0.
 template <bool EveryBody>
 class AbsoluteCoding {
  public:
@@ -58,7 +59,7 @@ class AbsoluteCoding {
  private:
   struct Section {
     std::span<const std::byte> values;
-    std::size_t first = 0;  // of its slots among all corrected ones
+    std::size_t first = 0;  // index of its first slot among all corrected ones
   };
   static BodyState clamped(BodyState body) {
     for (std::int32_t& value : body.p) value = std::clamp(value, -kPositionLimit, kPositionLimit);

@@ -1,6 +1,6 @@
 #pragma once
-// What the paper's codecs have in common: scan a block, choose bodies, keep to the budget, write one section
-// a block.
+// The common part of the thesis's codecs: scan a block, choose bodies, keep to the budget, write one section
+// per block.
 
 #include <algorithm>
 #include <array>
@@ -17,9 +17,10 @@ namespace tandem {
 
 /// A body that could be corrected in this frame.
 struct Candidate {
-  std::uint64_t error = 0;  ///< what errors are compared by: squared; of surfaces as it is
+  std::uint64_t error = 0;  ///< the value by which errors are compared: squared for positions, not squared
+                            ///< for surfaces
   Slot slot = 0;
-  std::uint16_t bits = 0;  ///< of its values
+  std::uint16_t bits = 0;  ///< bits of the body's values
   Residual residual{};     ///< unused by codecs of absolute values
 };
 
@@ -48,7 +49,7 @@ class BlockCodec final : public Codec {
     std::size_t bytes = 0;
     for (std::uint32_t b = 0; b < block_count(capacity_); ++b) {
       const Block block = block_at(b, capacity_);
-      // A list is taken only where it is no longer than the mask.
+      // A list is used only if it is not longer than the mask.
       bytes += section_bytes(
           body_bytes(block, SelectionForm::kMask, 0, std::uint64_t{coding_.most_bits()} * block.slots));
     }
@@ -112,7 +113,7 @@ class BlockCodec final : public Codec {
     return bytes;
   }
 
-  // Bodies of one section, the first of which is the `first`-th of the delta.
+  // Reads the bodies of one section. Its first body is the `first`-th of the delta.
   Result<std::uint32_t> parse(const Section& section, std::span<const std::uint8_t> alive,
                               std::size_t first) {
     ByteReader in(section.body);
@@ -127,7 +128,7 @@ class BlockCodec final : public Codec {
     return chosen;
   }
 
-  // Collects everything worth sending, ascending by slot, and what each block would cost.
+  // Collects everything that is worth sending, ascending by slot, and the cost of each block.
   void scan(const State& state, const State& target, const CodecParameters& parameters) {
     candidates_.reserve(capacity_);
     candidates_.clear();
@@ -163,12 +164,13 @@ class BlockCodec final : public Codec {
                           : surface_error(state.body(slot), target.body(slot), radii_[target.type()[slot]]);
   }
 
-  // Drops all candidates from the first on that does not fit, in the order of their errors.
+  // Keeps candidates in the order of their errors, and drops the first one that does not fit and all after
+  // it.
   void keep_largest(std::size_t budget) {
     const auto first = [](const Candidate& a, const Candidate& b) {
       return a.error != b.error ? a.error > b.error : a.slot < b.slot;
     };
-    // More than budget / cheapest body cannot fit, so only that many need sorting.
+    // At most budget / cheapest body candidates fit, so only that many are sorted.
     std::uint16_t cheapest = UINT16_MAX;
     for (const Candidate& candidate : candidates_) cheapest = std::min(cheapest, candidate.bits);
     const std::size_t most = std::min(candidates_.size(), budget * 8 / cheapest + 1);
@@ -196,7 +198,7 @@ class BlockCodec final : public Codec {
               [](const Candidate& a, const Candidate& b) { return a.slot < b.slot; });
   }
 
-  // `chosen` are the `first`-th corrected body and those that follow.
+  // `chosen` are the corrected bodies from the `first`-th on.
   void write_section(std::uint32_t index, const State& target, std::span<const Candidate> chosen,
                      std::size_t first, ByteWriter& out) {
     const Block block = block_at(index, capacity_);
@@ -219,7 +221,7 @@ class BlockCodec final : public Codec {
   std::vector<std::int32_t> radii_;  // with orientations
   Coding coding_;
   std::vector<Slot> corrected_;
-  // Encoder only, taken by the first encode().
+  // Encoder only; allocated by the first encode().
   std::vector<Candidate> candidates_;
   std::vector<Plan> plans_;
   std::vector<std::uint8_t> marks_;

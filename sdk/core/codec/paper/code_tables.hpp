@@ -10,11 +10,12 @@
 
 namespace tandem {
 
-/// Code lengths for counts of residual bytes (two's complement): 256 for positions, then 256 for velocities;
-/// with orientations then 256 for rotation vectors and 256 for angular velocities.
+/// Computes code lengths from counts of residual bytes (two's complement): 256 for positions, then 256 for
+/// velocities; with orientations then 256 for rotation vectors and 256 for angular velocities.
 [[nodiscard]] std::vector<std::byte> code_tables(std::span<const SymbolCounts> counts);
 
-/// For a scene that was never trained: lengths for counts that fall off with the square of the residual.
+/// The tables for a scene that was never trained: lengths for counts that fall with the square of the
+/// residual.
 [[nodiscard]] std::vector<std::byte> default_code_tables(const Groups& groups = {});
 
 }  // namespace tandem

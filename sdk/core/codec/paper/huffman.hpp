@@ -11,21 +11,21 @@
 namespace tandem {
 
 inline constexpr std::size_t kSymbols = 256;
-/// Three codes always fit the 56 bits that one refill of the decoder guarantees.
+/// Three codes of this length always fit the 56 bits that one refill of the decoder guarantees.
 inline constexpr unsigned kMaxCodeLength = 18;
 
 /// One length per symbol. Every symbol has a code, so that anything can be sent.
 using CodeLengths = std::array<std::uint8_t, kSymbols>;
 using SymbolCounts = std::array<std::uint64_t, kSymbols>;
 
-/// Optimal lengths <= kMaxCodeLength for counts + 1 (Larmore, Hirschberg 1990, package-merge). Allocates.
+/// The optimal lengths <= kMaxCodeLength for counts + 1 (Larmore, Hirschberg 1990, package-merge). Allocates.
 [[nodiscard]] CodeLengths build_code_lengths(const SymbolCounts& counts);
 
-/// True when all lengths are in 1 .. kMaxCodeLength and fill the code space exactly.
+/// True if all lengths are in 1 .. kMaxCodeLength and fill the code space exactly.
 [[nodiscard]] bool is_complete_code(const CodeLengths& lengths);
 
-/// Tables of one canonical code: codes count up within a length by symbol, shorter codes first (as in RFC
-/// 1951).
+/// Tables of one canonical code. Codes of one length count up by symbol, and shorter codes come first (as in
+/// RFC 1951).
 class HuffmanCode {
  public:
   /// `lengths` must satisfy is_complete_code().
@@ -39,7 +39,7 @@ class HuffmanCode {
     std::uint8_t value;
     std::uint8_t length;
   };
-  /// The code at the top of `window`. Every bit pattern is one, as the code is complete.
+  /// Decodes the code at the top of `window`. Every bit pattern is a code, because the code is complete.
   [[nodiscard]] Symbol peek(std::uint64_t window) const {
     const Symbol quick = lookup_[window >> (64U - kLookupBits)];
     return quick.length != 0 ? quick : peek_long(window);

@@ -1,5 +1,5 @@
 #pragma once
-// Residuals: what is left of a body, quantised to eight bits.
+// Residuals: the differences of a body to its target, quantised to eight bits.
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace tandem {
 
-/// Quantised residual of a body, x, y, z each: position, velocity; with orientations the rotation vector from
-/// predicted to target orientation and the angular velocity, without them zeros.
+/// The quantised residual of a body: x, y, z of the position, then of the velocity; with orientations then of
+/// the rotation vector from predicted to target orientation and of the angular velocity, otherwise zeros.
 using Residual = std::array<std::int8_t, 12>;
 [[nodiscard]] constexpr std::size_t residual_vectors(const Groups& groups) {
   return groups.orientation ? 4 : 2;
@@ -27,15 +27,15 @@ inline constexpr std::int32_t kResidualLimit = 127;
 }
 
 using WideSpin = std::array<std::int64_t, kSpinChannels>;
-/// `from` and so many steps, before limited_spin(). `q`: x, y, z.
+/// `from` moved by `q` steps (x, y, z), before limited_spin().
 [[nodiscard]] inline WideSpin moved_spin(const Spin& from, const std::int8_t* q, std::int32_t step) {
   WideSpin spin{};
   for (std::size_t i = 0; i < spin.size(); ++i) spin[i] = from[i] + std::int64_t{q[i]} * step;
   return spin;
 }
 
-/// quantise() of each axis; where that leads beyond the limit, so that limited_spin() would halve it, towards
-/// what is slower.
+/// quantise() of each axis. If the result is beyond the limit, so that limited_spin() would halve it, it
+/// rounds towards the slower spin.
 inline void quantise_spin(const Spin& from, const Spin& target, std::int32_t step, std::int8_t* q) {
   for (std::size_t i = 0; i < kSpinChannels; ++i) q[i] = quantise(from[i], target[i], step);
   const WideSpin spin = moved_spin(from, q, step);
@@ -61,8 +61,8 @@ inline void quantise_spin(const Spin& from, const Spin& target, std::int32_t ste
   return q;
 }
 
-/// rest = 0, p += q * position_step, v += q * velocity_step, clamped to the lattice; the orientation turned
-/// by q * turn_step, w += q * spin_step, both of them limited_spin().
+/// Applies a residual: rest = 0; p += q * position_step and v += q * velocity_step, clamped to the lattice;
+/// the orientation is turned by q * turn_step, w += q * spin_step, both after limited_spin().
 inline void apply_residual(State& state, Slot slot, const Residual& q, const CodecParameters& parameters) {
   const auto moved = [](std::int32_t from, std::int8_t steps, std::int32_t step, std::int64_t limit) {
     return static_cast<std::int32_t>(std::clamp(from + std::int64_t{steps} * step, -limit, limit));

@@ -1,5 +1,5 @@
 #pragma once
-// Quantised residuals (paper, section 3.3.2): as bytes (`quantized`) or Huffman codes (`entropy`, `limited`).
+// Quantised residuals (thesis, section 3.3.2) as bytes (`quantized`) or Huffman codes (`entropy`, `limited`).
 
 #include <algorithm>
 #include <cstring>
@@ -10,7 +10,7 @@
 
 namespace tandem {
 
-/// Bytes: 3 a vector.
+/// Bytes: 3 for each vector.
 class PlainResiduals {
  public:
   explicit PlainResiduals(std::size_t vectors) : body_bytes_(3 * vectors) {}
@@ -34,7 +34,7 @@ class PlainResiduals {
   std::size_t body_bytes_;
 };
 
-/// Canonical Huffman codes, a table for each vector.
+/// Canonical Huffman codes, with one table for each vector.
 class HuffmanResiduals {
  public:
   explicit HuffmanResiduals(std::span<const CodeLengths> lengths);
@@ -47,7 +47,7 @@ class HuffmanResiduals {
   std::vector<HuffmanCode> codes_;
 };
 
-/// Bodies beyond the threshold as residuals; what exceeds the range of 127 steps is finished in later frames.
+/// Codes bodies beyond the threshold as residuals. Later frames correct what exceeds the range of 127 steps.
 template <class Bits>
 class ResidualCoding {
  public:
@@ -59,7 +59,7 @@ class ResidualCoding {
                Candidate& candidate) const {
     candidate.residual = quantise(state, target, candidate.slot, parameters);
     candidate.bits = static_cast<std::uint16_t>(bits_.bits(candidate.residual));
-    // With steps wider than the threshold all may round to nothing: sending that would change nothing.
+    // With steps wider than the threshold all residuals may round to zero; sending them would change nothing.
     return candidate.residual != Residual{};
   }
   static void begin() {}

@@ -1,5 +1,6 @@
 #pragma once
-// The tracker's encoder: which bodies to correct. By how much is in steps.hpp. Nothing here is on the wire.
+// The tracker's encoder: chooses the bodies to correct. steps.hpp chooses by how much. Nothing here is on the
+// wire.
 
 #include <array>
 #include <cstdint>
@@ -13,47 +14,48 @@
 
 namespace tandem {
 
-/// What the encoder keeps to, as to a budget. Bodies that all jump at once take about a third of it.
+/// The encoder keeps to this limit as to a budget. Bodies that all jump at once take about a third of it.
 [[nodiscard]] constexpr std::size_t most_tracker_bytes_per_body(bool turns) { return turns ? 48 : 24; }
 inline constexpr std::size_t kTrackerSlackBytes = 64;
-/// Most bytes of sections for a capacity.
+/// Maximum number of bytes of sections for a capacity.
 [[nodiscard]] constexpr std::size_t tracker_bound(std::uint32_t capacity, bool turns) {
   return block_count(capacity) * (kMostSectionHeaderBytes + kMostBlockNumberBytes + kTrackerSlackBytes) +
          most_tracker_bytes_per_body(turns) * capacity;
 }
 
-/// Keeps, beside scratch memory, how long each body has waited for its correction, and where it was.
+/// Chooses the bodies to correct. Besides scratch memory it keeps how long each body has waited for its
+/// correction, and where the body was.
 class TrackerEncoder {
  public:
-  /// `memory` outlives it.
+  /// `memory` must outlive the encoder.
   explicit TrackerEncoder(const TrackerMemory& memory);
 
   /// Writes at most `budget` bytes of sections, fills in frame.delta and returns the corrected slots,
-  /// ascending; changes nothing else.
+  /// ascending. Changes nothing else.
   std::span<const Slot> encode(const TrackerFrame& frame, const State& target, std::size_t budget,
                                ByteWriter& out);
 
  private:
-  /// A body that may be corrected, and how.
+  /// A body that may be corrected, and its correction.
   struct Candidate {
     enum class Steps : std::uint8_t { kOpen, kFound, kUseless };
     std::uint64_t error = 0;  // squared
     Slot slot = 0;
-    std::int32_t cost = kNoCost;  // estimated: what it adds to its block, if that is sent
+    std::int32_t cost = kNoCost;  // estimated: what it adds to its block if the block is sent
     Steps state = Steps::kOpen;
     bool must = false;  // beyond the threshold
     bool is_sent = false;
     TrackerCorrection correction{};
   };
-  /// A block's share of candidates_, and of bytes_.
+  /// A block's part of candidates_ and of bytes_.
   struct Part {
     std::uint32_t candidates = 0;
     std::size_t first_byte = 0, coded_bytes = 0;
     bool fits = true;
-    std::int64_t cost = 0;   // estimated: its header and all flags as zeros
-    std::uint32_t sent = 0;  // by the cut at hand
+    std::int64_t cost = 0;   // estimated: the block's header, and all flags as zeros
+    std::uint32_t sent = 0;  // bodies sent by the current cut
   };
-  /// What an error is worth beside bits.
+  /// The worth of an error in bits.
   struct Worth {
     explicit Worth(std::int32_t threshold);
     ErrorWorth moving, at_rest;
@@ -69,18 +71,18 @@ class TrackerEncoder {
   // Estimated costs are in 1/256 bits, as in TrackerCosts.
   static constexpr std::int32_t kNoCost = INT32_MIN;
 
-  /// Candidates of a block without their steps.
+  /// Collects the candidates of a block, without their steps.
   void gather(const TrackerFrame& frame, const State& target, const Block& block);
-  /// Calls found(slot, error squared) for the bodies of a block that are off by more than `early`.
+  /// Calls found(slot, error squared) for the bodies of a block whose error is above `early`.
   template <class Found>
   void scan(const TrackerFrame& frame, const State& target, const Block& block, std::int32_t early,
             const Found& found);
-  /// Steps of a block's candidates that have none yet. Models are the same for a whole delta, so the choice
-  /// does not depend on what else is sent.
+  /// Chooses the steps of a block's candidates that have none yet. Models are the same for a whole delta, so
+  /// the choice does not depend on what else is sent.
   void choose(const TrackerFrame& frame, const State& target, const Block& block);
   void choose(const TrackerFrame& frame, const State& target, const Worth& worth, Candidate& candidate);
 
-  /// Sends as many of the most urgent bodies as fit. True: all of them, and the early ones.
+  /// Sends as many of the most urgent bodies as fit. Returns true if all of them and the early ones fit.
   bool write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget);
   /// Fills order_ with the bodies that must go, and the costs of parts_.
   void rank(const TrackerFrame& frame);
@@ -88,27 +90,29 @@ class TrackerEncoder {
     std::uint32_t count;
     std::int64_t cost;
   };
-  /// How many of the most urgent bodies, `first` .. `last` but at least one, seem to cost at most `most`.
-  /// order_ then starts with them, the least urgent of them last; with `first` and `last` it does so already.
+  /// Estimates how many of the most urgent bodies, `first` .. `last` but at least one, cost at most `most`.
+  /// Afterwards order_ starts with them, the least urgent of them last. Before the call order_ must already
+  /// be partitioned in this way at `first` and at `last`.
   Cut cut(const TrackerFrame& frame, const State& target, std::uint32_t first, std::uint32_t last,
           std::int64_t most);
-  /// What order_[first, last) adds to a cut.
+  /// The cost that order_[first, last) adds to a cut.
   std::int64_t add(const TrackerFrame& frame, const State& target, std::uint32_t first, std::uint32_t last);
   std::int64_t remove(std::uint32_t first, std::uint32_t last);
   [[nodiscard]] std::int32_t cost(const TrackerFrame& frame, const Candidate& candidate) const;
 
-  /// Code streams of all blocks with the first `count` of order_. Returns the bytes of their sections.
+  /// Writes the code streams of all blocks with the first `count` bodies of order_. Returns the bytes of
+  /// their sections.
   std::size_t write_first(const TrackerFrame& frame, std::uint32_t count);
-  /// Likewise, with all candidates if `all`, else with those that are marked as sent.
+  /// Does the same with all candidates if `all`, otherwise with those that are marked as sent.
   std::size_t write(const TrackerFrame& frame, bool all);
   void write_block(const TrackerFrame& frame, const Block& block, bool all);
   void remember_waiting(const TrackerFrame& frame);
 
-  std::vector<Candidate> candidates_;  // of each block from its first slot on, ascending
+  std::vector<Candidate> candidates_;  // each block's from the index of its first slot on, ascending
   std::vector<Part> parts_;            // by block
-  std::vector<std::byte> bytes_;       // of each block from its first_byte on
+  std::vector<std::byte> bytes_;       // each block's from its first_byte on
   std::vector<Ranked> order_;
-  std::vector<std::uint8_t> waiting_;  // frames that a body was beyond the threshold and not corrected
+  std::vector<std::uint8_t> waiting_;  // frames that a body has been beyond the threshold and not corrected
   std::vector<std::uint8_t> marks_;
   bool some_wait_ = false;
   TrackerCosts costs_;

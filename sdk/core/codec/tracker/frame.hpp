@@ -1,5 +1,5 @@
 #pragma once
-// A frame of the tracker while its delta is coded: what encoder and decoder have in common. Both read the
+// A frame of the tracker while its delta is coded: the common part of encoder and decoder. Both read the
 // memory, list the model of every decision, and fill in a TrackerDelta.
 
 #include <algorithm>
@@ -14,16 +14,17 @@
 
 namespace tandem {
 
-/// Scratch memory: the models of the decisions at hand, slot by slot.
+/// Scratch memory: the models of the current decisions, slot by slot.
 struct TrackerScratch {
   explicit TrackerScratch(std::uint32_t capacity) : flags(capacity), contexts(capacity) {}
   std::vector<std::uint16_t> flags;  ///< model of each slot's flag "is this body corrected"
   TrackerContexts contexts;
 };
 
-/// Blocks are coded side by side; each touches its own part of scratch memory and delta alone.
+/// The data of one frame. Blocks are coded in parallel; each touches only its own part of scratch memory and
+/// delta.
 struct TrackerFrame {
-  const TrackerMemory& memory;  ///< as the delta before left it
+  const TrackerMemory& memory;  ///< as the previous delta left it
   const CodecFrame& at;
   TrackerScratch& scratch;
   TrackerDelta& delta;  ///< to be filled
@@ -36,12 +37,12 @@ struct TrackerFrame {
   [[nodiscard]] std::uint32_t flag_of(Slot slot) const {
     return is_renewed(slot) ? flag_model(0, 0, false) : memory.flag_of(slot, at.predicted.rest()[slot] != 0);
   }
-  /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots have a
-  /// model that is never a one and takes no bits, so that loops need not ask.
+  /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots get a
+  /// model that is never a one and takes no bits, so that loops need no test.
   void list_flags(const Block& block) const;
-  /// Of a slot, in a stream with orientations.
+  /// The context of a slot, in a stream with orientations.
   [[nodiscard]] TrackerTurnContext turn_context_of(Slot slot) const;
-  /// Codes a correction; as code_correction().
+  /// Codes a correction, as code_correction().
   template <class Coder>
   bool code(Coder& coder, Slot slot, TrackerCorrection& correction) const {
     const TrackerContext context = scratch.contexts.of(slot);
@@ -50,7 +51,7 @@ struct TrackerFrame {
   }
   /// Fills the contexts of a block, at least those of `slots`.
   void list_contexts(const Block& block, std::span<const Slot> slots) const;
-  /// Once every block is coded: completes the delta. Returns the corrected slots, ascending.
+  /// Call when all blocks are coded: completes the delta. Returns the corrected slots, ascending.
   std::span<const Slot> join() const;
 
   /// Calls job(block) for all blocks, perhaps on several threads.

@@ -1,5 +1,5 @@
 #pragma once
-// The tracker's encoder, one body that turns at a time: whether to correct its position, its orientation or
+// The tracker's encoder for one body that turns: chooses whether to correct its position, its orientation or
 // both, and by which steps. Nothing here is on the wire.
 
 #include <cstdint>
@@ -19,9 +19,9 @@ struct JointResidual {
   unsigned position_bits;  ///< as in the frame
 };
 
-/// Fills steps, turn and fine of `correction`: of the points around what is missing, those that leave the
-/// surface within the threshold with the least bits + what the error is worth. False: none does; then the
-/// ones that leave it least off.
+/// Fills steps, turn and fine of `correction`. It tries the points around the missing correction. Among those
+/// that leave the surface within the threshold it takes the one with the minimum of bits + worth of the
+/// error. If there is none, it returns false and takes the point with the minimum error.
 bool choose_joint_steps(const JointResidual& body, const ErrorWorth& worth, const TrackerCosts& costs,
                         const TrackerContext& position, const TrackerTurnContext& turn,
                         TrackerCorrection& correction);

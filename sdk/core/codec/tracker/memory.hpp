@@ -1,6 +1,6 @@
 #pragma once
-// What the tracker remembers from frame to frame: the same on both sides, bit by bit. It reads a delta before
-// it is applied and changes by TrackerMemory::apply() alone.
+// What the tracker remembers from frame to frame, the same on both sides, bit by bit. It is read before a
+// delta is applied, and only TrackerMemory::apply() changes it.
 
 #include <cstdint>
 #include <span>
@@ -13,31 +13,33 @@
 
 namespace tandem {
 
-/// What a delta says, and what was seen in saying it. Its memory is made once and used for every frame.
+/// The content of a delta, and the decisions counted in coding it. Its memory is allocated once and used for
+/// every frame.
 struct TrackerDelta {
   explicit TrackerDelta(std::uint32_t capacity)
       : slots(capacity), corrections(capacity), blocks(block_count(capacity)) {}
 
-  /// Of a block, which is coded beside others: its corrected slots, ascending, and their corrections stand
-  /// from the block's first slot on until join(), then from `first` on.
+  /// The part of one block; blocks are coded in parallel. Until join() its corrected slots, ascending, and
+  /// their corrections begin at the block's first slot; afterwards they begin at `first`.
   struct Part {
     std::uint32_t corrected = 0;
     std::uint32_t first = 0;
     TrackerCounts counts{};
-    /// A decision that was counted as a zero is a one.
+    /// Corrects the counts: a decision that was counted as a zero is a one.
     void count_one(std::uint32_t model) {
       --counts[model][0];
       ++counts[model][1];
     }
   };
-  /// Makes one list of all blocks and one sum of the decisions of those with corrections, or with
-  /// `of_all_blocks` of every one. Returns the corrected slots.
+  /// Makes one list of all blocks. Sums the decisions of the blocks with corrections, or with `of_all_blocks`
+  /// of every block. Returns the corrected slots.
   std::span<const Slot> join(std::uint32_t capacity, bool of_all_blocks);
 
   std::vector<Slot> slots;
-  std::vector<TrackerCorrection> corrections;  ///< of slots
+  std::vector<TrackerCorrection> corrections;  ///< corrections of `slots`
   std::vector<Part> blocks;
-  const TrackerCounts* seen = nullptr;  ///< all decisions of the delta; one of the blocks' after join()
+  const TrackerCounts* seen = nullptr;  ///< all decisions of the delta; set by join() to the counts of one of
+                                        ///< the blocks
 };
 
 /// Calls job(block) for all blocks of `capacity` slots, perhaps on several threads.
@@ -54,17 +56,17 @@ void for_each_tracker_block(std::uint32_t capacity, const RunBlocks& run_blocks,
 
 class TrackerMemory {
  public:
-  static constexpr std::size_t kColumns = 5;  ///< of a group: age, interval, steps x, y, z
+  static constexpr std::size_t kColumns = 5;  ///< columns of a group: age, interval, steps x, y, z
 
   explicit TrackerMemory(const CodecSetup& setup);
 
   [[nodiscard]] std::uint32_t capacity() const { return capacity_; }
-  /// All columns, one after another: part of the state hash.
+  /// All columns, one after another; part of the state hash.
   [[nodiscard]] std::span<const std::byte> columns() const { return columns_; }
   [[nodiscard]] const std::uint8_t* column(std::size_t i) const {
     return reinterpret_cast<const std::uint8_t*>(columns_.data()) + i * capacity_;
   }
-  /// With orientations; then turn() remembers them, and the models of turns count.
+  /// True with orientations: then turn() remembers them, and the models of turns are used.
   [[nodiscard]] bool turns() const { return !radii_.empty(); }
   [[nodiscard]] std::uint32_t models_in_use() const {
     return turns() ? TrackerModelIndex::kCount : TrackerModelIndex::kOfPositions;
@@ -72,7 +74,7 @@ class TrackerMemory {
   [[nodiscard]] std::span<const std::int32_t> radii() const { return radii_; }
   [[nodiscard]] TrackerBody body(Slot slot) const { return read(0, slot); }
   [[nodiscard]] TrackerBody turn(Slot slot) const { return read(kColumns, slot); }
-  /// What flags depend on, by slot.
+  /// The values that flags depend on, by slot.
   [[nodiscard]] const std::uint8_t* flag_ages() const { return turns() ? youngest_.data() : column(0); }
   [[nodiscard]] const std::uint8_t* histories() const { return history_.data(); }
   [[nodiscard]] std::uint32_t flag_of(Slot slot, bool rest) const {
@@ -81,12 +83,12 @@ class TrackerMemory {
   [[nodiscard]] const TrackerModels& models() const { return models_; }
   [[nodiscard]] const TrackerGains& gains() const { return gains_; }
 
-  /// Takes in a delta: forgets the renewed bodies, corrects the others in `state`, lets the models learn and
-  /// every body age by a frame. `state` has the delta's lifecycle records applied.
+  /// Applies a delta: forgets the renewed bodies, corrects the others in `state`, lets the models learn, and
+  /// lets every body age by a frame. `state` has the delta's lifecycle records applied.
   void apply(const TrackerDelta& delta, const Corrections& corrections, const RunBlocks& run_blocks,
              State& state);
 
-  /// As Codec has them.
+  /// The functions of Codec.
   void save_models(NumberEncoder& out) const;
   [[nodiscard]] std::size_t models_bits_bound() const;
   [[nodiscard]] Result<void> load(std::span<const std::byte> columns, NumberDecoder& models);
@@ -94,24 +96,24 @@ class TrackerMemory {
  private:
   [[nodiscard]] TrackerBody read(std::size_t column, Slot slot) const;
   void write(std::size_t column, Slot slot, const TrackerBody& body);
-  // In a stream without orientations.
+  // For a stream without orientations.
   void correct_position(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
                         State& state);
-  // In one with them.
+  // For a stream with orientations.
   void correct_position_and_turn(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
                                  State& state);
   void grow_older(std::size_t column, const Block& block, std::span<const Slot> renewed, const State& state);
-  // Works out again what follows from the columns of a slot.
+  // Recomputes what follows from the columns of a slot.
   void derive(Slot slot);
   void apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block, State& state);
 
   std::uint32_t capacity_;
   std::vector<std::int32_t> radii_;
-  std::vector<std::byte> columns_;  // of positions, then of orientations
-  // What follows from the columns: flag_history() of each body, and its younger age where it has two.
+  std::vector<std::byte> columns_;  // columns of positions, then of orientations
+  // Derived from the columns: flag_history() of each body, and its younger age if it has two.
   std::vector<std::uint8_t> history_, youngest_;
   TrackerModels models_;
-  TrackerGains gains_;  // follow from the parameters in force
+  TrackerGains gains_;  // derived from the parameters in force
 };
 
 inline TrackerBody TrackerMemory::read(std::size_t column, Slot slot) const {

@@ -1,6 +1,6 @@
 #pragma once
-// The tracker codec's probabilities: which decisions a block codes, each in which context. One text for the
-// encoder, the decoder and the encoder's estimate of costs.
+// The tracker codec's probabilities: the decisions that a block codes, each with its context. The same code
+// serves the encoder, the decoder and the encoder's estimate of costs.
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace tandem {
 
-/// Indices of the models, and the decisions seen in one delta: zeros and ones of each model.
+/// Indices of the models. TrackerCounts counts the decisions in one delta: zeros and ones of each model.
 struct TrackerModelIndex {
   static constexpr std::uint32_t kAges = 15, kLengths = 3, kShortAges = 5, kIntervals = 4, kSpeeds = 3,
                                  kUnary = 14;
@@ -23,63 +23,63 @@ struct TrackerModelIndex {
   static constexpr std::uint32_t kFlag = 0;
   static constexpr std::uint32_t kFlagAtRest = kFlag + kAges * kAges * kLengths;
   static constexpr std::uint32_t kRest = kFlagAtRest + kAges;
-  static constexpr std::uint32_t kSteps = kRest + 2 * kShortAges * kSpeeds;  ///< of positions
-  // Of steps, from their first on.
+  static constexpr std::uint32_t kSteps = kRest + 2 * kShortAges * kSpeeds;  ///< first model of the steps of
+                                                                             ///< positions
+  // Offsets from the first model of steps.
   static constexpr std::uint32_t kZero = 0;
   static constexpr std::uint32_t kSign = kZero + 3 * kShortAges * kIntervals * 3 * 2;
   static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
   static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
   static constexpr std::uint32_t kStepModels = kEscape + 32;
   static constexpr std::uint32_t kOfPositions =
-      kSteps + kStepModels;  ///< all of a stream without orientations
+      kSteps + kStepModels;  ///< number of models in a stream without orientations
   static constexpr std::uint32_t kBoth = kOfPositions;
   static constexpr std::uint32_t kWhich = kBoth + 3 * kShortAges * kShortAges;
   static constexpr std::uint32_t kFine = kWhich + 3 * kShortAges * kShortAges;
-  static constexpr std::uint32_t kTurnSteps = kFine + 1;  ///< of orientations
+  static constexpr std::uint32_t kTurnSteps = kFine + 1;  ///< first model of the steps of orientations
   static constexpr std::uint32_t kCount = kTurnSteps + kStepModels;
-  static constexpr std::uint32_t kEven = kCount;     ///< of decisions without a model
-  static constexpr std::uint32_t kDead = kEven + 1;  ///< of slots without a body: never a 1
+  static constexpr std::uint32_t kEven = kCount;     ///< for decisions without a model
+  static constexpr std::uint32_t kDead = kEven + 1;  ///< for slots without a body: never a 1
   static constexpr std::uint32_t kAll = kDead + 1;
 };
 using TrackerCounts = std::array<std::array<std::uint32_t, 2>, TrackerModelIndex::kAll>;
 
-/// The probability of a 1 of each model, in 1/65536, and how much is behind it. All blocks share them, and
-/// they stay the same within a delta, so that blocks are coded side by side; they learn when the delta is
-/// done.
+/// The probability of a 1 of each model, in 1/65536, and its weight. All blocks share the models. They stay
+/// the same within a delta, so that blocks can be coded in parallel, and learn at its end.
 struct TrackerModels {
-  /// In 1/65536: no decision costs more than 11 bits, and one that is as expected 0.0007, so that the flags
-  /// of a million bodies at rest take 90 bytes. Lower saves some of those and makes each surprise dearer.
+  /// Limits of the probability in 1/65536. With them no decision costs more than 11 bits, and an expected one
+  /// costs 0.0007 bits, so that the flags of a million bodies at rest take 90 bytes. A lower limit saves some
+  /// of those and makes each surprise cost more.
   static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
-  /// What a flag and a rest start with, 1/16: most bodies need no correction. Forgotten after the first
-  /// deltas.
+  /// The initial probability of a flag and of a rest, 1/16, because most bodies need no correction. It is
+  /// forgotten after the first deltas.
   static constexpr std::uint16_t kRare = 4096;
 
   TrackerModels();
-  /// p1 becomes the mean of what it was, counted weight + 1 times, and of the decisions; the weight grows by
-  /// their number, up to 255.
-  /// Of the first `models`.
+  /// Updates the first `models` models. p1 becomes the mean of its old value, counted weight + 1 times, and
+  /// of the decisions. The weight grows by their number, up to 255.
   void learn(const TrackerCounts& counts, std::uint32_t models);
 
   std::array<std::uint16_t, TrackerModelIndex::kAll> p1{};
   std::array<std::uint8_t, TrackerModelIndex::kCount> weight{};
 };
 
-/// The context of a body's steps: parts of their models' indices.
+/// The context of a body's steps: parts of the indices of their models.
 struct TrackerContext {
-  std::uint32_t steps = TrackerModelIndex::kSteps;  ///< the first model of its steps
-  std::uint32_t rest = 0;                           ///< the whole index, of "is it put to rest"
-  std::uint32_t zero = 0;                           ///< of "is this axis untouched"
-  std::uint32_t magnitude = 0;                      ///< of "is it longer"
-  std::array<std::uint32_t, 3> sign{};              ///< the whole index, per axis
+  std::uint32_t steps = TrackerModelIndex::kSteps;  ///< index of the first model of its steps
+  std::uint32_t rest = 0;                           ///< complete index of "is it put to rest"
+  std::uint32_t zero = 0;                           ///< part of the index of "is this axis untouched"
+  std::uint32_t magnitude = 0;                      ///< part of the index of "is it longer"
+  std::array<std::uint32_t, 3> sign{};              ///< complete index, per axis
   std::array<std::uint32_t, 3> moved_last{};        ///< 0, 1: whether the last correction moved this axis
 };
 
-/// What a body of a stream with orientations adds.
+/// The additional context of a body in a stream with orientations.
 struct TrackerTurnContext {
-  std::uint32_t choice = 0;  ///< of "are both corrected" and "which"
-  TrackerContext turn;       ///< of the orientation's steps
+  std::uint32_t choice = 0;  ///< part of the indices of "are both corrected" and "which"
+  TrackerContext turn;       ///< context of the orientation's steps
 };
-/// `position`, `turn`: as remembered before the delta; zeros of a renewed body, and so `w`.
+/// `position`, `turn`: as remembered before the delta. They and `w` are zeros for a renewed body.
 [[nodiscard]] TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& turn,
                                               const Spin& w);
 
@@ -88,7 +88,7 @@ extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 
 namespace tracker_detail {
 
-// Of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
+// The class of the longest of a body's last steps: 0 up to one, 1 two, 2 more.
 inline std::uint32_t length_class(const TrackerSteps& steps) {
   std::int32_t longest = 0;
   for (const std::int32_t step : steps) longest = std::max({longest, step, -step});
@@ -97,8 +97,8 @@ inline std::uint32_t length_class(const TrackerSteps& steps) {
 
 }  // namespace tracker_detail
 
-/// What a flag depends on in a stream with orientations: the younger correction, the shorter interval (0:
-/// none), the longer steps.
+/// The values that a flag depends on in a stream with orientations: the younger correction, the shorter
+/// interval (0: none), the longer steps.
 [[nodiscard]] TrackerBody merged(const TrackerBody& position, const TrackerBody& turn);
 
 /// The part of a flag's index that changes only when its body is corrected: 0 .. 44.
@@ -113,12 +113,13 @@ inline std::uint32_t length_class(const TrackerSteps& steps) {
          tracker_age_buckets[age + 1U] * (TrackerModelIndex::kAges * TrackerModelIndex::kLengths) + history;
 }
 
-/// flag_model() of many slots, from their columns; kDead where there is no body.
+/// Computes flag_model() of many slots from their columns; kDead if there is no body.
 void list_flag_models(const std::uint8_t* ages, const std::uint8_t* histories, const std::uint8_t* rest,
                       const std::uint8_t* alive, std::span<std::uint16_t> models);
 
-/// The contexts of all slots of a block, a byte each: worked out side by side, whether they are used or not,
-/// which takes less time than those of a tenth of the bodies one by one.
+/// The contexts of all slots of a block, one byte per column. They are computed for all slots in one loop,
+/// whether they are used or not. That takes less time than computing those of a tenth of the bodies one by
+/// one.
 class TrackerContexts {
  public:
   explicit TrackerContexts(std::uint32_t slots) : slots_(slots), bytes_(std::size_t{kColumns} * slots) {}
@@ -126,7 +127,7 @@ class TrackerContexts {
   /// `ages`, `intervals`, `steps`: columns of the bodies before the delta; v and c of the predicted state.
   void fill(const Block& block, const State& predicted, const std::array<const std::uint8_t*, 5>& bodies,
             std::int32_t threshold);
-  /// Of a body that was renewed in this delta.
+  /// Sets the context of a body that was renewed in this delta.
   void renew(Slot slot) {
     for (std::size_t i = 0; i < kColumns; ++i) column(i)[slot] = kRenewed[i];
   }
@@ -144,8 +145,8 @@ class TrackerContexts {
   }
 
  private:
-  // zero, from bit 5 on moved_last; magnitude, from bit 4 on the age in all signs; what else is in the sign
-  // of x, y, z: 0 .. 26; of rest: 0 .. 29.
+  // The columns: zero, with moved_last from bit 5 on; magnitude, with the common age of all signs from bit 4
+  // on; the rest of the sign's index for x, y, z: 0 .. 26; rest: 0 .. 29.
   static constexpr std::size_t kColumns = 6;
   static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 13, 13, 13, 0};
   std::uint8_t* column(std::size_t i) { return bytes_.data() + i * slots_; }
@@ -154,7 +155,7 @@ class TrackerContexts {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Index of "is this axis untouched", after `moved` axes that are not.
+/// The index of "is this axis untouched", after `moved` axes that are not zero.
 [[nodiscard]] inline std::uint32_t zero_model(const TrackerContext& context, std::uint32_t axis,
                                               std::uint32_t moved) {
   using Index = TrackerModelIndex;
@@ -162,13 +163,14 @@ class TrackerContexts {
          ((axis * Index::kShortAges * Index::kIntervals + context.zero) * 3 + moved) * 2 +
          context.moved_last[axis];
 }
-/// Index of "is it longer than 1", after `moved` axes that are not zero; those of longer ones follow it.
+/// The index of "is it longer than 1", after `moved` axes that are not zero. The indices for longer ones
+/// follow it.
 [[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t moved) {
   return context.steps + TrackerModelIndex::kMagnitude +
          (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
 }
 
-/// Decisions into bytes; counts them.
+/// Codes decisions into bytes and counts them.
 struct DecisionEncoder {
   bool code(bool bit, std::uint32_t model) {
     range.put(bit, models->p1[model]);
@@ -182,7 +184,7 @@ struct DecisionEncoder {
   TrackerCounts* counts = nullptr;
 };
 
-/// Bytes into decisions; counts them. The first argument is what an encoder would code.
+/// Reads decisions from bytes and counts them. The first argument is what an encoder would code.
 struct DecisionDecoder {
   bool code(bool /*bit*/, std::uint32_t model) {
     const bool bit = range.get(models->p1[model]);
@@ -200,13 +202,13 @@ struct DecisionDecoder {
   TrackerCounts* counts = nullptr;
 };
 
-/// Most bits code_correction() takes.
+/// Maximum number of bits that code_correction() writes.
 inline constexpr std::size_t kMostCorrectionBits =
     11 + 3 * (22 + (std::size_t{TrackerModelIndex::kUnary} + 31) * 11 + 31);
 
 namespace tracker_detail {
 
-// x >= 0 as the number of bits of x + 1, in unary, then those bits without the first.
+// Codes x >= 0: the number of bits of x + 1 in unary, then those bits without the first.
 template <class Coder>
 bool code_escape(Coder& coder, std::uint32_t models, std::uint32_t& x) {
   const std::uint64_t wanted = std::uint64_t{x} + 1;
@@ -222,7 +224,7 @@ bool code_escape(Coder& coder, std::uint32_t models, std::uint32_t& x) {
 
 }  // namespace tracker_detail
 
-/// Codes one axis. `moved`: how many earlier axes are not zero. Returns as code_steps().
+/// Codes one axis. `moved`: number of earlier axes that are not zero. Returns as code_steps().
 template <class Coder>
 [[gnu::always_inline]] inline bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis,
                                              std::uint32_t moved, std::int32_t& steps) {
@@ -250,11 +252,11 @@ template <class Coder>
 }
 
 /// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
-/// returning the bit; for a decoder the argument means nothing and `steps` is filled. False: a decoder read
-/// steps beyond kMostTrackerSteps.
+/// returning the bit. A decoder ignores the argument and fills `steps`. Returns false if a decoder read steps
+/// beyond kMostTrackerSteps.
 template <class Coder>
 bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps) {
-  Coder local = coder;  // in registers: counts are written through pointers in between
+  Coder local = coder;  // a copy in registers, because counts are written through pointers in between
   std::uint32_t moved = 0;
   const auto code = [&](std::uint32_t axis) {
     const bool good = code_axis(local, context, axis, moved, steps[axis]);
@@ -266,14 +268,14 @@ bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps
   return good;
 }
 
-/// Codes a correction; as code_steps().
+/// Codes a correction. Returns as code_steps().
 template <class Coder>
 bool code_correction(Coder& coder, const TrackerContext& context, TrackerCorrection& correction) {
   correction.rest = coder.code(correction.rest, context.rest);
   return code_steps(coder, context, correction.steps);
 }
 
-/// The same in a stream with orientations.
+/// Does the same in a stream with orientations.
 template <class Coder>
 bool code_correction(Coder& coder, const TrackerContext& context, const TrackerTurnContext& turn_context,
                      TrackerCorrection& correction) {

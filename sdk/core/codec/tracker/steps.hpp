@@ -1,5 +1,5 @@
 #pragma once
-// The tracker's encoder, one body at a time: by which of the points inside the error ball to correct it.
+// The tracker's encoder for one body: chooses the point inside the error ball to which the body is corrected.
 // Nothing here is on the wire.
 
 #include <array>
@@ -27,14 +27,15 @@ namespace tandem {
   return log;
 }
 
-/// What decisions would cost, in 1/256 bits: of each model a zero and a one. Coarse on purpose (12 bits of
-/// the probability, a cost of at most 12 bits): a choice between points that differ by less is worth nothing.
+/// The costs of decisions in 1/256 bits: a zero and a one of each model. They are coarse on purpose (12 bits
+/// of the probability, a cost of at most 12 bits), because a choice between points with a smaller difference
+/// is worth nothing.
 struct TrackerCosts {
   void learn(const TrackerModels& models);
   std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
 };
 
-/// Adds up what decisions would cost: a coder for code_steps().
+/// A coder for code_steps() that adds up the costs of decisions.
 struct CostCoder {
   const TrackerCosts* costs;
   std::uint32_t cost = 0;
@@ -46,9 +47,9 @@ struct CostCoder {
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
 };
 
-/// What an error costs beside bits, for one threshold: worked out once, because it takes a long division.
+/// The cost of an error in bits, for one threshold. It is computed once, because it takes a long division.
 struct ErrorWorth {
-  /// `bits`: what an error of one threshold is worth.
+  /// `bits`: the worth of an error of one threshold.
   ErrorWorth(std::int32_t e, std::uint64_t bits);
   std::int64_t threshold;
   std::uint64_t limit;  ///< threshold squared
@@ -56,15 +57,14 @@ struct ErrorWorth {
   std::uint64_t worth;  ///< (error^2 >> shift) * worth >> 24: in 1/256 bits
 };
 
-/// Steps that correct `to` - `from` (lattice units) at least cost: of the eight points around it that leave
-/// an error of at most the threshold, the one with the least bits + what its
-/// error is worth. False: none
-/// does; `steps` is then the nearest.
+/// Chooses the steps that correct `to` - `from` (lattice units) at minimum cost. Among the eight points
+/// around it that leave an error of at most the threshold, it takes the one with the minimum of bits + worth
+/// of the error. If there is none, it returns false and `steps` is the nearest point.
 bool choose_steps(const Vec3i& from, const Vec3i& to, const TrackerSteppings& steppings,
                   const ErrorWorth& worth, const TrackerCosts& costs, const TrackerContext& context,
                   TrackerSteps& steps);
 
-/// Steps that a body may be corrected by, and what they cost, in 1/256 bits.
+/// Steps by which a body may be corrected, and their cost in 1/256 bits.
 struct TrackerPoint {
   TrackerSteps steps{};
   std::uint32_t cost = 0;

@@ -1,5 +1,6 @@
 #pragma once
-// The tracker's encoder: which bodies of the full simulation stand still. Nothing here is on the wire.
+// The tracker's encoder: finds the bodies of the full simulation that stand still. Nothing here is on the
+// wire.
 
 #include <array>
 #include <cstdint>
@@ -11,15 +12,15 @@
 
 namespace tandem {
 
-/// Remembers where bodies were, because engines that put no body to sleep let it tremble.
+/// Remembers where bodies were, because bodies tremble in engines that put none to sleep.
 class Stillness {
  public:
-  /// `radii` of the stream, with orientations.
+  /// `radii`: those of the stream, with orientations.
   Stillness(std::uint32_t capacity, std::span<const std::int32_t> radii);
 
-  /// Takes in the full simulation of the next frame.
+  /// Takes the full simulation of the next frame.
   void follow(const CodecFrame& frame, const State& target);
-  /// Whether a body may be put to rest: it hardly moved in the last frame, and something holds it up (a body
+  /// True if a body may be put to rest: it hardly moved in the last frame, and something holds it up (a body
   /// at the top of its throw is slow too).
   [[nodiscard]] bool is_still(const CodecFrame& frame, const State& target, Slot slot) const;
 
@@ -27,7 +28,7 @@ class Stillness {
   std::array<std::vector<std::int32_t>, 3> p_, moved_, moved_before_;  // lattice units
   std::array<std::vector<std::int32_t>, kQuaternionChannels> q_, q_before_;
   std::span<const std::int32_t> radii_;
-  std::vector<std::uint8_t> frames_;  // seen since it was renewed, 0 .. 2
+  std::vector<std::uint8_t> frames_;  // frames seen since the body was renewed, 0 .. 2
 };
 
 }  // namespace tandem

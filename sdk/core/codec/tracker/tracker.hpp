@@ -1,7 +1,7 @@
 #pragma once
-// The codec `tracker`: both sides treat each body as a tracking filter that small position corrections steer;
-// no velocity is sent (filter.hpp). Which bodies, and how far, is range coded with probabilities that learn
-// from delta to delta (models.hpp). Bytes: idl/PROTOCOL.md, "Tracker".
+// The codec `tracker`. Both sides treat each body as a tracking filter that small position corrections steer;
+// no velocity is sent (filter.hpp). The choice of bodies and the corrections are range coded, with
+// probabilities that learn from delta to delta (models.hpp). Bytes: idl/PROTOCOL.md, "Tracker".
 
 #include <memory>
 
@@ -12,9 +12,9 @@
 
 namespace tandem {
 
-/// See Codec. Blocks are coded side by side where the setup says how. Corrects every body that is off by more
-/// than the threshold, and a few that soon would be. Where a budget binds, bodies go by error^2 * (frames
-/// they have waited + 1)^2, so that none waits for ever; ties by slot.
+/// See Codec. Blocks are coded in parallel if the setup says how. Corrects every body whose error is above
+/// the threshold, and a few whose error soon would be. If a budget does not suffice, bodies are ordered by
+/// error^2 * (frames they have waited + 1)^2, so that none waits for ever; ties by slot.
 class Tracker final : public Codec {
  public:
   explicit Tracker(const CodecSetup& setup);
@@ -42,7 +42,7 @@ class Tracker final : public Codec {
   RunBlocks run_blocks_;
   TrackerMemory memory_;
   TrackerScratch scratch_;
-  TrackerDelta delta_;  // of the last encode() or decode()
+  TrackerDelta delta_;  // the delta of the last encode() or decode()
   TrackerDecoder decoder_;
   std::unique_ptr<TrackerEncoder> encoder_;  // made by the first encode(): a decoder needs none of its memory
 };

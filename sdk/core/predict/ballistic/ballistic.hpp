@@ -4,8 +4,8 @@
 
 namespace tandem {
 
-/// Gravity, damping and the learned acceleration c; bodies do not interact. O(capacity) a step, no scratch
-/// memory.
+/// The tier `ballistic`: gravity, damping and the learned acceleration c. Bodies do not interact. O(capacity)
+/// per step, no scratch memory.
 class Ballistic final : public Predictor {
  public:
   [[nodiscard]] std::string_view name() const override { return "ballistic"; }

@@ -1,5 +1,5 @@
 #pragma once
-// The walk over the grid's bodies, for each way to look at a run of them.
+// The walk over the grid's bodies, for each way to examine a run of them.
 
 #include <array>
 #include <cstdint>
@@ -8,9 +8,9 @@
 
 namespace tandem {
 
-/// The 13 cells ahead of one and itself, as runs of bodies that follow each other: three cells of a row are
-/// one run. No run is listed first or passed over when empty: whether it is is as good as random, and most
-/// are not.
+/// Visits a cell and the 13 cells ahead of it, as runs of consecutive bodies: three cells of a row are one
+/// run. Runs are neither listed first nor skipped if empty, because whether one is empty is hard to predict,
+/// and most are not.
 template <class Search>
 class ContactWalk {
  public:
@@ -20,7 +20,7 @@ class ContactWalk {
         layer_(row_ << grid.side_bits),
         last_((layer_ << grid.side_bits) - 1) {}
 
-  /// Of the body at `place`, in `cell`.
+  /// Visits the neighbours of the body at `place` in `cell`.
   void around(std::uint32_t place, std::uint32_t cell, Search& search) const {
     const std::array<std::uint32_t, 4> middles = middles_of(cell);
     bool inside = cell != last_;
@@ -38,8 +38,8 @@ class ContactWalk {
     return {(cell + row_) & last_, (cell + layer_ - row_) & last_, (cell + layer_) & last_,
             (cell + layer_ + row_) & last_};
   }
-  // Where the list of cells closes to a ring, so that any run may be two. A copy, so that the other stays in
-  // registers.
+  // At the ends, where the list of cells closes to a ring, a run may be split in two. `search` is copied, so
+  // that the caller's stays in registers.
   [[gnu::noinline]] Search around_the_ends(std::uint32_t place, std::uint32_t cell, Search search) const {
     search.among(place + 1, begin_[cell + 1]);
     among_cell(cell + 1, search);
@@ -56,9 +56,9 @@ class ContactWalk {
   std::uint32_t row_, layer_, last_;
 };
 
-/// ContactKernels::find. `Search`, of an unnamed namespace (code for AVX2 must not become everybody's), has
-/// start(place), whose neighbours are looked for; among(from, to), which adds those of a run of at most 48;
-/// and count(), how many pairs there are.
+/// Implements ContactKernels::find. `Search` is in an unnamed namespace, because code for AVX2 must not be
+/// linked into other code. It has start(place), the body whose neighbours are searched; among(from, to),
+/// which adds the neighbours of a run of at most 48 bodies; and count(), the number of pairs.
 template <class Search>
 std::uint32_t find_pairs(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                          ContactPairs& pairs) {

@@ -1,5 +1,5 @@
 #pragma once
-// What the tiers `contact` and `field` know of the world, and its form in the session.
+// What the tiers `contact` and `field` know about the world, and its form in the session.
 
 #include <array>
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace tandem {
 
-/// Changes of v in one sub-step: by overlap (lattice units a frame), in 1/16384, and by relative velocity, in
-/// 1/8192.
+/// The changes of v in one sub-step: by overlap (lattice units a frame), in 1/16384, and by relative
+/// velocity, in 1/8192.
 struct ContactMaterial {
   static constexpr std::int32_t kMostSpring = 1 << 16, kMostDamping = 1 << 13;
   std::int32_t spring = 0, damping = 0, shear = 0;
@@ -27,7 +27,7 @@ struct ContactConstants {
 
   struct Type {
     std::int32_t radius = 1;
-    std::int32_t mobility = 65536;  ///< mass of type 0 over this one's, in 1/65536
+    std::int32_t mobility = 65536;  ///< mass of type 0 divided by this one's, in 1/65536
   };
   struct Plane {
     Vec3i normal{};
@@ -44,7 +44,7 @@ struct ContactConstants {
 
   std::int32_t substeps = 1;
   ContactMaterial pair, wall;
-  std::vector<Type> types;  ///< at least one; a body of a type beyond has the last one's
+  std::vector<Type> types;  ///< at least one; a body of a higher type uses the last one
   std::vector<Plane> planes;
   std::vector<Box> boxes;
   std::vector<Ball> balls;
@@ -54,14 +54,14 @@ struct ContactConstants {
   }
 };
 
-/// The world in one step a frame, for the tier `field`: the gains of all sub-steps together, as far as one
-/// step does not shake by them. With one sub-step nothing changes.
+/// The constants for one step per frame, for the tier `field`: the gains of all sub-steps together, limited
+/// so that one step does not oscillate. With one sub-step nothing changes.
 [[nodiscard]] ContactConstants in_one_step(ContactConstants constants);
 
-/// The integers of a session's `predictor_constants`.
+/// Writes the integers of a session's `predictor_constants`.
 [[nodiscard]] std::vector<std::int32_t> write_contact_constants(const ContactConstants& constants);
 
-/// Errors: kMalformed with the reason; nothing in `values` is trusted.
+/// Reads `predictor_constants`. Untrusted. Errors: kMalformed with the reason.
 [[nodiscard]] Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> values);
 
 }  // namespace tandem

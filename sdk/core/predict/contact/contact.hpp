@@ -1,5 +1,5 @@
 #pragma once
-// The tiers `contact` and `field`: the engine's penalty contacts as integers. idl/PROTOCOL.md, "Predicted
+// The tiers `contact` and `field`: the engine's penalty contacts in integers. idl/PROTOCOL.md, "Predicted
 // step", has the formulas.
 
 #include <array>
@@ -15,20 +15,19 @@
 
 namespace tandem {
 
-/// Ballistic motion plus forces between bodies that overlap and of the static geometry.
-/// O(capacity) a step whatever the state: at most ContactGrid::kMostInCell bodies of a cell take part in
-/// pairs.
+/// Ballistic motion, plus forces between overlapping bodies and from the static geometry. O(capacity) per
+/// step in any state: at most ContactGrid::kMostInCell bodies of a cell take part in pairs.
 class Contact final : public Predictor {
  public:
   enum class Tier {
-    kContact,  ///< as many sub-steps a frame as the engine
-    kField,    ///< one step a frame
+    kContact,  ///< as many sub-steps per frame as the engine
+    kField,    ///< one step per frame
   };
   Contact(std::uint32_t capacity, ContactConstants constants, Tier tier);
 
   [[nodiscard]] std::string_view name() const override { return coarse_ ? "field" : "contact"; }
   void step(const State& from, State& to, const StepInput& input) override;
-  /// Steps all bodies: each depends on the others.
+  /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
 
@@ -38,22 +37,23 @@ class Contact final : public Predictor {
   void add_pairs(bool first);
   void copy(const State& from, State& to) const;
 
-  bool coarse_;  // one step stands for several
+  bool coarse_;  // one step replaces several sub-steps
   ContactConstants constants_;
   std::int32_t largest_radius_;
   std::uint32_t shift_;  // a grid unit is 2^shift lattice units
   ContactLaw pair_law_;
   ContactKernels kernels_;
   ContactWalls walls_;
-  std::uint32_t side_bits_ = 2;   // the grid is a torus of 2^side_bits cells a side
+  std::uint32_t side_bits_ = 2;   // the grid is a torus of 2^side_bits cells per side
   std::int32_t cells_per_ = 0;    // cells per grid unit, in 2^-32
   std::uint32_t near_ = 0;        // in 2^5 grid units
-  std::int32_t later_share_ = 0;  // of v, in 1/32768: what the sub-steps before the last move a body by
-  bool one_mobility_ = false;     // all bodies have that of type 0
-  std::vector<std::uint32_t> cell_, place_;  // by slot; first the rank in the cell, then the place
-  std::vector<std::uint8_t> in_cell_;        // by cell, how many
+  std::int32_t later_share_ = 0;  // share of v, in 1/32768, by which the sub-steps before the last move a
+                                  // body
+  bool one_mobility_ = false;     // all bodies have the mobility of type 0
+  std::vector<std::uint32_t> cell_, place_;  // by slot: at first the rank in the cell, later the place
+  std::vector<std::uint8_t> in_cell_;        // by cell: number of bodies
   std::vector<std::uint32_t> begin_;         // by cell, and one more
-  // By place: bodies that take part in pairs by cell, then the rest.
+  // By place: first the bodies that take part in pairs, sorted by cell, then the rest.
   std::uint32_t count_ = 0;
   std::vector<ContactBody> bodies_;
   std::vector<ContactView> views_;

@@ -1,5 +1,5 @@
 #pragma once
-// Four 32-bit integers at once, in what compilers make of them on any processor.
+// Four 32-bit integers at once, as vector types that compilers translate for any processor.
 
 #include <array>
 #include <cstdint>
@@ -20,7 +20,7 @@ inline std::int32_t value_of(std::uint32_t bits) { return static_cast<std::int32
 inline FourBits bits_of(Four x) { return reinterpret_cast<FourBits>(x); }
 inline Four value_of(FourBits bits) { return reinterpret_cast<Four>(bits); }
 
-/// 16 bytes of anything.
+/// Loads a vector from memory.
 template <class Vector, class T>
 inline Vector load(const T& from) {
   Vector x;
@@ -28,14 +28,14 @@ inline Vector load(const T& from) {
   return x;
 }
 
-/// Also of single integers.
+/// Works for vectors and single integers.
 template <class X>
 inline X clamped(X x, X limit) {
   x = x < -limit ? -limit : x;
   return x > limit ? limit : x;
 }
 
-/// Four rows of four, turned over.
+/// Transposes four rows of four.
 inline void transpose(std::array<Four, 4>& row) {
   const Four ab_low = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
   const Four ab_high = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);

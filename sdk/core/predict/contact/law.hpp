@@ -1,5 +1,5 @@
 #pragma once
-// The force of one contact, as idl/PROTOCOL.md has it.
+// The force of one contact, as in idl/PROTOCOL.md.
 
 #include <algorithm>
 #include <array>
@@ -9,11 +9,11 @@
 
 namespace tandem {
 
-inline constexpr std::int32_t kMostSpeed = (1 << 14) - 1;  ///< of a body, in grid units per frame
-inline constexpr std::int32_t kMostPush = (1 << 15) - 1;   ///< 1/8 grid unit
+inline constexpr std::int32_t kMostSpeed = (1 << 14) - 1;  ///< maximum speed of a body, grid units per frame
+inline constexpr std::int32_t kMostPush = (1 << 15) - 1;   ///< maximum push, 1/8 grid unit
 inline constexpr std::int32_t kMostOverlap = 1 << 14;      ///< grid units
 
-/// A velocity, in 1/64 lattice unit, as the law has it.
+/// Converts a velocity in 1/64 lattice unit to the law's unit.
 [[nodiscard]] inline std::int32_t contact_speed(const ContactLaw& law, std::int32_t v) {
   return std::clamp(v >> (law.shift + 6), -kMostSpeed, kMostSpeed);
 }
@@ -28,11 +28,11 @@ inline constexpr std::int32_t kMostOverlap = 1 << 14;      ///< grid units
 // n) >> 11 is twice the speed along the contact, as S counts in 2^-13 and K in 2^-14.
 //
 // Usual values of a sub-step: K 0.2 to 0.5, B and S 0.03 to 0.05. In a pile, where a body has a dozen
-// neighbours, the step shakes with K above 5/8 (in_one_step()); a weak spring lets what lies below sink into
-// each other.
-/// With `n` in 2^-12 towards the other, `u` the other's velocity less the own. |u| < 2^15 on each axis,
-/// |n| < 2^12.5, spring <= 2^16, shear <= 2^13, drag <= 2^14: all of it fits 32 bits.
-/// Of one contact, or of several in vectors.
+// neighbours, the step oscillates with K above 5/8 (in_one_step()). With a weak spring the lower bodies of a
+// pile sink into each other.
+/// The force of one contact, or of several in vectors. `n` in 2^-12 points towards the other body; `u` is the
+/// other's velocity minus the own. |u| < 2^15 on each axis, |n| < 2^12.5, spring <= 2^16, shear <= 2^13, drag
+/// <= 2^14: everything fits 32 bits.
 template <class X>
 [[nodiscard]] inline std::array<X, 3> contact_force(const ContactLaw& law, X overlap,
                                                     const std::array<X, 3>& n, const std::array<X, 3>& u) {

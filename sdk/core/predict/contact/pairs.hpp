@@ -1,5 +1,6 @@
 #pragma once
-// Pairs of the tier `contact`: who is near whom at the start of a frame, and the forces between them.
+// Pairs of the tier `contact`: finds the bodies that are near each other at the start of a frame, and adds
+// the forces between them.
 
 #include <array>
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 namespace tandem {
 
-/// A body while a frame is stepped: half a cache line.
+/// A body during the steps of a frame: half a cache line.
 struct alignas(32) ContactBody {
   Vec3i p;
   std::int32_t radius;
@@ -20,7 +21,7 @@ struct alignas(32) ContactBody {
   Slot slot;
 };
 
-/// What other bodies see of one. Differences wrap, as places far apart do not matter.
+/// The part of a body that other bodies see. Differences may wrap, because bodies far apart do not matter.
 struct alignas(16) ContactView {
   std::array<std::int16_t, 3> q;  ///< p in grid units, the lower 16 bits
   std::int16_t radius;            ///< grid units
@@ -28,59 +29,60 @@ struct alignas(16) ContactView {
   std::int16_t unused;
 };
 
-/// Changes of v, in 1/16 grid unit per frame. 0 between two sub-steps.
+/// The changes of v, in 1/16 grid unit per frame. They are 0 between two sub-steps.
 struct alignas(16) ContactForce {
   Vec3i f;
-  std::int32_t mobility;  ///< of the body
+  std::int32_t mobility;  ///< mobility of the body
 };
 
 /// The torus of cells, with the bodies that take part sorted by cell.
 struct ContactGrid {
   static constexpr std::uint32_t kMostInCell = 16;
 
-  std::uint32_t side_bits;     ///< 2^side_bits cells a side, x lowest in a cell's number
-  const std::uint32_t* begin;  ///< by cell, and one more: places of its bodies
+  std::uint32_t side_bits;     ///< 2^side_bits cells per side, x lowest in a cell's number
+  const std::uint32_t* begin;  ///< by cell, and one more: the place of its first body
   const std::uint32_t* cell;   ///< by place
-  // By place, each coordinate in 16 bits of 2^5 grid units; readable 8 further.
-  const std::uint32_t* xy;  ///< x below, y above
-  /// Where the last sub-step finds it if nothing pushes it; none for one sub-step.
+  // By place, each coordinate in 16 bits of 2^5 grid units. The arrays are readable for 8 more elements.
+  const std::uint32_t* xy;  ///< x in the lower half, y in the upper
+  /// Where the last sub-step finds the body if nothing pushes it; null for one sub-step.
   const std::uint32_t* later_xy;
-  const std::uint32_t* z;      ///< now below, later or 0 above
+  const std::uint32_t* z;      ///< lower half: now; upper half: later, or 0
   std::uint32_t near_squared;  ///< bodies nearer than this, now or later, are a pair
 };
 
-/// Places of the two bodies of each pair, the one whose cell lies behind first.
+/// The places of the two bodies of each pair; the body whose cell is behind comes first.
 struct ContactPairs {
   std::uint32_t* first;
   std::uint32_t* second;
   std::uint32_t count;
 
-  /// Forces are added to so many at a time. A body and itself are a pair that adds nothing.
+  /// Number of pairs whose forces are added at a time. A pair of a body and itself adds nothing.
   static constexpr std::uint32_t kBatch = 512;
-  /// How many more than enough may be found, and what a vector writes beyond.
+  /// Maximum number of pairs that may be found beyond `enough`, including what a vector writes beyond its
+  /// end.
   static constexpr std::uint32_t kMostAtOnce = 14 * ContactGrid::kMostInCell + 16;
 };
 
-/// What a contact does, besides where it is. Gains as in ContactMaterial.
+/// The constants of a contact's force. Gains as in ContactMaterial.
 struct ContactLaw {
-  std::int32_t spring, drag, shear;  ///< drag: damping and shear
+  std::int32_t spring, drag, shear;  ///< drag: damping + shear
   std::uint32_t shift;               ///< a grid unit is 2^shift lattice units
 };
 
 struct ContactKernels {
-  /// Appends the pairs of the bodies from `place` on until they are `enough`; there is room for kMostAtOnce
-  /// more. Returns the place of the first body not looked at.
+  /// Appends the pairs of the bodies from `place` on until there are `enough`. There is room for kMostAtOnce
+  /// more. Returns the place of the first body that was not examined.
   std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                         ContactPairs& pairs);
-  /// Adds the forces of all pairs, whole batches. `inverse_root`: 2^30 / r by r^2 >> 16.
+  /// Adds the forces of all pairs, in whole batches. `inverse_root`: 2^30 / r by r^2 >> 16.
   void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
                      const ContactPairs& pairs, ContactForce* forces);
 };
 
-/// Plain integers, for any machine.
+/// Kernels in plain integers, for any machine.
 [[nodiscard]] ContactKernels portable_contact_kernels();
 #ifdef TANDEM_CONTACT_AVX2
-/// The same bits, eight at a time; only where the processor has AVX2.
+/// Kernels with the same bits, eight at a time; only if the processor has AVX2.
 [[nodiscard]] ContactKernels avx2_contact_kernels();
 #endif
 [[nodiscard]] ContactKernels fastest_contact_kernels();

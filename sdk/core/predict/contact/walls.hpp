@@ -1,5 +1,5 @@
 #pragma once
-// Where a body touches the static geometry of the tier `contact`.
+// Contacts of bodies with the static geometry of the tier `contact`.
 
 #include <cstdint>
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace tandem {
 
-/// How deep (lattice units, <= 0: not at all), and the unit vector (in 2^-14) out of the surface.
+/// The depth of a touch (lattice units, <= 0: no touch), and the unit vector (in 2^-14) out of the surface.
 struct WallTouch {
   std::int64_t overlap = 0;
   Vec3i out{};
@@ -20,16 +20,16 @@ struct WallTouch {
 [[nodiscard]] WallTouch touch(const ContactConstants::Box& box, const Vec3i& p, std::int32_t radius);
 [[nodiscard]] WallTouch touch(const ContactConstants::Ball& ball, const Vec3i& p, std::int32_t radius);
 
-/// The static geometry, and the forces of what touches it.
+/// The static geometry, and its forces on bodies that touch it.
 class ContactWalls {
  public:
-  /// `largest_radius` of all types; `constants` outlive this.
+  /// `largest_radius`: of all types. `constants` must outlive this.
   ContactWalls(const ContactConstants& constants, const ContactLaw& law, std::int32_t largest_radius);
 
-  /// `forces` by place, as `bodies`.
+  /// Adds forces. `forces` is indexed by place, as `bodies`.
   void add_forces(std::span<const ContactBody> bodies, std::span<ContactForce> forces) const;
 
-  /// Where low <= normal . p <= high, with p in lattice units; no wider than 2^63.
+  /// The region low <= normal . p <= high, with p in lattice units; not wider than 2^63.
   struct Slab {
     Vec3i normal{};
     std::int64_t low = 0, high = 0;
@@ -42,10 +42,10 @@ class ContactWalls {
 
   const ContactConstants& constants_;
   ContactLaw law_;
-  std::vector<Slab> planes_, boxes_, balls_;  // one a plane, three each of the others
+  std::vector<Slab> planes_, boxes_, balls_;  // one per plane, three per other shape
 };
 
-/// Largest r with r * r <= x.
+/// The maximum r with r * r <= x.
 [[nodiscard]] std::int64_t root(std::uint64_t x);
 
 }  // namespace tandem

@@ -1,5 +1,5 @@
 #pragma once
-// What stands still in a world, and how hard bodies push: all that predicts contacts.
+// What stands still in a world, and the law of contact forces. Predictors of contacts compute with both.
 
 #include <array>
 #include <cstdint>
@@ -9,15 +9,15 @@
 
 namespace tandem {
 
-/// The solid things that bodies meet, and the law by which they push. Clients predict contacts by it, the
-/// better the nearer it is to what the simulation does; an error costs bits, not correctness. Scene units,
-/// the mass units of ServedType::mass, seconds.
+/// The solid things that bodies meet, and the law by which contacts push them. Clients predict contacts with
+/// it. A prediction that is nearer to the simulation needs fewer bits; an error never makes a client wrong.
+/// Units: scene units, the mass units of ServedType::mass, seconds.
 struct Scenery {
-  /// Penalty contact (S. Green, "Particle Simulation using CUDA", 2008): for the overlap o of two spheres
-  /// along the unit vector n from this one to the other, relative velocity u (other - this) and its
-  /// tangential part u_t, force = -spring * o * n + damping * u + shear * u_t.
+  /// Penalty contact (S. Green, "Particle Simulation using CUDA", 2008): for two spheres with overlap o along
+  /// the unit vector n from this one to the other, relative velocity u (other - this) and its tangential part
+  /// u_t, force = -spring * o * n + damping * u + shear * u_t.
   struct Law {
-    double spring = 200;   ///< mass units / s^2, >= 0; 0: bodies pass through
+    double spring = 200;   ///< mass units / s^2, >= 0; 0: bodies pass through each other
     double damping = 1.5;  ///< mass units / s, >= 0
     double shear = 1.5;    ///< mass units / s, >= 0
   };
@@ -28,7 +28,7 @@ struct Scenery {
   };
   struct Box {
     engine::Vec3 centre{}, half{1, 1, 1};  ///< half: > 0
-    /// Orthonormal: the box's x, y, z in the scene.
+    /// The directions of the box's x, y and z in the scene; orthonormal.
     std::array<engine::Vec3, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   };
   struct Ball {
@@ -37,7 +37,7 @@ struct Scenery {
   };
 
   Law between_bodies = {}, with_scenery = {};
-  std::uint32_t substeps = 1;  ///< of contacts in a step, 1..16
+  std::uint32_t substeps = 1;  ///< contact substeps of one step, 1..16
   std::vector<Plane> planes = {};
   std::vector<Box> boxes = {};
   std::vector<Ball> balls = {};
