@@ -63,7 +63,7 @@ struct ServerOptions {
   std::optional<Scenery> scenery = {};  ///< what contact and field compute with; empty: they are not
                                         ///< available
   std::size_t budget_bytes = 0;         ///< maximum size of the corrections of a frame, with codec limited or
-                                 ///< tracker; 0: the codec's default
+                                        ///< tracker; 0: the codec's default
   /// Publishes the same world as up to eight streams, for clients with different processors and links. The
   /// form is that of tandemd's --stream: NAME:PREDICTOR, or NAME:key=value,... with the keys codec,
   /// predictor, threshold, target-bandwidth, max-error, budget. Keys that are left out come from the options
