@@ -7,10 +7,21 @@
 
 namespace tandem::client {
 
+namespace {
+constexpr std::string_view kUnplayable =
+    "this client computes the stream otherwise than the server: the state soon differed after each of 3 snapshots";
+}  // namespace
+
 Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::SessionMessage& session,
                                                             Now now) {
-  const auto playable = playable_streams(session);
+  auto playable = playable_streams(session);
   if (!playable) return tl::unexpected<Error>(playable.error());
+  const auto unplayable = [&](std::size_t index) {
+    return epoch_ &&
+           std::count(epoch_->unplayable.begin(), epoch_->unplayable.end(), session.streams[index].id) > 0;
+  };
+  std::erase_if(*playable, unplayable);
+  if (playable->empty()) return fail(ErrorCode::kMismatch, std::string(kUnplayable));
   const bool choice = playable->size() > 1 && preference_.kind != StreamPreference::Kind::kNamed;
   if (choice && !own_step_ns_) own_step_ns_ = measure_own_step(options_.measure_ns);
   chooser_.emplace(list_offers(session, *playable), preference_, 1e9 / session.frame_rate_hz, own_step_ns_);
@@ -31,6 +42,21 @@ Result<std::unique_ptr<Follower>> ClientCore::follow(const transport::SessionMes
 void ClientCore::prefer(std::string_view preference) {
   preference_ = read_preference(preference);
   if (chooser_) chooser_->prefer(preference_);
+}
+
+void ClientCore::leave_unplayable(Now now) {
+  EpochState& e = *epoch_;
+  if (e.wrong_joins < kMostWrongJoins) return;
+  e.wrong_joins = 0;
+  e.unplayable.push_back(e.played->stream().id);
+  auto other = choose_stream(e.session, now);
+  if (!other) {
+    refuse(other.error());
+    port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
+    return;
+  }
+  log(LogLevel::kError, kUnplayable);
+  join_instead(std::move(*other), now);
 }
 
 void ClientCore::tell_stream() {
@@ -82,17 +108,18 @@ void ClientCore::join_instead(std::unique_ptr<Follower> other, Now now) {
   EpochState& e = *epoch_;
   e.played->close(port_);
   e.played = std::move(other);
+  e.has_loaded = false;
   e.join_began_ns = now.steady_ns;
   tell_stream();
 }
 
 void ClientCore::follow_change(Now now) {
   EpochState& e = *epoch_;
-  if (e.change->to().joining() && !join(e.change->to(), now)) {
-    if (e.change->gets_nowhere(now.steady_ns, statistics_.last_applied_ns))
-      give_up_change("nothing came", now);
+  if (e.change->gets_nowhere(now.steady_ns, statistics_.last_applied_ns)) {
+    give_up_change("nothing came", now);
     return;
   }
+  if (e.change->to().joining() && !join(e.change->to(), now)) return;
   const Follower::Step step = e.change->catch_up(*e.played, e.scheduled);
   if (step.loss) on_loss_in_change(*step.loss, now);
   if (step.done) move_over(now);
@@ -108,6 +135,7 @@ void ClientCore::move_over(Now now) {
   e.played->close(port_);
   const Frame left_at = e.played->timeline().applied();
   e.played = e.change->take();
+  e.has_loaded = !e.played->joining();
   e.change.reset();
   e.frame_cost_ns = 0;
   e.told_too_slow = false;

@@ -70,6 +70,7 @@ std::int64_t ClientCore::poll(Now now) {
     port_.pass_over_session(transport::PassOver::kWhileThereIsAnother);
   }
   take_sessions(now);
+  if (epoch_ != nullptr) leave_unplayable(now);
   if (epoch_ != nullptr) {
     take_stream(now);
     take_replies(now);
@@ -347,7 +348,9 @@ std::optional<std::int64_t> ClientCore::server_wall_ns(std::int64_t steady_ns) c
   return steady_ns + epoch_->pacer.clock().offset_ns();
 }
 std::uint32_t ClientCore::join_attempt() const {
-  return epoch_ ? epoch_->played->join_attempt() : join_attempts_;
+  if (!epoch_) return join_attempts_;
+  const std::uint32_t played = epoch_->played->join_attempt();
+  return epoch_->change ? std::max(played, epoch_->change->to().join_attempt()) : played;
 }
 
 ClientStatus ClientCore::status() const {
@@ -382,7 +385,7 @@ ClientStatus ClientCore::status() const {
 
 void ClientCore::start_sampling() {
   if (pictures_.wanted()) return;
-  if (epoch_ && epoch_->has_played)
+  if (epoch_ && epoch_->has_loaded)
     epoch_->pictures.on_loaded(epoch_->played->timeline(), epoch_->pacer, last_poll_ns_);
   pictures_.want();  // last, so that the next call tries again if there was no memory for a first picture
 }

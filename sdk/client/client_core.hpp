@@ -65,6 +65,11 @@ class CoreListener {
 /// sample().
 class ClientCore {
  public:
+  /// A stream is left after so many joins in a row that each ended with a state other than the server's
+  /// within so many frames: this client computes it otherwise, and would join for ever.
+  static constexpr std::uint32_t kMostWrongJoins = 3;
+  static constexpr std::uint64_t kSettledFrames = 30;
+
   /// `port` and `listener` must outlive the core; `listener` may be null.
   ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener = nullptr);
   ~ClientCore() = default;
@@ -172,6 +177,7 @@ class ClientCore {
                                                                 Now now);
   [[nodiscard]] Result<std::unique_ptr<Follower>> follow(const transport::SessionMessage& session,
                                                          Now now) const;
+  void leave_unplayable(Now now);
   void tell_stream();
   void consider_streams(Now now);
   void change_stream(Now now);

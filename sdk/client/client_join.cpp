@@ -32,7 +32,8 @@ void ClientCore::begin(Now now) {
   if (!snapshot) return;
   follow_uncorrected();
   if (pictures_.wanted()) e.pictures.on_loaded(e.played->timeline(), e.pacer, now.steady_ns);
-  e.has_played = true;
+  e.has_loaded = true;
+  e.frames_since_join = 0;
   e.frame_cost_ns = 0;
   ack_due_ = true;
   statistics_.join_ns = now.steady_ns - e.join_began_ns;
@@ -62,6 +63,7 @@ void ClientCore::on_loss(const Follower::Loss& loss, Now now) {
   if (e.played->joining()) return;
   ++statistics_.resyncs;
   ++statistics_.resyncs_by_reason[static_cast<std::size_t>(loss.reason)];
+  if (loss.reason == ResyncReason::kMismatch && e.frames_since_join < kSettledFrames) ++e.wrong_joins;
   const bool lost_on_the_way = loss.reason == ResyncReason::kGap || loss.reason == ResyncReason::kLostPart ||
                                loss.reason == ResyncReason::kMissingInput;
   if (lost_on_the_way) chooser_->on_loss(now.steady_ns);

@@ -121,6 +121,7 @@ void ClientCore::on_applied(const CompleteDelta& delta, std::int64_t cost_ns, No
   if (e.uncorrected) e.uncorrected->on_applied(timeline);
   e.pictures.on_applied(timeline, e.pacer, now.steady_ns);
   ++statistics_.frames_applied;
+  if (++e.frames_since_join == kSettledFrames) e.wrong_joins = 0;
   statistics_.payload_bytes += delta.payload.size();
   statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta.server_time_ns));
   if (options_.measure_ns != nullptr) {

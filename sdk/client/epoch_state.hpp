@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "sdk/client/drawing/local_echo.hpp"
 #include "sdk/client/drawing/picture_writer.hpp"
@@ -40,7 +41,12 @@ struct EpochState {
   LocalEcho echo;
   std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while that is wanted
 
-  bool has_played = false;         ///< it has played in this epoch
+  /// Joins in a row after which the state soon differed from the server's.
+  std::uint32_t wrong_joins = 0;
+  std::uint64_t frames_since_join = 0;
+  std::vector<StreamId> unplayable;  ///< streams that this client computes otherwise than the server
+
+  bool has_loaded = false;         ///< `played` holds a state that can be drawn
   std::int64_t silence_ns = 0;     ///< time since anything came from the server, counted only while polled
   std::int64_t join_began_ns = 0;  ///< when the session was found, or when a loss began a rejoin
   std::int64_t frame_cost_ns = 0;  ///< simulation time since the last applied delta

@@ -23,8 +23,6 @@ class Admission {
   /// names can be made to point anywhere.
   [[nodiscard]] bool origin_fits(std::string_view origin, std::string_view host) const;
 
-  [[nodiscard]] bool asks_for_token() const { return !token_.empty(); }
-
  private:
   std::string token_;
   std::vector<std::string> origins_;

@@ -175,6 +175,7 @@ struct Host::Impl {
   InputDesk inputs;
   Audience audience;
   std::deque<Lane> lanes;
+  std::size_t first_to_send = 0;
   ReplyDesk replies;
   Claim claim;
   Pacing pacing;
@@ -215,7 +216,10 @@ bool Host::Impl::poll() {
     const StreamSet due = snapshots_due();
     produced = advance_if_due(due);
     if (due.any() && (produced || now_ns >= frame_awaited_until_ns())) make_snapshots(due);
-    for (Lane& lane : lanes) lane.transfer.send(roster.accounts(), now_ns);
+    // Streams take turns as well, as one alone may fill the outbox.
+    first_to_send = (first_to_send + 1) % lanes.size();
+    for (std::size_t i = 0; i < lanes.size(); ++i)
+      lanes[(first_to_send + i) % lanes.size()].transfer.send(roster.accounts(), now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
   }

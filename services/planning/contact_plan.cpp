@@ -30,6 +30,11 @@ ContactMaterial material_of(const Scenery::Law& law, double mass, double dt_s, d
           rounded(8192.0 * law.shear * share)};
 }
 
+bool is_above_0(double value) { return std::isfinite(value) && value > 0; }
+bool is_law(const Scenery::Law& law) {
+  return std::isfinite(law.spring) && law.spring >= 0 && std::isfinite(law.damping) && law.damping >= 0 &&
+         std::isfinite(law.shear) && law.shear >= 0;
+}
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 bool is_unit(const Vec3& v) {
   return std::fabs(dot(v, v) - 1) < 1e-3;
@@ -44,13 +49,22 @@ bool is_orthonormal(const std::array<Vec3, 3>& axes) {
 // Returns what is wrong; empty if nothing is.
 std::string fault(const World& world) {
   if (!world.scenery || world.types.empty()) return "needs a world with body types and scenery";
-  if (!std::ranges::all_of(world.types, [](const BodyType& type) { return type.mass > 0; }))
+  if (!std::ranges::all_of(world.types, [](const BodyType& type) { return is_above_0(type.mass); }))
     return "needs body types with a mass above 0";
+  if (!std::ranges::all_of(world.types, [](const BodyType& type) { return is_above_0(type.contact_radius); }))
+    return "needs body types with a contact radius above 0";
   const Scenery& scenery = *world.scenery;
+  if (!is_law(scenery.between_bodies) || !is_law(scenery.with_scenery))
+    return "a law's spring, damping and shear are finite and not negative";
   if (!std::ranges::all_of(scenery.planes, [](const auto& plane) { return is_unit(plane.normal); }))
     return "a plane's normal has length 1";
   if (!std::ranges::all_of(scenery.boxes, [](const auto& box) { return is_orthonormal(box.axes); }))
     return "a box's axes are orthonormal";
+  if (!std::ranges::all_of(scenery.boxes,
+                           [](const auto& box) { return std::ranges::all_of(box.half, is_above_0); }))
+    return "a box's half sizes are above 0";
+  if (!std::ranges::all_of(scenery.balls, [](const auto& ball) { return is_above_0(ball.radius); }))
+    return "a ball's radius is above 0";
   return {};
 }
 
@@ -83,7 +97,10 @@ Result<std::vector<std::int32_t>> contact_constants(const World& world, const ho
   for (const auto& ball : scenery.balls)
     constants.balls.push_back({scaled(ball.centre, scale), rounded(ball.radius * scale)});
   std::vector<std::int32_t> values = write_contact_constants(constants);
-  if (!read_contact_constants(values)) return wrong("the world does not fit the lattice");
+  if (!read_contact_constants(values)) {
+    return fail(ErrorCode::kCapacity,
+                fmt::format("predictor '{}': the world does not fit the lattice", predictor));
+  }
   return values;
 }
 

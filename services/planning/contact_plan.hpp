@@ -11,8 +11,9 @@
 
 namespace tandem::planning {
 
-/// Returns the integers that travel in the session. Errors name `predictor`: kInvalidArgument for a world
-/// without scenery or body types, with invalid geometry in its scenery, or one that does not fit the lattice.
+/// The integers that travel in the session. `predictor` is named in errors: kInvalidArgument for a world
+/// without scenery or body types, or with scenery that is no geometry; kCapacity for one that does not fit
+/// the lattice.
 [[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const World& world,
                                                                   const host::Lattice& lattice,
                                                                   std::string_view predictor);

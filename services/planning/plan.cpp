@@ -12,7 +12,6 @@
 #include "services/host/streams/block_threads.hpp"
 #include "services/host/streams/groups.hpp"
 #include "services/planning/contact_plan.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::planning {
 namespace {
@@ -84,8 +83,12 @@ Result<void> choose_predictor(const World& world, const Wishes& wishes, const Co
     if (!predictor) return tl::unexpected(predictor.error());
     return set_predictor(world, **predictor, stream);
   }
-  for (const PredictorTraits& predictor : predictors())
-    if (suits(predictor, world, traits) && set_predictor(world, predictor, stream)) return {};
+  for (const PredictorTraits& predictor : predictors()) {
+    if (!suits(predictor, world, traits)) continue;
+    // One that the lattice is too fine for is passed over, but not one that was described wrongly.
+    auto set = set_predictor(world, predictor, stream);
+    if (set || set.error().code != ErrorCode::kCapacity) return set;
+  }
   return set_predictor(world, basic_predictor(), stream);
 }
 
@@ -151,6 +154,8 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
   std::vector<Wished> all;
   if (wishes.streams.empty()) all.push_back({{}, wishes});
   for (const StreamWishes& stream : wishes.streams) {
+    if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "each stream needs a name");
+    if (auto good = check_stream(wishes, stream); !good) return of_stream(stream.name, good.error());
     auto of = wishes_of(wishes, stream);
     if (!of) return of_stream(stream.name, of.error());
     all.push_back({stream.name, std::move(*of)});
@@ -210,20 +215,29 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
 
 namespace {
 
-Result<void> check_service(const Wishes& wishes, const ServiceWishes& service) {
-  if (wishes.threads < 1 || wishes.threads > kMaxThreads)
-    return fail(ErrorCode::kInvalidArgument, fmt::format("threads: 1 to {}", kMaxThreads));
-  if (wishes.max_error_m && !(*wishes.max_error_m >= kLeastLength && *wishes.max_error_m <= kMostLength))
-    return fail(ErrorCode::kInvalidArgument, "the largest error must be a length from 1e-9 to 1e9");
+Result<void> check_service(const ServiceWishes& service) {
+  const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
+  const std::uint32_t most_ahead = host::ServiceConfig().window_ceiling;
+  if (service.lead > 1) return wrong("lead: 0 or 1");
+  if (service.client_limit < 1 || service.client_limit > kMostClients)
+    return wrong(fmt::format("client-limit: 1 to {}", kMostClients));
+  if (service.window && (*service.window < 1 || *service.window > most_ahead))
+    return wrong(fmt::format("window: 1 to {} frames, or auto", most_ahead));
+  if (service.rate_hz && !(*service.rate_hz >= 1 && *service.rate_hz <= 1000))
+    return wrong("rate: 1 to 1000 Hz, or max");
   if (service.stall_timeout_s && !(*service.stall_timeout_s >= 0.01 && *service.stall_timeout_s <= 10))
-    return fail(ErrorCode::kInvalidArgument, "stall timeout: 0.01 to 10 seconds, or none");
+    return wrong("stall-timeout: 0.01 to 10 seconds, or off");
   return {};
 }
 
 }  // namespace
 
 Result<host::HostConfig> plan_server(const World& world, Wishes wishes, const ServiceWishes& service) {
-  if (auto good = check_service(wishes, service); !good) return tl::unexpected(good.error());
+  if (auto good = check_wishes(wishes); !good) return tl::unexpected(good.error());
+  if (auto good = check_service(service); !good) return tl::unexpected(good.error());
+  if (wishes.predictor != kAutomaticPredictor) {
+    if (auto known = find_predictor(wishes.predictor); !known) return tl::unexpected(known.error());
+  }
   if (wishes.streams.empty()) {
     auto usual = usual_streams(world, wishes);
     if (!usual) return tl::unexpected(usual.error());

@@ -6,6 +6,7 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "services/planning/number.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::planning {
 namespace {
@@ -107,10 +108,38 @@ Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream) {
   return wishes;
 }
 
-Result<void> check_stream(const Wishes& common, const StreamWishes& stream) {
-  const auto wrong = [&stream](const std::string& what) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("{}: {}", stream.name, what));
+Result<void> check_wishes(const Wishes& wishes) {
+  const auto wrong = [](std::string_view key, std::string_view what) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("{}: {}", key, what));
   };
+  const auto is_length = [](double metres) { return metres >= kLeastLength && metres <= kMostLength; };
+  const CodecTraits traits = traits_of(wishes.codec);
+  if (wishes.threshold_m && !is_length(*wishes.threshold_m)) return wrong("threshold", kLength);
+  if (!(wishes.threshold_scale >= 1e-6 && wishes.threshold_scale <= 1e6))
+    return wrong("threshold-scale", "a positive factor");
+  if (wishes.automatic && !traits.reads_threshold) {
+    return wrong("threshold",
+                 fmt::format("auto chooses nothing with codec {}, which has no threshold", wishes.codec));
+  }
+  if (wishes.automatic && wishes.threshold_m) return wrong("threshold", "a length or auto, not both");
+  const bool steered = wishes.target_mbit_per_s != 0;
+  if (!wishes.automatic && steered) return wrong("target-bandwidth", "needs --threshold auto");
+  if (!wishes.automatic && wishes.max_error_m)
+    return wrong("max-error", "needs an automatic threshold: a target, or auto");
+  if (steered && !(wishes.target_mbit_per_s >= 0.001 && wishes.target_mbit_per_s <= 1e6))
+    return wrong("target-bandwidth", "Mbit/s, at least 0.001");
+  if (wishes.max_error_m && !is_length(*wishes.max_error_m)) return wrong("max-error", kLength);
+  if (wishes.budget_bytes && !traits.takes_budget)
+    return wrong("budget", "only with codec limited or tracker");
+  if (wishes.budget_bytes && *wishes.budget_bytes < kLeastBudgetBytes)
+    return wrong("budget", fmt::format("at least {} bytes", kLeastBudgetBytes));
+  if (wishes.threads < 1 || wishes.threads > kMaxThreads)
+    return wrong("threads", fmt::format("1 to {}", kMaxThreads));
+  return {};
+}
+
+Result<void> check_stream(const Wishes& common, const StreamWishes& stream) {
+  const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
   const auto wishes = wishes_of(common, stream);
   if (!wishes) return wrong(wishes.error().message);
   for (const auto& [key, value] : stream.settings) {
@@ -118,13 +147,15 @@ Result<void> check_stream(const Wishes& common, const StreamWishes& stream) {
     if (!in_range(*option, value)) return wrong(fmt::format("a {} is {}", key, option->takes));
   }
   const CodecTraits traits = traits_of(wishes->codec);
-  const bool steered = says(stream, "target-bandwidth");
-  if (says(stream, "threshold") && (steered || says(stream, "max-error")))
-    return wrong("either a threshold, or one that is chosen at run time by target-bandwidth and max-error");
-  if (steered && !traits.reads_threshold)
-    return wrong(fmt::format("codec {} has no threshold to reach a target-bandwidth with", wishes->codec));
-  if (says(stream, "max-error") && !wishes->automatic)
-    return wrong("max-error needs target-bandwidth, or an automatic threshold");
+  for (const StreamOption& option : kStreamOptions) {
+    if (!option.steers || !says(stream, option.key)) continue;
+    if (says(stream, "threshold"))
+      return wrong(fmt::format("either a threshold, or one that is chosen at run time by {}", option.key));
+    if (!traits.reads_threshold)
+      return wrong(fmt::format("codec {} has no threshold that {} could choose", wishes->codec, option.key));
+    if (!wishes->automatic)
+      return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
+  }
   if (says(stream, "budget") && !traits.takes_budget) return wrong("a budget needs codec limited or tracker");
   return {};
 }

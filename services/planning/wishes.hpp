@@ -21,6 +21,7 @@ inline constexpr std::string_view kAutomaticPredictor = "auto";
 /// With a smaller budget a frame has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
+inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
 
 /// The settings of one of several streams; the others come from Wishes.
 struct StreamWishes {
@@ -53,9 +54,10 @@ struct StreamOption {
   std::variant<std::string Wishes::*, double Wishes::*, std::optional<double> Wishes::*,
                std::optional<std::size_t> Wishes::*>
       field;
-  double least = 0, most = 0;          ///< minimum and maximum of a number
-  std::string_view takes = {};         ///< what errors say about the permitted values
-  std::optional<bool> automatic = {};  ///< the value that it gives Wishes::automatic
+  double least = 0, most = 0;          ///< of a number
+  std::string_view takes = {};         ///< in errors: what it is
+  std::optional<bool> automatic = {};  ///< what it makes of Wishes::automatic
+  bool steers = false;                 ///< goes with an automatic threshold alone
 };
 
 /// A new option needs a field above and in idl/server.proto, a line here, and its use in plan.cpp.
@@ -67,7 +69,7 @@ inline constexpr std::array kStreamOptions{
                  .field = &Wishes::threshold_m,
                  .least = kLeastLength,
                  .most = kMostLength,
-                 .takes = "a length from 1e-9 to 1e9 metres",
+                 .takes = kLength,
                  .automatic = false},
     StreamOption{.key = "target-bandwidth",
                  .file_field = "target_bandwidth",
@@ -75,13 +77,15 @@ inline constexpr std::array kStreamOptions{
                  .least = 0.001,
                  .most = 1e6,
                  .takes = "a rate in Mbit/s, at least 0.001",
-                 .automatic = true},
+                 .automatic = true,
+                 .steers = true},
     StreamOption{.key = "max-error",
                  .file_field = "max_error",
                  .field = &Wishes::max_error_m,
                  .least = kLeastLength,
                  .most = kMostLength,
-                 .takes = "a length from 1e-9 to 1e9 metres"},
+                 .takes = kLength,
+                 .steers = true},
     StreamOption{.key = "budget",
                  .file_field = "budget_bytes",
                  .field = &Wishes::budget_bytes,
@@ -98,11 +102,17 @@ inline constexpr std::array kStreamOptions{
 /// that cannot be read.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
-/// Checks a stream's own settings, and that they do not conflict with the common wishes. Errors:
+/// Checks what is said for all streams. Errors: kInvalidArgument, which begins with the option's key and a
+/// colon.
+[[nodiscard]] Result<void> check_wishes(const Wishes& wishes);
+
+/// Checks what a stream says for itself, and that it goes with what is said for all. Errors:
 /// kInvalidArgument.
 [[nodiscard]] Result<void> check_stream(const Wishes& common, const StreamWishes& stream);
 
-/// How a session is served, independent of its streams.
+inline constexpr std::uint32_t kMostClients = 65'536;
+
+/// How the session is served, whatever its streams.
 struct ServiceWishes {
   std::string session = "default";
   std::uint32_t lead = 1;  ///< frames that clients may simulate beyond the last delta, 0 or 1

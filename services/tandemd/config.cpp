@@ -14,7 +14,6 @@
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
 #include "services/planning/number.hpp"
-#include "services/workers/workers.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::daemon {
@@ -22,8 +21,6 @@ namespace {
 
 using idl::ServerConfig;
 using planning::number;
-
-constexpr std::uint32_t kMostClients = 65536;
 
 // Keeps the first error as one line; protobuf counts lines and columns from 0.
 class FirstError final : public google::protobuf::io::ErrorCollector {
@@ -49,8 +46,6 @@ CodecTraits traits_of(const std::string& codec) {
   return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
 }
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
-constexpr const char* kLength = "a length from 1e-9 to 1e9 metres";
-bool is_length(double metres) { return within(metres, planning::kLeastLength, planning::kMostLength); }
 
 /// Numbers that may be words.
 Result<void> check_words(const ServerConfig& config, Options& options) {
@@ -83,10 +78,8 @@ Result<void> check_numbers(const Options& options) {
   if (options.lead > 1) return refuse("lead", "0 or 1");
   if (options.domain > transport::kMaxDomain)
     return refuse("domain", fmt::format("0 to {}", transport::kMaxDomain));
-  if (options.client_limit < 1 || options.client_limit > kMostClients)
-    return refuse("client-limit", fmt::format("1 to {}", kMostClients));
-  if (options.choice.threads < 1 || options.choice.threads > kMaxThreads)
-    return refuse("threads", fmt::format("1 to {}", kMaxThreads));
+  if (options.client_limit < 1 || options.client_limit > planning::kMostClients)
+    return refuse("client-limit", fmt::format("1 to {}", planning::kMostClients));
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
     return refuse("duration", "seconds, not negative");
   return {};
@@ -94,27 +87,13 @@ Result<void> check_numbers(const Options& options) {
 
 /// Threshold, automatic quality and budget: which of them go together.
 Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
-  const CodecTraits traits = traits_of(choice.codec);
-  if (choice.threshold_m && !is_length(*choice.threshold_m)) return refuse("threshold", kLength);
-  if (!within(choice.threshold_scale, 1e-6, 1e6)) return refuse("threshold-scale", "a positive factor");
   if (choice.threshold_m && config.has_threshold_scale())
     return refuse("threshold-scale", "not together with --threshold");
-  if (choice.automatic && !traits.reads_threshold) {
-    return refuse("threshold",
-                  fmt::format("auto chooses nothing with codec {}, which has no threshold", choice.codec));
-  }
-  if (choice.automatic && choice.threshold_m) return refuse("threshold", "a length or auto, not both");
-  if (!choice.automatic && config.has_target_bandwidth())
-    return refuse("target-bandwidth", "needs --threshold auto");
-  if (!choice.automatic && choice.max_error_m) return refuse("max-error", "needs --threshold auto");
-  if (config.has_target_bandwidth() && !within(choice.target_mbit_per_s, 0.001, 1e6))
+  if (config.has_target_bandwidth() && choice.target_mbit_per_s == 0)
     return refuse("target-bandwidth", "Mbit/s, at least 0.001");
-  if (choice.max_error_m && !is_length(*choice.max_error_m)) return refuse("max-error", kLength);
-  if (choice.budget_bytes && !traits.takes_budget)
-    return refuse("budget", "only with --codec limited or tracker");
-  if (choice.budget_bytes && *choice.budget_bytes < planning::kLeastBudgetBytes)
-    return refuse("budget", fmt::format("at least {} bytes", planning::kLeastBudgetBytes));
-  return {};
+  return planning::check_wishes(choice).map_error([](const Error& error) {
+    return Error{error.code, "--" + error.message};
+  });
 }
 
 const google::protobuf::FieldDescriptor* field_of(const planning::StreamOption& option) {
@@ -172,7 +151,7 @@ Result<void> check_streams(const ServerConfig& config, const sessions::SessionCh
                                              config.predictor(), stream.name(), stream.predictor()));
     }
     if (auto good = planning::check_stream(choice, wishes_of(stream)); !good)
-      return refuse("stream", good.error().message);
+      return refuse("stream", fmt::format("{}: {}", stream.name(), good.error().message));
     names.emplace_back();
     names.back().name = stream.name();
   }

@@ -11,9 +11,32 @@
 
 namespace tandem::api {
 
-/// The size of a struct when it was first released; smaller sizes were never valid.
+/// What a struct had when it was first released: up to the end of its last member then. Smaller ones were
+/// never valid; members that are added later do not change it.
 template <class T>
-inline constexpr std::uint32_t kFirstSize = sizeof(T);
+inline constexpr std::size_t kFirstSize = 0;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_options> = offsetof(tandem_options, prefer) + sizeof(char*);
+template <>
+inline constexpr std::size_t kFirstSize<tandem_status> = offsetof(tandem_status, stream_changes) + 8;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_sample_options> = offsetof(tandem_sample_options,
+                                                                          smoothing_s) +
+                                                                 8;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_columns> = offsetof(tandem_columns, change_stride) + 4;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_frame> = offsetof(tandem_frame, phase) + 4;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_event> = offsetof(tandem_event, text) + 256;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_scene> = offsetof(tandem_scene, name) + 72;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_solid> = offsetof(tandem_solid, radius) + 4;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_body_type> = offsetof(tandem_body_type, name) + 72;
+template <>
+inline constexpr std::size_t kFirstSize<tandem_session_info> = offsetof(tandem_session_info, predictor) + 72;
 
 /// No struct will ever be larger; a larger size is garbage.
 inline constexpr std::uint32_t kLargestStruct = 4096;
@@ -28,6 +51,7 @@ inline constexpr std::uint32_t kLargestStruct = 4096;
 template <class T>
 [[nodiscard]] tandem_result check_struct(const T* theirs) {
   if (theirs == nullptr) return refuse(TANDEM_INVALID_ARGUMENT, "a pointer to a struct is null");
+  static_assert(kFirstSize<T> > 0, "say above what it had when it was first released");
   const std::uint32_t size = size_of(theirs);
   if (size < kFirstSize<T> || size > kLargestStruct) {
     return refuse(TANDEM_INVALID_ARGUMENT, "a struct's size is not set: begin with its ..._INIT");

@@ -126,7 +126,10 @@ Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_n
   const Outcome outcome = deltas_.add(std::move(part));
   // If nothing was buffered, deltas may come that the snapshot already contains.
   if (!joining_) deltas_.drop_through(timeline_.applied());
-  if (outcome == Outcome::kStored) return {.done = last_part};
+  if (outcome == Outcome::kStored) {
+    if (!joining_) heard_ns_ = now_ns;
+    return {.done = last_part};
+  }
   if (outcome == Outcome::kIgnored) return {};
   // A joining client restarts its buffer. After a gap the requested snapshot may still fit the deltas that
   // follow.

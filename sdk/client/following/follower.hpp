@@ -112,7 +112,7 @@ class Follower {
   [[nodiscard]] bool is_open() const { return is_open_; }
   [[nodiscard]] bool joining() const { return joining_; }  ///< false: it plays
   [[nodiscard]] bool misses_input() const { return input_missing_ns_.has_value(); }
-  /// When a part of the snapshot came last, or the join began.
+  /// A part of the snapshot or, once it is loaded, a delta came, or the join began.
   [[nodiscard]] std::int64_t heard_ns() const { return heard_ns_; }
   /// Restarts heard_ns(): until now nothing could be heard.
   void excuse_silence(std::int64_t now_ns) { heard_ns_ = now_ns; }

@@ -29,8 +29,8 @@ class StreamChange {
   /// Moves to() out, which ends the change.
   [[nodiscard]] std::unique_ptr<Follower> take() { return std::move(to_); }
 
-  /// While to() joins and has no snapshot loaded: true if the change is to be given up. `last_applied_ns`:
-  /// when the stream that is played applied its last frame.
+  /// True when it is to be given up: nothing of its snapshot or its deltas has come for so long.
+  /// `last_applied_ns`: when the stream that is played had its last frame.
   [[nodiscard]] bool gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_ns);
   /// When to() plays: applies its frames up to that of the stream that is played. Done: to() can replace that
   /// stream.

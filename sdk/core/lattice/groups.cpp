@@ -32,6 +32,18 @@ constexpr void for_each_vector(unsigned groups, const Visit& visit, Bodies&... b
   }
 }
 
+// A group without a vector would travel in no record.
+static_assert([] {
+  BodyState body;
+  for (const ChannelGroup& each : kChannelGroups) {
+    bool has_vectors = false;
+    for_each_vector(
+        each.bit, [&has_vectors](const auto&) { has_vectors = true; }, body);
+    if (!has_vectors) return false;
+  }
+  return true;
+}());
+
 bool within(const Vec3i& values, std::int32_t limit) {
   return std::all_of(values.begin(), values.end(),
                      [limit](std::int32_t x) { return -limit <= x && x <= limit; });

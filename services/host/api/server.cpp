@@ -51,7 +51,7 @@ Result<planning::Wishes> wishes_of(const ServerOptions& options) {
   planning::Wishes wishes;
   wishes.codec = options.codec;
   wishes.predictor = options.predictor;
-  wishes.automatic = options.target_mbit_per_s != 0;  // a value that is not a number is refused with the goal
+  wishes.automatic = options.automatic_threshold || options.target_mbit_per_s != 0;
   wishes.target_mbit_per_s = options.target_mbit_per_s;
   if (options.max_error != 0) wishes.max_error_m = options.max_error;
   if (options.budget_bytes != 0) wishes.budget_bytes = options.budget_bytes;
@@ -59,7 +59,6 @@ Result<planning::Wishes> wishes_of(const ServerOptions& options) {
   for (const std::string& text : options.streams) {
     auto stream = planning::read_stream(text);
     if (!stream) return tl::unexpected(stream.error());
-    if (auto good = planning::check_stream(wishes, *stream); !good) return tl::unexpected(good.error());
     wishes.streams.push_back(std::move(*stream));
   }
   return wishes;

@@ -107,9 +107,9 @@ void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
       bytes += entry.sent.bytes;
     }
     // A part that was sent twice counts as arrived by the last copy for which there was time, if DDS has
-    // given up the first.
-    const bool by_copy =
-        is_new[entry.part] && given_up(flying_.front()) && now_ns - entry.sent.at_ns >= window_.least_ns();
+    // given up all that left before that copy.
+    const bool by_copy = !is_first && is_new[entry.part] && given_up(flying_[i - 1]) &&
+                         now_ns - entry.sent.at_ns >= window_.least_ns();
     if (is_first || by_copy) settled = i + 1;
   }
   std::erase_if(again_, [this, &held](std::size_t part) {  // the part was on its way after all
@@ -218,9 +218,10 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
   while (satisfied < passages_.size()) {
     if (next == passages_.end()) next = passages_.begin();
     const std::uint64_t before = bytes_;
-    if (!serve(next->first, next->second, now_ns)) return;
+    const bool goes_on = serve(next->first, next->second, now_ns);
+    if (bytes_ != before) last_served_ = next->first;
+    if (!goes_on) return;
     satisfied = bytes_ == before ? satisfied + 1 : 0;
-    last_served_ = next->first;
     ++next;
   }
   for (const auto& [client, passage] : passages_) next_ns_ = std::min(next_ns_, passage.next_ns());

@@ -143,6 +143,7 @@ Reason LiveSource::accept(const engine::Input& input, const InputOrigin& origin,
       acts_on = next_frame();
       return Reason::kNone;
     case engine::Classification::Effect::kRefused:
+      note_refusal(origin, effect.reason);
       break;
   }
   return Reason::kInvalid;
@@ -183,8 +184,11 @@ Result<Frame> LiveSource::inject(const engine::Input& input, Outbox& outbox) {
   switch (accept(input, {}, outbox, acts_on)) {
     case Reason::kNone:
       return acts_on;
-    case Reason::kInvalid:
-      return fail(ErrorCode::kInvalidArgument, "the simulation refuses this input");
+    case Reason::kInvalid: {
+      const std::string reason = simulation_->classify(input).reason;
+      return fail(ErrorCode::kInvalidArgument,
+                  "the simulation refuses this input" + (reason.empty() ? reason : ": " + reason));
+    }
     default:
       return fail(ErrorCode::kCapacity, "too many inputs at once");
   }
@@ -195,8 +199,14 @@ Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters
   return lanes_[id].stream->set_parameters(parameters);
 }
 
+void LiveSource::note_refusal(const InputOrigin& origin, const std::string& reason) {
+  if (refusals_.size() >= kMostRefusals || origin.client == 0) return;
+  refusals_.push_back(fmt::format("the simulation refuses input {} of client {:016x}: {}", origin.number,
+                                  origin.client, reason));
+}
+
 std::vector<std::string> LiveSource::take_notices(std::int64_t now_ns) {
-  std::vector<std::string> lines;
+  std::vector<std::string> lines = std::exchange(refusals_, {});
   note_mishaps(now_ns, lines);
   for (Lane& lane : lanes_)
     if (lane.stream) note_target(lane, lines);

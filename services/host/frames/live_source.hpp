@@ -66,6 +66,7 @@ class LiveSource final : public FrameSource {
   /// Hands the simulation all inputs that act on frame s, the one that is about to be stepped.
   void apply(Frame s);
   void make_deltas();
+  void note_refusal(const InputOrigin& origin, const std::string& reason);
   void note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
   [[nodiscard]] Frame next_frame() const { return frame_ + 1; }
@@ -86,7 +87,9 @@ class LiveSource final : public FrameSource {
   std::vector<Waiting> scheduled_;        // in the order of their numbers and so ascending by frame
   std::vector<engine::Input> immediate_;  // in the order of arrival
   Frame scheduling_frame_ = 0;
-  std::uint32_t scheduled_now_ = 0;  // inputs for scheduling_frame_
+  std::uint32_t scheduled_now_ = 0;                // for scheduling_frame_
+  static constexpr std::size_t kMostRefusals = 4;  // told of a frame
+  std::vector<std::string> refusals_;              // not told yet
   std::int64_t noted_mishaps_ns_ = -kSecond;
   engine::Mishaps noted_mishaps_;
   std::optional<Error> error_;

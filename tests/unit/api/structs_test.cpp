@@ -51,7 +51,7 @@ struct Grown {
 }  // namespace
 
 template <>
-inline constexpr std::uint32_t kFirstSize<Grown> = 8;
+inline constexpr std::size_t kFirstSize<Grown> = 8;
 
 namespace {
 

@@ -17,6 +17,10 @@ class HostileTest : public ClientTest {
     ASSERT_EQ(core->timeline()->applied(), server.frame());
     EXPECT_EQ(core->timeline()->hash(), server.hashes.at(server.frame()));
   }
+  /// So many frames that what went wrong before does not count any more.
+  void settle() {
+    for (std::uint64_t i = 0; i < ClientCore::kSettledFrames; ++i) frame();
+  }
   void expect_no_wrong_frame() const {
     for (const auto& [frame, hash] : recorder.hashes)
       EXPECT_EQ(hash, server.hashes.at(frame)) << "frame " << frame;
@@ -48,6 +52,37 @@ TEST_F(HostileTest, AWrongHashIsAMismatchAndTheClientJoinsAgain) {
   expect_no_wrong_frame();
 }
 
+TEST_F(HostileTest, AStreamThatComesOutOtherwiseAfterEachSnapshotIsLeft) {
+  join();
+  for (std::uint32_t wrong = 0; wrong < ClientCore::kMostWrongJoins; ++wrong) {
+    ASSERT_NE(core->phase(), ClientPhase::kRefused) << wrong;
+    if (wrong > 0) recover();
+    auto delta = server.advance();
+    delta.hash ^= 1;
+    deliver(delta);
+    poll();
+  }
+  poll(kFrameNs);
+  EXPECT_EQ(core->phase(), ClientPhase::kRefused);
+  EXPECT_NE(core->status().reason.find("otherwise than the server"), std::string::npos);
+  const auto attempts = core->join_attempt();
+  for (int i = 0; i < 300; ++i) frame();
+  EXPECT_EQ(core->join_attempt(), attempts) << "it does not ask for snapshots for ever";
+}
+
+TEST_F(HostileTest, AMismatchNowAndThenIsNoReasonToLeave) {
+  join();
+  for (std::uint32_t wrong = 0; wrong < 2 * ClientCore::kMostWrongJoins; ++wrong) {
+    settle();
+    auto delta = server.advance();
+    delta.hash ^= 1;
+    deliver(delta);
+    poll();
+    recover();
+  }
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+}
+
 TEST_F(HostileTest, AnyMutatedDeltaIsCaughtBeforeItCounts) {
   constexpr std::uint64_t kSeed = 20'240'601;
   RecordProperty("seed", std::to_string(kSeed));
@@ -72,6 +107,7 @@ TEST_F(HostileTest, AnyMutatedDeltaIsCaughtBeforeItCounts) {
     if (changed) {
       ASSERT_EQ(core->phase(), ClientPhase::kJoining) << "mutation " << i;
       recover();
+      settle();
     }
   }
   expect_no_wrong_frame();
@@ -101,6 +137,7 @@ TEST_F(HostileTest, AnyMutatedSnapshotIsRefusedOrFoundOutByTheNextDeltas) {
     port.snapshots.push_back(from_server(snapshot));
     for (int k = 0; k < 3; ++k) frame();
     recover();
+    settle();
   }
   expect_no_wrong_frame();
   EXPECT_GT(figures().refused_messages, 400U);

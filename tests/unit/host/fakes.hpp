@@ -35,6 +35,7 @@ class FakeSimulation final : public engine::Simulation {
     if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kGravity) && input.values.size() == 3) {
       const bool large = std::ranges::any_of(input.values, [](double v) { return !(std::abs(v) <= 1000); });
       effect.effect = large ? Effect::kRefused : Effect::kScheduled;
+      if (large) effect.reason = "beyond 1000";
       std::copy_n(input.values.begin(), 3, effect.gravity.begin());
     } else if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kPush) &&
                input.values.size() == 7) {

@@ -1,4 +1,5 @@
 // What becomes of an input.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -207,6 +208,17 @@ TEST_F(InputTest, WhatIsNotFiniteOrOutOfRangeIsRefusedAsInvalid) {
   EXPECT_EQ(bench.refusal(1, number), Reason::kInvalid);
   EXPECT_EQ(bench.host->totals().refused_inputs, number);
   EXPECT_TRUE(bench.simulation.applied.empty());
+}
+
+TEST_F(InputTest, TheSimulationsOwnReasonForARefusalIsLoggedAndTold) {
+  static_cast<void>(bench.host->take_notices());
+  send(bench.gravity(1, 7, 1001));
+  bench.run_ms(50);
+  EXPECT_THAT(bench.host->take_notices(),
+              ::testing::Contains("the simulation refuses input 7 of client 0000000000000001: beyond 1000"));
+  const auto injected = bench.host->inject({.kind = 1, .values = {0, 0, 1001}});
+  ASSERT_FALSE(injected);
+  EXPECT_EQ(injected.error().message, "the simulation refuses this input: beyond 1000");
 }
 
 TEST_F(InputTest, UnknownKindsAndOversizedValuesAreRefusedAsInvalid) {

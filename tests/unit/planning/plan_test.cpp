@@ -71,6 +71,37 @@ TEST(Plan, SceneryThatIsNoGeometryIsRefusedWhereItIsNeeded) {
   EXPECT_NE(with([](World& w) { w.types[0].contact_radius = 0; }), "accepted");
 }
 
+TEST(Plan, SceneryThatIsNoGeometryIsNotPassedOverInSilence) {
+  World world = balls_in_a_box();
+  world.scenery->planes[0].normal = {0, 2, 0};
+  EXPECT_NE(refusal(world).find("a plane's normal has length 1"), std::string::npos) << refusal(world);
+  world.scenery->planes[0] = {.normal = {0, 1, 0}, .offset = -1e12};  // beyond every lattice: it flies freely
+  EXPECT_EQ(refusal(world), "accepted");
+}
+
+TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
+  const auto with = [](auto change) {
+    Wishes wishes;
+    ServiceWishes service;
+    change(wishes, service);
+    return refusal(balls_in_a_box(), wishes, service);
+  };
+  using W = Wishes;
+  using S = ServiceWishes;
+  EXPECT_EQ(with([](W& w, S&) { w.budget_bytes = 1; }), "budget: at least 64 bytes");
+  EXPECT_NE(with([](W& w, S&) { w.codec = "entropy", w.budget_bytes = 500; }), "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.codec = "none", w.automatic = true; }), "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.max_error_m = 1; }), "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.automatic = true, w.target_mbit_per_s = 1e300; }), "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.automatic = true, w.target_mbit_per_s = 1e-9; }), "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.predictor = "rubbish", w.streams = {read_stream("x:ballistic").value()}; }),
+            "accepted");
+  EXPECT_EQ(with([](W& w, S&) { w.streams = {{"", {}}}; }), "each stream needs a name");
+  EXPECT_NE(with([](W& w, S&) { w.streams = {read_stream("x:max-error=1").value()}; }), "accepted");
+  EXPECT_NE(with([](W&, S& s) { s.client_limit = 100'000; }), "accepted");
+  EXPECT_NE(with([](W&, S& s) { s.rate_hz = std::numeric_limits<double>::quiet_NaN(); }), "accepted");
+}
+
 TEST(Plan, AnApplicationsWorldIsPlannedAsTheSameScene) {
   const auto scene = scenes::load_scene("half_pipe").value();
   const World world = sessions::world_of(scene, 1000);

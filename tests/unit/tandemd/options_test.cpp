@@ -385,8 +385,8 @@ TEST(SessionPlan, StreamsShareTheLatticeOfTheFinestThreshold) {
     const auto planned = sessions::plan_session(*scene, choice);
     return planned ? std::string("accepted") : planned.error().message;
   };
-  choice.streams[1].settings.emplace_back("threshold", "1e-12");
-  EXPECT_EQ(refused().find("stream fine: threshold 1e-12 is too fine"), 0U) << refused();
+  choice.streams[1].settings.emplace_back("threshold", "1e-9");
+  EXPECT_EQ(refused().find("stream fine: threshold 1e-09 is too fine"), 0U) << refused();
   choice.streams[1].settings.back().second = length(scene->threshold_m);
   choice.streams[0].settings.back().second = "1e9";
   EXPECT_EQ(refused().find("stream coarse: threshold"), 0U) << refused();

@@ -50,7 +50,10 @@ struct ServerOptions {
   /// Payload rate that the server holds by choosing the error itself, up to `max_error`; Mbit/s (2^20 bits).
   /// 0: `threshold` alone decides.
   double target_mbit_per_s = 0;
-  double max_error = 0;           ///< used with `target_mbit_per_s`; scene units; 0: four thresholds
+  /// Threshold and quantisation steps follow the bodies at run time, from a quarter of `threshold` up to
+  /// `max_error`; a target implies it.
+  bool automatic_threshold = false;
+  double max_error = 0;           ///< with an automatic threshold; scene units; 0: four thresholds
   std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
   /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
   /// field (bodies also meet each other and the scenery), or auto. auto publishes two streams if the codec is
