@@ -164,11 +164,12 @@ class Adversary {
     std::uint32_t node = 1;
     for (unsigned i = 0; i < 5; ++i) node = 2 * node + (unlikely(models_.length[node]) ? 1U : 0U);
     const std::uint32_t bits = std::min(node - 31, most_bits_);
+    const std::size_t models = std::min<std::size_t>(bits, models_.sign.size() - 1);  // longer ones have none
     std::uint64_t value = 1;
     for (std::uint32_t left = bits - 1; left > 0; --left)
-      value = 2 * value + (value < 4 && unlikely(models_.next[bits][value]) ? 1U : 0U);
-    return unlikely(models_.sign[bits]) ? -static_cast<std::int64_t>(value)
-                                        : static_cast<std::int64_t>(value);
+      value = 2 * value + (value < 4 && unlikely(models_.next[models][value]) ? 1U : 0U);
+    return unlikely(models_.sign[models]) ? -static_cast<std::int64_t>(value)
+                                          : static_cast<std::int64_t>(value);
   }
 
   std::uint32_t most_bits_;
