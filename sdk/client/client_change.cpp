@@ -9,7 +9,7 @@ namespace tandem::client {
 
 namespace {
 constexpr std::string_view kUnplayable =
-    "this client computes the stream otherwise than the server: the state soon differed after each of 3 snapshots";
+    "this client computes the stream otherwise than the server: the state soon differed after each of several snapshots";
 }  // namespace
 
 Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::SessionMessage& session,
@@ -47,7 +47,6 @@ void ClientCore::prefer(std::string_view preference) {
 void ClientCore::leave_unplayable(Now now) {
   EpochState& e = *epoch_;
   if (e.wrong_joins < kMostWrongJoins) return;
-  e.wrong_joins = 0;
   e.unplayable.push_back(e.played->stream().id);
   auto other = choose_stream(e.session, now);
   if (!other) {
@@ -109,6 +108,7 @@ void ClientCore::join_instead(std::unique_ptr<Follower> other, Now now) {
   e.played->close(port_);
   e.played = std::move(other);
   e.has_loaded = false;
+  e.wrong_joins = 0;
   e.join_began_ns = now.steady_ns;
   tell_stream();
 }
@@ -136,6 +136,7 @@ void ClientCore::move_over(Now now) {
   const Frame left_at = e.played->timeline().applied();
   e.played = e.change->take();
   e.has_loaded = !e.played->joining();
+  e.wrong_joins = 0;
   e.change.reset();
   e.frame_cost_ns = 0;
   e.told_too_slow = false;

@@ -111,7 +111,8 @@ class ClientCore {
   /// Call once before the first sample(): from now on each frame is prepared for drawing.
   void start_sampling();
   /// While this is on, sample() shows the state of the moment it was switched on, or of a later snapshot,
-  /// only predicted from there: see Uncorrected. What is agreed, acknowledged and hashed does not change.
+  /// only predicted from there: see Uncorrected. The agreed state, its acknowledgements and its hash stay the
+  /// same.
   void show_uncorrected(bool on);
   /// The drift of the shown state at the last frame applied; empty while this is off or the client does not
   /// play.

@@ -41,7 +41,7 @@ struct EpochState {
   LocalEcho echo;
   std::optional<Uncorrected> uncorrected;  ///< drawn instead of the timeline, while that is wanted
 
-  /// Joins in a row after which the state soon differed from the server's.
+  /// Joins of `played` in a row after which the state soon differed from the server's.
   std::uint32_t wrong_joins = 0;
   std::uint64_t frames_since_join = 0;
   std::vector<StreamId> unplayable;  ///< streams that this client computes otherwise than the server

@@ -36,10 +36,8 @@ bool is_law(const Scenery::Law& law) {
          std::isfinite(law.shear) && law.shear >= 0;
 }
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-bool is_unit(const Vec3& v) {
-  return std::fabs(dot(v, v) - 1) < 1e-3;
-}  // false for values that are not
-   // numbers
+// False for values that are not numbers.
+bool is_unit(const Vec3& v) { return std::fabs(dot(v, v) - 1) < 1e-3; }
 bool is_orthonormal(const std::array<Vec3, 3>& axes) {
   for (std::size_t i = 0; i < 3; ++i)
     if (!is_unit(axes[i]) || !(std::fabs(dot(axes[i], axes[(i + 1) % 3])) < 1e-3)) return false;

@@ -155,7 +155,6 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
   if (wishes.streams.empty()) all.push_back({{}, wishes});
   for (const StreamWishes& stream : wishes.streams) {
     if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "each stream needs a name");
-    if (auto good = check_stream(wishes, stream); !good) return of_stream(stream.name, good.error());
     auto of = wishes_of(wishes, stream);
     if (!of) return of_stream(stream.name, of.error());
     all.push_back({stream.name, std::move(*of)});
@@ -212,25 +211,6 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
   }
   return config;
 }
-
-namespace {
-
-Result<void> check_service(const ServiceWishes& service) {
-  const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
-  const std::uint32_t most_ahead = host::ServiceConfig().window_ceiling;
-  if (service.lead > 1) return wrong("lead: 0 or 1");
-  if (service.client_limit < 1 || service.client_limit > kMostClients)
-    return wrong(fmt::format("client-limit: 1 to {}", kMostClients));
-  if (service.window && (*service.window < 1 || *service.window > most_ahead))
-    return wrong(fmt::format("window: 1 to {} frames, or auto", most_ahead));
-  if (service.rate_hz && !(*service.rate_hz >= 1 && *service.rate_hz <= 1000))
-    return wrong("rate: 1 to 1000 Hz, or max");
-  if (service.stall_timeout_s && !(*service.stall_timeout_s >= 0.01 && *service.stall_timeout_s <= 10))
-    return wrong("stall-timeout: 0.01 to 10 seconds, or off");
-  return {};
-}
-
-}  // namespace
 
 Result<host::HostConfig> plan_server(const World& world, Wishes wishes, const ServiceWishes& service) {
   if (auto good = check_wishes(wishes); !good) return tl::unexpected(good.error());

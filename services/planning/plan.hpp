@@ -26,7 +26,7 @@ namespace tandem::planning {
 /// A host's configuration with the wished streams, on the lattice of the minimum threshold among them, and
 /// with the world's frame rate, types and names. The rest keeps its defaults. Errors: as plan_stream(),
 /// naming the stream if it has a name; also kInvalidArgument for a stream that the lattice cannot hold and
-/// for what check_stream() refuses; and as host::check_stream_names().
+/// for what wishes_of() refuses; and as host::check_stream_names().
 [[nodiscard]] Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes);
 
 /// Does the same for a server: uses the default streams if none are wished, and serves them as `service`

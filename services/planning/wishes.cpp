@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "sdk/core/tables/codec_table.hpp"
+#include "services/host/frames/configuration.hpp"
 #include "services/planning/number.hpp"
 #include "services/workers/workers.hpp"
 
@@ -68,10 +68,24 @@ bool in_range(const StreamOption& option, std::string_view value) {
   return read && *read >= option.least && *read <= option.most;
 }
 
-/// An unknown codec excludes nothing here; it is refused where the session is planned.
-CodecTraits traits_of(const std::string& codec) {
-  const auto traits = codec_traits(codec);
-  return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
+// Checks what a stream says for itself against `wishes`, all that is wished for it.
+Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, const CodecTraits& traits) {
+  const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
+  for (const auto& [key, value] : stream.settings) {
+    const StreamOption* const option = find_option(key);
+    if (!in_range(*option, value)) return wrong(fmt::format("a {} is {}", key, option->takes));
+  }
+  for (const StreamOption& option : kStreamOptions) {
+    if (!option.steers || !says(stream, option.key)) continue;
+    if (says(stream, "threshold"))
+      return wrong(fmt::format("either a threshold, or one that is chosen at run time by {}", option.key));
+    if (!traits.reads_threshold)
+      return wrong(fmt::format("codec {} has no threshold that {} could choose", wishes.codec, option.key));
+    if (!wishes.automatic)
+      return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
+  }
+  if (says(stream, "budget") && !traits.takes_budget) return wrong("a budget needs codec limited or tracker");
+  return {};
 }
 
 }  // namespace
@@ -99,12 +113,19 @@ Result<StreamWishes> read_stream(const std::string& text) {
   return stream;
 }
 
+CodecTraits traits_of(const std::string& codec) {
+  const auto traits = codec_traits(codec);
+  return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
+}
+
 Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream) {
   Wishes wishes = common;
   wishes.streams.clear();
   for (const auto& [key, value] : stream.settings)
     if (auto good = set(key, value, wishes); !good) return tl::unexpected(good.error());
-  if (!traits_of(wishes.codec).reads_threshold) wishes.automatic = false;
+  const CodecTraits traits = traits_of(wishes.codec);
+  if (!traits.reads_threshold) wishes.automatic = false;
+  if (auto good = check_settings(stream, wishes, traits); !good) return tl::unexpected(good.error());
   return wishes;
 }
 
@@ -138,25 +159,18 @@ Result<void> check_wishes(const Wishes& wishes) {
   return {};
 }
 
-Result<void> check_stream(const Wishes& common, const StreamWishes& stream) {
+Result<void> check_service(const ServiceWishes& service) {
   const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
-  const auto wishes = wishes_of(common, stream);
-  if (!wishes) return wrong(wishes.error().message);
-  for (const auto& [key, value] : stream.settings) {
-    const StreamOption* const option = find_option(key);
-    if (!in_range(*option, value)) return wrong(fmt::format("a {} is {}", key, option->takes));
-  }
-  const CodecTraits traits = traits_of(wishes->codec);
-  for (const StreamOption& option : kStreamOptions) {
-    if (!option.steers || !says(stream, option.key)) continue;
-    if (says(stream, "threshold"))
-      return wrong(fmt::format("either a threshold, or one that is chosen at run time by {}", option.key));
-    if (!traits.reads_threshold)
-      return wrong(fmt::format("codec {} has no threshold that {} could choose", wishes->codec, option.key));
-    if (!wishes->automatic)
-      return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
-  }
-  if (says(stream, "budget") && !traits.takes_budget) return wrong("a budget needs codec limited or tracker");
+  const std::uint32_t most_ahead = host::ServiceConfig().window_ceiling;
+  if (service.lead > 1) return wrong("lead: 0 or 1");
+  if (service.client_limit < 1 || service.client_limit > kMostClients)
+    return wrong(fmt::format("client-limit: 1 to {}", kMostClients));
+  if (service.window && (*service.window < 1 || *service.window > most_ahead))
+    return wrong(fmt::format("window: 1 to {} frames, or auto", most_ahead));
+  if (service.rate_hz && !(*service.rate_hz >= 1 && *service.rate_hz <= 1000))
+    return wrong("rate: 1 to 1000 Hz, or max");
+  if (service.stall_timeout_s && !(*service.stall_timeout_s >= 0.01 && *service.stall_timeout_s <= 10))
+    return wrong("stall-timeout: 0.01 to 10 seconds, or off");
   return {};
 }
 

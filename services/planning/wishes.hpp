@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "sdk/core/tables/codec_table.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::planning {
@@ -99,16 +100,16 @@ inline constexpr std::array kStreamOptions{
 [[nodiscard]] Result<StreamWishes> read_stream(const std::string& text);
 
 /// All wishes for one of several streams: the common ones and its own. Errors: kInvalidArgument for a setting
-/// that cannot be read.
+/// that cannot be read, is out of range, or does not go with the others.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
 /// Checks what is said for all streams. Errors: kInvalidArgument, which begins with the option's key and a
 /// colon.
 [[nodiscard]] Result<void> check_wishes(const Wishes& wishes);
 
-/// Checks what a stream says for itself, and that it goes with what is said for all. Errors:
-/// kInvalidArgument.
-[[nodiscard]] Result<void> check_stream(const Wishes& common, const StreamWishes& stream);
+/// The traits of a codec. Those of an unknown one exclude nothing: it is refused where the session is
+/// planned.
+[[nodiscard]] CodecTraits traits_of(const std::string& codec);
 
 inline constexpr std::uint32_t kMostClients = 65'536;
 
@@ -123,5 +124,8 @@ struct ServiceWishes {
   bool free_rate = false;                       ///< as fast as window and queue allow
   std::optional<double> stall_timeout_s = 0.5;  ///< empty: no limit
 };
+
+/// Checks all but the session's name. Errors: as check_wishes().
+[[nodiscard]] Result<void> check_service(const ServiceWishes& service);
 
 }  // namespace tandem::planning

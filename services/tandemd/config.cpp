@@ -7,6 +7,7 @@
 
 #include <array>
 #include <fstream>
+#include <limits>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/codec_table.hpp"
@@ -40,34 +41,25 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
   return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
 }
 
-/// An unknown codec, or none named, excludes nothing here; it is refused where the session is planned.
-CodecTraits traits_of(const std::string& codec) {
-  const auto traits = codec_traits(codec);
-  return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
-}
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 
-/// Numbers that may be words.
-Result<void> check_words(const ServerConfig& config, Options& options) {
-  if (config.has_window() && config.window() != "auto") {
-    const std::uint32_t most = host::ServiceConfig().window_ceiling;
-    options.window = number<std::uint32_t>(config.window());
-    if (!options.window || *options.window < 1 || *options.window > most)
-      return refuse("window", fmt::format("1 to {} frames, or auto", most));
-  }
-  if (config.rate() == "max") {
-    options.free_rate = true;
-  } else if (config.has_rate()) {
-    options.rate_hz = number<double>(config.rate());
-    if (!options.rate_hz || !within(*options.rate_hz, 1, 1000)) return refuse("rate", "1 to 1000 Hz, or max");
-  }
+/// As the command line has it: the error of the planner names the option that is a flag here.
+tl::unexpected<Error> refuse(const Error& error) { return fail(error.code, "--" + error.message); }
+
+/// Reads numbers that may be words; what cannot be read becomes a number that is refused with its flag.
+Result<void> read_service(const ServerConfig& config, Options& options) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (config.has_window() && config.window() != "auto")
+    options.window = number<std::uint32_t>(config.window()).value_or(0);
+  options.free_rate = config.rate() == "max";
+  if (config.has_rate() && !options.free_rate)
+    options.rate_hz = number<double>(config.rate()).value_or(kNone);
   if (config.stall_timeout() == "off") {
     options.stall_timeout_s.reset();
   } else if (config.has_stall_timeout()) {
-    options.stall_timeout_s = number<double>(config.stall_timeout());
-    if (!options.stall_timeout_s || !within(*options.stall_timeout_s, 0.01, 10))
-      return refuse("stall-timeout", "0.01 to 10 seconds, or off");
+    options.stall_timeout_s = number<double>(config.stall_timeout()).value_or(kNone);
   }
+  if (const auto good = planning::check_service(options); !good) return refuse(good.error());
   return {};
 }
 
@@ -75,11 +67,8 @@ Result<void> check_numbers(const Options& options) {
   const std::uint32_t bodies = options.choice.bodies;
   if (bodies == 0 || bodies > engine::kMaxBodies)
     return refuse("bodies", fmt::format("1 to {}, not {}", engine::kMaxBodies, bodies));
-  if (options.lead > 1) return refuse("lead", "0 or 1");
   if (options.domain > transport::kMaxDomain)
     return refuse("domain", fmt::format("0 to {}", transport::kMaxDomain));
-  if (options.client_limit < 1 || options.client_limit > planning::kMostClients)
-    return refuse("client-limit", fmt::format("1 to {}", planning::kMostClients));
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
     return refuse("duration", "seconds, not negative");
   return {};
@@ -91,9 +80,8 @@ Result<void> check_quality(const ServerConfig& config, const sessions::SessionCh
     return refuse("threshold-scale", "not together with --threshold");
   if (config.has_target_bandwidth() && choice.target_mbit_per_s == 0)
     return refuse("target-bandwidth", "Mbit/s, at least 0.001");
-  return planning::check_wishes(choice).map_error([](const Error& error) {
-    return Error{error.code, "--" + error.message};
-  });
+  if (const auto good = planning::check_wishes(choice); !good) return refuse(good.error());
+  return {};
 }
 
 const google::protobuf::FieldDescriptor* field_of(const planning::StreamOption& option) {
@@ -150,7 +138,7 @@ Result<void> check_streams(const ServerConfig& config, const sessions::SessionCh
       return refuse("predictor", fmt::format("{}, but --stream {} says {}: say it there alone",
                                              config.predictor(), stream.name(), stream.predictor()));
     }
-    if (auto good = planning::check_stream(choice, wishes_of(stream)); !good)
+    if (auto good = planning::wishes_of(choice, wishes_of(stream)); !good)
       return refuse("stream", fmt::format("{}: {}", stream.name(), good.error().message));
     names.emplace_back();
     names.back().name = stream.name();
@@ -212,7 +200,7 @@ Result<idl::Stream> parse_stream(const std::string& text) {
 ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   // Drops settings from the file that conflict with a flag: a length, a scale and auto exclude each other,
   // quality follows auto, and auto and a budget need codecs that have them.
-  const CodecTraits traits = traits_of(flags.codec());
+  const CodecTraits traits = planning::traits_of(flags.codec());
   if (flags.has_threshold() || flags.has_threshold_auto() || flags.has_threshold_scale())
     file.clear_threshold();
   if (flags.has_threshold()) file.clear_threshold_scale();
@@ -248,7 +236,7 @@ Result<Options> check_config(const ServerConfig& config) {
   options.hash_log = config.hash_log();
   if (const auto named = transport::check_session_name(options.session); !named)
     return refuse("session", named.error().message);
-  return check_words(config, options)
+  return read_service(config, options)
       .and_then([&] { return check_numbers(options); })
       .and_then([&] { return check_quality(config, options.choice); })
       .and_then([&] { return check_streams(config, options.choice); })

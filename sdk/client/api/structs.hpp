@@ -11,8 +11,8 @@
 
 namespace tandem::api {
 
-/// What a struct had when it was first released: up to the end of its last member then. Smaller ones were
-/// never valid; members that are added later do not change it.
+/// The size of a struct when it was first released, without padding at its end. A smaller size was never
+/// valid. Members that are added later do not change it.
 template <class T>
 inline constexpr std::size_t kFirstSize = 0;
 template <>

@@ -56,7 +56,7 @@ struct SampledFrame {
   double since_delta_s = 0;  ///< time from the last agreed frame, or from the snapshot, to now
 };
 
-/// What there is to draw, for a caller that has to make room first.
+/// Says how much can be drawn, so that a caller can make room first.
 struct Drawable {
   Epoch epoch = 0;
   std::uint32_t capacity = 0;

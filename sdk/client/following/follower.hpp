@@ -104,10 +104,8 @@ class Follower {
   [[nodiscard]] const ClientTimeline& timeline() const { return timeline_; }
   /// The oldest complete delta, or null.
   [[nodiscard]] const CompleteDelta* front() const { return deltas_.front(); }
-  [[nodiscard]] std::size_t waiting() const {
-    return deltas_.size();
-  }  ///< number of complete deltas that
-     ///< wait
+  /// The number of complete deltas that wait.
+  [[nodiscard]] std::size_t waiting() const { return deltas_.size(); }
   [[nodiscard]] std::size_t most_waiting() const { return deltas_.high_water(); }
   [[nodiscard]] bool is_open() const { return is_open_; }
   [[nodiscard]] bool joining() const { return joining_; }  ///< false: it plays
