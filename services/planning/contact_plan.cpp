@@ -68,10 +68,10 @@ std::string fault(const World& world) {
 
 }  // namespace
 
-Result<std::vector<std::int32_t>> contact_constants(const World& world, const host::Lattice& lattice,
-                                                    std::string_view predictor) {
-  const auto wrong = [predictor](const std::string& what) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("predictor '{}': {}", predictor, what));
+Result<void> set_contact(const World& world, const host::Lattice& lattice, const PredictorTraits& predictor,
+                         Layout& layout) {
+  const auto wrong = [&predictor](const std::string& what) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("predictor '{}': {}", predictor.name, what));
   };
   if (const std::string what = fault(world); !what.empty()) return wrong(what);
   const Scenery& scenery = *world.scenery;
@@ -94,12 +94,14 @@ Result<std::vector<std::int32_t>> contact_constants(const World& world, const ho
   }
   for (const auto& ball : scenery.balls)
     constants.balls.push_back({scaled(ball.centre, scale), rounded(ball.radius * scale)});
-  std::vector<std::int32_t> values = write_contact_constants(constants);
-  if (!read_contact_constants(values)) {
+  if (!read_contact_constants(write_contact_constants(constants))) {
     return fail(ErrorCode::kCapacity,
-                fmt::format("predictor '{}': the world does not fit the lattice", predictor));
+                fmt::format("predictor '{}': the world does not fit the lattice", predictor.name));
   }
-  return values;
+  const bool is_merged = predictor.one_step && constants.substeps > 1;
+  layout.predictor = predictor.one_step && !is_merged ? "contact" : predictor.name;
+  layout.predictor_constants = write_contact_constants(is_merged ? in_one_step(constants) : constants);
+  return {};
 }
 
 }  // namespace tandem::planning

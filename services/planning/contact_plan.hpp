@@ -2,20 +2,18 @@
 // Turns a world into the constants of the predictors that compute contacts.
 
 #include <cstdint>
-#include <string_view>
-#include <vector>
-
+#include "sdk/core/layout/layout.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "services/planning/world.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::planning {
 
-/// The integers that travel in the session. `predictor` is named in errors: kInvalidArgument for a world
-/// without scenery or body types, or with scenery that is no geometry; kCapacity for one that does not fit
-/// the lattice.
-[[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const World& world,
-                                                                  const host::Lattice& lattice,
-                                                                  std::string_view predictor);
+/// Sets a predictor that reads the world, and its constants. In a world of one sub-step `field` is `contact`,
+/// and is called so. Errors name the predictor: kInvalidArgument for a world without scenery or body types,
+/// or with scenery that is no geometry; kCapacity for one that does not fit the lattice.
+[[nodiscard]] Result<void> set_contact(const World& world, const host::Lattice& lattice,
+                                       const PredictorTraits& predictor, Layout& layout);
 
 }  // namespace tandem::planning

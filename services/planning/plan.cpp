@@ -66,11 +66,7 @@ bool suits(const PredictorTraits& predictor, const World& world, const CodecTrai
 }
 
 Result<void> set_predictor(const World& world, const PredictorTraits& predictor, host::StreamConfig& stream) {
-  if (predictor.reads_world) {
-    auto constants = contact_constants(world, stream.lattice, predictor.name);
-    if (!constants) return tl::unexpected(constants.error());
-    stream.layout.predictor_constants = std::move(*constants);
-  }
+  if (predictor.reads_world) return set_contact(world, stream.lattice, predictor, stream.layout);
   stream.layout.predictor = predictor.name;
   return {};
 }

@@ -22,7 +22,6 @@ using synthetic::Random;
 class Chained final : public Predictor {
  public:
   explicit Chained(std::uint32_t capacity) : before_(capacity) {}
-  [[nodiscard]] std::string_view name() const override { return "chained"; }
   void step(const State& from, State& to, const StepInput& input) override {
     before_ = from;
     ballistic_.step(from, to, input);

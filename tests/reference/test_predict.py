@@ -98,10 +98,6 @@ class Contact(unittest.TestCase):
                 contact.read_world(constants)
             self.assertEqual(caught.exception.rule, "session")
 
-    def test_field_changes_nothing_with_one_substep(self):
-        world = contact.read_world([1, *worlds.CONTACT[1:]])
-        self.assertIs(world.as_field(), world)
-
 
 class Integers(unittest.TestCase):
     def test_root(self):

@@ -34,7 +34,7 @@ class ByHand(RefusalCase):
 
     def bytes(self, stream=None, inputs="", tail=b""):
         """The snapshot, or one with a fault."""
-        head = b"TDSP\1" + u64(11) + bytes.fromhex("02000000 03000000") + u64(40) + u64(9)
+        head = b"TDSP\2" + u64(11) + bytes.fromhex("02000000 03000000") + u64(40) + u64(9)
         head += bytes.fromhex("01000000 ffffffff 00000000 c800") + u64(self.state) + bytes.fromhex("03000000")
         values = bytes.fromhex("820e 01c801 0206 030a 04c00c 0500 0600")
         region = b"\0" + u64(self.hash) + (self.region() if stream is None else stream)
@@ -69,7 +69,7 @@ class ByHand(RefusalCase):
         good = self.bytes()
         for rule, bad in (
             ("snapshot", b"TDSQ" + good[4:]),
-            ("snapshot", good[:4] + b"\2" + good[5:]),
+            ("snapshot", good[:4] + b"\3" + good[5:]),
             ("snapshot", good[:21] + b"\1" + bytes(6) + b"\x40" + good[29:]),  # frame beyond 2^62
             ("snapshot", good[:59] + b"\4" + good[60:]),  # another capacity
             ("snapshot", good[:63] + good[79:]),  # no parameters

@@ -144,13 +144,20 @@ def turns():
             vector.say("nobody is corrected")
             vector.delta(b"")
         elif frame == 8:
-            vector.say("p, v and c rounded; a new threshold")
+            vector.say("all rounded; a new threshold")
             changed = writer.section(0x82, writer.parameters({1: 77}))
-            vector.track(some_corrections((2, 3, 2)), changed, rounding=writer.section(0x87, bytes([2, 5, 3])))
+            vector.track(some_corrections((2, 3, 2)), changed, rounding=writer.section(0x87, bytes([2, 5, 3, 18, 16])))
+        elif frame == 12:
+            vector.say("q and w rounded alone")
+            vector.delta(writer.section(0x87, bytes([0, 0, 0, 15, 20])))
         else:
             vector.track(some_corrections((1, 2, 3) if frame < 11 else (20, 200, 3000)))
     vector.say("a snapshot of this frame holds the same state")
     vector.snapshot(writer.snapshot(vector.line))
+    vector.predict()
+    for bits, why in (((25, 0, 0, 0, 0), "p by too many bits"), ((0, 0, 0, 19, 0), "q by too many bits"),
+                      ((0, 0, 0, 0, 25), "w by too many bits"), ((1, 1, 1), "without q and w")):  # fmt: skip
+        vector.refuse(writer.section(0x87, bytes(bits)), why)
     return vector
 
 

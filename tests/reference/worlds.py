@@ -20,12 +20,14 @@ CONTACT = [
     2, 1820, 205, 205, 1820, 205, 205, 2, 1, 1, 1, 20000, 65536, 10000, 131072, 0, ONE, 0, 0,
     200000, 0, 0, 50000, 50000, 50000, ONE, 0, 0, 0, ONE, 0, 0, 0, ONE, -200000, 0, 0, 60000,
 ]  # fmt: skip
+# The same in one step a frame.
+FIELD = [1, 3640, 102, 410, 3640, 102, 410, *CONTACT[7:]]
 FALL = Drive((0, -3000, 0), 200)
 
 
 def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False):
     """A small stream; with orientations where it `turns`."""
-    constants = [] if predictor == "ballistic" else CONTACT
+    constants = {"contact": CONTACT, "field": FIELD}.get(predictor, [])
     groups = ["position", "orientation"] if turns else ["position"]
     radii = [500 + kind for kind in range(types)] if turns else []
     values = dict(parameters or PARAMETERS)

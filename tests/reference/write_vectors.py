@@ -139,7 +139,7 @@ def snapshots():
     vector.predict()
     vector.input(7, 44, Drive((0, 0, 0), 0))
     vector.predict(4)
-    vector.refuse_snapshot(start[:4] + b"\2" + start[5:], "an unknown version")
+    vector.refuse_snapshot(start[:4] + b"\3" + start[5:], "an unknown version")
     vector.refuse_snapshot(start[:59] + b"\1" + start[60:], "another capacity")
     vector.refuse_snapshot(start[:51] + bytes(8) + start[59:], "another state hash")
     vector.refuse_snapshot(start[:-1], "cut short")

@@ -1,5 +1,6 @@
 """Writes what the reference decoder reads; for its tests and for the vectors of idl/vectors."""
 
+import math
 import struct
 
 import numpy as np
@@ -189,29 +190,55 @@ def tracker_section(world, threshold, steps, renewed=None, block=0, rests=()):
     return section(0x83, leb128(block) + encoder.finish(1))
 
 
-def column(numbers, values, how, at_rest):
-    """A column of a region."""
+def shifted(numbers, values):
+    """A column's shift, written, and its values without it."""
     values = [int(value) for value in values]
     used = 0
     for value in values:
         used |= value
     shift = (used & -used).bit_length() - 1 if used else 0
     numbers.even_bits(shift, 5)
+    return shift, [value >> shift for value in values]
+
+
+def column(numbers, values, how, at_rest):
+    """A column of a region."""
+    _, values = shifted(numbers, values)
     kinds, guess = [NumberModels(), NumberModels()], reference.Guess(how)
-    for value, rest in zip(values, at_rest):
-        x = value >> shift
+    for x, rest in zip(values, at_rest):
         numbers.number(kinds[rest], x - guess.values[rest])
         guess.saw(rest, x)
 
 
+def norm_column(numbers, q, at_rest):
+    """The column w of quaternions."""
+    shift, values = shifted(numbers, q[3])
+    kinds = [NumberModels(), NumberModels()]
+    for x, rest, others in zip(values, at_rest, q[:3].T.tolist()):
+        guess = math.isqrt(max(0, 2**60 - sum(other * other for other in others))) >> shift
+        numbers.number(kinds[rest], x - guess)
+
+
+def same_column(numbers, values, at_rest):
+    """A column in which 0 and the value of the body before change places."""
+    _, values = shifted(numbers, values)
+    kinds, before = [NumberModels(), NumberModels()], [0, 0]
+    for x, rest in zip(values, at_rest):
+        numbers.number(kinds[rest], {0: before[rest], before[rest]: 0}.get(x, x))
+        before[rest] = x
+
+
 def models_of(numbers, models):
     """The models of the codec `tracker`."""
-    weights, probabilities, before = NumberModels(), NumberModels(), 32768
-    for weight, p in zip(models.weight.tolist(), models.p.tolist()):
+    weights, ones, rest = NumberModels(), [NumberModels() for _ in range(8)], NumberModels()
+    starts = tracker.Models(len(models.p) > tracker.Models(False).p.size).p.tolist()
+    for weight, p, start in zip(models.weight.tolist(), models.p.tolist(), starts):
         numbers.number(weights, -weight % 256)
         if weight:
-            numbers.number(probabilities, p - before)
-            before = p
+            seen = ((weight + 1) * p - start + 2**15) >> 16
+            numbers.number(ones[weight.bit_length() - 1], seen)
+            guess = (start + 65536 * seen) // (weight + 1)
+            numbers.number(rest, p - min(max(guess, 32), 65504))
 
 
 def region(world):
@@ -229,10 +256,18 @@ def region(world):
     for rows, how in ((state.p, reference.BEFORE), (state.v, reference.HALF), (state.c, reference.HALF)):
         for axis in range(3):
             column(numbers, rows[axis, slots], how, at_rest)
-    for row in (*state.q, *state.w):
-        column(numbers, row[slots], reference.ZERO, at_rest)
-    for row in state.codec:
-        column(numbers, (row[slots] + 128) % 256 - 128, reference.ZERO, at_rest)
+    if state.orientation:
+        for row in state.q[:3]:
+            column(numbers, row[slots], reference.REST, at_rest)
+        norm_column(numbers, state.q[:, slots], at_rest)
+        for row in state.w:
+            column(numbers, row[slots], reference.ZERO, at_rest)
+    for i, row in enumerate(state.codec):
+        values = (row[slots] + 128) % 256 - 128
+        if i % tracker.GROUP < 2:
+            same_column(numbers, values, at_rest)
+        else:
+            column(numbers, values, reference.ZERO, at_rest)
     if world.models:
         models_of(numbers, world.models)
     return leb128(0) + struct.pack("<Q", state.region_hash()) + numbers.finish()
@@ -247,7 +282,7 @@ def snapshot(timeline, epoch=1, stream=0, generation=0):
     ]
     return b"".join(
         [
-            b"TDSP\x01",
+            b"TDSP\x02",
             struct.pack("<QIIQQ", epoch, stream, generation, timeline.frame, timeline.last_input),
             struct.pack("<3iH", *drive.gravity, drive.damping),
             struct.pack("<QI", state.hash(), state.capacity),

@@ -9,6 +9,7 @@
 
 #include "sdk/core/codec/numbers.hpp"
 #include "sdk/core/codec/observer.hpp"
+#include "sdk/core/codec/rounding.hpp"
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
@@ -30,10 +31,9 @@ struct CodecFrame {
   std::span<const Slot> renewed;        ///< slots spawned, despawned or teleported by the records; ascending,
                                         ///< each once
   const CodecParameters& parameters;
-  Vec3i gravity{};             ///< gravity of the drive in force at this frame; c of a body at rest balances
-                               ///< it
-  unsigned position_bits = 0;  ///< n: p is rounded to multiples of 2^n in an encoder's state, and `tracker`
-                               ///< keeps it so
+  Vec3i gravity{};      ///< gravity of the drive in force at this frame; c of a body at rest balances it
+  Rounding rounding{};  ///< of this delta, none by default: p and q are rounded in an encoder's state;
+                        ///< `tracker` keeps p rounded, and q is rounded once more afterwards
 };
 
 /// One corrections section: the number of an existing block, and the codec's bytes for it.
@@ -49,7 +49,7 @@ struct Corrections {
   std::span<const Slot> renewed;  ///< as in the frame
   CodecParameters parameters;     ///< as in the frame
   Vec3i gravity{};                ///< as in the frame
-  unsigned position_bits = 0;     ///< as in the frame
+  Rounding rounding{};            ///< as in the frame
 };
 
 /// The corrections part of a delta; one implementation for each codec name (thesis, sections 3.3.1 and
@@ -83,6 +83,8 @@ class Codec {
   /// The codec's own columns, which are part of the state hash and of snapshots: one byte per slot, one
   /// column after another; zero for dead slots. Empty for the thesis's codecs.
   [[nodiscard]] virtual std::span<const std::byte> columns() const { return {}; }
+  /// How a snapshot guesses the numbers of one of these columns.
+  [[nodiscard]] virtual Guess guess(std::size_t /*column*/) const { return Guess::kZero; }
   /// Writes the codec's other state that lives across frames into a snapshot. Nothing for the thesis's
   /// codecs.
   virtual void save_models(NumberEncoder& /*out*/) const {}

@@ -14,10 +14,11 @@ struct DeltaCodec::Impl {
   std::uint32_t capacity = 0;
   TypeId type_count = 0;
   Groups groups;
-  StreamParameters parameters;  // in force
-  StreamParameters next;        // server: parameters from the next encode() on
-  bool round_next = false;      // server: the next encode() rounds
-  Vec3i gravity{};              // at the current delta
+  std::int32_t most_radius = 0;  // lattice units; with orientations
+  StreamParameters parameters;   // in force
+  StreamParameters next;         // server: parameters from the next encode() on
+  bool round_next = false;       // server: the next encode() rounds
+  Vec3i gravity{};               // at the current delta
   // The lifecycle of the current delta.
   std::vector<LifecycleRecord> lifecycle;
   std::vector<std::uint8_t> alive;  // after lifecycle; used only if there are records
@@ -79,7 +80,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
     }
     case SectionType::kRounding: {
       if (!enter(3)) break;
-      const auto rounding = read_rounding(body);
+      const auto rounding = read_rounding(body, groups);
       if (!rounding) return tl::unexpected<Error>(rounding.error());
       parsed.rounding = *rounding;
       return {};
@@ -129,13 +130,15 @@ void DeltaCodec::Impl::remember(const Delta& delta) {
 }
 
 DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
-                       const StreamParameters& parameters, TypeId type_count, const Groups& groups)
+                       const StreamParameters& parameters, TypeId type_count, const Groups& groups,
+                       std::span<const std::int32_t> radii)
     : impl_(std::make_unique<Impl>()) {
   TANDEM_ASSERT(valid_parameters(parameters.codec));
   impl_->codec = std::move(codec);
   impl_->capacity = capacity;
   impl_->type_count = type_count;
   impl_->groups = groups;
+  for (const std::int32_t radius : radii) impl_->most_radius = std::max(impl_->most_radius, radius);
   impl_->parameters = parameters;
   impl_->next = parameters;
   impl_->lifecycle.reserve(std::min<std::size_t>(capacity, 1024));
@@ -150,7 +153,7 @@ DeltaCodec::~DeltaCodec() = default;
 
 std::size_t DeltaCodec::bound() const {
   return 3 * kMostSectionHeaderBytes + impl_->capacity * most_lifecycle_bytes_per_slot(impl_->groups) +
-         kMostParametersBytes + kRoundingBytes + impl_->codec->bound();
+         kMostParametersBytes + kMostRoundingBytes + impl_->codec->bound();
 }
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
@@ -176,9 +179,10 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   }
   std::optional<Rounding> rounding;
   if (std::exchange(impl_->round_next, false)) {
-    rounding = rounding_for(impl_->parameters.codec.threshold);
-    put_section(SectionType::kRounding, writer, [&](ByteWriter& body) { write_rounding(*rounding, body); });
-    round_positions(*rounding, state);
+    rounding = rounding_for(impl_->parameters.codec.threshold, impl_->most_radius);
+    put_section(SectionType::kRounding, writer,
+                [&](ByteWriter& body) { write_rounding(*rounding, impl_->groups, body); });
+    round_before_corrections(*rounding, state);
   }
   TANDEM_ASSERT(std::equal(state.alive().begin(), state.alive().end(), target.alive().begin()));
   if (observer != nullptr) observer->frame(state, target, impl_->parameters.codec);
@@ -188,14 +192,14 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   impl_->list_renewed();
   const Corrections corrections =
       impl_->codec->encode({state, state.alive(), impl_->renewed, impl_->parameters.codec, impl_->gravity,
-                            rounding ? rounding->p : 0U},
+                            rounding.value_or(Rounding{})},
                            target, left, writer, observer);
   TANDEM_ASSERT(!writer.overflow());
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
   encoded.corrected = static_cast<std::uint32_t>(corrections.slots.size());
   impl_->codec->apply(corrections, state);
-  if (rounding) round_motion(*rounding, state);
+  if (rounding) round_after_corrections(*rounding, state);
   impl_->remember({impl_->lifecycle, impl_->parameters, rounding, corrections});
   return encoded;
 }
@@ -235,7 +239,7 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
   impl_->list_renewed();
   const auto corrections =
       impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters.codec, impl_->gravity,
-                            parsed.rounding ? parsed.rounding->p : 0U},
+                            parsed.rounding.value_or(Rounding{})},
                            impl_->sections);
   if (!corrections) return tl::unexpected<Error>(corrections.error());
   return Delta{impl_->lifecycle, parsed.parameters, parsed.rounding, *corrections};
@@ -244,9 +248,9 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
 void DeltaCodec::apply(const Delta& delta, State& state) {
   impl_->parameters = impl_->next = delta.parameters;
   apply_lifecycle(delta.lifecycle, state);
-  if (delta.rounding) round_positions(*delta.rounding, state);
+  if (delta.rounding) round_before_corrections(*delta.rounding, state);
   impl_->codec->apply(delta.corrections, state);
-  if (delta.rounding) round_motion(*delta.rounding, state);
+  if (delta.rounding) round_after_corrections(*delta.rounding, state);
   impl_->remember(delta);
 }
 

@@ -40,9 +40,9 @@ struct Delta {
 /// for the message of a refusal.
 class DeltaCodec {
  public:
-  /// `codec` must be made for `capacity`.
+  /// `codec` must be made for `capacity`. `radii`: those of the stream, with orientations.
   DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity, const StreamParameters& parameters,
-             TypeId type_count, const Groups& groups = {});
+             TypeId type_count, const Groups& groups = {}, std::span<const std::int32_t> radii = {});
   DeltaCodec(DeltaCodec&&) noexcept;
   DeltaCodec& operator=(DeltaCodec&&) noexcept;
   DeltaCodec(const DeltaCodec&) = delete;

@@ -20,22 +20,73 @@ TANDEM_VECTOR_CLONES void round_moving(std::span<std::int32_t> column, unsigned 
     column[i] = rest[i] != 0 ? column[i] : (column[i] + half) & kept;
 }
 
+// A vector whose rounded components would be out of its range stays as it is.
+template <class Vector>
+Vector rounded_if_valid(const Vector& exact, unsigned bits, bool (&is_valid)(const Vector&)) {
+  Vector vector = exact;
+  round_all(vector, bits);
+  return is_valid(vector) ? vector : exact;
+}
+
+void round_orientations(unsigned bits, State& state) {
+  if (bits == 0) return;
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.alive()[slot] != 0) state.set_quaternion(slot, rounded(state.quaternion(slot), bits));
+  }
+}
+
+void round_spins(unsigned bits, State& state) {
+  if (bits == 0) return;
+  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+    if (state.rest()[slot] != 0) continue;
+    const Spin w = rounded_if_valid(state.spin(slot), bits, valid_spin);
+    for (std::size_t i = 0; i < w.size(); ++i) state.w(i)[slot] = w[i];
+  }
+}
+
 }  // namespace
 
-Result<Rounding> read_rounding(std::span<const std::byte> section) {
-  if (section.size() != kRoundingBytes) return fail(ErrorCode::kMalformed, "rounding of another length");
-  const auto bits = [section](std::size_t i) { return std::to_integer<std::uint8_t>(section[i]); };
-  const Rounding rounding{bits(0), bits(1), bits(2)};
-  if (std::max({rounding.p, rounding.v, rounding.c}) > Rounding::kMost)
+Quaternion rounded(const Quaternion& q, unsigned bits) {
+  if (bits == 0) return q;
+  Quaternion result = rounded_if_valid(q, bits, valid_quaternion);
+  // -q is the same turn. With one sign, neighbours with the same turn have the same numbers.
+  if (result[3] < 0) {
+    for (std::int32_t& component : result) component = -component;
+  }
+  return result;
+}
+
+void write_rounding(const Rounding& rounding, const Groups& groups, ByteWriter& out) {
+  for (const std::uint8_t bits : {rounding.p, rounding.v, rounding.c}) out.put(bits);
+  if (!groups.orientation) return;
+  for (const std::uint8_t bits : {rounding.q, rounding.w}) out.put(bits);
+}
+
+Result<Rounding> read_rounding(std::span<const std::byte> section, const Groups& groups) {
+  ByteReader in(section);
+  Rounding rounding{in.get<std::uint8_t>(), in.get<std::uint8_t>(), in.get<std::uint8_t>()};
+  if (groups.orientation) {
+    rounding.q = in.get<std::uint8_t>();
+    rounding.w = in.get<std::uint8_t>();
+  }
+  if (!in.ok() || in.remaining() != 0) return fail(ErrorCode::kMalformed, "rounding of another length");
+  if (std::max({rounding.p, rounding.v, rounding.c, rounding.w}) > Rounding::kMost ||
+      rounding.q > Rounding::kMostQ) {
     return fail(ErrorCode::kMalformed, "rounding by too many bits");
+  }
   return rounding;
 }
 
-void round_positions(const Rounding& rounding, State& state) {
+void round_before_corrections(const Rounding& rounding, State& state) {
   for (std::size_t i = 0; i < kPositionChannels; ++i) round_all(state.p(i), rounding.p);
+  if (state.groups().orientation) round_orientations(rounding.q, state);
 }
 
-void round_motion(const Rounding& rounding, State& state) {
+void round_after_corrections(const Rounding& rounding, State& state) {
+  if (state.groups().orientation) {
+    round_orientations(rounding.q, state);
+    round_spins(rounding.w, state);
+  }
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     round_moving(state.v(i), rounding.v, state.rest());
     round_moving(state.c(i), rounding.c, state.rest());

@@ -48,7 +48,10 @@ struct BodyState {
 enum class Guess : std::uint8_t {
   kZero,
   kBefore,  ///< the number of the previous body: adjacent slots hold adjacent bodies
-  kHalf,    ///< half way from the previous guess to that number
+  kHalf,    ///< half way from the previous guess to that number; of bodies at rest as kBefore
+  kRest,    ///< of bodies at rest as kBefore, of others 0
+  kNorm,    ///< what gives a norm of 1 with the three columns before, not negative
+  kSame,    ///< 0 stands for the number of the previous body, and that number for 0
 };
 
 /// Columns of a state that are alike, such as those of a vector.
@@ -80,7 +83,9 @@ inline constexpr std::array<ChannelGroup, 2> kChannelGroups{{
      .listed = &Groups::orientation,
      .needs_radii = true,
      .first_column = 9,
-     .runs = {{{kQuaternionChannels, kQuaternionOne}, {kSpinChannels, kSpinLimit}}}},  // q, w
+     .runs = {{{3, kQuaternionOne, Guess::kRest},  // q x, y, z
+               {1, kQuaternionOne, Guess::kNorm},  // q w
+               {kSpinChannels, kSpinLimit}}}},     // w
 }};
 inline constexpr std::size_t kColumns = 16;  ///< columns of all groups
 

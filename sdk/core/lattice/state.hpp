@@ -71,6 +71,8 @@ class State {
   [[nodiscard]] Quaternion quaternion(Slot slot) const {
     return {q(0)[slot], q(1)[slot], q(2)[slot], q(3)[slot]};
   }
+  /// Only with orientations.
+  [[nodiscard]] Spin spin(Slot slot) const { return {w(0)[slot], w(1)[slot], w(2)[slot]}; }
   void set_quaternion(Slot slot, const Quaternion& turn) {
     for (std::size_t i = 0; i < kQuaternionChannels; ++i) q(i)[slot] = turn[i];
   }

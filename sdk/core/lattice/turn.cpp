@@ -102,28 +102,37 @@ std::uint64_t half_sine_squared(const Quaternion& difference) {
   return sum;
 }
 
-// h / sin h of the half angle h, by the series of the arc sine in sin^2; up to 1 rad it is off by 1/200.
-std::array<std::int64_t, 3> rough_turn_between(const Quaternion& from, const Quaternion& to) {
-  const Quaternion d = difference(from, to);
+// The rotation vector of a difference, with h / sin h of the half angle h by the series of the arc sine in
+// sin^2; up to 1 rad it is off by 1/200.
+Spin rough_spin(const Quaternion& d) {
   const auto x = static_cast<std::int64_t>(half_sine_squared(d) >> 32U);  // 2^-28
   std::int64_t ratio = 0;                                                 // 2^-28
   // 63/2816, 35/1152, 5/112, 3/40, 1/6, 1
   for (const std::int64_t term : {6005481, 8155591, 11983726, 20132659, 44739243, 268435456})
     ratio = ((ratio * x) >> 28) + term;
-  std::array<std::int64_t, 3> spin{};
-  for (std::size_t i = 0; i < 3; ++i) spin[i] = (d[i] * ratio) >> 29;
+  Spin spin{};
+  for (std::size_t i = 0; i < 3; ++i) spin[i] = static_cast<std::int32_t>((d[i] * ratio) >> 29);
   return spin;
 }
 
-// The vector with the same direction, at most 2 rad long.
-Spin shortened(std::array<std::int64_t, 3> spin) {
+// The rotation vector of a difference of at most 2 rad. The error of the rough vector is a turn about the
+// same axis.
+Spin spin_of(const Quaternion& d) {
+  const Spin estimate = rough_spin(d);
+  const Spin rough = limited_spin({estimate[0], estimate[1], estimate[2]});
+  const Spin rest = rough_spin(difference(turned(kNoTurn, rough), d));
+  return {rough[0] + rest[0], rough[1] + rest[1], rough[2] + rest[2]};
+}
+
+// Half the turn: the normalised sum of the difference and of no turn.
+Quaternion halved(const Quaternion& d) {
+  const std::array<std::int64_t, 4> sum{d[0], d[1], d[2], std::int64_t{d[3]} + kQuaternionOne};
   std::uint64_t squared = 0;
-  for (const std::int64_t a : spin) squared += static_cast<std::uint64_t>(a * a);
-  const auto length = static_cast<std::int64_t>(square_root(squared)) + 1;
-  if (length > kSpinLimit) {
-    for (std::int64_t& a : spin) a = a * kSpinLimit / length;
-  }
-  return limited_spin(spin);
+  for (const std::int64_t a : sum) squared += static_cast<std::uint64_t>(a * a);
+  const auto length = static_cast<std::int64_t>(square_root(squared));
+  Quaternion half{};
+  for (std::size_t i = 0; i < 4; ++i) half[i] = static_cast<std::int32_t>(sum[i] * kQuaternionOne / length);
+  return half;
 }
 
 }  // namespace
@@ -145,7 +154,7 @@ bool valid_spin(const Spin& spin) {
   return length_squared(spin[0], spin[1], spin[2]) <= Wide{kSpinLimit} * kSpinLimit;
 }
 
-Spin limited_spin(std::array<std::int64_t, 3> spin) {
+Spin limited_spin(WideSpin spin) {
   const auto fits = [&] {
     return std::all_of(spin.begin(), spin.end(),
                        [](Wide a) { return -kSpinLimit <= a && a <= kSpinLimit; }) &&
@@ -169,12 +178,20 @@ std::uint64_t half_sine(const Quaternion& from, const Quaternion& to) {
   return square_root(half_sine_squared(difference(from, to))) + 1;
 }
 
+Turned turned_by(const Quaternion& q, const WideSpin& by) {
+  const Spin step = limited_spin(by);
+  const Quaternion once = turned(q, step);
+  const bool is_far = !std::equal(step.begin(), step.end(), by.begin());
+  return {is_far ? turned(once, step) : once, is_far};
+}
+
 Spin turn_between(const Quaternion& from, const Quaternion& to) {
-  const Spin rough = shortened(rough_turn_between(from, to));
-  // The error of the rough result is a turn about the same axis.
-  std::array<std::int64_t, 3> spin = rough_turn_between(turned(from, rough), to);
-  for (std::size_t i = 0; i < 3; ++i) spin[i] += rough[i];
-  return shortened(spin);
+  constexpr std::int32_t kCosineOfOne = 580145192;  // beyond 2 rad the series is too far off
+  const Quaternion d = difference(from, to);
+  if (d[3] >= kCosineOfOne) return spin_of(d);
+  Spin spin = spin_of(halved(d));
+  for (std::int32_t& a : spin) a *= 2;
+  return spin;
 }
 
 void turn_all(const TurnColumns& columns, std::span<const std::uint8_t> still) {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string_view>
 
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
@@ -17,8 +16,6 @@ namespace tandem {
 class Predictor {
  public:
   virtual ~Predictor() = default;
-  /// The tier whose steps are computed. `field` in a world of one sub-step is `contact`.
-  [[nodiscard]] virtual std::string_view name() const = 0;
 
   /// Writes into `to` the state that follows `from`. Both have the same capacity and may be the same object.
   /// Allocates nothing. Dead slots stay zero.

@@ -18,10 +18,9 @@ Made make_ballistic(std::uint32_t /*capacity*/, std::span<const std::int32_t> co
   return std::make_unique<Ballistic>();
 }
 
-template <Contact::Tier tier>
 Made make_contact(std::uint32_t capacity, std::span<const std::int32_t> constants) {
   return read_contact_constants(constants).map([&](ContactConstants&& read) {
-    return std::unique_ptr<Predictor>(std::make_unique<Contact>(capacity, std::move(read), tier));
+    return std::unique_ptr<Predictor>(std::make_unique<Contact>(capacity, std::move(read)));
   });
 }
 
@@ -37,10 +36,11 @@ constexpr std::array kTable{
                     .most_bodies = kMostForField,
                     .only_spheres = true,
                     .reads_world = true,
+                    .one_step = true,
                     .tracker = {.hit_k = 3, .early = 5243},
                     .first_gains = {13000, 39322, 16384},
                     .gain_aim = {10, -10},
-                    .make = &make_contact<Contact::Tier::kField>},
+                    .make = &make_contact},
     // Contacts are predicted, so the remaining error grows more slowly, and there is no force to learn. c is
     // kept (92 %) only until it is clear whether it should be. beta 0.7, gamma 0.
     PredictorTraits{.name = "contact",
@@ -50,7 +50,7 @@ constexpr std::array kTable{
                     .tracker = {.hit_k = 3},
                     .first_gains = {60000, 22938, 0},
                     .gain_aim = {},
-                    .make = &make_contact<Contact::Tier::kContact>},
+                    .make = &make_contact},
     // Bodies move at the start, so little of c is worth keeping: decay 20 %, beta 0.8, gamma 0.15.
     PredictorTraits{.name = "ballistic",
                     .most_bodies = kAnyNumber,

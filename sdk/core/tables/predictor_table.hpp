@@ -37,6 +37,8 @@ struct PredictorTraits {
   bool only_spheres = false;
   /// Its constants are the world's geometry and materials (ContactConstants); otherwise it has none.
   bool reads_world = false;
+  /// Its constants are those for one step per frame: in_one_step().
+  bool one_step = false;
   TrackerKind tracker;
   FirstGains first_gains;
   GainAim gain_aim;

@@ -10,7 +10,7 @@ namespace tandem {
 Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local,
                                  std::unique_ptr<Predictor> predictor) {
   if (auto good = check_layout(layout); !good) return tl::unexpected<Error>(good.error());
-  const auto traits = find_predictor(predictor->name());  // empty for a caller's own predictor
+  const auto traits = find_predictor(layout.predictor);  // empty for a caller's own predictor
   auto codec = make_codec({.name = layout.codec,
                            .capacity = layout.capacity,
                            .tables = layout.codec_tables,
@@ -23,10 +23,10 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
   if (has_turn_steps(layout.parameters.codec) != reads_turn_steps)
     return fail(ErrorCode::kInvalidArgument,
                 "steps of turns that nothing reads, or none where they are read");
-  return TimelineParts{
-      std::move(predictor),
-      DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count, groups_of(layout)),
-      local.run_blocks, StateHasher()};
+  return TimelineParts{std::move(predictor),
+                       DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count,
+                                  groups_of(layout), layout.radii),
+                       local.run_blocks, StateHasher()};
 }
 
 }  // namespace tandem

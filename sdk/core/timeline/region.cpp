@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sdk/core/codec/numbers.hpp"
+#include "sdk/core/lattice/fixed_point.hpp"
 
 namespace tandem {
 namespace {
@@ -15,23 +16,46 @@ class ColumnCoder {
  public:
   explicit ColumnCoder(Guess guess) : guess_(guess) {}
 
-  /// Codes the number of the next body; `x` is what an encoder writes.
+  /// Codes the number of the next body; `x` is what an encoder writes. `norm`: the guess for kNorm.
   template <class Coder>
-  [[gnu::always_inline]] std::int64_t code(Coder& coder, bool at_rest, std::int64_t x) {
+  [[gnu::always_inline]] std::int64_t code(Coder& coder, bool at_rest, std::int64_t x, std::int64_t norm) {
     Kind& kind = kinds_[at_rest ? 1 : 0];
+    if (guess_ == Guess::kSame)
+      return kind.guess = kind.exchanged(code_number(coder, kind.models, kind.exchanged(x)));
+    if (guess_ == Guess::kNorm) kind.guess = norm;
     x = kind.guess + code_number(coder, kind.models, x - kind.guess);
-    if (guess_ == Guess::kBefore || (guess_ == Guess::kHalf && at_rest)) kind.guess = x;
+    if (guess_ == Guess::kBefore || (at_rest && (guess_ == Guess::kHalf || guess_ == Guess::kRest)))
+      kind.guess = x;
     if (guess_ == Guess::kHalf && !at_rest) kind.guess = (kind.guess + x) >> 1;
     return x;
   }
 
  private:
   struct Kind {
+    /// 0 and the guess change places.
+    [[nodiscard]] std::int64_t exchanged(std::int64_t x) const { return x == 0 ? guess : x == guess ? 0 : x; }
+
     std::int64_t guess = 0;
     NumberModels models;
   };
   Guess guess_;
   std::array<Kind, 2> kinds_;
+};
+
+// The component of a quaternion that gives a norm of 1 with the others; not negative.
+class MissingComponent {
+ public:
+  explicit MissingComponent(const std::array<std::span<const std::int32_t>, 3>& others) : others_(others) {}
+  [[nodiscard]] std::int64_t of(Slot slot) const {
+    std::uint64_t squared = 0;
+    for (const auto& column : others_)
+      squared += static_cast<std::uint64_t>(std::int64_t{column[slot]} * column[slot]);
+    constexpr std::uint64_t kOne = std::uint64_t{1} << 60U;
+    return squared >= kOne ? 0 : static_cast<std::int64_t>(square_root(kOne - squared));
+  }
+
+ private:
+  std::array<std::span<const std::int32_t>, 3> others_;
 };
 
 // Numbers that are all multiples of 2^n are written without their n lowest bits.
@@ -49,7 +73,8 @@ class RegionWriter {
     }
   }
   template <class T>
-  void column(std::span<const T> column, Guess guess, std::int64_t /*least*/, std::int64_t /*most*/) {
+  void column(std::span<const T> column, Guess guess, std::int64_t /*least*/, std::int64_t /*most*/,
+              const MissingComponent* missing = nullptr) {
     std::uint32_t used = 0;
     for (const Slot slot : bodies_) used |= static_cast<std::uint32_t>(column[slot]);
     const auto shift = static_cast<unsigned>(used == 0 ? 0 : std::countr_zero(used));
@@ -57,7 +82,8 @@ class RegionWriter {
     ColumnCoder numbers(guess);
     NumberEncoder coder = coder_;  // a copy, so that it stays in registers while bytes are written
     for (const Slot slot : bodies_)
-      numbers.code(coder, !rest_.empty() && rest_[slot] != 0, std::int64_t{column[slot]} >> shift);
+      numbers.code(coder, !rest_.empty() && rest_[slot] != 0, std::int64_t{column[slot]} >> shift,
+                   missing == nullptr ? 0 : missing->of(slot) >> shift);
     coder_ = coder;
   }
   /// From the next column on, bodies at rest have their own models.
@@ -83,13 +109,15 @@ class RegionReader {
     }
   }
   template <class T>
-  void column(std::span<T> column, Guess guess, std::int64_t least, std::int64_t most) {
+  void column(std::span<T> column, Guess guess, std::int64_t least, std::int64_t most,
+              const MissingComponent* missing = nullptr) {
     const unsigned shift = coder_.even(0, kShiftBits);
     ColumnCoder numbers(guess);
     NumberDecoder coder = coder_;
     for (const Slot slot : bodies_) {
       if (!good_) break;
-      const std::int64_t x = numbers.code(coder, !rest_.empty() && rest_[slot] != 0, 0);
+      const std::int64_t x = numbers.code(coder, !rest_.empty() && rest_[slot] != 0, 0,
+                                          missing == nullptr ? 0 : missing->of(slot) >> shift);
       // Within 2^33 before the shift, so it fits.
       const std::int64_t value = x * (std::int64_t{1} << shift);
       good_ = value >= least && value <= most;
@@ -110,18 +138,24 @@ class RegionReader {
 
 // Passes all columns in their order to a writer or a reader.
 template <class Columns, class TheState, class CodecColumns>
-void code_columns(Columns& columns, TheState& state, CodecColumns codec_columns, std::int64_t most_type) {
+void code_columns(Columns& columns, TheState& state, const Codec& codec, CodecColumns codec_columns,
+                  std::int64_t most_type) {
   columns.column(state.rest(), Guess::kZero, 0, 1);
   columns.know_rest(state.rest());
   columns.column(state.reuse(), Guess::kZero, 0, UINT8_MAX);
   columns.column(state.type(), Guess::kZero, 0, most_type);
   for_each_group(state.groups(), [&](const ChannelGroup& group) {
     for_each_column(group, [&](std::size_t column, const ColumnRun& run) {
-      columns.column(state.column(column), run.guess, -run.limit, run.limit);
+      if (run.guess != Guess::kNorm)
+        return columns.column(state.column(column), run.guess, -run.limit, run.limit);
+      const MissingComponent missing(
+          {state.column(column - 3), state.column(column - 2), state.column(column - 1)});
+      columns.column(state.column(column), run.guess, -run.limit, run.limit, &missing);
     });
   });
   for (std::size_t at = 0; at < codec_columns.size(); at += state.capacity())
-    columns.column(codec_columns.subspan(at, state.capacity()), Guess::kZero, INT8_MIN, INT8_MAX);
+    columns.column(codec_columns.subspan(at, state.capacity()), codec.guess(at / state.capacity()), INT8_MIN,
+                   INT8_MAX);
 }
 
 // Checks what the limits of columns do not cover.
@@ -161,7 +195,7 @@ void write_region(std::uint64_t hash, const State& state, const Codec& codec, By
   out.put_leb128(0);
   out.put(hash);
   RegionWriter region(state, out.rest());
-  code_columns(region, state, numbers(codec.columns()), UINT16_MAX);
+  code_columns(region, state, codec, numbers(codec.columns()), UINT16_MAX);
   codec.save_models(region.coder());
   const std::size_t size = region.coder().finish();
   // An overflow is reported as one byte more than there is room for.
@@ -178,7 +212,7 @@ Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId typ
   state = State(state.capacity(), state.groups());
   RegionReader region(state, in.get_bytes(in.remaining()));
   std::vector<std::byte> columns(codec.columns().size());
-  code_columns(region, state, numbers(std::span(columns)), type_count - 1);
+  code_columns(region, state, codec, numbers(std::span(columns)), type_count - 1);
   if (!region.good() || !bodies_are_valid(state))
     return fail(ErrorCode::kMalformed, "snapshot value out of range");
   if (auto loaded = codec.load(columns, region.coder()); !loaded)

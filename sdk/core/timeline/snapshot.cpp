@@ -11,7 +11,7 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x50534454;  // "TDSP"
-constexpr std::uint8_t kVersion = 1;
+constexpr std::uint8_t kVersion = 2;
 constexpr std::size_t kDriveBytes = 3 * 4 + 2;
 constexpr std::size_t kInputBytes = 8 + 8 + kDriveBytes;
 constexpr std::size_t kHeaderBytes = 4 + 1 + 8 + 4 + 4 + 8 + 8 + kDriveBytes + 8 + 4;

@@ -163,10 +163,7 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
 }
 
 Result<void> choose_gains(StreamConfig& config) {
-  // The predictor that the constants lead to; its name may differ from the configured one.
-  const auto predictor = make_predictor(config.layout.predictor, 1, config.layout.predictor_constants);
-  if (!predictor) return tl::unexpected(predictor.error());
-  const auto traits = find_predictor((*predictor)->name());
+  const auto traits = find_predictor(config.layout.predictor);
   if (!traits) return tl::unexpected(traits.error());
   set_first_gains(**traits, config.layout.parameters);
   config.gains = usual_gain_goal(**traits);

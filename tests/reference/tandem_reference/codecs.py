@@ -77,5 +77,5 @@ def add_residuals(state, slots, steps, values):
     state.p[:, slots] = clamp(state.p[:, slots] + steps[:3] * values["position_step"], MOST_P)
     state.v[:, slots] = clamp(state.v[:, slots] + steps[3:6] * values["velocity_step"], MOST_V)
     if state.orientation:
-        state.q[:, slots] = turn.turned(state.q[:, slots], turn.limited(steps[6:9] * values["turn_step"]))
+        state.q[:, slots], _ = turn.turned_by(state.q[:, slots], steps[6:9] * values["turn_step"])
         state.w[:, slots] = turn.limited(state.w[:, slots] + steps[9:] * values["spin_step"])

@@ -1,6 +1,6 @@
 """The predictors `contact` and `field`: forces of bodies that overlap and of the static geometry."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,12 +18,6 @@ class Kind:
     normal: int
     shear: int
 
-    def as_field(self, substeps):
-        """The same in one step a frame, as `field` takes it."""
-        total = 5 * substeps * (self.normal + self.shear) // 8
-        shear = min(substeps * self.shear, total, 2**13)
-        return Kind(min(substeps * self.spring, 10240), min(total - shear, 2**13), shear)
-
 
 @dataclass(frozen=True)
 class World:
@@ -37,13 +31,6 @@ class World:
     planes: list
     boxes: list
     balls: list
-
-    def as_field(self):
-        """The world of the predictor `field`: one step a frame. With one already it is the same."""
-        if self.substeps == 1:
-            return self
-        kinds = self.bodies.as_field(self.substeps), self.ground.as_field(self.substeps)
-        return replace(self, substeps=1, bodies=kinds[0], ground=kinds[1])
 
     @property
     def shift(self):

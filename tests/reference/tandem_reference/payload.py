@@ -50,7 +50,7 @@ class Parsed:
 
     records: list
     parameters: dict
-    rounding: tuple  # bits of p, v and c
+    rounding: tuple  # bits of p, v, c, q and w
     corrections: list  # (block, Reader at what the codec says)
 
 
@@ -71,7 +71,7 @@ def parse(data, world):
     state = world.state
     known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", ROUNDING: "rounding", CORRECTIONS: "corrections"}
     known[LAST_CORRECTIONS] = "corrections of the last block"
-    parsed = Parsed([], {}, (0, 0, 0), [])
+    parsed = Parsed([], {}, (0, 0, 0, 0, 0), [])
     before = None
     for kind, body in sections(Reader(data, "payload"), known):
         ascends = before is None or ORDER.index(kind) > ORDER.index(before)
@@ -82,7 +82,7 @@ def parse(data, world):
         elif kind == PARAMETERS:
             parsed.parameters = parameters.read(body, world.parameters)
         elif kind == ROUNDING:
-            parsed.rounding = read_rounding(body)
+            parsed.rounding = read_rounding(body, state.orientation)
         else:
             block = body.leb128(4) if kind == CORRECTIONS else state.blocks() - 1
             require(block < state.blocks(), "corrections", f"block {block} does not exist")
@@ -92,17 +92,33 @@ def parse(data, world):
     return parsed
 
 
-def read_rounding(body):
-    """How many bits of p, v and c are rounded away."""
-    bits = body.u8(), body.u8(), body.u8()
+def read_rounding(body, orientation):
+    """How many bits of p, v, c, q and w are rounded away."""
+    bits = tuple(body.u8() for _ in range(5 if orientation else 3))
     require(not body.left(), "length", "bytes behind a rounding")
     require(max(bits) <= 24, "rounding", f"rounding by {bits} bits")
+    bits = (bits + (0, 0))[:5]
+    require(bits[3] <= 18, "rounding", f"rounding q by {bits[3]} bits")
     return bits
 
 
 def rounded(columns, bits):
     """The nearest multiples of 2^bits, halves up."""
     return ((columns + (1 << bits >> 1)) >> bits) << bits
+
+
+def rounded_in_range(vectors, bits, is_in_range):
+    """The same of vectors, each of which stays as it is where the result would be out of range."""
+    result = rounded(vectors, bits)
+    return np.where(is_in_range(result), result, vectors)
+
+
+def round_orientations(state, bits):
+    """q of every body, with a w that is not negative."""
+    if state.orientation and bits:
+        alive = state.alive == 1
+        q = rounded_in_range(state.q[:, alive], bits, turn.is_quaternion)
+        state.q[:, alive] = np.where(q[3] < 0, -q, q)
 
 
 def read_position(body):
@@ -188,8 +204,9 @@ def apply_delta(world, stream, data, gravity=(0, 0, 0)):
     after.parameters.update(parsed.parameters)
     state = after.state
     renewed = apply_records(state, parsed.records, stream.types)
-    for_p, for_v, for_c = parsed.rounding
+    for_p, for_v, for_c, for_q, for_w = parsed.rounding
     state.p[:] = rounded(state.p, for_p)
+    round_orientations(state, for_q)
     if stream.codec == "tracker":
         tracker.apply_corrections(after, stream, parsed.corrections, renewed, tracker.Setting(for_p, gravity))
     else:
@@ -197,4 +214,7 @@ def apply_delta(world, stream, data, gravity=(0, 0, 0)):
     awake = state.rest == 0
     state.v[:, awake] = rounded(state.v[:, awake], for_v)
     state.c[:, awake] = rounded(state.c[:, awake], for_c)
+    round_orientations(state, for_q)
+    if state.orientation:
+        state.w[:, awake] = rounded_in_range(state.w[:, awake], for_w, turn.is_spin)
     return after

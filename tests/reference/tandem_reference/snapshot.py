@@ -1,5 +1,6 @@
 """A snapshot: all that a joiner needs to start after the delta of its frame."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +12,13 @@ from .payload import PARAMETERS, World, sections, start_models
 from .predict import Drive
 from .reader import Reader
 from .state import MOST_C, MOST_P, MOST_V, State
+from .tracker import GROUP
 from .xxh3 import text
 
 INPUTS, REGION = 0x84, 0x85
 MOST_GRAVITY = 2**28
 MOST_INPUTS = 256
-ZERO, BEFORE, HALF = range(3)
+ZERO, BEFORE, HALF, REST = range(4)
 
 
 @dataclass
@@ -61,7 +63,7 @@ def read_inputs(body, frame, last_input):
 
 
 class Guess:
-    """What the next number of a column is expected to be: 0, the one before, or half way to it."""
+    """What the next number of a column is expected to be: 0, the one before (at rest), or half way to it."""
 
     def __init__(self, how):
         self.how = how
@@ -69,7 +71,7 @@ class Guess:
 
     def saw(self, rest, x):
         """Learn the number of a body."""
-        if self.how == BEFORE or (self.how == HALF and rest):
+        if self.how == BEFORE or (self.how != ZERO and rest):
             self.values[rest] = x
         elif self.how == HALF:
             self.values[rest] = (self.values[rest] + x) >> 1
@@ -86,6 +88,33 @@ def read_column(numbers, guess, at_rest, most):
         value = x << shift
         require(most[0] <= value <= most[1], "snapshot", f"a value of {value}")
         values.append(value)
+    return values
+
+
+def read_norm(numbers, at_rest, others, most):
+    """A column of w, guessed as what gives a norm of 1 with x, y and z (`others`)."""
+    shift = numbers.even_bits(5)
+    kinds = [NumberModels(), NumberModels()]
+    values = []
+    for rest, vector in zip(at_rest, others.T.tolist()):
+        guess = math.isqrt(max(0, 2**60 - sum(x * x for x in vector))) >> shift
+        value = (guess + numbers.number(kinds[rest])) << shift
+        require(-most <= value <= most, "snapshot", f"a value of {value}")
+        values.append(value)
+    return values
+
+
+def read_same(numbers, at_rest):
+    """A column of bytes in which 0 and the value of the body before change places."""
+    shift = numbers.even_bits(5)
+    kinds, before = [NumberModels(), NumberModels()], [0, 0]
+    values = []
+    for rest in at_rest:
+        x = numbers.number(kinds[rest])
+        x = {0: before[rest], before[rest]: 0}.get(x, x)
+        before[rest] = x
+        require(-128 <= x << shift <= 127, "snapshot", f"a value of {x << shift}")
+        values.append(x << shift)
     return values
 
 
@@ -112,15 +141,20 @@ def read_region(body, stream):
     for rows, how, most in ((state.p, BEFORE, MOST_P), (state.v, HALF, MOST_V), (state.c, HALF, MOST_C)):
         for axis in range(3):
             rows[axis, slots] = column(how, -most, most)
-    for rows, most in ((state.q, turn.ONE), (state.w, turn.MOST_W)):
-        for row in rows:
-            row[slots] = column(ZERO, -most, most)
+    if stream.orientation:
+        for axis in range(3):
+            state.q[axis, slots] = column(REST, -turn.ONE, turn.ONE)
+        state.q[3, slots] = read_norm(numbers, at_rest, state.q[:3, slots], turn.ONE)
+        for axis in range(3):
+            state.w[axis, slots] = column(ZERO, -turn.MOST_W, turn.MOST_W)
     state.check_ranges(stream.types, "snapshot")
     for i, row in enumerate(state.codec):
-        values = np.array(column(ZERO, -128, 127), np.int64)
-        row[slots] = values % 256 if i < 2 else values
-    require(not len(state.codec) or not np.any(state.codec[0] > 254), "snapshot", "an age of 255")
-    require(not np.any(state.codec[2:] < -127), "snapshot", "a last step of -128")
+        if i % GROUP < 2:  # age, interval
+            row[slots] = np.array(read_same(numbers, at_rest), np.int64) % 256
+            require(i % GROUP == 1 or not np.any(row > 254), "snapshot", "an age of 255")
+        else:
+            row[slots] = column(ZERO, -128, 127)
+            require(not np.any(row < -127), "snapshot", "a last step of -128")
     models = start_models(stream)
     if models:
         models.read(numbers)
@@ -135,7 +169,7 @@ def read(data, stream):
     reader = Reader(data, "snapshot")
     require(reader.take(4) == b"TDSP", "snapshot", "its first four bytes are others")
     version = reader.u8()
-    require(version == 1, "snapshot", f"version {version}")
+    require(version == 2, "snapshot", f"version {version}")
     epoch, stream_id, generation = reader.u64(), reader.u32(), reader.u32()
     frame, last_input = reader.u64(), reader.u64()
     require(frame <= 2**62, "snapshot", f"frame {frame}")

@@ -51,8 +51,6 @@ class Stream:
             require(not self.predictor_constants, "session", "ballistic has no constants")
         else:
             self.world = contact.read_world(self.predictor_constants)
-            if self.predictor == "field":
-                self.world = self.world.as_field()
 
     def layout_text(self):
         """The text whose hash is the layout hash."""

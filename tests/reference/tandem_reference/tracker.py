@@ -45,15 +45,18 @@ class Models:
 
     def read(self, numbers):
         """Take the models of a snapshot."""
-        weights, probabilities, before = NumberModels(), NumberModels(), 32768
+        weights, ones, rest = NumberModels(), [NumberModels() for _ in range(8)], NumberModels()
         for model in range(len(self.p)):
             lacks = numbers.number(weights)
             require(0 <= lacks <= 255, "snapshot", f"a model that lacks {lacks} of its weight")
-            self.weight[model] = -lacks % 256
-            if lacks:
-                before += numbers.number(probabilities)
-                require(32 <= before <= 65504, "snapshot", "a model's probability out of range")
-                self.p[model] = before
+            weight = -lacks % 256
+            self.weight[model] = weight
+            if weight:
+                seen = numbers.number(ones[weight.bit_length() - 1])
+                guess = (int(self.p[model]) + 65536 * seen) // (weight + 1)
+                p = min(max(guess, 32), 65504) + numbers.number(rest)
+                require(32 <= p <= 65504, "snapshot", "a model's probability out of range")
+                self.p[model] = p
 
 
 def count_below(x, limits):
@@ -284,8 +287,9 @@ def correct(state, corrected, values, stream, setting):
         radii = np.array(stream.radii, np.int64)[state.type[slots]]
         unit = turned.unit(threshold, True, setting.rounding)
         angle = np.clip((unit << 28) // radii, 1, turn.MOST_W)
-        state.q[:, slots] = turn.turned(state.q[:, slots], turn.limited(steps * angle))
-        state.w[:, slots] = turn.limited(state.w[:, slots] + steps * (turned.growth(angle, for_v) >> 6))
+        state.q[:, slots], far = turn.turned_by(state.q[:, slots], steps * angle)
+        w = turn.limited(state.w[:, slots] + steps * (turned.growth(angle, for_v) >> 6))
+        state.w[:, slots] = np.where(far, state.w[:, slots], w)
         turned.remember()
     slots = np.array(list(corrected), np.int64)
     state.rest[slots] = [correction.rest for correction in corrected.values()]

@@ -29,6 +29,15 @@ def limited(w):
     return w
 
 
+def turned_by(q, by):
+    """The quaternions turned by rotation vectors of any length, and which of these were too long for one turn."""
+    step = limited(by)
+    far = np.any(step != by, axis=0)
+    after = turned(q, step)
+    after[:, far] = turned(after[:, far], step[:, far])
+    return after, far
+
+
 def times(a, b):
     """A product of numbers of which one is in 2^-28."""
     return (a * b) >> 28

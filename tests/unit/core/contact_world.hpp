@@ -29,9 +29,12 @@ inline ContactConstants constants_of(std::int32_t substeps) {
   return constants;
 }
 
-inline std::unique_ptr<Predictor> predictor_of(std::string_view tier, std::uint32_t capacity,
+/// With the constants that a server announces for this predictor in a world of `constants`.
+inline std::unique_ptr<Predictor> predictor_of(std::string_view name, std::uint32_t capacity,
                                                const ContactConstants& constants) {
-  return *make_predictor(tier, capacity, write_contact_constants(constants));
+  const bool one_step = (*find_predictor(name))->one_step;
+  return *make_predictor(name, capacity,
+                         write_contact_constants(one_step ? in_one_step(constants) : constants));
 }
 
 inline Vec3i vector_within(std::mt19937_64& random, std::int32_t limit) {

@@ -269,7 +269,7 @@ TEST(Snapshot, OfAnotherCapacityOrVersionIsRefused) {
   State other(4);
   auto bytes = write(example(), state);
   EXPECT_EQ(read_snapshot(bytes, kTypes, other, *codec_for(4)).error().code, ErrorCode::kMalformed);
-  bytes[4] = std::byte{2};
+  bytes[4] = std::byte{1};
   EXPECT_EQ(read_snapshot(bytes, kTypes, state, *codec_for(3)).error().code, ErrorCode::kUnsupported);
 }
 

@@ -26,7 +26,6 @@ inline constexpr std::int32_t kResidualLimit = 127;
   return static_cast<std::int8_t>(target < from ? -q : q);
 }
 
-using WideSpin = std::array<std::int64_t, kSpinChannels>;
 /// `from` moved by `q` steps (x, y, z), before limited_spin().
 [[nodiscard]] inline WideSpin moved_spin(const Spin& from, const std::int8_t* q, std::int32_t step) {
   WideSpin spin{};
@@ -56,13 +55,14 @@ inline void quantise_spin(const Spin& from, const Spin& target, std::int32_t ste
   }
   if (!has_turn_steps(parameters)) return q;
   const BodyState from = state.body(slot), to = target.body(slot);
-  quantise_spin({}, turn_between(from.q, to.q), parameters.turn_step, &q[6]);
+  const Spin turn = turn_between(from.q, to.q);
+  for (std::size_t i = 0; i < kSpinChannels; ++i) q[6 + i] = quantise(0, turn[i], parameters.turn_step);
   quantise_spin(from.w, to.w, parameters.spin_step, &q[9]);
   return q;
 }
 
 /// Applies a residual: rest = 0; p += q * position_step and v += q * velocity_step, clamped to the lattice;
-/// the orientation is turned by q * turn_step, w += q * spin_step, both after limited_spin().
+/// the orientation is turned_by() q * turn_step, w += q * spin_step after limited_spin().
 inline void apply_residual(State& state, Slot slot, const Residual& q, const CodecParameters& parameters) {
   const auto moved = [](std::int32_t from, std::int8_t steps, std::int32_t step, std::int64_t limit) {
     return static_cast<std::int32_t>(std::clamp(from + std::int64_t{steps} * step, -limit, limit));
@@ -76,8 +76,7 @@ inline void apply_residual(State& state, Slot slot, const Residual& q, const Cod
   }
   if (!has_turn_steps(parameters)) return;
   const BodyState from = state.body(slot);
-  const Spin turn = limited_spin(moved_spin({}, &q[6], parameters.turn_step));
-  state.set_quaternion(slot, turned(from.q, turn));
+  state.set_quaternion(slot, turned_by(from.q, moved_spin({}, &q[6], parameters.turn_step)).q);
   const Spin w = limited_spin(moved_spin(from.w, &q[9], parameters.spin_step));
   for (std::size_t i = 0; i < kSpinChannels; ++i) state.w(i)[slot] = w[i];
 }

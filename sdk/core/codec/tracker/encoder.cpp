@@ -124,11 +124,11 @@ void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, cons
     const BodyState from = frame.at.predicted.body(slot);
     const BodyState to = target.body(slot);
     const std::int32_t radius = frame.memory.radii()[target.type()[slot]];
-    inside = choose_joint_steps({from, to, radius, threshold, frame.at.position_bits}, of_error, costs_,
-                                context, frame.turn_context_of(slot), correction);
+    inside = choose_joint_steps({from, to, radius, threshold, frame.at.rounding}, of_error, costs_, context,
+                                frame.turn_context_of(slot), correction);
   } else {
     inside = choose_steps(position(frame.at.predicted, slot), position(target, slot),
-                          TrackerSteppings(threshold, frame.at.position_bits), of_error, costs_, context,
+                          TrackerSteppings(threshold, frame.at.rounding.p), of_error, costs_, context,
                           correction.steps);
   }
   const bool is_of_use =

@@ -106,14 +106,17 @@ void TrackerFilter::turn(State& state, Slot slot, const TrackerCorrection& corre
   const tracker_detail::Meaning meaning(steps, body);
   const std::int64_t one = steppings(correction).angle_for(steps, radii_[state.type()[slot]]);
   const std::int64_t w_of_one = meaning.growth(one, gains_.velocity(meaning.k)) >> 6;
-  std::array<std::int64_t, 3> by{}, w{};
+  WideSpin by{}, w{};
   for (std::size_t i = 0; i < 3; ++i) {
     by[i] = steps[i] * one;
     w[i] = state.w(i)[slot] + steps[i] * w_of_one;
   }
-  state.set_quaternion(slot, turned(state.quaternion(slot), limited_spin(by)));
-  const Spin kept = limited_spin(w);
-  for (std::size_t i = 0; i < 3; ++i) state.w(i)[slot] = kept[i];
+  const Turned turned = turned_by(state.quaternion(slot), by);
+  state.set_quaternion(slot, turned.q);
+  if (!turned.is_far) {
+    const Spin kept = limited_spin(w);
+    for (std::size_t i = 0; i < 3; ++i) state.w(i)[slot] = kept[i];
+  }
   meaning.remember(body);
 }
 

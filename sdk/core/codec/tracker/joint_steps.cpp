@@ -49,8 +49,8 @@ std::uint64_t Search::error_of_position(const TrackerSteps& steps, std::int64_t 
 
 std::uint64_t Search::error_of_turn(const TrackerSteps& steps, std::int64_t angle) const {
   BodyState moved = body_.target;
-  const Spin by = limited_spin({steps[0] * angle, steps[1] * angle, steps[2] * angle});
-  moved.q = turned(body_.predicted.q, by);
+  const WideSpin by{steps[0] * angle, steps[1] * angle, steps[2] * angle};
+  moved.q = rounded(turned_by(body_.predicted.q, by).q, body_.rounding.q);
   return surface_error(moved, body_.target, body_.radius);
 }
 
@@ -109,7 +109,7 @@ bool choose_joint_steps(const JointResidual& body, const ErrorWorth& worth, cons
   Search search(body, worth, costs);
   for (const bool fine : {false, true}) {
     const auto size = fine ? TrackerSteppings::kFine : TrackerSteppings::kJoint;
-    search.list(TrackerSteppings(body.threshold, body.position_bits, size), position, turn.turn);
+    search.list(TrackerSteppings(body.threshold, body.rounding.p, size), position, turn.turn);
     search.run(turn, fine);
     if (search.found()) break;
   }

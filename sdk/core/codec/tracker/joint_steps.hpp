@@ -16,7 +16,7 @@ struct JointResidual {
   const BodyState& target;
   std::int32_t radius;  ///< lattice units
   std::int32_t threshold;
-  unsigned position_bits;  ///< as in the frame
+  Rounding rounding;  ///< as in the frame
 };
 
 /// Fills steps, turn and fine of `correction`. It tries the points around the missing correction. Among those

@@ -1,6 +1,7 @@
 #include "sdk/core/codec/tracker/memory.hpp"
 
 #include <algorithm>
+#include <bit>
 
 namespace tandem {
 namespace {
@@ -8,25 +9,31 @@ namespace {
 // Corrected and renewed bodies are younger than the others afterwards: their age restarts at zero.
 constexpr std::uint8_t kYoungest = 0xFF;
 
-// Codes models in a snapshot: the weight of each as its difference to 256 (most used models lack one), and
-// the probability of each used model as its difference to the previous one.
+// Codes models in a snapshot: the weight of each as its difference to 256 (most used models lack one), and of
+// each used model the number of ones that explains its probability, and what is left.
 class ModelsCoder {
  public:
-  /// Returns false if a decoder read an invalid model.
+  /// `start`: P of a model that has learned nothing. Returns false if a decoder read an invalid model.
   template <class Coder>
-  bool code(Coder& coder, std::uint8_t& weight, std::uint16_t& p1) {
+  bool code(Coder& coder, std::uint16_t start, std::uint8_t& weight, std::uint16_t& p1) {
     const std::int64_t lacks = code_number(coder, weights_, static_cast<std::uint8_t>(0U - weight));
     if (lacks < 0 || lacks > UINT8_MAX) return false;
     weight = static_cast<std::uint8_t>(-lacks);
     if (weight == 0) return true;
-    guess_ += code_number(coder, probabilities_, p1 - guess_);
-    p1 = static_cast<std::uint16_t>(guess_);
-    return guess_ >= TrackerModels::kLeast && guess_ <= TrackerModels::kMost;
+    // A model that has seen `ones` among `weight` decisions has about this P.
+    const std::int64_t count = weight + 1;
+    const std::int64_t seen = (count * p1 - start + (1 << 15)) >> 16;
+    const std::int64_t ones = code_number(coder, ones_[std::bit_width(unsigned{weight}) - 1], seen);
+    const std::int64_t guess =
+        std::clamp<std::int64_t>((start + ones * 65536) / count, TrackerModels::kLeast, TrackerModels::kMost);
+    const std::int64_t p = guess + code_number(coder, rounding_, p1 - guess);
+    p1 = static_cast<std::uint16_t>(p);
+    return p >= TrackerModels::kLeast && p <= TrackerModels::kMost;
   }
 
  private:
-  NumberModels weights_, probabilities_;
-  std::int64_t guess_ = 32768;
+  NumberModels weights_, rounding_;
+  std::array<NumberModels, 8> ones_;  // by the number of bits of the weight
 };
 
 }  // namespace
@@ -119,7 +126,7 @@ void TrackerMemory::correct_position_and_turn(const TrackerFilter& filter,
 
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block,
                           State& state) {
-  const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.position_bits, gains_,
+  const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.rounding.p, gains_,
                              radii_);
   const TrackerDelta::Part& part = delta.blocks[block.index];
   for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
@@ -154,15 +161,17 @@ void TrackerMemory::grow_older(std::size_t column, const Block& block, std::span
 
 void TrackerMemory::save_models(NumberEncoder& out) const {
   ModelsCoder coder;
+  const TrackerModels start;
   for (std::size_t i = 0; i < models_in_use(); ++i) {
     std::uint8_t weight = models_.weight[i];
     std::uint16_t p1 = models_.p1[i];
-    coder.code(out, weight, p1);
+    coder.code(out, start.p1[i], weight, p1);
   }
 }
 
 std::size_t TrackerMemory::models_bits_bound() const {
-  return models_in_use() * (most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX));
+  return models_in_use() *
+         (most_number_bits(UINT8_MAX) + most_number_bits(2 * UINT8_MAX) + most_number_bits(UINT16_MAX));
 }
 
 Result<void> TrackerMemory::load(std::span<const std::byte> columns, NumberDecoder& in) {
@@ -181,7 +190,7 @@ Result<void> TrackerMemory::load(std::span<const std::byte> columns, NumberDecod
   ModelsCoder coder;
   TrackerModels models;
   for (std::size_t i = 0; i < models_in_use(); ++i) {
-    if (!coder.code(in, models.weight[i], models.p1[i]))
+    if (!coder.code(in, models.p1[i], models.weight[i], models.p1[i]))
       return fail(ErrorCode::kMalformed, "coder state with an impossible model");
   }
   if (!in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length");

@@ -37,14 +37,14 @@ Corrections Tracker::encode(const CodecFrame& at, const State& target, std::size
   const TrackerFrame frame = this->frame(at);
   const std::span<const Slot> corrected = encoder_->encode(frame, target, budget, out);
   if (observer != nullptr) report(frame, corrected, *observer);
-  return {corrected, at.renewed, at.parameters, at.gravity, at.position_bits};
+  return {corrected, at.renewed, at.parameters, at.gravity, at.rounding};
 }
 
 Result<Corrections> Tracker::decode(const CodecFrame& at, std::span<const Section> sections) {
   TANDEM_ASSERT(at.alive.size() == memory_.capacity());
   const auto corrected = decoder_.decode(frame(at), sections);
   if (!corrected) return tl::unexpected<Error>(corrected.error());
-  return Corrections{*corrected, at.renewed, at.parameters, at.gravity, at.position_bits};
+  return Corrections{*corrected, at.renewed, at.parameters, at.gravity, at.rounding};
 }
 
 void Tracker::apply(const Corrections& corrections, State& state) {

@@ -8,7 +8,6 @@ namespace tandem {
 /// per step, no scratch memory.
 class Ballistic final : public Predictor {
  public:
-  [[nodiscard]] std::string_view name() const override { return "ballistic"; }
   void step(const State& from, State& to, const StepInput& input) override;
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return false; }

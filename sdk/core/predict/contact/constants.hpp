@@ -1,5 +1,5 @@
 #pragma once
-// What the tiers `contact` and `field` know about the world, and its form in the session.
+// What the predictors `contact` and `field` know about the world, and its form in the session.
 
 #include <array>
 #include <cstdint>
@@ -54,8 +54,8 @@ struct ContactConstants {
   }
 };
 
-/// The constants for one step per frame, for the tier `field`: the gains of all sub-steps together, limited
-/// so that one step does not oscillate. With one sub-step nothing changes.
+/// The constants for one step per frame, which a server announces for `field`: the gains of all sub-steps
+/// together, limited so that one step does not oscillate. With one sub-step nothing changes.
 [[nodiscard]] ContactConstants in_one_step(ContactConstants constants);
 
 /// Writes the integers of a session's `predictor_constants`.

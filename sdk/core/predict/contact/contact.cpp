@@ -111,9 +111,8 @@ TANDEM_VECTOR_CLONES std::uint32_t begin_cells(std::span<const std::uint8_t> in_
 
 }  // namespace
 
-Contact::Contact(std::uint32_t capacity, ContactConstants constants, Tier tier)
-    : coarse_(tier == Tier::kField && constants.substeps > 1),
-      constants_(tier == Tier::kField ? in_one_step(std::move(constants)) : std::move(constants)),
+Contact::Contact(std::uint32_t capacity, ContactConstants constants)
+    : constants_(std::move(constants)),
       largest_radius_(largest_radius_of(constants_)),
       shift_(shift_for(largest_radius_)),
       pair_law_(law_of(constants_.pair, shift_)),

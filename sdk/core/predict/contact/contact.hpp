@@ -1,6 +1,6 @@
 #pragma once
-// The tiers `contact` and `field`: the engine's penalty contacts in integers. idl/PROTOCOL.md, "Predicted
-// step", has the formulas.
+// The step of the predictors `contact` and `field`: the engine's penalty contacts in integers. They differ in
+// their constants alone. idl/PROTOCOL.md, "Contact", has the formulas.
 
 #include <array>
 #include <cstdint>
@@ -19,13 +19,8 @@ namespace tandem {
 /// step in any state: at most ContactGrid::kMostInCell bodies of a cell take part in pairs.
 class Contact final : public Predictor {
  public:
-  enum class Tier {
-    kContact,  ///< as many sub-steps per frame as the engine
-    kField,    ///< one step per frame
-  };
-  Contact(std::uint32_t capacity, ContactConstants constants, Tier tier);
+  Contact(std::uint32_t capacity, ContactConstants constants);
 
-  [[nodiscard]] std::string_view name() const override { return coarse_ ? "field" : "contact"; }
   void step(const State& from, State& to, const StepInput& input) override;
   /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
@@ -37,7 +32,6 @@ class Contact final : public Predictor {
   void add_pairs(bool first);
   void copy(const State& from, State& to) const;
 
-  bool coarse_;  // one step replaces several sub-steps
   ContactConstants constants_;
   std::int32_t largest_radius_;
   std::uint32_t shift_;  // a grid unit is 2^shift lattice units
