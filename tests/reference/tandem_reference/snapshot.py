@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import parameters, turn
+from . import parameters, tracker, turn
 from .errors import require
 from .number_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
@@ -118,9 +118,11 @@ def read_region(body, stream):
     state.check_ranges(stream.types, "snapshot")
     for i, row in enumerate(state.codec):
         values = np.array(column(ZERO, -128, 127), np.int64)
-        row[slots] = values % 256 if i < 2 else values
-    require(not len(state.codec) or not np.any(state.codec[0] > 254), "snapshot", "an age of 255")
-    require(not np.any(state.codec[2:] < -127), "snapshot", "a last step of -128")
+        row[slots] = values % 256 if i % tracker.GROUP in (tracker.AGE, tracker.INTERVAL) else values
+    for first in range(0, len(state.codec), tracker.GROUP):
+        columns = state.codec[first : first + tracker.GROUP]
+        require(not np.any(columns[tracker.AGE] > 254), "snapshot", "an age of 255")
+        require(not np.any(columns[tracker.LAST] < -127), "snapshot", "a last step of -128")
     models = start_models(stream)
     if models:
         models.read(numbers)
