@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import writer
 
 from tandem_reference import parameters as reference_parameters
 from tandem_reference import payload
@@ -23,9 +24,11 @@ CONTACT = [
 FALL = Drive((0, -3000, 0), 200)
 
 
-def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False):
-    """A small stream; with orientations where it `turns`."""
-    constants = [] if predictor == "ballistic" else CONTACT
+def stream(
+    codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False, constants=()
+):
+    """A small stream; with orientations where it `turns`. Without other constants contact has CONTACT."""
+    constants = [] if predictor == "ballistic" else list(constants or CONTACT)
     groups = ["position", "orientation"] if turns else ["position"]
     radii = [500 + kind for kind in range(types)] if turns else []
     values = dict(parameters or PARAMETERS)
@@ -74,6 +77,15 @@ def some_spin(following):
     w = [following(300000000) for _ in range(3)]
     small = abs(following(28))
     return [axis >> small for axis in w]
+
+
+def teleported(places):
+    """A lifecycle section that teleports bodies {slot: (p, v)}, slots ascending."""
+    records, before = b"", 0
+    for slot, (p, v) in places.items():
+        records += writer.record(slot - before, 2, b"\1", writer.position(p, v))
+        before = slot
+    return writer.section(0x81, records)
 
 
 def two_hundred_bodies(codec="none"):
