@@ -35,6 +35,9 @@ def turns():
              [long, -long, long, -long], [0, 0, short, 0], [0, -short, 0, 0]]  # fmt: skip
     following = worlds.random_numbers(31)
     cases = [(q, w) for q in plain for w in limits]
+    # Norms at the limits exactly; one that is long, about to lie along an axis.
+    cases += [(q, w) for q in ((one, 2**25, 0, 0), (31 * 2**25, 7 * 2**25, 3 * 2**25, 2**26)) for w in limits[:2]]
+    cases += [((0, 0, 514904931, 942527154), (0, 0, -(2**28)))]
     cases += [(worlds.some_quaternion(following), w) for w in limits]
     cases += [(worlds.some_quaternion(following), worlds.some_spin(following)) for _ in range(60)]
     about = "# The turn: q x y z w, w x y z, then q afterwards; limits, norms just allowed, any, a chain"

@@ -1,5 +1,7 @@
 """The vectors of the codec `tracker`, and of rounding."""
 
+from dataclasses import replace
+
 import worlds
 import writer
 from tandem_reference.predict import Drive
@@ -16,6 +18,8 @@ def vectors():
         "tracker_blocks": blocks(),
         "tracker_rest": rests(),
         "tracker_turns": turns(),
+        "tracker_turns_refused": refused_of_turns(),
+        "tracker_turns_snapshot": middle_of_turns(),
         "tracker_refused": refused(),
         "rounding": rounding(),
     }
@@ -25,22 +29,37 @@ def deltas(predictor, seed):
     """Several deltas in a row, so that the models learn; with renewed bodies and parameters that change."""
     slots = [slot for slot in range(30) if slot % 5 != 4]
     line = scattered("tracker", predictor, slots, 30, b"", seed)
-    vector = Vector(f"codec tracker with {predictor}: twelve frames", line)
+    vector = Vector(f"codec tracker with {predictor}: eighteen frames", line)
     following = worlds.random_numbers(seed + 1)
+    changes = {
+        8: ({1: 77, 4: 2000, 5: 30000, 6: 20000}, "threshold, decay and gains change; threshold and gains hold at once"),
+        14: ({1: 300001, 5: 65535, 6: 65535}, "a large threshold, the largest gains"),
+        16: ({1: 5}, "a small threshold: gravity limits c, also along axes that are not corrected"),
+        18: ({1: 1}, "the smallest threshold"),
+    }
     place = writer.position((500, 600, 700), (9999, -9999, 0))
     born = writer.section(0x81, writer.record(3, 2, b"\1", place) + writer.record(1, 1, b"\1\1", place))
-    for frame in range(1, 13):
+    sizes = {**dict.fromkeys(range(9, 13), (20, 200, 3000)), 15: (2, 2, 2), 16: (2, 60, 2), 17: (900, 2, 900)}
+    for frame in range(1, 19):
+        if frame == 15:
+            vector.input(1, 16, Drive((4000, -3000, 100), 100))
         vector.predict()
-        steps = some_steps(slots, following, (1, 2, 3) if frame < 9 else (20, 200, 3000))
+        steps = some_steps(slots, following, sizes.get(frame, (1, 2, 3)))
         if frame == 4:
             vector.say("slot 3 teleported, not corrected; slot 4 spawned and corrected")
             vector.track({**{s: v for s, v in steps.items() if s != 3}, 4: [1, 0, -1]}, born, (3, 4))
         elif frame == 6:
             vector.say("nobody is corrected")
             vector.delta(b"")
-        elif frame == 8:
-            vector.say("threshold, decay and gains change; threshold and gains hold at once")
-            vector.track(steps, writer.section(0x82, writer.parameters({1: 77, 4: 2000, 5: 30000, 6: 20000})))
+        elif frame == 10:
+            vector.say("slot 8 teleported; nobody is corrected")
+            vector.delta(writer.section(0x81, writer.record(8, 2, b"\1", place)))
+        elif frame == 13:
+            vector.say("slot 2 of another type, which renews nobody")
+            vector.track(steps, writer.section(0x81, writer.record(2, 3, b"\1")))
+        elif frame in changes:
+            vector.say(changes[frame][1])
+            vector.track(steps, writer.section(0x82, writer.parameters(changes[frame][0])))
         else:
             vector.track(steps)
     return vector
@@ -52,26 +71,119 @@ def some_steps(slots, following, sizes):
     return {slot: value for slot, value in steps.items() if any(value)}
 
 
+def learn_anything(models, following):
+    """Weights and probabilities of every kind; some that one decision leads beyond the limits."""
+    for model in range(len(models.p)):
+        models.weight[model] = min(max(128 + following(160), 0), 255)
+        if models.weight[model]:
+            models.p[model] = 32768 + following(32000)
+        if following(100) > 70:
+            models.weight[model], models.p[model] = 1, 32 if model % 2 else 65504
+
+
+# Where classes of frames begin.
+EDGES = 0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 19, 20, 23, 24, 39, 40, 63, 64, 127, 128, 249, 250, 253, 254
+
+
+def some_columns(slot, following):
+    """Columns of a group: age, interval and last steps; ages and intervals about where a class begins."""
+    age = EDGES[slot % len(EDGES)]
+    interval = (*EDGES, 255)[following(14) + 14] if slot % 4 else 0
+    return [age, interval, *([following(3) for _ in range(3)] if slot % 7 else (127, -127, following(127)))]
+
+
 def middle():
     """Ages, intervals, last steps and models of every kind, from a snapshot."""
     line = scattered("tracker", "contact", range(60), 60, b"", 8)
     following = worlds.random_numbers(9)
-    state, models = line.world.state, line.world.models
+    state = line.world.state
+    # With this threshold its quarter and its 32nd part are rounded.
+    threshold = line.world.parameters[1] = 119
+    of_v = threshold + threshold // 4, 20 * threshold, 64 * threshold
     for slot in range(60):
-        small = 40 if slot % 2 else 127
-        state.codec[:, slot] = [following(small) % 255, following(small) % 256] + [following(3) for _ in range(3)]
+        state.codec[:, slot] = some_columns(slot, following)
         state.c[:, slot] = [following(9) for _ in range(3)]
         state.v[:, slot] = [following(300) for _ in range(3)]
-    for model in range(len(models.p)):
-        models.weight[model] = 128 + following(127)
-        models.p[model] = 32768 + following(32000)
+        if slot % 3 == 0:
+            state.v[slot // 3 % 3, slot] = (1, -1)[slot % 2] * (of_v[slot // 6 % 3] + slot // 18 % 2)
+            state.c[:, slot] = [(1, -1)[following(2)] * (threshold // 32 + abs(following(2)) % 2) for _ in range(3)]
+    learn_anything(line.world.models, following)
     start = writer.snapshot(line)
     vector = Vector("codec tracker: a start in the middle, with columns and models of every kind", line, start)
+    vector.track(some_steps(range(0, 60, 2), following, (2, 2, 2)))
     for _ in range(3):
         vector.predict()
         vector.track(some_steps(range(60), following, (2, 30, 2)))
+    vector.say("as many steps as there may be")
+    vector.predict()
+    vector.track({3: [2**31 - 1, 1, 1 - 2**31], 4: [0, -(2**30) - 14, 2**30 + 13]})
     vector.say("a snapshot of this frame holds the same state, parameters, drive and models")
     vector.snapshot(writer.snapshot(vector.line))
+    return vector
+
+
+def middle_of_turns():
+    """The same of a stream of orientations, which plays on; a type of the largest radius."""
+    line = scattered("tracker", "ballistic", range(54), 54, b"", 41, turns=True)
+    line.stream = replace(line.stream, radii=[500, 2**30])
+    following = worlds.random_numbers(42)
+    state = line.world.state
+    state.type[::4] = 1
+    for slot in range(54):
+        state.codec[:5, slot] = some_columns(slot, following)
+        state.codec[5:, slot] = some_columns(slot + following(3), following)
+        state.w[:, slot] = [(2**17, 2**18)[following(2)] * following(3) + following(2) for _ in range(3)]
+        state.v[:, slot] = [following(300) for _ in range(3)]
+        state.c[:, slot] = [following(9) for _ in range(3)]
+    state.rest[5::9] = 1
+    state.c[:, 5::9] = [[0], [3000], [0]]
+    state.w[:, 5::9] = 0
+    learn_anything(line.world.models, following)
+    about = "codec tracker: orientations from the middle, with columns and models of every kind"
+    vector = Vector(about, line, writer.snapshot(line))
+    vector.track(some_corrections(range(0, 54, 2), following, (2, 2, 2)))
+    changes = {
+        2: ({1: 3000001, 5: 65535}, "a large threshold, the largest gain: angles, turns and growth at their limits"),
+        4: ({1: 70}, "a small one again"),
+        5: ({1: 1}, "the smallest: angles of bodies of type 1 are 1"),
+    }
+    content = turned_content(following)
+    place = writer.position((1, 2, 3), (4, 5, 6))
+    born = [writer.record(7, 2, b"\2", content), writer.record(1, 3, b"\0"), writer.record(1, 2, b"\1", place)]
+    for frame in range(1, 8):
+        vector.predict()
+        corrections = some_corrections(range(54), following, (2, 2, 3))
+        if frame in changes:
+            vector.say(changes[frame][1])
+            vector.track(corrections, writer.section(0x82, writer.parameters(changes[frame][0])))
+        elif frame == 3:
+            vector.say("slot 7 turned, 9 moved, 8 of another type, all corrected")
+            corrections[7] = Correction(0, None, [-1, 1, 2], 0)
+            corrections[8] = Correction(0, [1, 1, 0], [1, 0, -1], 1)
+            corrections[9] = Correction(0, [1, 0, 0], [2, -2, 1], 0)
+            vector.track(corrections, writer.section(0x81, b"".join(born)), (7, 9))
+        elif frame == 6:
+            vector.say("slot 3 turned; nobody is corrected")
+            vector.delta(writer.section(0x81, writer.record(3, 2, b"\2", content)))
+        else:
+            vector.track(corrections)
+    return vector
+
+
+def refused_of_turns():
+    """Snapshots that no stream of orientations has."""
+    line = scattered("tracker", "ballistic", range(2), 2, b"", 43, turns=True)
+    vector = Vector("codec tracker: snapshots of orientations that are refused", line)
+    columns = line.world.state.codec
+    for group, column, value, why in (
+        (0, 0, 255, "an age of 255"),
+        (1, 0, 255, "an age of 255 of the orientation"),
+        (0, 2, -128, "a last step of -128"),
+        (1, 4, -128, "a last step of -128 of the orientation"),
+    ):
+        columns[5 * group + column, 1] = value
+        vector.refuse_snapshot(writer.snapshot(line), why)
+        columns[5 * group + column, 1] = 0
     return vector
 
 
@@ -82,6 +194,8 @@ def blocks():
     for steps in ({0: [1, 0, 0], 16389: [0, -2, 16]}, {16384: [0, 0, 1]}, {16383: [-1, -1, -1], 16384: [15, 0, 0]}):
         vector.predict()
         vector.track(steps)
+    vector.say("a snapshot of this frame: a block without a section taught nothing")
+    vector.snapshot(writer.snapshot(vector.line))
     return vector
 
 
@@ -116,17 +230,6 @@ def turns():
     vector = Vector("codec tracker: orientations", line)
     following = worlds.random_numbers(32)
 
-    def some_corrections(sizes):
-        corrections = {}
-        for slot in slots:
-            rest = int(following(100) > 70)
-            steps = [following(size) for size in sizes] if following(100) > -40 else None
-            turn_by = [following(size) for size in sizes] if following(100) > -40 else None
-            correction = correction_of(rest, steps, turn_by, following(2) & 1)
-            if correction:
-                corrections[slot] = correction
-        return corrections
-
     content = writer.position((500, 600, 700), (9999, -9999, 0)) + turned_content(following)
     for frame in range(1, 15):
         if frame == 9:
@@ -137,7 +240,7 @@ def turns():
             born = writer.section(
                 0x81, writer.record(3, 2, b"\2", turned_content(following)) + writer.record(2, 1, b"\1\1", content)
             )
-            corrections = {slot: how for slot, how in some_corrections((2, 2, 2)).items() if slot != 3}
+            corrections = {slot: how for slot, how in some_corrections(slots, following, (2, 2, 2)).items() if slot != 3}
             corrections[5] = Correction(0, [1, 0, 0], [0, 1, -2], 1)
             vector.track(corrections, born, (3, 5))
         elif frame == 6:
@@ -146,12 +249,12 @@ def turns():
         elif frame == 8:
             vector.say("all rounded; a new threshold")
             changed = writer.section(0x82, writer.parameters({1: 77}))
-            vector.track(some_corrections((2, 3, 2)), changed, rounding=writer.section(0x87, bytes([2, 5, 3, 18, 16])))
+            vector.track(some_corrections(slots, following, (2, 3, 2)), changed, rounding=writer.section(0x87, bytes([2, 5, 3, 18, 16])))
         elif frame == 12:
             vector.say("q and w rounded alone")
             vector.delta(writer.section(0x87, bytes([0, 0, 0, 15, 20])))
         else:
-            vector.track(some_corrections((1, 2, 3) if frame < 11 else (20, 200, 3000)))
+            vector.track(some_corrections(slots, following, (1, 2, 3) if frame < 11 else (20, 200, 3000)))
     vector.say("a snapshot of this frame holds the same state")
     vector.snapshot(writer.snapshot(vector.line))
     vector.predict()
@@ -159,6 +262,19 @@ def turns():
                       ((0, 0, 0, 0, 25), "w by too many bits"), ((1, 1, 1), "without q and w")):  # fmt: skip
         vector.refuse(writer.section(0x87, bytes(bits)), why)
     return vector
+
+
+def some_corrections(slots, following, sizes):
+    """Corrections of some of the slots, of either group or both."""
+    corrections = {}
+    for slot in slots:
+        rest = int(following(100) > 70)
+        steps = [following(size) for size in sizes] if following(100) > -40 else None
+        turn_by = [following(size) for size in sizes] if following(100) > -40 else None
+        correction = correction_of(rest, steps, turn_by, following(2) & 1)
+        if correction:
+            corrections[slot] = correction
+    return corrections
 
 
 def correction_of(rest, steps, turn_by, fine):

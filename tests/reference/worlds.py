@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import writer
 
 from tandem_reference import parameters as reference_parameters
 from tandem_reference import payload
@@ -25,9 +26,12 @@ FIELD = [1, 3640, 102, 410, 3640, 102, 410, *CONTACT[7:]]
 FALL = Drive((0, -3000, 0), 200)
 
 
-def stream(codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False):
-    """A small stream; with orientations where it `turns`."""
-    constants = {"contact": CONTACT, "field": FIELD}.get(predictor, [])
+def stream(
+    codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False, constants=()
+):
+    """A small stream; with orientations where it `turns`. `contact` and `field` have constants of their own without others."""
+    usual = {"contact": CONTACT, "field": FIELD}.get(predictor, [])
+    constants = list(constants or usual)
     groups = ["position", "orientation"] if turns else ["position"]
     radii = [500 + kind for kind in range(types)] if turns else []
     values = dict(parameters or PARAMETERS)
@@ -76,6 +80,15 @@ def some_spin(following):
     w = [following(300000000) for _ in range(3)]
     small = abs(following(28))
     return [axis >> small for axis in w]
+
+
+def teleported(places):
+    """A lifecycle section that teleports bodies {slot: (p, v)}, slots ascending."""
+    records, before = b"", 0
+    for slot, (p, v) in places.items():
+        records += writer.record(slot - before, 2, b"\1", writer.position(p, v))
+        before = slot
+    return writer.section(0x81, records)
 
 
 def two_hundred_bodies(codec="none"):

@@ -4,6 +4,7 @@ import pathlib
 import struct
 import sys
 
+import contact_vectors
 import orientation_vectors
 import tracker_vectors
 import worlds
@@ -16,7 +17,9 @@ from vector_text import NOTE, Vector, scattered
 
 def absolute():
     """Codec none: three forms of selection."""
-    vector = Vector("codec none: list, mask and all; c becomes 0", scattered("none", "ballistic", (0, 1, 5, 9), 10))
+    line = scattered("none", "ballistic", (0, 1, 5, 9), 10)
+    line.world.state.c[:, :] = line.world.state.alive * 77
+    vector = Vector("codec none: list, mask and all; c becomes 0", line)
     vector.predict()
     vector.say("list: slot 5")
     vector.delta(writer.section(0x83, bytes.fromhex("00 00 0100 0500") + struct.pack("<6i", 1, -2, 2**30, 3, -4, 2**28)))
@@ -24,6 +27,10 @@ def absolute():
     vector.delta(writer.section(0x83, bytes.fromhex("00 01 0202") + struct.pack("<12i", *range(-6, 6))))
     vector.say("all: slots 0, 1, 5, 9")
     vector.delta(writer.section(0x83, bytes.fromhex("00 02") + struct.pack("<24i", *range(100, 124))))
+    vector.say("all, of which 0 was despawned and 3 spawned in this delta")
+    born = writer.record(0, 0) + writer.record(3, 1, b"\1\1", writer.position((9, 8, 7), (6, 5, 4)))
+    everyone = writer.section(0x83, bytes.fromhex("00 02") + struct.pack("<24i", *range(200, 224)))
+    vector.delta(writer.section(0x81, born) + everyone)
     vector.refuse(writer.section(0x83, bytes.fromhex("00 00 0100 0500") + struct.pack("<6i", 2**30 + 1, 0, 0, 0, 0, 0)),
                  "a position out of range")  # fmt: skip
     vector.refuse(writer.section(0x83, bytes.fromhex("00 01 0206") + bytes(72)), "an unused bit of the mask")
@@ -40,12 +47,17 @@ def quantized():
     vector = Vector("codec quantized: residuals to -128 and 127, sums clamped, c stays, rest ends", line)
     vector.delta(writer.section(0x83, bytes.fromhex("00 02 8000 7f7f 0080 010203 ff8000")))
     vector.predict(2)
+    vector.say("p is rounded before the corrections alone, v and c behind them")
+    rounded = writer.section(0x87, bytes([6, 5, 4]))
+    vector.delta(rounded + writer.section(0x83, bytes.fromhex("00 01 08 010203 040506")))
+    vector.predict()
     return vector
 
 
 def huffman():
     """Codec entropy, with another table for velocities than for positions."""
-    tables = worlds.huffman_lengths() + bytes([8]) * 256
+    # The codes of velocities are of 1 to 10, 17 and 18 bits.
+    tables = worlds.huffman_lengths() + bytes([*range(1, 11), *[17] * 10, *[18] * 236])
     vector = Vector("codec entropy", scattered("entropy", "ballistic", (0, 2, 3, 7), 8, tables))
     residuals = [[0, 0, -1, 0, 1, 255], [2, -2, 3, -128, 127, 0], [-128, 127, 4, 128, 5, 6]]
     codes = [Table(tables[:256]).code_of, Table(tables[256:]).code_of]
@@ -79,6 +91,7 @@ def lifecycle():
         ("type change of 2", [writer.record(2, 3, b"\0")]),
         ("despawn and spawn of 5", [writer.record(5, 0), writer.record(0, 1, b"\0\1", place)]),
         ("several", [writer.record(0, 0), writer.record(1, 1, b"\1\0", place), writer.record(1, 3, b"\1")]),
+        ("despawn of 2, which zeroes reuse", [writer.record(2, 0)]),
     ):
         vector.say(why)
         vector.delta(writer.section(0x81, b"".join(records)))
@@ -130,12 +143,18 @@ def snapshots():
     line.frame = 40
     line.world.state.reuse[1], line.world.state.type[2], line.world.state.rest[3] = 255, 1, 1
     line.world.state.c[1, 3] = 3000
+    line.world.state.p[:] = line.world.state.p >> 5 << 5
+    line.world.state.v[:] = line.world.state.v >> 2 << 2
+    line.world.state.c[0, 20:] = line.world.state.alive[20:] * 400
+    line.world.parameters[4] = 1234
     line.add_input(3, 42, Drive((1, 2, 3), 4))
     line.add_input(4, 43, Drive((5, 6, 7), 8))
     line.add_input(5, 42, Drive((9, -10, 11), 12))
     line.last_input = 6
     start = writer.snapshot(line)
     vector = Vector("a snapshot with inputs still to act; of two for a frame the highest number counts", line, start)
+    vector.say("one that the snapshot counts already changes nothing")
+    vector.input(6, 42, Drive((99, 98, 97), 96))
     vector.predict()
     vector.input(7, 44, Drive((0, 0, 0), 0))
     vector.predict(4)
@@ -159,25 +178,25 @@ def ballistic_rest():
     return vector
 
 
-def fifty_steps(predictor):
-    """The world of 200 bodies among a plane, a box and a ball."""
-    line = worlds.timeline(worlds.stream("none", predictor, 200, parameters={**worlds.PARAMETERS, 4: 800}))
-    line.world.state = worlds.two_hundred_bodies()
-    vector = Vector(f"{predictor}: 200 bodies of two types, a plane, a box, a ball; 50 steps", line)
-    vector.predict(50)
-    return vector
-
-
-def contact_rest():
-    """A body at rest among others, with contact."""
-    of = worlds.stream("none", "contact")
-    places = {i: ((i * 30000, 25000 + 4000 * i, 0), (0, -5000 * i, 0)) for i in range(4)}
-    line = worlds.timeline(of, places)
-    line.world.state.rest[1] = 1
-    line.world.state.c[1, 1] = 3000
-    line.world.state.v[0, 1] = 6400
-    vector = Vector("contact: slot 1 rests (with a velocity, which the others feel); contact wakes nobody", line)
-    vector.predict(5)
+def ballistic():
+    """Halves, and the limits of the state."""
+    most_p, most_v = 2**30, 2**28
+    places = {
+        0: ((0, 0, 0), (33, -33, 31)),
+        1: ((most_p - 5, 5 - most_p, 0), (most_v, -most_v, most_v - 1)),
+        2: ((7, -7, 7), (97, -95, -31)),
+        3: ((0, 0, 0), (-most_v, most_v, -96)),
+    }
+    line = worlds.timeline(worlds.stream(), places, Drive((0, 0, 0), 2**15))
+    line.world.parameters[4] = line.stream.parameters[4] = 2**15
+    state = line.world.state
+    state.c[:, 0], state.c[:, 1], state.c[:, 2] = (1, -1, 3), (most_v, -most_v, 0), (-5, 5, 7)
+    vector = Vector("ballistic: halves of every rounding, p and v beyond their limits", line)
+    vector.predict(2)
+    vector.input(1, 3, Drive((most_v, -most_v, 0), 0))
+    vector.predict(2)
+    vector.input(2, 5, Drive((1, -1, 0), 1))
+    vector.predict()
     return vector
 
 
@@ -201,10 +220,9 @@ def main(folder):
         "lifecycle": lifecycle(),
         "sections": sections(),
         "snapshot": snapshots(),
+        "ballistic": ballistic(),
         "ballistic_rest": ballistic_rest(),
-        "contact": fifty_steps("contact"),
-        "contact_rest": contact_rest(),
-        "field": fifty_steps("field"),
+        **contact_vectors.vectors(),
         **tracker_vectors.vectors(),
         **orientation_vectors.vectors(),
     }

@@ -1,5 +1,6 @@
 """Writes what the reference decoder reads; for its tests and for the vectors of idl/vectors."""
 
+import bisect
 import math
 import struct
 
@@ -87,12 +88,14 @@ class RangeEncoder:
     def finish(self, least=0):
         """The shortest bytes within the range, zeros left out behind, of a number of at least `least`."""
         size = 4 + self.shifted
-        for kept in range(size + 1):
+
+        def value(kept):
             unit = 256 ** (size - kept)
-            value = max(-(-self.low // unit), least) * unit
-            if value < self.low + self.range:
-                return value.to_bytes(size, "big").rstrip(b"\0")
-        raise AssertionError("a range is never empty")
+            return max(-(-self.low // unit), least) * unit
+
+        # Where so many bytes do, more do, too.
+        kept = bisect.bisect_left(range(size), True, key=lambda kept: value(kept) < self.low + self.range)
+        return value(kept).to_bytes(size, "big").rstrip(b"\0")
 
 
 class NumberEncoder(RangeEncoder):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import parameters, turn
+from . import parameters, tracker, turn
 from .errors import require
 from .number_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
@@ -149,9 +149,9 @@ def read_region(body, stream):
             state.w[axis, slots] = column(ZERO, -turn.MOST_W, turn.MOST_W)
     state.check_ranges(stream.types, "snapshot")
     for i, row in enumerate(state.codec):
-        if i % GROUP < 2:  # age, interval
+        if i % tracker.GROUP in (tracker.AGE, tracker.INTERVAL):
             row[slots] = np.array(read_same(numbers, at_rest), np.int64) % 256
-            require(i % GROUP == 1 or not np.any(row > 254), "snapshot", "an age of 255")
+            require(i % tracker.GROUP == tracker.INTERVAL or not np.any(row > 254), "snapshot", "an age of 255")
         else:
             row[slots] = column(ZERO, -128, 127)
             require(not np.any(row < -127), "snapshot", "a last step of -128")
