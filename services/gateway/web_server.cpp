@@ -411,7 +411,7 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
         ErrorCode::kIo,
         options.tls_cert.empty()
             ? fmt::format("cannot listen on {} port {}", options.address, options.port)
-            : fmt::format("{} and {} are no certificate and its key", options.tls_cert, options.tls_key));
+            : fmt::format("{} and {} are not a certificate and its key", options.tls_cert, options.tls_key));
   }
   impl->tick.self = impl.get();
   lws_sul_schedule(impl->context, 0, &impl->tick.sul, Impl::on_tick, 1);

@@ -154,7 +154,7 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
   std::vector<Wished> all;
   if (wishes.streams.empty()) all.push_back({{}, wishes});
   for (const StreamWishes& stream : wishes.streams) {
-    if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "each stream needs a name");
+    if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "every stream needs a name");
     auto of = wishes_of(wishes, stream);
     if (!of) return of_stream(stream.name, of.error());
     all.push_back({stream.name, std::move(*of)});

@@ -182,26 +182,31 @@ int run_replay(const ReplayOptions& options) {
 void add_replay(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand("replay", "Publishes a recorded session again.");
   const auto options = std::make_shared<ReplayOptions>();
-  command.add_option("file", options->file, "What `tandem record` wrote").required();
+  command.add_option("file", options->file, "File that `tandem record` wrote").required();
   add_endpoint_options(command, options->domain, options->session);
-  command.add_option("--rate", options->rate, "Speed; 1 is that of the session, frames a second at most 1000")
+  command
+      .add_option("--rate", options->rate,
+                  "Speed, where 1 is that of the session; the maximum is 1000 frames per second")
       .range(0.01, 100.0)
       .show_default();
-  command.add_option("--from", options->from_s, "Seconds into the recording").not_negative().show_default();
-  command.add_flag("--loop", options->loop, "Again from there at its end, until stopped");
+  command.add_option("--from", options->from_s, "Where to begin, in seconds from the start of the recording")
+      .not_negative()
+      .show_default();
+  command.add_flag("--loop", options->loop, "Begin again there at the end of the recording, until stopped");
   command
       .add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
       .range(0U, 256U)
       .show_default();
   command.footer(
-      "Clients join at any frame. Each run of the recording (where it has a gap, or the server was restarted, another "
-      "begins) is\n"
-      "an epoch of its own. Participants may seek, which begins another; all other inputs are refused. --rate changes "
-      "how\n"
-      "often frames come, not what they say: velocities stay those of the recorded time. At its end a replay ends, "
-      "but one\n"
-      "in which somebody sought stays there, until it is sought back or stopped. A file that is cut short is\n"
-      "replayed up to there. Exit 1 when it cannot be read.");
+      "Clients can join at any frame. Each run of the recording becomes an epoch of its own; a gap in the\n"
+      "recording, a restart of its server and a participant that seeks each begin another run. All inputs "
+      "but\n"
+      "seeks are refused. --rate changes how often frames come, but not the velocities in them. The replay "
+      "ends\n"
+      "with the recording, unless somebody has sought: then it stays at the end until somebody seeks or it "
+      "is\n"
+      "stopped. A file that is cut short is replayed up to that place. Exits with 1 if the file cannot be "
+      "read.");
   command.on_chosen([options, &run] { run = [options] { return run_replay(*options); }; });
 }
 
