@@ -216,7 +216,7 @@ export class Client {
   }
 
   #send(kind: number, content: Uint8Array): number {
-    if (this.#phase !== 'playing') throw new TandemError('input is possible while playing only');
+    if (this.#phase !== 'playing') throw new TandemError('a client can send input only while it plays');
     const number = this.#guard((module) => module.send(kind, content));
     if (number === undefined) throw new TandemError('the module failed');
     this.#pump();
@@ -313,7 +313,7 @@ export class Client {
     this.#setPhase(this.#phaseOf(status));
     if (this.#socket?.readyState === OPEN && status.serverAlive && now - this.#heardMs > SILENCE_MS) {
       this.#drop(1001, 'silence');
-      this.#onClose(1006, 'nothing came for 10 s');
+      this.#onClose(1006, 'nothing was received for 10 s');
       return;
     }
     this.#pollTimer = setTimeout(() => this.#pump(), Math.min(Math.max(due - now, 0), LONGEST_WAIT_MS));

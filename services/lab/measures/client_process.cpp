@@ -107,7 +107,7 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   if (!printed) return fail(ErrorCode::kIo, "the client printed no JSON");
   const Json& json = *printed;
   const double played_s = json["played_s"].number();
-  if (played_s < setup.seconds) return fail(ErrorCode::kIo, "the client joined too late: settle for longer");
+  if (played_s < setup.seconds) return fail(ErrorCode::kIo, "the client joined too late: increase --settle");
 
   ClientProcessRow row;
   row.frames_per_s = (json["frames_applied"].number() - 1) / played_s;

@@ -35,7 +35,7 @@ class Reader {
       reader.tell(fmt::format("is cut short at byte {}; exported up to there", *torn));
     const auto step = reader.next();
     if (!step) return tl::unexpected(step.error());
-    if (*step == Step::kEnd) return fail(ErrorCode::kMalformed, path + ": holds no snapshot to begin from");
+    if (*step == Step::kEnd) return fail(ErrorCode::kMalformed, path + ": it has no snapshot to begin from");
     return reader;
   }
   [[nodiscard]] Result<Step> next() {
