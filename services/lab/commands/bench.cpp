@@ -59,7 +59,7 @@ void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>&
 
 commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
                                     const std::string& help) {
-  // The parser reads -1 as 2^64 - 1, and what is too large as that.
+  // The parser would read -1 and numbers that are too large as 2^64 - 1.
   return command.add_option("--seed", seed, help)
       .check([](const std::string& text) {
         std::uint64_t value = 0;

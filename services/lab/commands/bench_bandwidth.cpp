@@ -43,7 +43,7 @@ struct Job {
   std::uint32_t bodies;
 };
 
-/// All codecs over one source; the rows lack only what the scene does not know.
+/// Measures all codecs over one source. The caller adds to the rows what only the scene knows.
 Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& source,
                                           const BandwidthOptions& options, std::uint64_t frames,
                                           const std::function<void(Frame)>& progress) {
@@ -86,7 +86,7 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   if (!source) return tl::unexpected(source.error());
   auto rows = measure(scene, *source, options, options.frames, progress);
   if (!rows) return rows;
-  // With another number of users it is not the scene of the thesis's table.
+  // With another number of users, the scene differs from that of the thesis's table.
   const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
   for (BandwidthRow& row : *rows) {
     if (as_in_paper) row.number = static_cast<int>(scene.number);
@@ -96,7 +96,7 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   return rows;
 }
 
-/// What a session needs to know about a trajectory, in the form of a scene. Errors: kMalformed if the file
+/// Describes a trajectory as a scene, from which a session can be planned. Errors: kMalformed if the file
 /// that it names is not a scene.
 Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
   scenes::Scene scene;
@@ -124,7 +124,7 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   }
   scene.extent_m = std::max(scene.extent_m, named->extent_m);
   scene.world = std::move(named->world);
-  // A recording does not say which body is of which of the scene's types.
+  // A recording does not say which of the scene's types a body has.
   scene.world.types.resize(1);
   if (shapes.empty()) return scene;
   const engine::ParticleType first = scene.world.types.front();
@@ -134,14 +134,14 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   return scene;
 }
 
-/// The tiers that compute contacts need to know what the bodies are and where the walls stand.
+/// Predictors that compute contacts need the bodies' radius and materials, and the walls.
 Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const BandwidthOptions& options) {
   const std::string& predictor = options.choice.predictor;
   const auto is_ours = [](const std::string& codec) {
     const auto traits = codec_traits(codec);
     return traits && !traits->is_baseline;
   };
-  const auto named = find_predictor(predictor);  // none where it is chosen automatically
+  const auto named = find_predictor(predictor);  // none if it is chosen automatically
   const bool asked = named && (*named)->reads_world && std::ranges::any_of(options.codecs, is_ours);
   if (!asked || !trajectory.info().scene.empty()) return {};
   return fail(ErrorCode::kInvalidArgument,
@@ -150,8 +150,7 @@ Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const Ba
                           sidecar_path(options.trajectory).value(), predictor));
 }
 
-/// There is no other run to train on, so the thesis's codecs are trained with the trajectory itself, which
-/// favours them.
+/// Trains the thesis's codecs with the trajectory itself, as there is no other run. This favours them.
 Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& options) {
   const auto make = [&] {
     return RecordedTrajectory::open(options.trajectory)
@@ -184,7 +183,7 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   return rows;
 }
 
-/// Runs jobs in parallel; their rows come in the order of the jobs.
+/// Runs jobs in parallel, and returns their rows in the order of the jobs.
 Result<std::vector<BandwidthRow>> measure_jobs(std::span<const Job> jobs, const BandwidthOptions& options) {
   std::vector<Result<std::vector<BandwidthRow>>> results(jobs.size());
   std::atomic<std::size_t> next = 0;

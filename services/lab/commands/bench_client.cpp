@@ -1,4 +1,4 @@
-// `tandem bench client`: the cost of a client, next to that of the full simulation that it does not have to
+// `tandem bench client`: the cost of a client, next to that of the full simulation, which a client need not
 // run.
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// `tandem bench framerate`: updates a second of a user behind a slow link, as in the thesis's table 5.6.
+// `tandem bench framerate`: updates per second of a user behind a slow link, as in the thesis's table 5.6.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -47,7 +47,7 @@ bool streams(const FramerateOptions& options) {
                      [](const std::string& method) { return method != kClientOnly; });
 }
 
-/// All that can be wrong before minutes have passed.
+/// Checks at the start what would otherwise fail after minutes.
 Result<void> prepare(FramerateOptions& options) {
   options.setup.link.delay_ns = std::llround(options.delay_ms * 1e6);
   options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
@@ -69,7 +69,7 @@ void tell(const std::string& line) {
   if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K{}", line);
 }
 
-/// Empty for this machine as it is.
+/// Empty for this machine without a limit.
 Result<std::optional<Calibration>> set_up(FramerateOptions& options, const std::string& name,
                                           ThinDevice* processor) {
   options.setup.slowdown = 1;
@@ -108,7 +108,7 @@ int run_framerate(FramerateOptions options) {
   const auto scenes = load_scenes(options.scenes);
   if (!scenes) return report(kCommand, scenes.error());
   if (const auto ready = prepare(options); !ready) return report(kCommand, ready.error());
-  // Everything made here ends with the objects that hold it.
+  // The destructors of these objects remove all that is made here.
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
   options.setup.stop = &stopped;
@@ -158,7 +158,7 @@ void add_framerate(commandline::Command bench, Run& run) {
   std::vector<std::string> methods{std::string(kClientOnly)};
   for (const std::string_view name : codec_names()) methods.emplace_back(name);
   for (const std::string_view name : {kBallistic, kField, kAsItComes}) methods.emplace_back(name);
-  std::erase(methods, "tracker");  // by its predicted step, or as it comes
+  std::erase(methods, "tracker");  // named by its predicted step, or by `auto`
   command
       .add_option(
           "--method", options->methods,

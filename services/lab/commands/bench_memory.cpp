@@ -1,4 +1,4 @@
-// `tandem bench memory`: bytes that engine, server and client hold, in all and a slot.
+// `tandem bench memory`: bytes that engine, server and client hold, in total and per slot.
 
 #include <fmt/format.h>
 
@@ -46,7 +46,8 @@ int run_memory(const MemoryOptions& options) {
                {"client", &MemoryUse::client_bytes}};
   Json rows = Json::array();
   if (!options.json) fmt::print("{:>8} {:<8} {:>14} {:>14}\n", "bodies", "", "total bytes", "bytes a slot");
-  // Two sizes, each for itself: scratch may grow in steps, so that a line through both would tell nothing.
+  // Prints two sizes separately, because scratch may grow in steps, and a line through both would be
+  // misleading.
   for (const std::uint32_t bodies : {options.bodies, 2 * options.bodies}) {
     const auto use = measure_memory([&] { return host_scene(*scene, options, bodies); }, options.frames);
     if (!use) return report("bench memory", use.error());

@@ -1,4 +1,4 @@
-// `tandem bench train`: what the thesis's codecs need to know about a scene, written next to its file.
+// `tandem bench train`: writes next to a scene's file what the thesis's codecs need to know about the scene.
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 namespace tandem::lab {
 namespace {
 
-// Far from the seeds of measurements, so that no measurement uses a run that was trained on.
+// This is far from the seeds of measurements, so that no measurement uses a run that was trained on.
 constexpr std::uint64_t kTrainingSeed = 1001;
 
 struct TrainOptions {

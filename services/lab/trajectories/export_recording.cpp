@@ -26,7 +26,7 @@ using Step = Playback::Step;
 /// A playback whose errors name the file.
 class Reader {
  public:
-  /// At its first run.
+  /// Opens the recording at its first run.
   static Result<Reader> open(const std::string& path) {
     auto playback = Playback::open(path);
     if (!playback) return tl::unexpected(playback.error());
@@ -79,7 +79,7 @@ double smallest_radius(const transport::SessionMessage& session) {
   return smallest;
 }
 
-/// Empty unless all of them can be given.
+/// Empty if one of them is unknown.
 std::vector<engine::Shape> shapes_of(const transport::SessionMessage& session) {
   std::vector<engine::Shape> shapes;
   for (const transport::BodyType& type : session.types) {

@@ -1,5 +1,5 @@
 #pragma once
-// A recording of a session as other tools want it: a trajectory, or point clouds.
+// Exports a recording of a session for other tools, as a trajectory or as point clouds.
 
 #include <cstdint>
 #include <string>
