@@ -11,7 +11,7 @@
 
 namespace tandem::planning {
 
-/// The integers that travel in the session. `predictor` is named in errors: kInvalidArgument for a world
+/// The integers that travel in the session. Errors name `predictor`: kInvalidArgument for a world
 /// without scenery or body types, or with scenery that is no geometry; kCapacity for one that does not fit
 /// the lattice.
 [[nodiscard]] Result<std::vector<std::int32_t>> contact_constants(const World& world,

@@ -85,7 +85,7 @@ Result<void> choose_predictor(const World& world, const Wishes& wishes, const Co
   }
   for (const PredictorTraits& predictor : predictors()) {
     if (!suits(predictor, world, traits)) continue;
-    // One that the lattice is too fine for is passed over, but not one that was described wrongly.
+    // Skips a predictor for which the lattice is too fine, but reports a world that is described wrongly.
     auto set = set_predictor(world, predictor, stream);
     if (set || set.error().code != ErrorCode::kCapacity) return set;
   }

@@ -1,5 +1,5 @@
 #pragma once
-// What an operator wishes: the streams of a server, and how it serves them.
+// An operator's wishes for a server: its streams, and how it serves them.
 
 #include <array>
 #include <cstddef>

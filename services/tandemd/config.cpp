@@ -207,7 +207,8 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   if (flags.has_threshold()) file.clear_threshold_scale();
   if (flags.has_threshold() || !traits.reads_threshold) file.clear_threshold_auto();
   if (!traits.takes_budget) file.clear_budget_bytes();
-  // Streams are one whole, and a predictor is what they are told apart by.
+  // The list of streams is replaced as a whole; a predictor replaces it too, because streams differ by
+  // theirs.
   if (flags.stream_size() > 0 || flags.has_predictor()) file.clear_stream();
   if (flags.stream_size() > 0) file.clear_predictor();
   const bool automatic = flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto();

@@ -33,7 +33,7 @@ int report_error(const Error& error, int exit_code) {
   return exit_code;
 }
 
-/// Lines `epoch,frame,hash`, a file a stream.
+/// Writes lines `epoch,frame,hash`, with a file for each stream.
 class HashLog {
  public:
   /// `path` for stream 0, `path`.k for stream k.

@@ -1,4 +1,4 @@
-// `tandem record`: a session into a file, as an observer that writes down what it receives.
+// `tandem record`: an observer that writes what it receives into a file.
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ struct RecordOptions {
 Json report(const HeadlessClient& client) {
   const recording::Recorder::Totals& totals = client.recorder()->totals();
   Json out = client.report();
-  // Behind the payloads themselves: what the file adds to them, and what is no delta.
+  // The rest of the file: what it adds to payloads, and messages other than deltas.
   out["file_bytes"] = totals.file_bytes;
   out["frames_recorded"] = totals.frames;
   out["payload_recorded_bytes"] = totals.payload_bytes;

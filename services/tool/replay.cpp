@@ -1,4 +1,4 @@
-// `tandem replay`: a recorded session over DDS again, as a server that computes nothing new.
+// `tandem replay`: publishes a recorded session again, as a server that computes nothing new.
 
 #include <fmt/format.h>
 
@@ -41,27 +41,27 @@ struct ReplayOptions {
   std::uint32_t wait_for = 0;
 };
 
-// Readers have this long to take what was written last.
+// Readers get this time to take what was written last.
 constexpr std::chrono::milliseconds kTakingFrames(500), kTakingReplies(50);
 
-/// How a run was left.
+/// The result of serving one run.
 struct Served {
-  Step behind = Step::kFrame;      ///< what comes next in the file; kFrame when it was stopped before its end
-  std::optional<double> sought_s;  ///< a client wants to go on there
+  Step behind = Step::kFrame;      ///< the next step in the file; kFrame if it was stopped before its end
+  std::optional<double> sought_s;  ///< the time at which a client wants to continue
 };
 
 /// The data that all runs of a replay share.
 struct ReplayState {
   Epoch epoch = 0;      ///< the last; 0 before the first
-  bool sought = false;  ///< a client did
+  bool sought = false;  ///< a client has sought
   /// The port of the last run. It outlives the work, so that the program can report before DDS ends.
   std::unique_ptr<transport::ServerPort> port;
   std::future<void> ending;  ///< the end of the port before; its destructor waits for that
   accounts::TokenBucket seeks{1, 1};
 };
 
-/// Ends the port of the last run and waits for that, but not beyond a stop: DDS never ends when the network
-/// interface is gone, and the work has to.
+/// Ends the port of the last run and waits for that, but not beyond a stop, because DDS never ends if the
+/// network interface is gone.
 void end_port(ReplayState& state, const std::atomic<bool>& stop) {
   if (!state.port) return;
   state.ending = std::async(std::launch::async, [port = std::move(state.port)]() mutable { port.reset(); });
@@ -76,7 +76,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   const bool first = state.epoch == 0;
   end_port(state, stop);
   if (stop) return Served{};
-  // An epoch of its own for each run, as frames follow one another within one.
+  // Each run has an epoch of its own, because the frames of an epoch are consecutive.
   state.epoch = std::max<Epoch>(state.epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
   host::ServiceConfig config;
   config.session = options.session;
@@ -122,7 +122,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   return source.ending().map([&](Step behind) { return Served{behind, source.sought_s()}; });
 }
 
-// To the first frame that was recorded at `from_s` or later; kEnd where there is none.
+// Goes to the first frame that was recorded at `from_s` or later; kEnd if there is none.
 Result<Step> go_to(Playback& playback, double from_s) {
   playback.seek(from_s);
   auto step = playback.next();
@@ -146,7 +146,7 @@ Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState&
     if (!served) return tl::unexpected(served.error());
     if (served->sought_s) {
       state.sought = true;
-      end_port(state, stop);  // the way there may be long
+      end_port(state, stop);  // seeking may take long
     }
     step = served->sought_s ? go_to(playback, *served->sought_s) : served->behind;
   }

@@ -49,7 +49,7 @@ bool show(const TopView& view, const TopOptions& options) {
   return std::fflush(stdout) == 0;
 }
 
-/// Nobody reads any more, which is no failure.
+/// A reader of stdout that has gone is no failure.
 int reader_left() {
   __fpurge(stdout);
   std::clearerr(stdout);
