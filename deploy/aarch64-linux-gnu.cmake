@@ -1,5 +1,5 @@
-# CMake toolchain: builds for 64-bit ARM on Debian 12. It needs the packages of section [arm64] in deploy/packages; what the
-# build runs itself, and ctest, goes through qemu.
+# CMake toolchain that builds for 64-bit ARM on Debian 12. It needs the packages of section [arm64] in deploy/packages.
+# Programs that the build or ctest starts run in qemu.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)

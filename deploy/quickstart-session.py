@@ -1,7 +1,7 @@
 """Runs one server and three clients over loopback DDS, shows them live and compares their hash logs frame by frame. With
---view: a server, two participants and a gateway for browsers, until Ctrl-C, for 12 hours at most.
+--view, runs a server, two participants and a gateway for browsers until Ctrl-C, for a maximum of 12 hours.
 
-Started by deploy/quickstart, which builds the programs first. Standard library only.
+deploy/quickstart starts this script and builds the programs first. It needs the standard library only.
 """
 
 import argparse
@@ -23,7 +23,7 @@ import urllib.request
 
 OBSERVER_DELAY_S = 5
 VIEW_LIMIT_S = 12 * 3600
-START_LIMIT_S = 30  # for discovery and joining, for a slow machine's frames and, at the end, for leaving
+START_LIMIT_S = 30  # for discovery and joining, for the frames of a slow machine, and for leaving at the end
 FRAME_RATE_HZ = 30
 LOOPBACK = (
     '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/>'
@@ -37,11 +37,11 @@ CLIENTS = [  # name, starts after seconds, more flags of `tandem join`
 
 
 class Failure(Exception):
-    """Something the user should read; the run has failed."""
+    """The run has failed, and the user should read why."""
 
 
 def free_domain():
-    """A DDS domain none of whose UDP ports are in use on this machine."""
+    """A DDS domain with no UDP port in use on this machine."""
     with open("/proc/net/udp", encoding="ascii") as table:
         used = {int(line.split()[1].split(":")[1], 16) for line in table.readlines()[1:]}
     for domain in range(20, 100):  # the ports of higher domains overlap those that the system hands out
@@ -52,7 +52,7 @@ def free_domain():
 
 
 class Stopped(Failure):
-    """By a signal."""
+    """A signal has stopped the run."""
 
 
 class Session:
@@ -98,7 +98,7 @@ class Session:
             )
 
     def longest(self):
-        """Seconds after which server and clients end by themselves, should nobody be left to end them."""
+        """Seconds after which server and clients end by themselves if nobody is left to end them."""
         return self.options.seconds + 3 * START_LIMIT_S
 
     def logging(self, name):
@@ -131,19 +131,19 @@ class Session:
         return self.file(name, "err").read_text(encoding="utf-8", errors="replace").strip()
 
     def check_running(self):
-        """Nobody ends before it is told to."""
+        """Fails if a process has ended by itself."""
         for name, process in self.running.items():
             code = process.poll()
             if code is not None:
                 raise Failure(f"{name} ended with exit code {code}:\n{self.errors_of(name)}")
 
     def frame(self):
-        """The server's newest frame that `tandem top` told of; 0 before the first."""
+        """The newest frame of the server that `tandem top` has shown; 0 before the first."""
         server = server_of(self.latest)
         return server["frame"] if server else 0
 
     def stop(self, names, limit_s):
-        """Tells these to end, all at the same moment, and waits until they have."""
+        """Stops these processes at the same moment, and waits until they have ended."""
         for name in names:
             self.running[name].send_signal(signal.SIGINT)
         deadline = time.monotonic() + limit_s
@@ -167,7 +167,7 @@ class Session:
         return self.read_hashes(self.file(name, "hashes"))
 
     def hashes_of_streams(self, name):
-        """{(epoch, frame): hashes} of a server's logs, one a stream."""
+        """{(epoch, frame): hashes} of a server's logs, one for each stream."""
         log = {}
         first = self.file(name, "hashes")
         for path in [first, *sorted(first.parent.glob(first.name + ".*"))]:
@@ -219,16 +219,16 @@ class View(Session):
         return flags
 
     def address(self):
-        """What to open in a browser."""
+        """The address to open in a browser."""
         if not self.options.lan:
             return f"http://localhost:{self.options.port}/"
         return f"https://{lan_address()}:{self.options.port}/?token={self.token}"
 
     def plays(self):
-        """Whether the gateway says that it follows the session."""
+        """Whether the gateway follows the session."""
         scheme = "https" if self.options.lan else "http"
         trusting = ssl.create_default_context()
-        trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE  # of this machine and this run
+        trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE  # this run made the certificate
         try:
             with urllib.request.urlopen(f"{scheme}://127.0.0.1:{self.options.port}/healthz", timeout=2, context=trusting) as health:
                 return json.load(health)["phase"] == "playing"
@@ -248,7 +248,7 @@ TILT_PERIOD_S = 24
 
 
 def tilts(place, strength, seconds):
-    """An input script of the participant at a place, from 0: gravity leans to some side, and now and then turns over."""
+    """An input script of participant `place`, from 0: gravity leans to some side, and sometimes turns over."""
     dice = random.Random(place)
     lines = []
     for i in range(int(seconds / TILT_PERIOD_S)):
@@ -263,14 +263,14 @@ def lan_address():
     """The address by which others on the network see this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing: asks which interface would
+            probe.connect(("192.0.2.1", 9))  # sends nothing, but selects the interface
             return probe.getsockname()[0]
         except OSError:
             return "127.0.0.1"
 
 
 def make_certificate(certificate, key, address):
-    """A self-signed one for a week."""
+    """Makes a self-signed certificate for a week."""
     command = [
         "openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "7",
         "-subj", "/CN=tandem quickstart", "-addext", f"subjectAltName=IP:{address},IP:127.0.0.1,DNS:localhost",
@@ -282,7 +282,7 @@ def make_certificate(certificate, key, address):
 
 
 def view(session):
-    """Runs until somebody ends it, or for VIEW_LIMIT_S."""
+    """Runs until a signal comes, or for VIEW_LIMIT_S."""
     session.start_all()
     deadline = time.monotonic() + START_LIMIT_S
     while not session.plays():
@@ -293,8 +293,8 @@ def view(session):
     address = session.address()
     if session.options.lan:
         subprocess.run(["qrencode", "-t", "ANSIUTF8", "-m", "2", address], check=False)
-        print("The certificate is of this run, so browsers ask whether to go on.")
-    print(f"open {address}\nCtrl-C ends it, and so do {VIEW_LIMIT_S // 3600} hours", flush=True)
+        print("The certificate was made for this run, so browsers will ask whether to go on.")
+    print(f"open {address}\nstop with Ctrl-C; it runs for a maximum of {VIEW_LIMIT_S // 3600} hours", flush=True)
     deadline = time.monotonic() + VIEW_LIMIT_S
     while time.monotonic() < deadline:
         session.check_running()
@@ -307,7 +307,7 @@ def server_of(top):
 
 
 def live_line(second, top):
-    """One line from a line of `tandem top --stream`."""
+    """The line to print for a line of `tandem top --stream`."""
     server = server_of(top)
     if server is None:
         return f"{second:4d} s  waiting for the session"
@@ -325,11 +325,11 @@ def live_line(second, top):
 
 
 def run(session, seconds):
-    """Plays as many frames as fit into `seconds` at full speed, printing a line a second. Returns the frame that the
-    server had reached when all clients were told to end.
+    """Plays as many frames as fit into `seconds` at full speed, printing a line per second. Returns the frame that the
+    server had reached when all clients were stopped.
 
-    Frames are counted, not each client's seconds: on a busy machine clients start at different times, and slow frames
-    are no failure. It gives up waiting for them after START_LIMIT_S more."""
+    It counts frames, not each client's seconds, because on a busy machine clients start at different times, and slow
+    frames are no failure. It stops waiting for frames after START_LIMIT_S more."""
     session.start_server()
     session.start_top()
     waiting = list(CLIENTS)
@@ -343,7 +343,7 @@ def run(session, seconds):
         session.check_running()
         if not waiting and (session.frame() >= seconds * FRAME_RATE_HZ or elapsed > seconds + START_LIMIT_S):
             break
-        # A status a second: wait for the next one rather than show the last one twice.
+        # Status comes once a second: wait for the next one rather than show the last one twice.
         if elapsed >= shown + 1 and (live_line(0, session.latest) != last or elapsed >= shown + 2):
             shown, last = int(elapsed), live_line(0, session.latest)
             print(live_line(shown, session.latest), flush=True)
@@ -354,13 +354,13 @@ def run(session, seconds):
     return end
 
 
-# A client may be behind the server's newest frame when it is told to end; one further behind has stopped on its way.
+# A client may be this far behind the server's newest frame when it is stopped; one further behind stopped by itself.
 END_SLACK_FRAMES = 150
 
 
 def compare(server, client, end):
-    """(frames compared, problem or None): every frame from the client's first to frame `end`, when all were told to end,
-    each with the server's hash in the stream that the client played."""
+    """Compares every frame from the client's first to frame `end`, at which all were stopped, with the server's hashes in
+    all streams. Returns (frames compared, problem or None)."""
     frames = sorted(client)
     if not frames:
         return 0, "applied no frame"
@@ -378,7 +378,7 @@ def compare(server, client, end):
 
 
 def report(session, options, end):
-    """Prints the table; True when every client held the server's state on every frame."""
+    """Prints the table. Returns True if every client held the server's state on every frame."""
     server = session.result("server")
     server_hashes = session.hashes_of_streams("server")
     raw = 24 * 8 * options.bodies * FRAME_RATE_HZ / 2**20

@@ -9,7 +9,8 @@ namespace tandem::client {
 
 namespace {
 constexpr std::string_view kUnplayable =
-    "this client computes the stream otherwise than the server: the state soon differed after each of several snapshots";
+    "this client computes the stream differently from the server: the state soon differed after each of "
+    "several snapshots";
 }  // namespace
 
 Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::SessionMessage& session,
@@ -116,7 +117,7 @@ void ClientCore::join_instead(std::unique_ptr<Follower> other, Now now) {
 void ClientCore::follow_change(Now now) {
   EpochState& e = *epoch_;
   if (e.change->gets_nowhere(now.steady_ns, statistics_.last_applied_ns)) {
-    give_up_change("nothing came", now);
+    give_up_change("nothing was received", now);
     return;
   }
   if (e.change->to().joining() && !join(e.change->to(), now)) return;
@@ -161,7 +162,7 @@ void ClientCore::show_other(Frame left_at, Now now) {
 
 void ClientCore::give_up_change(const std::string& why, Now now) {
   EpochState& e = *epoch_;
-  log(LogLevel::kWarning, "staying: stream " + chooser_->chosen().name + " cannot be joined, " + why);
+  log(LogLevel::kWarning, "cannot change to stream " + chooser_->chosen().name + ": " + why);
   e.change->to().close(port_);
   e.played->continue_after(e.change->to().join_attempt());
   e.change.reset();
@@ -178,7 +179,7 @@ void ClientCore::adopt_streams(const transport::SessionMessage& session, Now now
           return stream.id == follower.stream().id && stream.layout_hash == follower.stream().layout_hash;
         });
   };
-  if (e.change && !still(e.change->to())) give_up_change("it is not there any more", now);
+  if (e.change && !still(e.change->to())) give_up_change("the server does not publish it any more", now);
   session_ = e.session = session;
   listener_.on_session(session);
   const bool goes_on = still(*e.played);
@@ -193,7 +194,7 @@ void ClientCore::adopt_streams(const transport::SessionMessage& session, Now now
     listener_.on_stream(e.played->stream());
     return;
   }
-  log(LogLevel::kWarning, "the stream that was played is not there any more");
+  log(LogLevel::kWarning, "the server does not publish the stream that was played any more");
   if (e.change) {
     move_over(now);
     return;

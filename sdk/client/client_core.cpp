@@ -170,8 +170,8 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   epoch_->join_began_ns = now.steady_ns;
   ++statistics_.epochs;
   if (epoch_->lead < options_.lead) {
-    log(LogLevel::kWarning, "lead " + std::to_string(options_.lead) + " asked for, the session allows " +
-                                std::to_string(epoch_->lead));
+    log(LogLevel::kWarning, "the session allows a lead of " + std::to_string(epoch_->lead) + ", not " +
+                                std::to_string(options_.lead));
   }
   log(LogLevel::kInfo, "found session '" + session_->session + "', scene '" + session_->scene + "', " +
                            std::to_string(session_->capacity) + " slots, epoch " +
@@ -263,7 +263,7 @@ void ClientCore::send_status(Now now) {
     const bool too_slow = status.client_ms_p50 > period_ms / 2;
     status.too_slow = too_slow ? 1 : 0;
     if (too_slow && !std::exchange(epoch_->told_too_slow, true)) {
-      log(LogLevel::kWarning, "too slow for this session: half of the frames take more than " +
+      log(LogLevel::kWarning, "this client is too slow for the session: half of its frames take more than " +
                                   std::to_string(std::lround(status.client_ms_p50)) + " of " +
                                   std::to_string(std::lround(period_ms)) + " ms");
     }
@@ -290,7 +290,7 @@ Result<std::uint64_t> ClientCore::send(transport::InputKind kind, std::vector<do
     return fail(ErrorCode::kOutOfOrder, "observers may not send input; connect as a participant");
   }
   if (phase() != ClientPhase::kPlaying)
-    return fail(ErrorCode::kOutOfOrder, "input is possible while playing only");
+    return fail(ErrorCode::kOutOfOrder, "a client can send input only while it plays");
   if (values.size() > transport::kMaxInputValues || bytes.size() > transport::kMaxInputBytes) {
     return fail(ErrorCode::kInvalidArgument, "an input holds at most 16 values and 1,024 bytes");
   }

@@ -2,7 +2,7 @@
 
     plot_energy.py [--session NAME] [--domain N] [--seconds S] [--out FILE.png] [--show]
 
-Every body has the mass 1, as a session does not say. Needs python3-matplotlib.
+All bodies count with mass 1, because a session has no masses. Needs python3-matplotlib.
 """
 
 import argparse

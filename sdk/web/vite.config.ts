@@ -2,7 +2,7 @@ import { copyFileSync } from 'node:fs';
 
 import { defineConfig } from 'vitest/config';
 
-/** Where the CMake build puts the WebAssembly modules. */
+/** The folder in which the CMake build puts the WebAssembly modules. */
 const wasm = process.env['TANDEM_WASM'] ?? '../../build/ci/sdk/web/wasm';
 
 // The library, for web apps: dist/tandem.js and, beside it, the modules.

@@ -1,5 +1,5 @@
 #pragma once
-// When one client is written a reply.
+// Decides when one client is sent a reply.
 
 #include <cstdint>
 
@@ -9,12 +9,12 @@
 
 namespace tandem::accounts {
 
-/// On a change, otherwise once a second at most. Not thread-safe.
+/// A reply is due on a change, otherwise at most once a second. Not thread-safe.
 class ReplySchedule {
  public:
-  /// Between replies that only echo the clock; twice for observers.
+  /// Minimum time between replies that only echo the clock; twice that for observers.
   static constexpr std::int64_t kEchoNs = kSecond;
-  static constexpr std::int64_t kChangeNs = 10 * kMillisecond;  ///< between replies at all
+  static constexpr std::int64_t kChangeNs = 10 * kMillisecond;  ///< minimum time between two replies
 
   /// Role, phase or reason changed.
   void on_change() { changed_ = true; }
@@ -24,9 +24,9 @@ class ReplySchedule {
 
   /// Something changed that was not told yet.
   [[nodiscard]] bool changed() const { return changed_; }
-  /// Whether a reply is to go out now.
+  /// True if a reply is to be sent now.
   [[nodiscard]] bool due(transport::Role role, std::int64_t now_ns);
-  /// It is on its way. One that goes out for nothing but outcomes spends of their rate.
+  /// A reply is on its way. A reply that is sent only for outcomes counts against their rate.
   void sent(transport::Role role, std::int64_t now_ns);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// How often something may happen.
+// Limits how often something may happen.
 
 #include <algorithm>
 #include <cstdint>
@@ -27,7 +27,7 @@ class TokenBucket {
  private:
   double per_second_;
   double burst_;
-  double spent_ = 0;  // of the burst, as of at_ns_
+  double spent_ = 0;  // spent part of the burst at at_ns_
   std::int64_t at_ns_ = 0;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// How much of a snapshot may be on its way to one receiver, and how fast it leaves.
+// Decides how much of a snapshot may be on its way to one receiver, and how fast it leaves.
 
 #include <algorithm>
 #include <array>
@@ -14,19 +14,19 @@ namespace tandem::accounts {
 /// it to the deltas.
 ///
 /// The window follows the rate at which parts arrive, as in BBR (Cardwell et al. 2016), not their delay and
-/// not their loss: DDS delivers in order, so that one lost packet holds up all behind it for a round trip,
-/// and jitter moves every delay. A rate is the most that was seen lately, which such pauses do not lower. Not
+/// not their loss: DDS delivers in order, so one lost packet delays all behind it by a round trip, and jitter
+/// changes every delay. The rate is the maximum of those seen lately, which such pauses do not lower. Not
 /// thread-safe.
 class TransferWindow {
  public:
-  /// Goes out before anything is known: a quarter of a second on a link of 256 kbit/s.
+  /// Sent before anything is known; it takes a quarter of a second on a link of 256 kbit/s.
   static constexpr std::size_t kFirst = 7'800;
   static constexpr std::size_t kLeast = 2'600;
   static constexpr std::size_t kMost = 4U << 20U;  ///< 1 Gbit/s at 30 ms from sending to acknowledgement
   /// Maximum queue of a full link.
   static constexpr std::int64_t kQueueNs = 100 * kMillisecond;
 
-  /// What is remembered about each part that is sent. The caller hands it back when the part arrived.
+  /// Recorded for each part that is sent. The caller hands it back when the part has arrived.
   struct Sent {
     std::int64_t at_ns = 0;
     std::size_t bytes = 0;
@@ -35,8 +35,8 @@ class TransferWindow {
     std::int64_t last_arrived_at_ns = 0;  // when the last of them had been sent
   };
 
-  /// Called whenever the caller looks what may leave. One that looks seldom, as a server whose frames take
-  /// long, may catch up by the time between two looks.
+  /// Call whenever parts may be sent. A caller that seldom calls, such as a server whose frames take long,
+  /// may catch up by the time between two calls.
   void look(std::int64_t now_ns) {
     if (now_ns == looked_ns_) return;
     behind_ns_ = std::clamp(now_ns - looked_ns_, kBurstNs, kMostBehindNs);
@@ -46,12 +46,13 @@ class TransferWindow {
   [[nodiscard]] bool admits(std::size_t bytes, std::int64_t now_ns) const {
     return flying_ == 0 || (flying_ + bytes <= bytes_ && now_ns >= next_ns_);
   }
-  /// When the pace admits the next part; in the past, or of no matter, while the window is full.
+  /// When the pace admits the next part. The result may be in the past, and has no meaning while the window
+  /// is full.
   [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
   [[nodiscard]] bool is_full(std::size_t bytes) const { return flying_ > 0 && flying_ + bytes > bytes_; }
 
   [[nodiscard]] Sent sent(std::size_t bytes, std::int64_t now_ns) {
-    if (flying_ == 0) {  // nothing was there to arrive: the time until now says nothing
+    if (flying_ == 0) {  // nothing could arrive, so the time until now says nothing
       arrived_ns_ = now_ns;
       last_arrived_at_ns_ = now_ns;
     }
@@ -62,7 +63,7 @@ class TransferWindow {
     }
     return {now_ns, bytes, arrived_, arrived_ns_, last_arrived_at_ns_};
   }
-  /// Is not waited for any more.
+  /// The part is not waited for any more.
   void lost(const Sent& part) { flying_ -= std::min(flying_, part.bytes); }
   /// Parts of this total size were acknowledged together; `last` is the one that was sent last.
   void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
@@ -114,7 +115,7 @@ class TransferWindow {
   void saw_rate(std::size_t bytes, std::int64_t within_ns, std::int64_t now_ns) {
     const double rate =
         static_cast<double>(bytes) * 1e9 / static_cast<double>(std::max(within_ns, kLeastGapNs));
-    // The most of this span and the last one.
+    // The maximum of this span and the last one.
     if (now_ns - span_ns_ >= kRateLastsNs) {
       rates_ = {now_ns - span_ns_ < 2 * kRateLastsNs ? rates_[1] : 0, 0};
       span_ns_ = now_ns;
@@ -147,7 +148,7 @@ class TransferWindow {
   std::int64_t least_ns_ = INT64_MAX;
   std::array<double, 2> rates_{};  // bytes a second
   std::int64_t span_ns_ = 0;
-  bool starting_ = true;  // how fast the link is was not seen yet
+  bool starting_ = true;  // the rate of the link is still unknown
 };
 
 }  // namespace tandem::accounts

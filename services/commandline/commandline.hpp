@@ -41,9 +41,9 @@ class Option {
   Option excludes(const std::vector<std::string>& others);
 
   Option separated_by(char delimiter);  ///< several values in one text
-  Option one_value_each();              ///< of a list: a flag is followed by one value, and may come again
+  Option one_value_each();              ///< for a list: each flag takes one value and may be repeated
   Option type_name(const std::string& name);
-  Option show_default();  ///< in --help: what the variable holds now
+  Option show_default();  ///< --help shows the current value of the variable
   Option show_default(const std::string& text);
 
  private:
@@ -60,7 +60,7 @@ class Command {
   /// vector of texts or of 32-bit numbers; commandline.cpp lists them.
   template <class T>
   Option add_option(const std::string& name, T& variable, const std::string& help = {});
-  /// Calls `set` with the value. T: as above, of those that commandline.cpp lists.
+  /// Calls `set` with the value. T: one of the types that commandline.cpp lists.
   template <class T>
   Option add_option_function(const std::string& name, const std::function<void(const T& value)>& set,
                              const std::string& help);
@@ -101,8 +101,8 @@ class Program : public Command {
 
   /// Sets what --version prints.
   void version(const std::string& text);
-  /// Prints help, version and errors. A number is the exit code of a program that is to end: 0, or 2 for
-  /// wrong usage.
+  /// Prints help, version and errors. Returns an exit code if the program has to end: 0, or 2 for wrong
+  /// usage.
   [[nodiscard]] std::optional<int> parse(int argc, const char* const* argv);
 
  private:
@@ -111,7 +111,7 @@ class Program : public Command {
   std::unique_ptr<CLI::App> app_;
 };
 
-/// Wrong usage, out of a callback: "FLAG: EXPECTED", "FLAG is required", "FLAG requires OTHER".
+/// Reports wrong usage from a callback: "FLAG: EXPECTED", "FLAG is required", "FLAG requires OTHER".
 [[noreturn]] void refuse(const std::string& flag, const std::string& expected);
 [[noreturn]] void refuse_missing(const std::string& flag);
 [[noreturn]] void refuse_without(const std::string& flag, const std::string& other);

@@ -70,8 +70,8 @@ Result<std::string> read_token(const std::string& path) {
   if (token.size() < kLeastToken || token.size() > kMostToken ||
       !std::ranges::all_of(token, is_token_character)) {
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("{}: its first line is no token: {} to {} characters of [A-Za-z0-9._~-]", path,
-                            kLeastToken, kMostToken));
+                fmt::format("{}: the first line must be a token of {} to {} characters of [A-Za-z0-9._~-]",
+                            path, kLeastToken, kMostToken));
   }
   return token;
 }
@@ -82,7 +82,7 @@ Result<void> check_origin(const std::string& origin) {
                      origin.find('/', origin.find("://") + 3) == std::string::npos && origin.size() <= 256);
   if (good) return {};
   return fail(ErrorCode::kInvalidArgument,
-              fmt::format("'{}' is no origin: SCHEME://HOST[:PORT], without a path, or *", origin));
+              fmt::format("'{}' is not an origin: SCHEME://HOST[:PORT] without a path, or *", origin));
 }
 
 }  // namespace tandem::gateway

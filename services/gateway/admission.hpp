@@ -9,18 +9,18 @@
 
 namespace tandem::gateway {
 
-/// Web pages of other sites run in the same browsers, and reach what listens on the loopback. Thread-safe.
+/// Refuses web pages of other sites, which run in the same browsers and can reach the loopback. Thread-safe.
 class Admission {
  public:
-  /// `token`: empty where none is asked for. `origins`: SCHEME://HOST[:PORT], or * for all.
+  /// `token`: empty if none is needed. `origins`: SCHEME://HOST[:PORT], or * for all.
   Admission(std::string token, std::vector<std::string> origins)
       : token_(std::move(token)), origins_(std::move(origins)) {}
 
   /// Takes the same time wherever the first wrong character is.
   [[nodiscard]] bool token_fits(std::string_view given) const;
-  /// `origin`, `host`: the request's headers, empty where there is none. No browser leaves the origin out. A
-  /// page that came from this gateway by its address is let in; by a name only if the name is listed, as
-  /// names can be made to point anywhere.
+  /// `origin`, `host`: the request's headers, empty if missing. Browsers always send the origin. A page that
+  /// this gateway served at an IP address may connect. A page that it served under a name may connect only if
+  /// the origin is listed, because anybody can make a name point anywhere.
   [[nodiscard]] bool origin_fits(std::string_view origin, std::string_view host) const;
 
  private:

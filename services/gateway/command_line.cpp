@@ -29,7 +29,7 @@ constexpr std::size_t kLeastQueueBytes = 64U << 10U, kMostQueueBytes = 1U << 30U
 Result<void> check(const Options& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
   if (options.web.tls_cert.empty() != options.web.tls_key.empty())
-    return fail(ErrorCode::kInvalidArgument, "--tls-cert and --tls-key go together");
+    return fail(ErrorCode::kInvalidArgument, "--tls-cert and --tls-key need each other");
   for (const std::string& origin : options.origins) {
     if (auto good = check_origin(origin); !good) return good;
   }
@@ -42,35 +42,40 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   commandline::Program app{"Serves a session to browsers, over HTTP and WebSocket.", "tandem-gateway"};
   app.version("tandem-gateway " TANDEM_VERSION);
   app.footer(
-      "Paths: / the viewer, /tandem the WebSocket, /healthz. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT "
-      "and SIGTERM end it cleanly.");
+      "Paths: / the viewer, /tandem the WebSocket, /healthz the state as JSON. Exit codes: 0 done, 1 failed, "
+      "2 wrong usage. SIGINT and SIGTERM stop the gateway cleanly.");
   Options options;
   app.add_option("--session", options.session, "Name of the session").show_default();
   app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
   app.add_option(
          "--prefer", options.prefer,
-         "Of a session's streams: auto, bandwidth, computing, error, or a name; all viewers play the same")
+         "The stream that all viewers play: a stream's name, or auto, bandwidth, computing or error, as in "
+         "`tandem join --help`")
       .show_default();
-  app.add_option("--listen", options.web.address, "IPv4 or IPv6 address; 0.0.0.0 or :: for all of the host's")
+  app.add_option("--listen", options.web.address,
+                 "IPv4 or IPv6 address to listen on; 0.0.0.0 or :: for all addresses of the host")
       .show_default();
   app.add_option("--port", options.web.port, "TCP port; 0 for any free one").range(0, 65535).show_default();
   options.viewer = installed_viewer();
-  app.add_option("--viewer", options.viewer,
-                 "Folder with the viewer's files, read once at the start [" TANDEM_VIEWER_INSTALL_DIR
-                 " where it is installed]");
+  app.add_option(
+      "--viewer", options.viewer,
+      "Folder with the viewer's files, which are read once at the start [" TANDEM_VIEWER_INSTALL_DIR
+      " if it is installed]");
   app.add_option("--token-file", options.token_file,
-                 "File whose first line is a token that viewers have to name: ?token=TOKEN");
+                 "File whose first line is a token that viewers must give: ?token=TOKEN");
   app.add_option("--tls-cert", options.web.tls_cert, "Certificate chain, PEM");
   app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM");
   app.add_option(
       "--origin", options.origins,
-      "Origin of pages that may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that came "
-      "from here by an address may always");
-  app.add_option("--max-viewers", options.limits.viewers, "Viewers at once")
+      "Origin whose pages may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that this "
+      "gateway served at an IP address may always connect");
+  app.add_option("--max-viewers", options.limits.viewers, "Maximum number of viewers")
       .range(std::size_t{1}, kMostViewers)
       .show_default();
-  app.add_option("--queue-bytes", options.limits.queue_bytes,
-                 "Deltas and scheduled inputs held for viewers that are slow, once for all of them")
+  app.add_option(
+         "--queue-bytes", options.limits.queue_bytes,
+         "Maximum bytes of deltas and scheduled inputs that are held for slow viewers; all viewers share "
+         "them")
       .range(kLeastQueueBytes, kMostQueueBytes)
       .show_default();
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
@@ -78,7 +83,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
     std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
     return {.options = std::nullopt, .exit_code = 2};
   }
-  // As many again for files, and some for refused connections.
+  // Each viewer has a second connection for files; the rest are for connections that will be refused.
   options.web.connections = 2 * options.limits.viewers + 64;
   return {.options = std::move(options), .exit_code = 0};
 }

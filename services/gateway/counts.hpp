@@ -23,7 +23,7 @@ struct Counts {
   [[nodiscard]] std::uint64_t& of(Refusal refusal) { return refused[static_cast<std::size_t>(refusal)]; }
 };
 
-/// A line about what changed, once a minute at most: what strangers do must not fill a disk. Not thread-safe.
+/// Writes a line about changes at most once a minute, so that strangers cannot fill a disk. Not thread-safe.
 class CountLog {
  public:
   static constexpr std::int64_t kPeriodNs = 60 * kSecond;

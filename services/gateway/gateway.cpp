@@ -106,12 +106,12 @@ void Gateway::skip(Viewer& viewer) {
   ++counts_.skips;
   Viewer::InEpoch& state = viewer.now;
   if (state.passage.unfinished()) {
-    // It joins, and would wait for what it cannot use any more.
+    // It joins, and waits for a snapshot that is useless now.
     state.passage = {};
     state.flow = Viewer::Flow::kWaiting;
     return;
   }
-  // The gap tells it to join again.
+  // The gap makes it join again.
   state.place = newest_delta_ && *newest_delta_ >= log_.begin() ? *newest_delta_ : log_.end();
 }
 
@@ -176,7 +176,7 @@ OutgoingPtr Gateway::reply(Viewer& viewer, std::int64_t now_ns) const {
   const Reason standing = demoted ? Reason::kDemoted : Reason::kNone;
   reply.reason = static_cast<std::uint32_t>(state.once != Reason::kNone ? state.once : standing);
   reply.highest_input = state.decided();
-  // Without the server's time an echo would say something wrong.
+  // Without the server's time, an echo would be wrong.
   if (const auto server_ns = world_.server_time_ns(now_ns)) {
     reply.client_clock_ns = state.clock_ns;
     reply.server_time_ns = *server_ns;
@@ -202,7 +202,7 @@ void Gateway::cut(std::int64_t now_ns) {
     if (input.number > made->last_input) inputs.push_back(input.message);
   }
   const auto snapshot = std::make_shared<SnapshotParts>(*made, session_->epoch, std::move(inputs));
-  frame_ = snapshot->frame;  // perhaps of a snapshot that the gateway was sent itself
+  frame_ = snapshot->frame;  // may come from a snapshot that the gateway itself received
   snapshot_bytes_ = snapshot->bytes;
   ++counts_.snapshots;
   for (auto& [id, viewer] : viewers_) {

@@ -1,5 +1,5 @@
 #pragma once
-// A session for viewers that have no DDS.
+// Serves a session to viewers that have no DDS.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace tandem::gateway {
 
-/// No message of a viewer is longer.
+/// Maximum size of a viewer's message.
 inline constexpr std::size_t kMostViewerBytes = 2048;
 
 struct Limits {
@@ -30,22 +30,22 @@ struct Limits {
   std::size_t queue_bytes = 1U << 20U;  ///< of deltas and scheduled inputs, held once for all viewers
 };
 
-/// The rules of idl/STATES.md, "The gateway", for all viewers: without a clock, a thread or a socket. Towards
-/// a viewer it stands where the server stands towards a client. Every buffer is bounded. Not thread-safe.
+/// The rules of idl/STATES.md, "The gateway", for all viewers, without a clock, a thread or a socket. It is
+/// to a viewer what the server is to a client. Every buffer is bounded. Not thread-safe.
 class Gateway {
  public:
-  /// A viewer that is this far behind gets a snapshot where that is smaller than what is queued for it.
+  /// A viewer that is this far behind gets a snapshot if that is smaller than what is queued for it.
   static constexpr std::int64_t kBehindNs = kSecond;
   /// A viewer that reads nothing for this time is disconnected.
   static constexpr std::int64_t kNotReadingNs = 30 * kSecond;
-  /// Inputs of a viewer without an outcome; what a reply can tell of.
+  /// Maximum number of a viewer's inputs without an outcome, which is as many as a reply can list.
   static constexpr std::size_t kMostUndecided = transport::kReplyRing;
 
   /// `world` must outlive it.
   Gateway(const Limits& limits, World& world);
 
   // What viewers do.
-  /// A new connection; nothing where there are too many.
+  /// Adds a connection; returns nothing if there are too many.
   [[nodiscard]] std::optional<ViewerId> admit();
   void leave(ViewerId id);
   /// Takes one message. Untrusted. Returns why the connection has to end, if it has to.
@@ -55,7 +55,7 @@ class Gateway {
     OutgoingPtr message;  ///< null: nothing to send
     bool more = false;    ///< there is another behind it
   };
-  /// The next message to send to a viewer, who can take one.
+  /// The next message to send to a viewer that can take one.
   [[nodiscard]] Next next(ViewerId id, std::int64_t now_ns);
   /// Lists the viewers for which next() has something. Replaces `out`.
   void list_ready(std::int64_t now_ns, std::vector<ViewerId>& out);
@@ -63,16 +63,17 @@ class Gateway {
   void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
 
   // What happens in the session.
-  /// The one followed, with the one stream that is played. Everything of another epoch is dropped.
+  /// The session that is followed, with the stream that is played. All that belongs to another epoch is
+  /// dropped.
   void on_session(const transport::SessionMessage& session);
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns);
-  /// Applied, so that a cut has it.
+  /// A delta that was applied, so that a snapshot cut now contains it.
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns);
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns);
   void on_status(const transport::ServerStatusMessage& status);
   void on_server_alive(bool alive);
 
-  /// Does what is due; returns when it wants to be called again, INT64_MAX: not before something happens.
+  /// Does what is due. Returns when it wants to be called again; INT64_MAX means when something happens.
   std::int64_t poll(std::int64_t now_ns);
 
   [[nodiscard]] const Counts& counts() const { return counts_; }
@@ -138,7 +139,7 @@ class Gateway {
 
   InputMerger merger_;
   std::vector<InputMerger::Verdict> verdicts_;            // kept to reuse its memory
-  transport::Role granted_ = transport::Role::kObserver;  // to the gateway, as replies told it last
+  transport::Role granted_ = transport::Role::kObserver;  // to the gateway, by the last reply
 };
 
 }  // namespace tandem::gateway

@@ -13,7 +13,7 @@ namespace tandem::gateway {
 struct Options {
   std::uint32_t domain = 0;
   std::string session = "default";
-  std::string prefer = "computing";  ///< of streams; see CoreOptions: all viewers play the same
+  std::string prefer = "computing";  ///< chooses the stream that all viewers play; see CoreOptions
   WebOptions web;
   Limits limits;
   std::string viewer;      ///< folder of its files; empty: none

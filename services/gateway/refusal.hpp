@@ -1,5 +1,5 @@
 #pragma once
-// Why a viewer's connection is ended: idl/PROTOCOL.md, "WebSocket".
+// The reasons to end a viewer's connection: idl/PROTOCOL.md, "WebSocket".
 
 #include <array>
 #include <cstddef>

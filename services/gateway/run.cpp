@@ -147,9 +147,11 @@ bool is_loopback(const std::string& address) { return address.starts_with("127."
 void warn_of_open_doors(const Options& options) {
   if (is_loopback(options.web.address)) return;
   if (options.token_file.empty()) {
-    spdlog::warn("no --token-file: every host that can reach {} may watch and send inputs", options.web.address);
+    spdlog::warn("there is no --token-file: every host that can reach {} may watch and send inputs",
+                 options.web.address);
   } else if (options.web.tls_cert.empty()) {
-    spdlog::warn("the token can be read on the way to {}: no --tls-cert", options.web.address);
+    spdlog::warn("there is no --tls-cert: others on the network can read the token on its way to {}",
+                 options.web.address);
   }
 }
 

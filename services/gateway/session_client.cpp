@@ -41,7 +41,7 @@ Result<std::uint64_t> SessionClient::send(transport::InputKind kind, std::vector
   return core_.send(kind, std::move(values), std::move(bytes), {.steady_ns = now_ns, .wall_ns = 0});
 }
 
-// Viewers are told of the one stream that is there for them; where none can be played, they say why
+// Viewers are told of the one stream that exists for them. If it cannot be played, they give the reason
 // themselves.
 void SessionClient::on_session(const transport::SessionMessage& session) { untold_ = session; }
 

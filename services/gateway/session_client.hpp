@@ -12,8 +12,8 @@
 
 namespace tandem::gateway {
 
-/// A ClientCore whose news a gateway hears in their order. Not thread-safe; the port's wait() and wake() are
-/// left to the caller.
+/// A ClientCore that reports its events to a gateway in their order. Not thread-safe. The caller calls the
+/// port's wait() and wake().
 class SessionClient final : public World, private client::CoreListener {
  public:
   /// `port` must outlive it.

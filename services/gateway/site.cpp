@@ -44,7 +44,7 @@ std::optional<std::string> read_file(const fs::path& path) {
   return bytes;
 }
 
-// Empty where it is not smaller.
+// Empty if it is not smaller.
 std::string gzip(const std::string& bytes) {
   constexpr int kGzipWindowBits = 15 + 16;
   constexpr int kMemoryLevel = 8;

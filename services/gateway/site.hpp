@@ -10,8 +10,8 @@
 
 namespace tandem::gateway {
 
-/// A folder, read once and held in memory: no request reaches the file system, so no path can lead out of it.
-/// Thread-safe.
+/// A folder that is read once and held in memory. Requests never reach the file system, so no path can leave
+/// it. Thread-safe.
 class Site {
  public:
   static constexpr std::size_t kMostFiles = 4096;
@@ -19,18 +19,18 @@ class Site {
 
   struct File {
     std::string bytes;
-    std::string gzip;  ///< the same, compressed; empty where that is not smaller
+    std::string gzip;  ///< the same, compressed; empty if that is not smaller
     std::string_view type;
     bool immutable = false;  ///< its name has a hash of its content
   };
 
   /// A site without files.
   Site() = default;
-  /// Reads `folder`, which must hold an index.html. Names that begin with a dot and what is no regular file
-  /// are left out. Errors: kIo, kCapacity.
+  /// Reads `folder`, which must hold an index.html. Skips names that begin with a dot, and all but regular
+  /// files. Errors: kIo, kCapacity.
   [[nodiscard]] static Result<Site> load(const std::string& folder);
 
-  /// The file at the path of a request, as "/assets/x.js"; "/" is index.html. Null where there is none.
+  /// The file at the path of a request, as "/assets/x.js"; "/" is index.html. Null if there is none.
   [[nodiscard]] const File* find(std::string_view path) const;
 
  private:

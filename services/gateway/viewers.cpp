@@ -20,7 +20,8 @@ bool is_gravity(const transport::InputMessage& input) {
   return input.kind == static_cast<std::uint32_t>(InputKind::kGravity);
 }
 
-// What comes in the place of another must not be refused in its place, where that can be known.
+// A gravity can stand for earlier ones. So an input that the server would refuse is refused here, if that can
+// be known, and not coalesced with them.
 bool well_formed(const transport::InputMessage& input) {
   const bool finite = std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
   switch (static_cast<InputKind>(input.kind)) {
@@ -89,7 +90,7 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage
   if (!plays) {
     on_joining(viewer, ack, now_ns);
   } else if (state.flow == Viewer::Flow::kSilent) {
-    // It played over another connection: from the newest on it finds out what it lacks.
+    // It played over another connection; after the newest message it can see what it lacks.
     state.flow = Viewer::Flow::kFollowing;
     state.place = newest_delta_.value_or(log_.end());
   }

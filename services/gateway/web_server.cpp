@@ -21,14 +21,14 @@ static_assert(Outgoing::kHeadroom >= LWS_PRE);
 
 constexpr const char* kSubprotocol = "tandem.1";
 constexpr std::string_view kPath = "/tandem";
-// Unsent bytes that the kernel takes of one connection: what is sent next is decided late. More only costs
-// those who are slow.
+// Maximum unsent bytes in the kernel for one connection. A small value decides late what is sent next; a
+// larger one makes only slow viewers wait.
 constexpr int kUnsentBytes = 16 * 1024;
 constexpr int kSendBufferBytes = 256 * 1024;
 constexpr std::size_t kChunkBytes = 16 * 1024;  // of a file
 constexpr int kRefusedSeconds = 5, kFileSeconds = 30;
 constexpr std::size_t kMostHeaderBytes = 2048;
-// A connection from which nothing comes is asked for a sign of life, and ended without one.
+// A silent connection gets a ping, and is ended if it does not answer.
 constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
                                      .retry_ms_table_count = 0,
                                      .conceal_count = 0,
@@ -57,16 +57,16 @@ bool names(std::string_view list, std::string_view wanted) {
 struct Connection {
   ViewerId id = 0;
   std::optional<Refusal> refused;
-  std::vector<std::byte> message;  // what came of the present one
+  std::vector<std::byte> message;  // the received part of the current message
 };
 
-/// A response on its way.
+/// A response that is being sent.
 struct Exchange {
-  std::string own;        // where the body is made for this one
-  std::string_view body;  // what is left of it
+  std::string own;        // the body, if it was made for this response
+  std::string_view body;  // the rest of the body
 };
 
-// libwebsockets keeps plain memory for a connection; it holds one pointer, to what we made.
+// libwebsockets keeps plain memory for a connection, which holds one pointer to our object.
 template <class T>
 T*& slot(void* user) {
   return *static_cast<T**>(user);
@@ -111,7 +111,7 @@ struct WebServer::Impl {
   void let_go();
 
   struct Tick {
-    lws_sorted_usec_list_t sul{};  // first: what libwebsockets hands back
+    lws_sorted_usec_list_t sul{};  // first, because libwebsockets hands back its address
     Impl* self = nullptr;
   };
 
@@ -136,7 +136,7 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
                                        static_cast<int>(value.size()), &at, end) == 0;
   };
   const Exchange& exchange = *slot<Exchange>(user);
-  // The address of a page may hold its token.
+  // The address of a page may contain its token.
   const bool good = lws_add_http_common_headers(wsi, status, std::string(type).c_str(), exchange.body.size(),
                                                 &at, end) == 0 &&
                     add("x-content-type-options:", "nosniff") && add("referrer-policy:", "no-referrer") &&
@@ -206,7 +206,7 @@ int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, 
   }
 }
 
-// Without this a client that asks for another WebSocket would only see the connection end.
+// Without this, a client that asks for another WebSocket would see only that the connection ends.
 int WebServer::Impl::confirm_upgrade(lws* wsi) {
   const auto refuse = [&](unsigned status, const char* why) {
     return lws_return_http_status(wsi, status, why) != 0 ? -1 : 1;
@@ -218,7 +218,7 @@ int WebServer::Impl::confirm_upgrade(lws* wsi) {
   return 0;
 }
 
-// The headers are there only now; what is refused is told once a close frame can be sent.
+// The headers exist only now; a refusal is sent as soon as a close frame can be.
 int WebServer::Impl::open(lws* wsi, void* user) {
   Handler::Request request{
       .origin = header(wsi, WSI_TOKEN_ORIGIN), .host = header(wsi, WSI_TOKEN_HOST), .token = {}};
@@ -347,7 +347,8 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
 
 namespace {
 
-/// Why it is impossible to listen there, which libwebsockets would not say; empty if it is possible.
+/// The reason why listening there is impossible, which libwebsockets does not report; empty if it is
+/// possible.
 std::optional<std::string> cannot_listen(const WebOptions& options) {
   const bool v6 = options.address.find(':') != std::string::npos;
   sockaddr_in6 six{};
@@ -411,7 +412,7 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
         ErrorCode::kIo,
         options.tls_cert.empty()
             ? fmt::format("cannot listen on {} port {}", options.address, options.port)
-            : fmt::format("{} and {} are no certificate and its key", options.tls_cert, options.tls_key));
+            : fmt::format("{} and {} are not a certificate and its key", options.tls_cert, options.tls_key));
   }
   impl->tick.self = impl.get();
   lws_sul_schedule(impl->context, 0, &impl->tick.sul, Impl::on_tick, 1);

@@ -1,5 +1,5 @@
 #pragma once
-// HTTP and WebSocket, by libwebsockets. This header sees nothing of it.
+// HTTP and WebSocket. The source uses libwebsockets, which this header hides.
 
 #include <atomic>
 #include <cstddef>
@@ -22,18 +22,18 @@ struct WebOptions {
   std::string address = "127.0.0.1";  ///< of IPv4 or IPv6
   std::uint16_t port = 8080;          ///< 0: any free one
   std::string tls_cert, tls_key;      ///< files; empty: no TLS
-  std::size_t connections = 512;      ///< at once, of all kinds
+  std::size_t connections = 512;      ///< maximum number of connections of all kinds
 };
 
-/// Serves the viewer's files and the connections of viewers. Connections are bounded; what is said on them is
-/// left to the handler.
+/// Serves the viewer's files and the connections of viewers. Their number is limited; a handler deals with
+/// their messages.
 class WebServer {
  public:
   /// Called by run(), in its thread.
   class Handler {
    public:
     struct Request {
-      std::string origin, host, token;  ///< empty where there is none
+      std::string origin, host, token;  ///< empty if missing
     };
     virtual ~Handler() = default;
     virtual std::variant<ViewerId, Refusal> open(const Request& request) = 0;
@@ -58,9 +58,9 @@ class WebServer {
   WebServer& operator=(WebServer&&) = delete;
   ~WebServer();
 
-  /// Serves until `stop`, and 0.1 s longer at most.
+  /// Serves until `stop`, and a maximum of 0.1 s longer.
   void run(const std::atomic<bool>& stop);
-  /// list_ready() has something new. Thread-safe.
+  /// Tells the server that list_ready() has something new. Thread-safe.
   void wake();
   [[nodiscard]] std::uint16_t port() const;
 

@@ -60,14 +60,16 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   const Layout& layout = config.streams.front().layout;
   for (const StreamConfig& stream : config.streams) {
     if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
-    if (stream.layout.lead != layout.lead) return refuse("all streams of a session have one lead");
+    if (stream.layout.lead != layout.lead) return refuse("all streams of a session must have the same lead");
   }
   if (config.types.size() != layout.type_count)
-    return refuse(fmt::format("{} body types, {} described", layout.type_count, config.types.size()));
+    return refuse(fmt::format("the layout has {} body types, but {} are described", layout.type_count,
+                              config.types.size()));
   static_assert(engine::kMaxBodies == kMaxCapacity);
   const std::uint32_t capacity = simulation.capacity();
   if (capacity != layout.capacity)
-    return refuse(fmt::format("{} slots for a simulation of {}", layout.capacity, capacity));
+    return refuse(
+        fmt::format("the layout has {} slots, but the simulation has {}", layout.capacity, capacity));
   // Reads it as clients do; otherwise each of them would fail.
   if (const auto text = transport::read_text_message(config.scene_description); !text)
     return refuse(text.error().message);

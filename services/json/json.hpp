@@ -1,6 +1,6 @@
 #pragma once
-// JSON as programs print it, and read it from each other. Stands before nlohmann-json, which costs every file
-// that includes it seconds of compiling.
+// JSON that programs print, and read from each other. Hides nlohmann-json, which costs every file that
+// includes it seconds of compiling.
 
 #include <concepts>
 #include <cstddef>
@@ -37,7 +37,7 @@ class Json {
   Json(std::string text) : value_(std::move(text)) {}
   Json(std::string_view text) : value_(std::string(text)) {}
   Json(const char* text) : value_(std::string(text)) {}
-  /// null where there is none.
+  /// null if there is none.
   template <class T>
   Json(const std::optional<T>& value) : Json(value ? Json(*value) : Json()) {}
   template <class T>
@@ -53,13 +53,13 @@ class Json {
   Json& operator[](std::string_view name);
   /// null if there is none.
   const Json& operator[](std::string_view name) const;
-  /// At the end of a list; null becomes one. Returns the new place.
+  /// Appends to a list; null becomes a list. Returns the new place.
   Json& push_back(Json value);
 
   [[nodiscard]] bool is_null() const { return std::holds_alternative<std::nullptr_t>(value_); }
   [[nodiscard]] bool is_text() const { return std::holds_alternative<std::string>(value_); }
   [[nodiscard]] bool is_real() const { return std::holds_alternative<double>(value_); }  ///< no whole number
-  /// 0, nothing, none where the value is something else.
+  /// 0, an empty text or no members if the value has another type.
   [[nodiscard]] double number() const;
   [[nodiscard]] const std::string& text() const;
   [[nodiscard]] const Members& members() const;

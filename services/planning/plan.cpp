@@ -81,7 +81,7 @@ Result<void> choose_predictor(const World& world, const Wishes& wishes, const Co
   }
   for (const PredictorTraits& predictor : predictors()) {
     if (!suits(predictor, world, traits)) continue;
-    // One that the lattice is too fine for is passed over, but not one that was described wrongly.
+    // Skips a predictor for which the lattice is too fine, but reports a world that is described wrongly.
     auto set = set_predictor(world, predictor, stream);
     if (set || set.error().code != ErrorCode::kCapacity) return set;
   }
@@ -150,7 +150,7 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
   std::vector<Wished> all;
   if (wishes.streams.empty()) all.push_back({{}, wishes});
   for (const StreamWishes& stream : wishes.streams) {
-    if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "each stream needs a name");
+    if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "every stream needs a name");
     auto of = wishes_of(wishes, stream);
     if (!of) return of_stream(stream.name, of.error());
     all.push_back({stream.name, std::move(*of)});

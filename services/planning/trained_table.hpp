@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench train` learned about a world.
+// Tables that `tandem bench train` has learned about a world.
 
 #include <cstdint>
 #include <vector>

@@ -51,7 +51,7 @@ struct Set {
 Result<void> set(std::string_view key, std::string_view value, Wishes& wishes) {
   const auto wrong = [](std::string what) { return fail(ErrorCode::kInvalidArgument, std::move(what)); };
   const StreamOption* const option = find_option(key);
-  if (option == nullptr) return wrong(fmt::format("'{}' is none of {}", key, known_keys()));
+  if (option == nullptr) return wrong(fmt::format("unknown key '{}'; known are {}", key, known_keys()));
   if (!std::visit(Set{value, &wishes}, option->field))
     return wrong(fmt::format("'{}' cannot be read as {}", value, key));
   if (option->automatic) wishes.automatic = *option->automatic;
@@ -68,19 +68,20 @@ bool in_range(const StreamOption& option, std::string_view value) {
   return read && *read >= option.least && *read <= option.most;
 }
 
-// Checks what a stream says for itself against `wishes`, all that is wished for it.
+// Checks a stream's own settings against `wishes`, which has them and the common ones.
 Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, const CodecTraits& traits) {
   const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
   for (const auto& [key, value] : stream.settings) {
     const StreamOption* const option = find_option(key);
-    if (!in_range(*option, value)) return wrong(fmt::format("a {} is {}", key, option->takes));
+    if (!in_range(*option, value)) return wrong(fmt::format("{} must be {}", key, option->takes));
   }
   for (const StreamOption& option : kStreamOptions) {
     if (!option.steers || !says(stream, option.key)) continue;
     if (says(stream, "threshold"))
-      return wrong(fmt::format("either a threshold, or one that is chosen at run time by {}", option.key));
+      return wrong(fmt::format("threshold cannot be combined with {}, which needs an automatic threshold",
+                               option.key));
     if (!traits.reads_threshold)
-      return wrong(fmt::format("codec {} has no threshold that {} could choose", wishes.codec, option.key));
+      return wrong(fmt::format("codec {} has no threshold, and so takes no {}", wishes.codec, option.key));
     if (!wishes.automatic)
       return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
   }
@@ -96,7 +97,7 @@ Result<StreamWishes> read_stream(const std::string& text) {
   };
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos || colon + 1 == text.size())
-    return wrong("NAME:PREDICTOR, or NAME:key=value,...");
+    return wrong("must be NAME:PREDICTOR, or NAME:key=value,...");
   StreamWishes stream{.name = text.substr(0, colon)};
   Wishes ignored;
   for (std::size_t begin = colon + 1; begin <= text.size();) {
@@ -107,7 +108,7 @@ Result<StreamWishes> read_stream(const std::string& text) {
     const std::string key = equals == std::string::npos ? "predictor" : item.substr(0, equals);
     const std::string value = equals == std::string::npos ? item : item.substr(equals + 1);
     if (const auto good = set(key, value, ignored); !good) return wrong(good.error().message);
-    if (says(stream, key)) return wrong(fmt::format("{} is said twice", key));
+    if (says(stream, key)) return wrong(fmt::format("{} is set twice", key));
     stream.settings.emplace_back(key, value);
   }
   return stream;
@@ -135,42 +136,42 @@ Result<void> check_wishes(const Wishes& wishes) {
   };
   const auto is_length = [](double metres) { return metres >= kLeastLength && metres <= kMostLength; };
   const CodecTraits traits = traits_of(wishes.codec);
-  if (wishes.threshold_m && !is_length(*wishes.threshold_m)) return wrong("threshold", kLength);
+  if (wishes.threshold_m && !is_length(*wishes.threshold_m))
+    return wrong("threshold", fmt::format("must be {}", kLength));
   if (!(wishes.threshold_scale >= 1e-6 && wishes.threshold_scale <= 1e6))
-    return wrong("threshold-scale", "a positive factor");
+    return wrong("threshold-scale", "must be from 1e-6 to 1e6");
   if (wishes.automatic && !traits.reads_threshold) {
     return wrong("threshold",
-                 fmt::format("auto chooses nothing with codec {}, which has no threshold", wishes.codec));
+                 fmt::format("auto cannot be combined with codec {}, which has no threshold", wishes.codec));
   }
-  if (wishes.automatic && wishes.threshold_m) return wrong("threshold", "a length or auto, not both");
+  if (wishes.automatic && wishes.threshold_m) return wrong("threshold", "must be a length or auto, not both");
   const bool steered = wishes.target_mbit_per_s != 0;
   if (!wishes.automatic && steered) return wrong("target-bandwidth", "needs --threshold auto");
-  if (!wishes.automatic && wishes.max_error_m)
-    return wrong("max-error", "needs an automatic threshold: a target, or auto");
+  if (!wishes.automatic && wishes.max_error_m) return wrong("max-error", "needs --threshold auto");
   if (steered && !(wishes.target_mbit_per_s >= 0.001 && wishes.target_mbit_per_s <= 1e6))
-    return wrong("target-bandwidth", "Mbit/s, at least 0.001");
-  if (wishes.max_error_m && !is_length(*wishes.max_error_m)) return wrong("max-error", kLength);
-  if (wishes.budget_bytes && !traits.takes_budget)
-    return wrong("budget", "only with codec limited or tracker");
+    return wrong("target-bandwidth", "must be from 0.001 to 1e6 Mbit/s");
+  if (wishes.max_error_m && !is_length(*wishes.max_error_m))
+    return wrong("max-error", fmt::format("must be {}", kLength));
+  if (wishes.budget_bytes && !traits.takes_budget) return wrong("budget", "needs codec limited or tracker");
   if (wishes.budget_bytes && *wishes.budget_bytes < kLeastBudgetBytes)
-    return wrong("budget", fmt::format("at least {} bytes", kLeastBudgetBytes));
+    return wrong("budget", fmt::format("must be at least {} bytes", kLeastBudgetBytes));
   if (wishes.threads < 1 || wishes.threads > kMaxThreads)
-    return wrong("threads", fmt::format("1 to {}", kMaxThreads));
+    return wrong("threads", fmt::format("must be 1 to {}", kMaxThreads));
   return {};
 }
 
 Result<void> check_service(const ServiceWishes& service) {
   const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
   const std::uint32_t most_ahead = host::ServiceConfig().window_ceiling;
-  if (service.lead > 1) return wrong("lead: 0 or 1");
+  if (service.lead > 1) return wrong("lead: must be 0 or 1");
   if (service.client_limit < 1 || service.client_limit > kMostClients)
-    return wrong(fmt::format("client-limit: 1 to {}", kMostClients));
+    return wrong(fmt::format("client-limit: must be 1 to {}", kMostClients));
   if (service.window && (*service.window < 1 || *service.window > most_ahead))
-    return wrong(fmt::format("window: 1 to {} frames, or auto", most_ahead));
+    return wrong(fmt::format("window: must be 1 to {} frames, or auto", most_ahead));
   if (service.rate_hz && !(*service.rate_hz >= 1 && *service.rate_hz <= 1000))
-    return wrong("rate: 1 to 1000 Hz, or max");
+    return wrong("rate: must be 1 to 1000 Hz, or max");
   if (service.stall_timeout_s && !(*service.stall_timeout_s >= 0.01 && *service.stall_timeout_s <= 10))
-    return wrong("stall-timeout: 0.01 to 10 seconds, or off");
+    return wrong("stall-timeout: must be 0.01 to 10 seconds, or off");
   return {};
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What an operator wishes: the streams of a server, and how it serves them.
+// An operator's wishes for a server: its streams, and how it serves them.
 
 #include <array>
 #include <cstddef>
@@ -17,9 +17,9 @@
 
 namespace tandem::planning {
 
-/// This name of a predictor stands for the first of predictors() that suits codec and world.
+/// This name stands for the first of predictors() that suits codec and world.
 inline constexpr std::string_view kAutomaticPredictor = "auto";
-/// With a smaller budget a frame has hardly room for one body.
+/// A frame with a smaller budget has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
 inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
@@ -37,7 +37,7 @@ struct Wishes {
   std::string predictor{kAutomaticPredictor};
   std::optional<double> threshold_m = {};  ///< empty: the world's, times threshold_scale
   double threshold_scale = 1;
-  bool automatic = false;        ///< quality follows the world at run time, from a quarter of the threshold
+  bool automatic = false;        ///< choose the threshold at run time, from a quarter of the first one
   double target_mbit_per_s = 0;  ///< with `automatic`; 0: the threshold stays
   std::optional<double> max_error_m = {};  ///< with `automatic`; empty: four times the threshold
   /// Maximum size of the corrections of a frame, for codecs that take a budget; empty:
@@ -55,10 +55,10 @@ struct StreamOption {
   std::variant<std::string Wishes::*, double Wishes::*, std::optional<double> Wishes::*,
                std::optional<std::size_t> Wishes::*>
       field;
-  double least = 0, most = 0;          ///< of a number
-  std::string_view takes = {};         ///< in errors: what it is
-  std::optional<bool> automatic = {};  ///< what it makes of Wishes::automatic
-  bool steers = false;                 ///< goes with an automatic threshold alone
+  double least = 0, most = 0;          ///< range of a number
+  std::string_view takes = {};         ///< describes the allowed values in errors
+  std::optional<bool> automatic = {};  ///< the value it sets Wishes::automatic to
+  bool steers = false;                 ///< needs an automatic threshold
 };
 
 /// A new option needs a field above and in idl/server.proto, a line here, and its use in plan.cpp.
@@ -99,16 +99,15 @@ inline constexpr std::array kStreamOptions{
 /// one line, for unknown keys and values that are not numbers.
 [[nodiscard]] Result<StreamWishes> read_stream(const std::string& text);
 
-/// All wishes for one of several streams: the common ones and its own. Errors: kInvalidArgument for a setting
-/// that cannot be read, is out of range, or does not go with the others.
+/// Merges the common wishes and a stream's own. Errors: kInvalidArgument for a setting that cannot be read,
+/// is out of range, or conflicts with another one.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
-/// Checks what is said for all streams. Errors: kInvalidArgument, which begins with the option's key and a
-/// colon.
+/// Checks the wishes that are common to all streams. Errors: kInvalidArgument, which begins with the option's
+/// key and a colon.
 [[nodiscard]] Result<void> check_wishes(const Wishes& wishes);
 
-/// The traits of a codec. Those of an unknown one exclude nothing: it is refused where the session is
-/// planned.
+/// The traits of a codec. Those of an unknown codec exclude nothing, because planning the session refuses it.
 [[nodiscard]] CodecTraits traits_of(const std::string& codec);
 
 inline constexpr std::uint32_t kMostClients = 65'536;

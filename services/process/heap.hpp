@@ -1,6 +1,6 @@
 #pragma once
-// Gives the free memory of a program back to the system. Only for programs: a library must not manage the
-// heap of its host.
+// Gives the free memory of a program back to the system. Only programs use this, because a library must not
+// manage the heap of its host.
 
 #include <condition_variable>
 #include <mutex>
@@ -8,9 +8,9 @@
 
 namespace tandem {
 
-/// While it lives, the pages that the program does not use any more are given back every 15 s. glibc gives
-/// back the top of a heap only: what a crowd of clients left below a block that is still in use would stay
-/// for ever. No effect with another C library.
+/// While it lives, it gives pages that the program does not use any more back every 15 s. glibc gives back
+/// only the top of a heap, so memory below a block that is still in use would stay for ever after a crowd of
+/// clients. Has no effect with another C library.
 class HeapTrimmer {
  public:
   HeapTrimmer();
@@ -18,11 +18,11 @@ class HeapTrimmer {
  private:
   std::mutex mutex_;
   std::condition_variable_any ended_;
-  std::jthread thread_;  // last: ends first
+  std::jthread thread_;  // last member, so that it ends first
 };
 
-/// Gives back what is free now. Thread-safe; takes milliseconds, in which other threads may have to wait for
-/// memory.
+/// Gives back the memory that is free now. Thread-safe; takes milliseconds, in which other threads may have
+/// to wait for memory.
 void trim_heap();
 
 }  // namespace tandem

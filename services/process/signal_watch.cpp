@@ -91,7 +91,7 @@ void SignalWatch::give_up(const std::string& when) const {
   std::string line = program_;
   if (code == kAtWork) {
     line += ": the work had not ended " + when +
-            ". The program broke it off: reports are missing, and files may lack their end.\n";
+            ". The program stopped it: reports are missing, and files may lack their end.\n";
   } else {
     line += ": DDS had not ended " + when +
             " (is the network interface gone?). The program ended without it, with exit code " +

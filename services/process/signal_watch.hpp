@@ -1,5 +1,5 @@
 #pragma once
-// SIGINT and SIGTERM as a flag, and an end in time whatever a library waits for.
+// Turns SIGINT and SIGTERM into a flag, and ends the process in time even if a library waits for ever.
 
 #include <atomic>
 #include <chrono>
@@ -10,25 +10,25 @@
 
 namespace tandem {
 
-/// A thread waits for the signals, so that no handler and no global is needed. Make it before other threads:
-/// its mask holds for those started later.
+/// A thread waits for the signals, so no handler and no global is needed. Make this object before other
+/// threads are started, because they inherit its mask.
 ///
 /// The same thread is the guard of the end. Cyclone DDS, when it stops, waits for a packet to itself, which
-/// never comes once the network interface is gone. So from the first signal, or from finish() where that is
+/// never comes once the network interface is gone. So from the first signal, or from finish() if that is
 /// earlier, the program has a limited time until this object is destroyed. After that, or at a further signal
 /// that comes a while after the first, the thread says on stderr what was left and ends the process with
 /// _exit().
 class SignalWatch {
  public:
   struct Limits {
-    /// For an orderly end; a program that is asked to end does so within 5 s.
+    /// Time for an orderly end; a program that is asked to end does so within 5 s.
     std::chrono::milliseconds end{4000};
     /// Another signal within this time of the first counts as the same request, because a terminal with a
     /// parent process, or timeout(1), sends two at once.
     std::chrono::milliseconds repeat{1000};
   };
 
-  /// `program` stands in front of what the guard says.
+  /// The guard's messages begin with `program`.
   explicit SignalWatch(std::string program) : SignalWatch(std::move(program), Limits()) {}
   SignalWatch(std::string program, Limits limits);
   ~SignalWatch();
@@ -39,9 +39,9 @@ class SignalWatch {
 
   [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
 
-  /// All work is done, reports and files are written, and only DDS is left to end: from now on `exit_code` is
-  /// that of the process, also when the guard ends it; before it would be 1. Flushes stdout, as _exit() does
-  /// not. Returns `exit_code`, or 1 when stdout took not all.
+  /// Call when all work is done, reports and files are written, and only DDS still has to end. From now on
+  /// the process exits with `exit_code` even if the guard ends it; before, that would be 1. Flushes stdout,
+  /// because _exit() does not. Returns `exit_code`, or 1 if stdout did not take everything.
   [[nodiscard]] int finish(int exit_code);
 
  private:
@@ -50,7 +50,7 @@ class SignalWatch {
   void run();
   /// The thread looks again at what it waits for.
   void wake();
-  /// Ends the process. `when`: in words, behind "had not ended".
+  /// Ends the process. `when` follows the words "had not ended".
   [[noreturn]] void give_up(const std::string& when) const;
 
   const std::string program_;

@@ -14,8 +14,9 @@ constexpr std::uint64_t kTowersKey = 0x544F574552;  // streams of random numbers
 constexpr std::uint64_t kRowsKey = 0x524F5753;
 constexpr std::uint64_t kTurnKey = 0x5455524E;
 constexpr std::uint32_t kAcross = 3;  // boxes in a row of a tower's layer
-constexpr double kGap = 0.02;     // between them, of a box's width: touching boxes would push each other away
-constexpr double kJitter = 0.01;  // of a body's place, of its width
+constexpr double kGap =
+    0.02;  // gap between boxes, in widths of a box; touching boxes would push each other away
+constexpr double kJitter = 0.01;          // maximum displacement of a body, in widths
 constexpr float kHalfRoot = 0.70710677F;  // sqrt(1/2)
 
 Vec3 edges(const BodyType& type) {

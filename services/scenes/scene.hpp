@@ -22,7 +22,7 @@ inline constexpr std::uint32_t kMaxUsers = 64;
 
 struct BodyType {
   std::string name;
-  double radius_m = 0;           ///< of what is no sphere: half of its least extent
+  double radius_m = 0;           ///< for a shape that is not a sphere, half of its minimum extent
   double bounding_radius_m = 0;  ///< of the sphere around it
   double mass_kg = 0;
   std::uint32_t colour_rgba = 0;  ///< 0xRRGGBBAA
@@ -80,7 +80,7 @@ struct Scene {
   engine::Vec3 gravity{};
   double smallest_radius_m = 0;
   double threshold_m = 0;  ///< error threshold
-  double extent_m = 0;     ///< largest |coordinate| within the bounds
+  double extent_m = 0;     ///< maximum |coordinate| within the bounds
   std::uint32_t users = 1;
   bool turns = false;  ///< bodies have orientations: engine::Bodies::orientation
   std::vector<BodyType> types;
@@ -110,9 +110,9 @@ struct Scene {
 /// Errors: kMalformed.
 [[nodiscard]] Result<Scene> parse_scene(const std::string& text, const std::string& source);
 
-/// The scene's simulation with `bodies` slots at frame 0. The number of bodies changes how far the scene is
-/// filled, nothing else. Errors: kInvalidArgument (bodies 0, above the limit or more than the scene's bounds
-/// hold; threads), kUnsupported for an engine that was not built.
+/// The scene's simulation with `bodies` slots at frame 0. The number of bodies only changes how far the scene
+/// is filled. Errors: kInvalidArgument (bodies 0, above the limit or more than the scene's bounds hold;
+/// threads), kUnsupported for an engine that was not built.
 [[nodiscard]] Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene,
                                                                           std::uint32_t bodies,
                                                                           std::uint64_t seed,

@@ -105,7 +105,7 @@ void Script::poke(Routine& routine) {
 }
 
 std::vector<ScriptedInput> Script::until(std::uint64_t frame) {
-  // Times are rounded to frames: what begins half a frame later may still belong to this one.
+  // Times are rounded to frames, so an action that begins half a frame later may still belong to this one.
   const double end_s = (static_cast<double>(frame) + 1) * scene_->dt_s;
   for (Routine& routine : routines_) {
     while (routine.next_s <= end_s) routine.tilting != nullptr ? tilt(routine) : poke(routine);

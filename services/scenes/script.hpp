@@ -1,5 +1,5 @@
 #pragma once
-// Scripted inputs: of a scene's users, and from input script files.
+// Scripted inputs of a scene's users, and of input script files.
 
 #include <cstdint>
 #include <string>
@@ -21,15 +21,16 @@ struct ScriptedInput {
   engine::Input input;
 };
 
-/// What `users` users of the scene do, frame by frame, for as long as a session lasts. The same for a seed on
-/// every machine. `users` 0 means as many as the scene says. Memory does not grow with the frames. Not
-/// thread-safe.
+/// The inputs of `users` users of the scene, frame by frame, for as long as a session lasts. A seed gives the
+/// same inputs on every machine. `users` 0 stands for the scene's number. Memory does not grow with the
+/// frames. Not thread-safe.
 class Script {
  public:
   /// `scene` must outlive the script.
   Script(const Scene& scene, std::uint64_t seed, std::uint32_t users);
 
-  /// All that acts after the frame of the last call and up to `frame`, ascending by frame, then by user.
+  /// All inputs that act after the frame of the last call and up to `frame`, ascending by frame, then by
+  /// user.
   [[nodiscard]] std::vector<ScriptedInput> until(std::uint64_t frame);
   /// Inputs made already that act on later frames.
   [[nodiscard]] std::size_t pending() const { return pending_.size(); }

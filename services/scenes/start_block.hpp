@@ -17,10 +17,10 @@ struct RigidStart {
   std::vector<engine::Quaternion> orientation;  ///< empty: none is turned
 };
 
-/// Tower by tower, layer by layer; the last one may be unfinished. Bodies are off their place by up to a
-/// hundredth of their width, so that seeds differ. Precondition: the scene has towers.
+/// The bodies tower by tower, layer by layer; the last tower may be unfinished. Bodies are displaced by up to
+/// a hundredth of their width, so that seeds differ. Precondition: the scene has towers.
 [[nodiscard]] RigidStart fill_towers(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
-/// Row by row. Precondition: the scene has rows.
+/// The bodies row by row. Precondition: the scene has rows.
 [[nodiscard]] RigidStart fill_rows(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
 /// `bodies` orientations, uniform over all.
 [[nodiscard]] std::vector<engine::Quaternion> turn_at_random(std::uint32_t bodies, std::uint64_t seed);

@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench train` learned about a scene; it is kept in a file next to the scene.
+// Tables that `tandem bench train` has learned about a scene, kept in a file next to the scene.
 
 #include <cstdint>
 #include <string>
@@ -20,8 +20,8 @@ using planning::TrainedTable;
 /// Loads the tables next to a scene; empty if there is no such file. Errors: kIo, kMalformed with file, line
 /// and field.
 [[nodiscard]] Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path);
-/// Puts `table` in the place of the one for the same size and threshold, or behind the others, and replaces
-/// the file in one go. Errors: kIo, kMalformed when the file there cannot be read.
+/// Replaces the table for the same size and threshold, or appends `table`, and replaces the file atomically.
+/// Errors: kIo; kMalformed if the old file cannot be read.
 [[nodiscard]] Result<void> save_trained(const std::string& scene_path, const TrainedTable& table);
 
 }  // namespace tandem::scenes

@@ -27,9 +27,10 @@ class Flags {
   void add(const char* flag, void (idl::ServerConfig::*set)(T), const std::string& help) {
     commandline::Option option = app_.add_option_function<T>(
         flag, [config = config_, set](T value) { (config->*set)(value); }, help);
-    // The parser reads -1 as the largest number, and what is too large as that.
+    // The parser would read -1 and numbers that are too large as the maximum.
     if constexpr (std::is_unsigned_v<T>)
-      option.check([](const std::string& text) { return planning::number<T>(text) ? "" : "a whole number"; });
+      option.check(
+          [](const std::string& text) { return planning::number<T>(text) ? "" : "must be a whole number"; });
   }
   void add(const char* flag, std::string* (idl::ServerConfig::*field)(), const std::string& help) {
     app_.add_option_function<std::string>(
@@ -48,7 +49,7 @@ void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
   if (config.threshold_auto()) return;
   const auto length = planning::number<double>(text);
-  if (!length) commandline::refuse("--threshold", "a length in metres, or auto");
+  if (!length) commandline::refuse("--threshold", "must be a length in metres, or auto");
   config.set_threshold(*length);
 }
 
@@ -83,57 +84,63 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add(
       "--predictor", &Config::mutable_predictor,
       fmt::format(
-          "Predicted step of server and clients: {}, or auto: with codec tracker and at most {} spheres of about "
-          "one size a stream of {} and one of {}, else {} [{}]",
+          "Predicted step of server and clients: {}, or auto. With codec tracker and up to {} spheres of "
+          "about the same size, auto publishes one stream with {} and one with {}, else one with {} [{}]",
           fmt::join(predictor_names(), ", "), best.most_bodies, basic, best.name, basic,
           defaults.choice.predictor));
   app.add_option_function<std::vector<std::string>>(
          "--stream", [&config](const std::vector<std::string>& texts) { add_streams(config, texts); },
-         "One of up to 8 ways of telling the world, each for clients of other means; made while somebody plays "
-         "it. NAME:PREDICTOR, or NAME:key=value,... with " +
+         "Adds a stream, NAME:PREDICTOR or NAME:key=value,...; repeatable, up to 8 streams of the same "
+         "world. The keys are " +
              stream_keys() +
-             "; the rest as the flags of these names say. Clients choose by themselves; one that chooses "
-             "nothing plays the first [thin:ballistic and rich:field where --predictor auto is field]")
+             "; the flags of these names set what is left out. Clients choose their stream, and one that "
+             "does not choose plays the first. The server computes a stream only while somebody plays it "
+             "[with --predictor auto, where field pays: thin:ballistic and rich:field]")
       .type_name("NAME:SPEC")
       .one_value_each();
   app.add_option_function<std::string>(
          "--threshold", [&config](const std::string& text) { set_threshold(config, text); },
-         "Position error above which a body is corrected, in metres, or auto: chosen at run time [the "
+         "Position error above which a body is corrected, in metres, or auto to choose it at run time [the "
          "scene's]")
       .type_name("METRES|auto");
-  flags.add("--target-bandwidth", &Config::set_target_bandwidth,
-            "Mbit/s of payload at the nominal rate that --threshold auto keeps to, from a quarter of the "
-            "threshold it starts from up to --max-error");
-  flags.add("--max-error", &Config::set_max_error,
-            "Largest threshold of --threshold auto, in metres; below the scene's it is also the first [four "
-            "times the scene's]");
+  flags.add(
+      "--target-bandwidth", &Config::set_target_bandwidth,
+      "Target of --threshold auto, in Mbit/s of payload at the nominal rate. The threshold stays between a "
+      "quarter of its first value and --max-error");
+  flags.add(
+      "--max-error", &Config::set_max_error,
+      "Maximum threshold of --threshold auto, in metres. If it is below the scene's threshold, it is also "
+      "the first one [four times the scene's]");
   flags.add("--threshold-scale", &Config::set_threshold_scale,
-            fmt::format("The scene's threshold times this [{}]", defaults.choice.threshold_scale));
-  flags.add("--budget", &Config::set_budget_bytes,
-            fmt::format("Bytes of corrections per frame with --codec limited [{}] or tracker [no limit]",
-                        kPaperBudgetBytes));
+            fmt::format("Factor for the scene's threshold [{}]", defaults.choice.threshold_scale));
+  flags.add(
+      "--budget", &Config::set_budget_bytes,
+      fmt::format("Maximum bytes of corrections per frame, with --codec limited [{}] or tracker [no limit]",
+                  kPaperBudgetBytes));
   flags.add("--window", &Config::mutable_window,
-            "Frames the server may run ahead of its slowest participant, or auto [auto]");
-  flags.add("--lead", &Config::set_lead,
-            fmt::format("Frames a client may simulate beyond its last delta: 0 or 1 [{}]", defaults.lead));
+            "Maximum frames that the server may run ahead of its slowest participant, or auto [auto]");
+  flags.add(
+      "--lead", &Config::set_lead,
+      fmt::format("Frames that a client may simulate beyond its last delta: 0 or 1 [{}]", defaults.lead));
   flags.add("--rate", &Config::mutable_rate, "Frames per second, or max [the scene's]");
   flags.add("--stall-timeout", &Config::mutable_stall_timeout,
-            fmt::format("Seconds a participant may hold up the others within 10 s, or off [{}]",
+            fmt::format("Maximum seconds that a participant may delay the others within 10 s, or off [{}]",
                         *defaults.stall_timeout_s));
   flags.add("--client-limit", &Config::set_client_limit,
-            fmt::format("Clients at once [{}]", defaults.client_limit));
+            fmt::format("Maximum number of clients [{}]", defaults.client_limit));
   flags.add("--wait-for", &Config::set_wait_for,
             fmt::format("Participants that must play before frame 1 [{}]", defaults.wait_for));
   flags.add("--duration", &Config::set_duration,
-            "Seconds from the first frame; as long again is waited for it [no end]");
+            "Seconds to run, counted from the first frame; the server waits for that frame as long [no end]");
   flags.add("--threads", &Config::set_threads,
             fmt::format("Threads of the full simulation [{}]", defaults.choice.threads));
-  flags.add("--seed", &Config::set_seed, fmt::format("Seed of start block and script [{}]", defaults.seed));
+  flags.add("--seed", &Config::set_seed,
+            fmt::format("Seed of the start block and the script [{}]", defaults.seed));
   app.add_flag_function(
       "--scripted", [&config] { config.set_scripted(true); },
-      "The server itself sends what the scene's users would");
-  flags.add("--users", &Config::set_users, "Users of that script [as many as the scene says]");
-  flags.add("--hash-log", &Config::mutable_hash_log, "File to write `epoch,frame,hash` of every frame to");
+      "Run the scene's script in the server, which then sends the inputs of simulated users");
+  flags.add("--users", &Config::set_users, "Number of users in that script [the scene's]");
+  flags.add("--hash-log", &Config::mutable_hash_log, "File for a line `epoch,frame,hash` of every frame");
 }
 
 }  // namespace
@@ -143,13 +150,13 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "Simulates a scene and streams it over DDS to clients, which hold bit-identical state.", "tandemd"};
   app.version("tandemd " TANDEM_VERSION);
   app.footer(
-      "Exit codes: 0 done, 1 failed (also: the session has a server already), 2 wrong usage. SIGINT and "
-      "SIGTERM end it cleanly.");
+      "Exit codes: 0 done, 1 failed (for example, the session already has a server), 2 wrong usage. SIGINT "
+      "and SIGTERM stop the server cleanly.");
   idl::ServerConfig config;
   std::string path;
   bool json = false;
   add_flags(app, config);
-  app.add_option("--config", path, "Configuration file (protobuf text, idl/server.proto); flags win over it");
+  app.add_option("--config", path, "Configuration file (protobuf text, idl/server.proto); flags override it");
   app.add_flag("--json", json, "Print one JSON object on stdout at the end");
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
   if (!path.empty()) {

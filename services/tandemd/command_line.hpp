@@ -7,8 +7,8 @@
 
 namespace tandem::daemon {
 
-/// The result of the command line: options to run with, or the exit code of --help, --version or a usage
-/// error, whose text was printed.
+/// The result of the command line: options to run with, or an exit code after --help, --version or a usage
+/// error, the text of which is already printed.
 struct CommandLine {
   std::optional<Options> options;
   int exit_code = 0;

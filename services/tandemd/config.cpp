@@ -43,10 +43,10 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
 
 bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 
-/// As the command line has it: the error of the planner names the option that is a flag here.
+/// The planner's error begins with the name of an option, which is a flag here.
 tl::unexpected<Error> refuse(const Error& error) { return fail(error.code, "--" + error.message); }
 
-/// Reads numbers that may be words; what cannot be read becomes a number that is refused with its flag.
+/// Reads numbers that may be words. Text that cannot be read becomes a number that check_service() refuses.
 Result<void> read_service(const ServerConfig& config, Options& options) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (config.has_window() && config.window() != "auto")
@@ -66,20 +66,20 @@ Result<void> read_service(const ServerConfig& config, Options& options) {
 Result<void> check_numbers(const Options& options) {
   const std::uint32_t bodies = options.choice.bodies;
   if (bodies == 0 || bodies > engine::kMaxBodies)
-    return refuse("bodies", fmt::format("1 to {}, not {}", engine::kMaxBodies, bodies));
+    return refuse("bodies", fmt::format("must be 1 to {}, not {}", engine::kMaxBodies, bodies));
   if (options.domain > transport::kMaxDomain)
-    return refuse("domain", fmt::format("0 to {}", transport::kMaxDomain));
+    return refuse("domain", fmt::format("must be 0 to {}", transport::kMaxDomain));
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
-    return refuse("duration", "seconds, not negative");
+    return refuse("duration", "must be a number of seconds, and not negative");
   return {};
 }
 
-/// Threshold, automatic quality and budget: which of them go together.
+/// Checks which of threshold, automatic quality and budget can be combined.
 Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
   if (choice.threshold_m && config.has_threshold_scale())
-    return refuse("threshold-scale", "not together with --threshold");
+    return refuse("threshold-scale", "cannot be combined with --threshold");
   if (config.has_target_bandwidth() && choice.target_mbit_per_s == 0)
-    return refuse("target-bandwidth", "Mbit/s, at least 0.001");
+    return refuse("target-bandwidth", "must be at least 0.001 Mbit/s");
   if (const auto good = planning::check_wishes(choice); !good) return refuse(good.error());
   return {};
 }
@@ -135,15 +135,16 @@ Result<void> check_streams(const ServerConfig& config, const sessions::SessionCh
   std::vector<host::StreamConfig> names;
   for (const idl::Stream& stream : config.stream()) {
     if (stream.has_predictor() && config.has_predictor() && stream.predictor() != config.predictor()) {
-      return refuse("predictor", fmt::format("{}, but --stream {} says {}: say it there alone",
-                                             config.predictor(), stream.name(), stream.predictor()));
+      return refuse("predictor",
+                    fmt::format("{} conflicts with --stream {}, which sets {}; set it there only",
+                                config.predictor(), stream.name(), stream.predictor()));
     }
     if (auto good = planning::wishes_of(choice, wishes_of(stream)); !good)
       return refuse("stream", fmt::format("{}: {}", stream.name(), good.error().message));
     names.emplace_back();
     names.back().name = stream.name();
   }
-  if (names.front().name.empty()) return refuse("stream", "each needs a name");
+  if (names.front().name.empty()) return refuse("stream", "every stream needs a name");
   if (auto named = host::check_stream_names(names); !named) return refuse("stream", named.error().message);
   return {};
 }
@@ -206,7 +207,8 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   if (flags.has_threshold()) file.clear_threshold_scale();
   if (flags.has_threshold() || !traits.reads_threshold) file.clear_threshold_auto();
   if (!traits.takes_budget) file.clear_budget_bytes();
-  // Streams are one whole, and a predictor is what they are told apart by.
+  // The list of streams is replaced as a whole; a predictor replaces it too, because streams differ by
+  // theirs.
   if (flags.stream_size() > 0 || flags.has_predictor()) file.clear_stream();
   if (flags.stream_size() > 0) file.clear_predictor();
   const bool automatic = flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto();
@@ -219,8 +221,8 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
 }
 
 Result<Options> check_config(const ServerConfig& config) {
-  if (config.scene().empty()) return refuse("scene", "a scene's name or file is needed");
-  if (!config.has_bodies()) return refuse("bodies", "how many are needed");
+  if (config.scene().empty()) return refuse("scene", "give a scene's name or file");
+  if (!config.has_bodies()) return refuse("bodies", "give the number of bodies");
   Options options;
   options.scene = config.scene();
   options.choice = choice_of(config);

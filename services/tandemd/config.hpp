@@ -1,5 +1,5 @@
 #pragma once
-// tandemd's configuration (idl/server.proto): a file says one part of it, flags another.
+// tandemd's configuration (idl/server.proto), which comes from a file and from flags.
 
 #include <string>
 
@@ -19,7 +19,7 @@ namespace tandem::daemon {
 /// or only a predictor. Errors: kInvalidArgument.
 [[nodiscard]] Result<idl::Stream> parse_stream(const std::string& text);
 
-/// Checks what needs no scene. Errors: kInvalidArgument naming the flag and what it takes.
+/// Checks all that needs no scene. Errors: kInvalidArgument, which names the flag and the values it takes.
 [[nodiscard]] Result<Options> check_config(const idl::ServerConfig& config);
 
 }  // namespace tandem::daemon

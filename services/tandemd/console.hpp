@@ -8,11 +8,11 @@
 
 namespace tandem::daemon {
 
-/// Gains and decay of codec `tracker`; nothing for the others.
+/// Gains and decay of codec `tracker`; an empty text for the other codecs.
 [[nodiscard]] std::string gains_text(const StreamParameters& parameters);
 
-/// How bodies are predicted and corrected from the first frame on: codec, predictor, threshold, and what
-/// binds them.
+/// Describes how bodies are predicted and corrected from the first frame on: codec, predictor, threshold,
+/// target and budget.
 [[nodiscard]] std::string coding_text(const host::StreamConfig& stream);
 
 /// Writes to stderr. Not thread-safe.

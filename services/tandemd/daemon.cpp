@@ -33,7 +33,7 @@ int report_error(const Error& error, int exit_code) {
   return exit_code;
 }
 
-/// Lines `epoch,frame,hash`, a file a stream.
+/// Writes lines `epoch,frame,hash`, with a file for each stream.
 class HashLog {
  public:
   /// `path` for stream 0, `path`.k for stream k.
@@ -43,7 +43,7 @@ class HashLog {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
       if (!files_.back()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", paths_.back()));
-      // Whole lines, also of a server that is killed.
+      // Line buffering leaves whole lines even if the server is killed.
       std::setvbuf(files_.back().get(), nullptr, _IOLBF, BUFSIZ);
     }
     return {};
@@ -52,7 +52,7 @@ class HashLog {
     if (stream >= files_.size()) return;
     std::fputs(fmt::format("{},{},{}\n", epoch_, frame, to_hex(hash)).c_str(), files_[stream].get());
   }
-  /// A full disk shows at the latest here.
+  /// Reports any write that failed, such as on a full disk.
   [[nodiscard]] Result<void> close() {
     Result<void> closed;
     for (std::size_t stream = 0; stream < files_.size(); ++stream) {
@@ -73,7 +73,7 @@ class HashLog {
   Epoch epoch_ = 0;
 };
 
-/// Sends what the scene's users would, each input in time for its frame.
+/// Runs the scene's script: sends each input in time for its frame.
 class ScriptSender {
  public:
   ScriptSender(const scenes::Scene& scene, const Options& options) : lead_(options.lead) {
@@ -106,7 +106,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   return transport::make_dds_server_port(dds);
 }
 
-/// Tells of writes that fail: the first at once, then how many there were, every 10 s.
+/// Logs failed writes: the first one at once, then their number every 10 s.
 class FailureLog {
  public:
   explicit FailureLog(const host::Publisher& publisher) : publisher_(&publisher) {}
@@ -133,7 +133,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
       options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
-  std::optional<std::int64_t> end_ns;  // nothing counts while the name is claimed
+  std::optional<std::int64_t> end_ns;  // empty while the server claims the session's name
   bool running = false;
   hashes.add(host.first_made(), host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
@@ -191,12 +191,12 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   return {};
 }
 
-/// A session of one stream does not name it.
+/// True for a session of one stream without a name.
 bool is_alone(const std::vector<host::StreamConfig>& streams) {
   return streams.size() == 1 && streams[0].name.empty();
 }
 
-/// Finishes the hash log, tells how it went, and returns the exit code.
+/// Finishes the hash log, reports the result, and returns the exit code.
 int tell_end(const host::Host& host, Ending ending, HashLog& hashes,
              const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options) {
   const auto closed = hashes.close();
@@ -253,7 +253,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
   const Ending ending = serve(**host, **port, script, hashes, publisher, options, signals.stop());
-  // Done before the last writes: if DDS blocks one of them, nothing else is missing.
+  // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code = signals.finish(tell_end(**host, ending, hashes, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();

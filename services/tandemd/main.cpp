@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
     spdlog::set_default_logger(spdlog::stderr_color_mt("tandemd"));
     const auto command = tandem::daemon::parse_command_line(argc, argv);
     if (!command.options) return command.exit_code;
-    tandem::SignalWatch signals("tandemd");  // first: its mask holds for all threads
+    tandem::SignalWatch signals("tandemd");  // first, so that its signal mask holds for all threads
     const tandem::HeapTrimmer trimmer;
     return tandem::daemon::run_daemon(*command.options, signals);
   } catch (const std::exception& error) {

@@ -11,10 +11,10 @@ namespace tandem::daemon {
 
 struct Options : planning::ServiceWishes {
   std::string scene;               ///< name or file
-  sessions::SessionChoice choice;  ///< its bodies and threads are the full simulation's, too
+  sessions::SessionChoice choice;  ///< its bodies and threads also apply to the full simulation
   std::uint64_t seed = 1;
-  bool scripted = false;    ///< the server itself sends what the scene's users would
-  std::uint32_t users = 0;  ///< of that script; 0: as many as the scene says
+  bool scripted = false;    ///< run the scene's script in the server
+  std::uint32_t users = 0;  ///< users of that script; 0: the scene's number
 
   std::uint32_t domain = 0;
   std::optional<double> duration_s;  ///< empty: until stopped

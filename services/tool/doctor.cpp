@@ -132,7 +132,8 @@ Check judge_interfaces(const MachineFacts& facts) {
             "bring an interface up: ip link set lo up"};
   if (!any_network) {
     return {"interfaces", Verdict::kWarning, list,
-            fmt::format("only this machine can take part; for that set CYCLONEDDS_URI='{}'", kLoopbackUri)};
+            fmt::format("only programs on this machine can meet; to use loopback, set CYCLONEDDS_URI='{}'",
+                        kLoopbackUri)};
   }
   return {"interfaces", Verdict::kGood, list, ""};
 }
@@ -148,9 +149,10 @@ Check judge_multicast(const MachineFacts& facts) {
     list += (list.empty() ? "" : ", ") + interface.name;
   }
   if (works.empty()) {
-    return {"multicast", Verdict::kWarning, "works on no interface",
-            "clients find the server by unicast only: name it in CYCLONEDDS_URI, Discovery/Peers, on every "
-            "client"};
+    return {
+        "multicast", Verdict::kWarning, "works on no interface",
+        "clients can find the server by unicast only: on every client, list the server under Discovery/Peers "
+        "in CYCLONEDDS_URI"};
   }
   return {"multicast", Verdict::kGood,
           fmt::format("works on {}{} (within this host; switches are not tested)", works,
@@ -250,10 +252,10 @@ std::vector<Check> judge(const MachineFacts& facts) {
 
 void add_doctor(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
-      "doctor", "Checks interfaces, multicast, socket buffers and limits, and says what to change.");
+      "doctor", "Checks interfaces, multicast, socket buffers and limits, and suggests changes.");
   const auto json = std::make_shared<bool>(false);
-  command.add_flag("--json", *json, "One JSON object: ok, checks[name, verdict, detail, advice]");
-  command.footer("Exit 1 when something keeps sessions from working at all; warnings exit 0.");
+  command.add_flag("--json", *json, "Print one JSON object: ok, checks[name, verdict, detail, advice]");
+  command.footer("Exits with 1 if sessions cannot work at all, and with 0 if there are only warnings.");
   command.on_chosen([json, &run] { run = [json] { return print(judge(machine_facts()), *json); }; });
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// `tandem doctor`: looks at what a session needs from this machine and says what to change.
+// `tandem doctor`: checks what a session needs from this machine and suggests changes.
 
 #include <cstdint>
 #include <string>
@@ -14,7 +14,7 @@ struct Check {
   std::string name;
   Verdict verdict = Verdict::kGood;
   std::string detail;  ///< what was found
-  std::string advice;  ///< what to change; empty when all is well
+  std::string advice;  ///< what to change; empty if nothing
 };
 
 /// A network interface that carries IPv4.

@@ -1,5 +1,5 @@
 #pragma once
-// --domain and --session, as every command that speaks DDS has them, and what clients have.
+// Options that several commands share: --domain and --session of those that use DDS, --prefer of clients.
 
 #include <cstdint>
 #include <string>
@@ -21,13 +21,14 @@ inline void add_endpoint_options(commandline::Command command, std::uint32_t& do
       .show_default();
 }
 
-/// --prefer, of what a client is told. Outlives `command`.
+/// `prefer` outlives `command`.
 inline void add_prefer_option(commandline::Command command, std::string& prefer) {
   command
       .add_option(
           "--prefer", prefer,
-          "Of a session's streams: auto (fewest bits, where they are cheap to follow), bandwidth (fewest "
-          "bits), computing (cheapest), error (smallest), or a name")
+          "The stream to play: `auto` takes the fewest bits that this machine can follow, `bandwidth` the "
+          "fewest bits, `computing` the cheapest predicted step, `error` the smallest error; or a stream's "
+          "name")
       .show_default();
 }
 

@@ -7,7 +7,7 @@
 
 namespace tandem::tool {
 
-/// A member of its name; a percentile, such as `frame_ms_p50`, as the member `p50` of `frame_ms`.
+/// Adds a member with this name; a percentile such as `frame_ms_p50` becomes the member `p50` of `frame_ms`.
 inline void put_figure(Json& object, std::string_view name, const Json& value) {
   const std::string_view percentile = name.substr(name.rfind('_') + 1);
   if (percentile == "p50" || percentile == "p99") {

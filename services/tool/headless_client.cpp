@@ -33,8 +33,8 @@ HeadlessClient::~HeadlessClient() = default;
 
 Result<void> HeadlessClient::open() {
   if (!options_.input_script.empty()) {
-    // Read now, so that a mistake in it is known at once; frames are settled when the session's rate is
-    // known.
+    // Reads the script now, so that a mistake in it is reported at once; frames are known when the session's
+    // rate is known.
     if (auto loaded = load_script(1.0 / 30); !loaded) return loaded;
   }
   if (!options_.hash_log.empty()) {
@@ -132,7 +132,7 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
   }
 }
 
-// A recording is of one stream at a time: whatever is told of it begins with where it is held.
+// A recording holds one stream at a time, and a change of the stream begins with a snapshot of its state.
 void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
   if (!recorder_) return;
   transport::SessionMessage session = *core_->session();

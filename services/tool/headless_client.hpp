@@ -26,14 +26,14 @@ struct HeadlessOptions {
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
   const char* command = "join";                                        ///< in front of lines for humans
-  std::string prefer = "auto";                                         ///< of streams; see CoreOptions
-  bool live = false;                                                   ///< a JSON line a second on stderr
-  bool quiet = false;                                                  ///< no lines for humans on stderr
-  std::uint32_t index = 0;                                             ///< of several clients, in live lines
-  std::string name;  ///< in front of lines for humans; may be empty
+  std::string prefer = "auto";  ///< which stream to play; see CoreOptions
+  bool live = false;            ///< a JSON line a second on stderr
+  bool quiet = false;           ///< no lines for humans on stderr
+  std::uint32_t index = 0;      ///< index of this client in live lines
+  std::string name;             ///< in front of lines for humans; may be empty
 };
 
-/// Runs in one thread of the caller's.
+/// Runs in one thread of the caller.
 class HeadlessClient final : public client::CoreListener {
  public:
   /// Opens its files and joins the DDS domain. Errors: kIo, kMalformed (script), kInvalidArgument,

@@ -74,13 +74,16 @@ int run_join(const JoinOptions& options) {
 }  // namespace
 
 void add_join(commandline::Command app, Run& run) {
-  commandline::Command command = app.add_subcommand("join", "Joins a session as a client without a picture.");
+  commandline::Command command =
+      app.add_subcommand("join", "Joins a session as a client that draws nothing.");
   const auto options = std::make_shared<JoinOptions>();
   HeadlessOptions& client = options->client;
   add_endpoint_options(command, client.domain, client.session);
-  command.add_flag("--observe", client.observe, "Only watch: the server does not wait for this client");
+  command.add_flag("--observe", client.observe,
+                   "Join as an observer: the server does not wait for this client");
   command
-      .add_option("--count", options->count, "Clients in this process; log files get the suffix .0, .1, ...")
+      .add_option("--count", options->count,
+                  "Number of clients in this process; log files get the suffix .0, .1, ...")
       .range(1U, kMaxCount)
       .show_default();
   command.add_option("--input-script", client.input_script, "Inputs to send, as protobuf text (InputScript)")
@@ -97,11 +100,11 @@ void add_join(commandline::Command app, Run& run) {
                      "Record into this file, without compression (MCAP; see `tandem record`)");
   command
       .add_option("--seconds", client.seconds,
-                  "How long, from the first applied frame (default: until stopped)")
+                  "Seconds to play, counted from the first applied frame (default: until stopped)")
       .positive();
-  command.add_flag("--live", client.live, "A JSON line a second on stderr");
+  command.add_flag("--live", client.live, "Print a JSON line per second on stderr");
   command.add_flag("--json", options->json, "Print the result as one JSON object");
-  command.footer("Exit 1 on any hash mismatch, or when it never played.");
+  command.footer("Exits with 1 on any hash mismatch, or if it never played.");
   command.on_chosen([options, &run] { run = [options] { return run_join(*options); }; });
 }
 

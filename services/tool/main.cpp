@@ -9,7 +9,8 @@
 
 int main(int argc, char** argv) {
   tandem::commandline::Program app{
-      "Streams large interactive simulations over DDS: clients, measurements, diagnosis.", "tandem"};
+      "Clients, recordings, measurements and diagnosis for Tandem, which streams large simulations over DDS.",
+      "tandem"};
   app.version("tandem " TANDEM_VERSION);
   app.require_subcommand();
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage. With --json, stdout holds one JSON object.");

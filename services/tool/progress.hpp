@@ -1,5 +1,5 @@
 #pragma once
-// Progress of what takes longer than two seconds, on a terminal only.
+// Shows the progress of work that takes longer than two seconds, on a terminal only.
 
 #include <cstdint>
 #include <string>

@@ -1,4 +1,4 @@
-// `tandem record`: a session into a file, as an observer that writes down what it receives.
+// `tandem record`: an observer that writes what it receives into a file.
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ struct RecordOptions {
 Json report(const HeadlessClient& client) {
   const recording::Recorder::Totals& totals = client.recorder()->totals();
   Json out = client.report();
-  // Behind the payloads themselves: what the file adds to them, and what is no delta.
+  // The rest of the file: what it adds to payloads, and messages other than deltas.
   out["file_bytes"] = totals.file_bytes;
   out["frames_recorded"] = totals.frames;
   out["payload_recorded_bytes"] = totals.payload_bytes;
@@ -66,7 +66,7 @@ void add_record(commandline::Command app, Run& run) {
       app.add_subcommand("record", "Records a session into a file (MCAP), for `tandem replay`.");
   const auto options = std::make_shared<RecordOptions>();
   HeadlessOptions& client = options->client;
-  command.add_option("file", client.capture, "The file, FILE.mcap").required();
+  command.add_option("file", client.capture, "File to write, FILE.mcap").required();
   add_endpoint_options(command, client.domain, client.session);
   client.prefer = "bandwidth";
   add_prefer_option(command, client.prefer);
@@ -74,19 +74,19 @@ void add_record(commandline::Command app, Run& run) {
       .positive();
   command
       .add_option("--seconds", client.seconds,
-                  "How long, from the first applied frame (default: until stopped)")
+                  "Seconds to record, counted from the first applied frame (default: until stopped)")
       .positive();
-  command.add_flag("--no-compression", options->plain, "Chunks as they are, not in zstd");
+  command.add_flag("--no-compression", options->plain, "Write chunks without compression by zstd");
   command.add_option("--hash-log", client.hash_log,
                      "Write a line `epoch,frame,hash` for every applied frame");
   command.add_flag("--json", options->json, "Print the result as one JSON object");
   command.footer(
-      "Recorded are what a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, TandemDelta, "
-      "TandemReply to it,\n"
-      "TandemServerStatus), what it sends, and a snapshot of the agreed state once a minute. The file is "
-      "readable while it grows;\n"
-      "until the first snapshot it is FILE.part, and an older FILE stays.\n"
-      "Exit 1 on any hash mismatch, when no frame came, or when the file could not be written.");
+      "The file holds all that a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, "
+      "TandemDelta, TandemReply\n"
+      "to this client, TandemServerStatus), all that it sends, and a snapshot of the agreed state once a "
+      "minute. It can be read\n"
+      "while it grows. Until the first snapshot it is called FILE.part, and an older FILE stays.\n"
+      "Exits with 1 on any hash mismatch, if no frame came, or if the file could not be written.");
   command.on_chosen([options, &run] { run = [options] { return run_record(*options); }; });
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// A recording in the place of a simulation: the frames of one of its runs.
+// Makes frames from one run of a recording instead of a simulation.
 
 #include <cstdint>
 #include <optional>
@@ -12,14 +12,12 @@
 
 namespace tandem::tool {
 
-/// Publishes a run of a playback as a session of its own, of the one stream that was recorded; what was
-/// recorded of payloads, hashes and scheduled inputs goes out as it is. Of inputs it takes kSeek, and ends
-/// with it.
+/// Publishes a run of a playback as a session of its own with the recorded stream. Recorded payloads, hashes
+/// and scheduled inputs are sent unchanged. The only input that it takes is kSeek, which ends it.
 class RecordedSource final : public host::FrameSource {
  public:
-  /// `playback` holds a state, outlives this, and is stepped by nobody else meanwhile. `seeks` says how often
-  /// one may seek, over all the runs that share it, by the clock of `config`, which must be there; it
-  /// outlives this.
+  /// `playback` must hold a state, outlive this, and be stepped by nobody else meanwhile. `seeks` limits how
+  /// often clients may seek, for all runs that share it; it must outlive this. `config` must have a clock.
   RecordedSource(recording::Playback& playback, const host::ServiceConfig& config,
                  accounts::TokenBucket& seeks);
 

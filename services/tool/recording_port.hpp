@@ -1,5 +1,5 @@
 #pragma once
-// A client's port that records what a listener does not hear: replies, and what the client writes.
+// A client's port that records what a CoreListener does not receive: replies, and what the client writes.
 
 #include <cstddef>
 #include <vector>

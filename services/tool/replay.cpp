@@ -1,4 +1,4 @@
-// `tandem replay`: a recorded session over DDS again, as a server that computes nothing new.
+// `tandem replay`: publishes a recorded session again, as a server that computes nothing new.
 
 #include <fmt/format.h>
 
@@ -41,27 +41,27 @@ struct ReplayOptions {
   std::uint32_t wait_for = 0;
 };
 
-// Readers have this long to take what was written last.
+// Readers get this time to take what was written last.
 constexpr std::chrono::milliseconds kTakingFrames(500), kTakingReplies(50);
 
-/// How a run was left.
+/// The result of serving one run.
 struct Served {
-  Step behind = Step::kFrame;      ///< what comes next in the file; kFrame when it was stopped before its end
-  std::optional<double> sought_s;  ///< a client wants to go on there
+  Step behind = Step::kFrame;      ///< the next step in the file; kFrame if it was stopped before its end
+  std::optional<double> sought_s;  ///< the time at which a client wants to continue
 };
 
 /// The data that all runs of a replay share.
 struct ReplayState {
   Epoch epoch = 0;      ///< the last; 0 before the first
-  bool sought = false;  ///< a client did
+  bool sought = false;  ///< a client has sought
   /// The port of the last run. It outlives the work, so that the program can report before DDS ends.
   std::unique_ptr<transport::ServerPort> port;
   std::future<void> ending;  ///< the end of the port before; its destructor waits for that
   accounts::TokenBucket seeks{1, 1};
 };
 
-/// Ends the port of the last run and waits for that, but not beyond a stop: DDS never ends when the network
-/// interface is gone, and the work has to.
+/// Ends the port of the last run and waits for that, but not beyond a stop, because DDS never ends if the
+/// network interface is gone.
 void end_port(ReplayState& state, const std::atomic<bool>& stop) {
   if (!state.port) return;
   state.ending = std::async(std::launch::async, [port = std::move(state.port)]() mutable { port.reset(); });
@@ -76,7 +76,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   const bool first = state.epoch == 0;
   end_port(state, stop);
   if (stop) return Served{};
-  // An epoch of its own for each run, as frames follow one another within one.
+  // Each run has an epoch of its own, because the frames of an epoch are consecutive.
   state.epoch = std::max<Epoch>(state.epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
   host::ServiceConfig config;
   config.session = options.session;
@@ -122,7 +122,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   return source.ending().map([&](Step behind) { return Served{behind, source.sought_s()}; });
 }
 
-// To the first frame that was recorded at `from_s` or later; kEnd where there is none.
+// Goes to the first frame that was recorded at `from_s` or later; kEnd if there is none.
 Result<Step> go_to(Playback& playback, double from_s) {
   playback.seek(from_s);
   auto step = playback.next();
@@ -146,7 +146,7 @@ Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState&
     if (!served) return tl::unexpected(served.error());
     if (served->sought_s) {
       state.sought = true;
-      end_port(state, stop);  // the way there may be long
+      end_port(state, stop);  // seeking may take long
     }
     step = served->sought_s ? go_to(playback, *served->sought_s) : served->behind;
   }
@@ -182,26 +182,31 @@ int run_replay(const ReplayOptions& options) {
 void add_replay(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand("replay", "Publishes a recorded session again.");
   const auto options = std::make_shared<ReplayOptions>();
-  command.add_option("file", options->file, "What `tandem record` wrote").required();
+  command.add_option("file", options->file, "File that `tandem record` wrote").required();
   add_endpoint_options(command, options->domain, options->session);
-  command.add_option("--rate", options->rate, "Speed; 1 is that of the session, frames a second at most 1000")
+  command
+      .add_option("--rate", options->rate,
+                  "Speed, where 1 is that of the session; the maximum is 1000 frames per second")
       .range(0.01, 100.0)
       .show_default();
-  command.add_option("--from", options->from_s, "Seconds into the recording").not_negative().show_default();
-  command.add_flag("--loop", options->loop, "Again from there at its end, until stopped");
+  command.add_option("--from", options->from_s, "Where to begin, in seconds from the start of the recording")
+      .not_negative()
+      .show_default();
+  command.add_flag("--loop", options->loop, "Begin again there at the end of the recording, until stopped");
   command
       .add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
       .range(0U, 256U)
       .show_default();
   command.footer(
-      "Clients join at any frame. Each run of the recording (where it has a gap, or the server was restarted, another "
-      "begins) is\n"
-      "an epoch of its own. Participants may seek, which begins another; all other inputs are refused. --rate changes "
-      "how\n"
-      "often frames come, not what they say: velocities stay those of the recorded time. At its end a replay ends, "
-      "but one\n"
-      "in which somebody sought stays there, until it is sought back or stopped. A file that is cut short is\n"
-      "replayed up to there. Exit 1 when it cannot be read.");
+      "Clients can join at any frame. Each run of the recording becomes an epoch of its own; a gap in the\n"
+      "recording, a restart of its server and a participant that seeks each begin another run. All inputs "
+      "but\n"
+      "seeks are refused. --rate changes how often frames come, but not the velocities in them. The replay "
+      "ends\n"
+      "with the recording, unless somebody has sought: then it stays at the end until somebody seeks or it "
+      "is\n"
+      "stopped. A file that is cut short is replayed up to that place. Exits with 1 if the file cannot be "
+      "read.");
   command.on_chosen([options, &run] { run = [options] { return run_replay(*options); }; });
 }
 

@@ -49,7 +49,7 @@ bool show(const TopView& view, const TopOptions& options) {
   return std::fflush(stdout) == 0;
 }
 
-/// Nobody reads any more, which is no failure.
+/// A reader of stdout that has gone is no failure.
 int reader_left() {
   __fpurge(stdout);
   std::clearerr(stdout);
@@ -95,13 +95,14 @@ void add_top(commandline::Command app, Run& run) {
   command.add_option("--domain", options->domain, "DDS domain")
       .range(0U, transport::kMaxDomain)
       .show_default();
-  command.add_option("--session", options->session, "Only this session (default: all)");
+  command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(
-      "--once", options->once, "Listen for 2.5 s, print once and end; exit 1 if nothing was heard");
-  command.add_flag("--json", options->json, "One JSON object: sessions, clients").needs(once);
-  command.add_flag("--stream", options->stream, "A JSON object a line, once a second, until stopped")
+      "--once", options->once, "Listen for 2.5 s, print once and stop; exit with 1 if nothing was heard");
+  command.add_flag("--json", options->json, "Print one JSON object: sessions, clients").needs(once);
+  command
+      .add_flag("--stream", options->stream, "Print a line with a JSON object once a second, until stopped")
       .excludes(once);
-  command.footer("Without flags: a table that is refreshed once a second, until Ctrl-C.");
+  command.footer("Without flags, shows a table that is refreshed once a second, until Ctrl-C.");
   command.on_chosen([options, &run] { run = [options] { return run_top(*options); }; });
 }
 

@@ -14,7 +14,7 @@ namespace tandem::tool {
 namespace {
 
 constexpr std::int64_t kSilenceNs = 3'000'000'000;
-// A machine that floods the status topics shall not fill this one's memory.
+// A machine that floods the status topics must not fill this one's memory.
 constexpr std::size_t kMostShown = 4096;
 
 const char* role_word(std::uint32_t role) {
@@ -29,7 +29,7 @@ double share_percent(const transport::ServerStatusMessage& s) {
   return s.raw_mbit_per_s > 0 ? 100 * s.mbit_per_s / s.raw_mbit_per_s : 0;
 }
 
-/// The names that bytes have in JSON: of one object together.
+/// The names of byte counts in JSON; they share one object.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
     {{"delta_bytes", "deltas"},
      {"reply_bytes", "replies"},

@@ -11,8 +11,8 @@
 
 namespace tandem::tool {
 
-/// Collects status messages. Status is published once a second; what was not heard of for three is forgotten,
-/// so memory stays bounded by what is alive. Time comes in as an argument. Not thread-safe.
+/// Collects status messages. Status is published once a second; a source that is silent for three seconds is
+/// forgotten, so memory is bounded by the living ones. Time comes in as an argument. Not thread-safe.
 class TopView {
  public:
   /// Shows only this session from now on.
@@ -23,8 +23,8 @@ class TopView {
   void forget_silent(std::int64_t now_ns);
 
   [[nodiscard]] bool empty() const { return streams_.empty() && clients_.empty(); }
-  /// {"sessions": [...], "clients": [...]}, one line; fields as in the status topics, of a session's streams
-  /// together, and "streams" with those of each.
+  /// {"sessions": [...], "clients": [...]} in one line, with the fields of the status topics. A session has
+  /// the sums over its streams, and "streams" with the fields of each.
   [[nodiscard]] std::string to_json() const;
   [[nodiscard]] std::string to_table() const;
 
@@ -40,7 +40,7 @@ class TopView {
   /// Name of the session, number of the stream.
   using StreamKey = std::pair<std::string, std::uint32_t>;
   [[nodiscard]] bool several(const std::string& session) const;
-  /// Its number, and its predictor if its status was heard.
+  /// The number of the client's stream, and the predictor if that stream's status was heard.
   [[nodiscard]] std::string stream_of(const transport::ClientStatusMessage& client) const;
 
   std::map<StreamKey, Heard<transport::ServerStatusMessage>> streams_;

@@ -1,5 +1,5 @@
 #pragma once
-// A pool of threads that share out blocks of work, first come first served.
+// A pool of threads that take blocks of work in turn.
 
 #include <atomic>
 #include <cstdint>
@@ -14,10 +14,10 @@ inline constexpr std::uint32_t kMaxThreads = 64;
 
 /// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
 /// because a static split waits for a thread whose core another program is using. A thread that wakes up late
-/// and finds nothing left is not waited for. Jobs must write to separate places.
+/// and finds nothing left does not delay the end. Jobs must write to separate places.
 class Workers {
  public:
-  /// `prepare` is called first on each thread of its own.
+  /// Each thread of the pool calls `prepare` first.
   explicit Workers(std::uint32_t threads, const std::function<void()>& prepare = {});
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;

@@ -21,7 +21,7 @@ EXAMPLES = {
     "new_stream_option.patch": 3,
 }
 SOURCES = {".cpp", ".hpp", ".c", ".h", ".idl", ".py", ".ts", ".proto", ".txt"}
-# What sdk/package/figures.py reads or writes.
+# Files that sdk/package/figures.py reads or writes.
 FIGURES = (
     "idl/tandem.idl",
     "sdk/include/tandem/client_figures.hpp",
@@ -38,7 +38,7 @@ def touched(patch):
 
 
 def by_hand(root, path):
-    """Whether a touched file is a source that somebody writes: no test, no text for people, nothing that a script writes."""
+    """True for a source that people write: not a test, a text or a file that a script writes."""
     file = root / path
     if path.startswith("tests/") or file.suffix not in SOURCES:
         return False
@@ -46,7 +46,7 @@ def by_hand(root, path):
 
 
 def faults(root, name, most):
-    """What is wrong with one example."""
+    """The faults of one example."""
     path = root / "tests/architecture/examples" / name
     if not path.is_file():
         yield f"{name}: missing; CONTRIBUTING.md names it"

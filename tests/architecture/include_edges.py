@@ -27,7 +27,7 @@ CLIENT = ["sdk/client", "sdk/client/drawing", "sdk/client/following", "sdk/clien
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
 HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/outgoing", "services/host/streams"]
 LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
-# What all rooms of a target may include besides one another.
+# Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
 OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"]
 OF_LAB = (
@@ -124,7 +124,7 @@ OWNERS = [
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]
 
-# The core is pure: what it computes depends on its arguments alone.
+# The core is pure: its results depend only on its arguments.
 IMPURE = re.compile(
     r"^(thread|mutex|shared_mutex|condition_variable|atomic|future|barrier|latch|semaphore|stop_token|chrono|ctime|"
     r"time\.h|fstream|iostream|ostream|istream|sstream|filesystem|cstdio|stdio\.h|random|cstdlib|unistd\.h|"
@@ -132,7 +132,7 @@ IMPURE = re.compile(
 )
 
 
-# A failed assertion has to be told to somebody.
+# A failed assertion has to be reported.
 IMPURE_FILES = {"sdk/core/lattice/assert.hpp"}
 
 

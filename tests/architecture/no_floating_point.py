@@ -11,7 +11,7 @@ import sys
 
 FOLDER = "sdk/core"
 FLOATING = re.compile(r"\b(?:double|float|c?math\.h)\b|<cmath>")
-# Comments and strings may speak of what they like.
+# Comments and strings may mention them.
 IGNORED = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 
 

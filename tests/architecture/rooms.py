@@ -2,8 +2,8 @@
 
     python3 rooms.py [ROOT]
 
-An include that runs up, from a folder into one that includes it, directly or by way of others, makes one thing of
-what the folders say are several. Prints one line per finding. Exit 0 none, 1 some.
+If a folder includes another one that includes it, directly or through others, the folders are not separate
+parts. Prints one line per finding. Exit 0 none, 1 some.
 """
 
 import collections

@@ -27,7 +27,7 @@ LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 class Failed(Exception):
-    """What was measured is not what it must be."""
+    """A measured value is out of its limits."""
 
 
 def shell(*words):
@@ -65,7 +65,7 @@ class Namespace:
 
     @contextlib.contextmanager
     def entered(self):
-        """What this thread opens or starts meanwhile is in there."""
+        """Sockets and programs that this thread opens or starts meanwhile are in that namespace."""
         outside = os.open("/proc/thread-self/ns/net", os.O_RDONLY)
         try:
             if self.descriptor is None:
@@ -137,12 +137,12 @@ class Process:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def resident_kb(self):
-        """Of its memory, what is in RAM."""
+        """The part of its memory that is in RAM."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
         return int(re.search(r"VmRSS:\s*(\d+)", status)[1])
 
     def log_bytes(self):
-        """What it wrote for people, which live lines are not."""
+        """Its lines for people, without live lines."""
         return sum(len(line) + 1 for _, line in list(self.lines) if not line.startswith("{"))
 
     def live(self):
@@ -150,7 +150,7 @@ class Process:
         return [(at, json.loads(line)) for at, line in list(self.lines) if line.startswith("{")]
 
     def output(self, seconds):
-        """What it prints until it ends by itself: a JSON object, or {}."""
+        """Waits until it ends by itself. Returns the JSON object that it printed, or {}."""
         try:
             out = self.process.stdout.read()
             self.process.wait(seconds)

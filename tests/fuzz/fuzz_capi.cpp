@@ -232,7 +232,7 @@ class Run {
     }
   }
 
-  /// What a server may say of its scene.
+  /// A description of a scene as a server may send it.
   tandem_result read_text() {
     const transport::Bytes bytes = program_.bytes(600);
     const auto scene = read_scene_text({reinterpret_cast<const char*>(bytes.data()), bytes.size()});

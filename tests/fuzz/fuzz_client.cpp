@@ -15,7 +15,7 @@ using fuzz::require;
 constexpr std::uint32_t kCapacity = 8;
 constexpr std::int64_t kStart = 1'000'000'000'000;
 
-/// What an honest server publishes: made once, so that a run costs the client's work only.
+/// The messages of an honest server, made once, so that a run costs only the client's work.
 struct Honest {
   explicit Honest(const Groups& groups)
       : server(1000, kCapacity, 1, groups), successor(~std::uint64_t{0} >> 1U, kCapacity, 1, groups) {
@@ -258,7 +258,7 @@ class Run {
       require(held->now() >= held->applied() && held->now() <= held->applied() + 1);
       require(synthetic::broken_invariant(held->state(held->now())) == nullptr);
     }
-    // What a client writes is bounded by time, not by what it is sent.
+    // A client's output is limited by time, whatever it receives.
     require(port_.acks.size() <= 4096);
   }
 

@@ -43,7 +43,7 @@ void try_payload(std::span<const std::byte> input) {
   const auto held = synthetic::coder_state(target.delta.codec());
   if (synthetic::receive(target.delta, target.state, input.subspan(1))) {
     require(synthetic::broken_invariant(target.state) == nullptr);
-    // What the delta did not touch is as it was.
+    // All that the delta did not touch is unchanged.
     std::vector<bool> touched(kCapacity);
     for (const Slot slot : target.delta.touched()) touched.at(slot) = true;
     for (Slot slot = 0; slot < kCapacity; ++slot) {

@@ -40,7 +40,7 @@ class Run {
     say(honest_, input);
     for (int i = 0; i < 40 && !acted_; ++i) frame(kPeriod);
     require(acted_);
-    // A burst and a rate of each kind, as InputMerger says.
+    // A burst and a rate of each kind, as in InputMerger.
     const double seconds = static_cast<double>(now_ns_ - kStart) * 1e-9;
     require(static_cast<double>(world_.sent.size()) <= 31 + 50 * seconds);
     require(gateway_.viewers() <= 4);
@@ -57,7 +57,7 @@ class Run {
     return message;
   }
 
-  // The next frame, read by the one who behaves, and acknowledged.
+  // The well-behaved viewer reads and acknowledges the next frame.
   void frame(std::int64_t later_ns) {
     now_ns_ += later_ns;
     client::CompleteDelta delta;

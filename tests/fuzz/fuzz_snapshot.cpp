@@ -29,7 +29,7 @@ void try_snapshot(std::span<const std::byte> input, std::string_view name, const
   predictor->step(state, state, {snapshot->drive, snapshot->parameters.step});
   require(synthetic::broken_invariant(state) == nullptr);
 
-  // What was read can be written and read again.
+  // A snapshot that was read can be written and read again.
   std::vector<std::byte> bytes(snapshot_bytes_bound(state, *codec));
   ByteWriter out(bytes);
   write_snapshot(*snapshot, state, *codec, out);

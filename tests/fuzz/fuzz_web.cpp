@@ -23,7 +23,7 @@ transport::Bytes envelope(const M& message) {
   return bytes;
 }
 
-/// What an honest gateway sends: made once, so that a run costs the viewer's work only.
+/// The messages of an honest gateway, made once, so that a run costs only the viewer's work.
 struct Honest {
   Honest() {
     messages.push_back(envelope(server.session));

@@ -107,7 +107,7 @@ void corrects_what_is_beyond_the_threshold_and_nothing_else(const Session& sessi
   State agreed = predicted;
   server.encode(agreed, target, {}, kNoBudget, out);
   const std::uint64_t limit = session.limit(parameters.codec.threshold);
-  // What a residual of one axis may be after a correction.
+  // The maximum residual of one axis after a correction.
   const auto settled = [](std::int32_t before, std::int32_t after, std::int32_t wanted, std::int32_t step) {
     const std::uint32_t error_before = magnitude(before, wanted);
     const std::uint32_t range = 127 * static_cast<std::uint32_t>(step);

@@ -99,7 +99,7 @@ TEST(HostileSnapshot, AMutatedSnapshotIsRefused) {
       synthetic::mutate(random, mutated);
       const Bytes exact(mutated.begin(), mutated.end());
       if (client.load(exact, 5)) {
-        // Only what the state's hash does not cover can have changed.
+        // Only values that the state hash does not cover can have changed.
         ASSERT_EQ(client.state(client.applied()), start);
         client.step(1);
         ASSERT_EQ(synthetic::broken_invariant(client.state(client.now())), nullptr);

@@ -173,7 +173,8 @@ inline Result<void> receive(DeltaCodec& client, State& state, std::span<const st
   return client.decode(state, payload).map([&](const Delta& delta) { client.apply(delta, state); });
 }
 
-/// What every state must hold, whatever bytes it came from; null or what is broken.
+/// Checks the rules that every state must keep, whatever bytes it came from. Returns the broken rule, or
+/// null.
 inline const char* broken_invariant(const State& state) {
   const auto within = [](std::int32_t value, std::int32_t limit) {
     return -limit <= value && value <= limit;
@@ -237,7 +238,7 @@ inline void mutate(Random& random, std::vector<std::byte>& bytes) {
   }
 }
 
-/// What a codec remembers: its columns, then its models.
+/// The memory of a codec: its columns, then its models.
 inline std::vector<std::byte> coder_state(const Codec& codec) {
   const std::span<const std::byte> columns = codec.columns();
   std::vector<std::byte> bytes(columns.begin(), columns.end());

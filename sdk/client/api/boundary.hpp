@@ -51,7 +51,7 @@ tandem_result call(Body&& body) noexcept {
 /// The result for a forked child that asks for a client or browser.
 inline tandem_result forked_child() noexcept {
   return refuse(TANDEM_TRANSPORT,
-                "a child of fork() cannot use DDS: its parent did; start a program with exec()");
+                "a child of fork() cannot use DDS after its parent has; start a program with exec()");
 }
 
 inline tandem_result null_pointer(const char* name) noexcept { return refuse(TANDEM_INVALID_ARGUMENT, name); }

@@ -44,14 +44,14 @@ tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
   if (const auto named = transport::check_session_name(session_of(ours)); !named)
     return refuse(named.error());
   if (ours.domain > transport::kMaxDomain) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "a DDS domain is 0 to 230");
+    return refuse(TANDEM_INVALID_ARGUMENT, "a DDS domain must be 0 to 230");
   }
   if (ours.role != TANDEM_OBSERVER && ours.role != TANDEM_PARTICIPANT) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "a role is TANDEM_OBSERVER or TANDEM_PARTICIPANT");
+    return refuse(TANDEM_INVALID_ARGUMENT, "a role must be TANDEM_OBSERVER or TANDEM_PARTICIPANT");
   }
-  if (ours.lead > kMaxLead) return refuse(TANDEM_INVALID_ARGUMENT, "a lead is 0 or 1");
+  if (ours.lead > kMaxLead) return refuse(TANDEM_INVALID_ARGUMENT, "a lead must be 0 or 1");
   if (ours.background > 1 || ours.echo > 1) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "background and echo are 0 or 1");
+    return refuse(TANDEM_INVALID_ARGUMENT, "background and echo must be 0 or 1");
   }
   return kOk;
 }

@@ -50,9 +50,9 @@ void RunningClient::work() {
 Result<void> RunningClient::usable() const {
   if (!fault_) return {};
   if (*fault_ == ErrorCode::kOutOfMemory) {
-    return fail(*fault_, "the client stopped when there was no memory left; join again");
+    return fail(*fault_, "the client stopped because no memory was left; join again");
   }
-  return fail(*fault_, "the client stopped at a fault of its own; join again");
+  return fail(*fault_, "the client stopped because of an internal error; join again");
 }
 
 Result<void> RunningClient::poll(std::int64_t& due_ns) {
@@ -84,7 +84,8 @@ Result<void> RunningClient::update(double wait_s) {
   if (has_thread()) {
     return fail(ErrorCode::kWrongThread, "this client has a thread of its own: join with background = 0");
   }
-  if (updating_.exchange(true)) return fail(ErrorCode::kWrongThread, "another thread updates this client");
+  if (updating_.exchange(true))
+    return fail(ErrorCode::kWrongThread, "another thread is updating this client");
   struct Done {
     std::atomic<bool>& updating;
     ~Done() { updating = false; }
@@ -96,7 +97,9 @@ Result<void> RunningClient::update(double wait_s) {
 
 Result<void> RunningClient::wait_until_playing(double timeout_s) {
   const auto playing = [this] { return phase_ == ClientPhase::kPlaying; };
-  const auto late = [] { return fail(ErrorCode::kTimeout, "no session to play within the time given"); };
+  const auto late = [] {
+    return fail(ErrorCode::kTimeout, "found no session to play within the given time");
+  };
   if (has_thread()) {
     std::unique_lock lock(mutex_);
     const bool over = phase_changed_.wait_for(lock, std::chrono::nanoseconds(wait_ns(timeout_s)),

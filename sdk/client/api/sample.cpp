@@ -21,10 +21,10 @@ constexpr double kLongestSmoothingS = 10;
 
 tandem_result check(const tandem_sample_options& options) {
   if (options.mode != TANDEM_INTERPOLATE && options.mode != TANDEM_EXTRAPOLATE) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "a mode is TANDEM_INTERPOLATE or TANDEM_EXTRAPOLATE");
+    return refuse(TANDEM_INVALID_ARGUMENT, "a mode must be TANDEM_INTERPOLATE or TANDEM_EXTRAPOLATE");
   }
   if (!(options.smoothing_s <= kLongestSmoothingS)) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "smoothing_s is at most 10");
+    return refuse(TANDEM_INVALID_ARGUMENT, "smoothing_s must be at most 10");
   }
   return kOk;
 }

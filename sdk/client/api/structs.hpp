@@ -51,10 +51,10 @@ inline constexpr std::uint32_t kLargestStruct = 4096;
 template <class T>
 [[nodiscard]] tandem_result check_struct(const T* theirs) {
   if (theirs == nullptr) return refuse(TANDEM_INVALID_ARGUMENT, "a pointer to a struct is null");
-  static_assert(kFirstSize<T> > 0, "say above what it had when it was first released");
+  static_assert(kFirstSize<T> > 0, "give above the size of the struct when it was first released");
   const std::uint32_t size = size_of(theirs);
   if (size < kFirstSize<T> || size > kLargestStruct) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "a struct's size is not set: begin with its ..._INIT");
+    return refuse(TANDEM_INVALID_ARGUMENT, "a struct's size is not set: initialise it with its ..._INIT");
   }
   return kOk;
 }
@@ -70,7 +70,7 @@ template <class T>
   for (std::size_t i = sizeof(T); i < size; ++i) {
     if (bytes[i] != std::byte{0}) {
       return refuse(TANDEM_UNSUPPORTED,
-                    "a struct of a newer header asks for what this library does not know");
+                    "a struct from a newer header sets a field that this library does not know");
     }
   }
   std::memcpy(&ours, whole, std::min(size, sizeof(T)));

@@ -11,15 +11,15 @@ std::string describe(std::uint32_t reason) {
     case transport::Reason::kObserver:
       return "observers may not send input";
     case transport::Reason::kDemoted:
-      return "made an observer: it had delayed the others for too long";
+      return "this client delayed the others for too long, and so became an observer";
     case transport::Reason::kInvalid:
-      return "input refused: not finite, out of range or of an unknown kind";
+      return "input refused: it is not finite, out of range or of an unknown kind";
     case transport::Reason::kRateLimited:
-      return "input refused: too many a second";
+      return "input refused: there were too many per second";
     case transport::Reason::kStaleEpoch:
-      return "input refused: of an earlier run of the server";
+      return "input refused: it was meant for an earlier run of the server";
     case transport::Reason::kDuplicate:
-      return "input refused: its number was handled before";
+      return "input refused: an input with this number was already handled";
     case transport::Reason::kNotPlaying:
       return "input refused: this client was still joining";
     case transport::Reason::kForeignClient:
@@ -33,7 +33,7 @@ std::string describe(std::uint32_t reason) {
     case transport::Reason::kRecording:
       return "input refused: the session is a recording";
   }
-  return "refused for reason " + std::to_string(reason);
+  return "the server refused it for reason " + std::to_string(reason);
 }
 
 }  // namespace tandem::client

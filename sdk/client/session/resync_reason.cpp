@@ -13,11 +13,11 @@ const char* describe(ResyncReason reason) {
     case ResyncReason::kMismatch:
       return "the state differed from the server's";
     case ResyncReason::kRefused:
-      return "what came broke a rule of the protocol";
+      return "a message broke a rule of the protocol";
     case ResyncReason::kOverflow:
-      return "more frames waited than there is room for";
+      return "there were more waiting frames than there is room for";
     case ResyncReason::kLag:
-      return "too far behind for too long";
+      return "this client was too far behind for too long";
   }
   return "";
 }

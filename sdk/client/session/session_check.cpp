@@ -22,14 +22,14 @@ tl::unexpected<Error> bad(const std::string& what) { return fail(ErrorCode::kMal
 Result<void> check_session(const transport::SessionMessage& s) {
   if (s.protocol_version != transport::kProtocolVersion) {
     return fail(ErrorCode::kUnsupported, "the server speaks protocol version " +
-                                             std::to_string(s.protocol_version) + ", this client " +
+                                             std::to_string(s.protocol_version) + ", but this client " +
                                              std::to_string(transport::kProtocolVersion));
   }
-  if (s.epoch == 0) return bad("epoch 0");
+  if (s.epoch == 0) return bad("the epoch is 0");
   if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))
-    return bad("frame rate out of range");
-  if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("lattice unit out of range");
-  if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + ", at most 1 is defined");
+    return bad("the frame rate is out of range");
+  if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("the lattice unit is out of range");
+  if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + " is above the maximum of 1");
   for (const auto& type : s.types) {
     if (!std::isfinite(type.radius) || type.radius < 0) return bad("radius of type " + type.name);
   }

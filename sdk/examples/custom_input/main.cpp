@@ -1,4 +1,4 @@
-// Sends gravity, a push and application bytes to session "default", and tells what became of each.
+// Sends gravity, a push and application bytes to session "default", and prints the outcome of each.
 #include <array>
 #include <cstddef>
 #include <cstdio>

@@ -1,5 +1,5 @@
-// headless_logger [SESSION [SECONDS]]: an observer that writes down what goes on, as CSV. Everything happens
-// in this thread, within update().
+// headless_logger [SESSION [SECONDS]]: an observer that writes a log of the session as CSV. Everything
+// happens in this thread, within update().
 #include <cstdio>
 #include <cstdlib>
 #include <tandem/client.hpp>

@@ -14,7 +14,7 @@ namespace {
 constexpr double kRateHz = 144;
 constexpr int kPictures = 5 * 144;
 
-/// What this renderer has of a body, as its graphics card wants it.
+/// A body in the form that the graphics card needs.
 struct Instance {
   std::array<float, 3> position;
   std::uint16_t type;

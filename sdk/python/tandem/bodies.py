@@ -1,4 +1,4 @@
-"""Arrays of bodies: what is sampled, and what a recording holds."""
+"""Arrays of bodies, as in samples and recordings."""
 
 from __future__ import annotations
 

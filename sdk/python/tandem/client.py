@@ -27,7 +27,7 @@ from tandem.session import (
 
 
 def version() -> str:
-    """Of the library at run time: "MAJOR.MINOR.PATCH"."""
+    """The version of the library at run time: "MAJOR.MINOR.PATCH"."""
     return _client.version()
 
 
@@ -37,7 +37,7 @@ def clock_ns() -> int:
 
 
 def sessions(domain: int = 0, wait: float = 2.0) -> list[SessionInfo]:
-    """The sessions on a DDS domain (0..230), by name, after listening for `wait` seconds without taking part."""
+    """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name."""
     browser = _client.Browser(domain)
     time.sleep(wait)
     return [SessionInfo._of(session) for session in browser.list()]
@@ -46,8 +46,8 @@ def sessions(domain: int = 0, wait: float = 2.0) -> list[SessionInfo]:
 class Sample(Bodies):
     """Bodies as they should be drawn at a moment.
 
-    `velocities` contain a correction that is being blended in, as `positions` do; with smoothing 0 they are as the
-    bodies move on the server. `angular_velocities` contain none.
+    `velocities`, like `positions`, contain a correction that is being blended in; with smoothing 0 they are those of
+    the server. `angular_velocities` contain no correction.
     """
 
     changes: Optional[np.ndarray]  #: (n,) uint8: a Change, against the client's previous sample
@@ -55,7 +55,7 @@ class Sample(Bodies):
     def __init__(self, columns=None) -> None:
         super().__init__(columns)
         self.frame = 0.0  #: the moment that is drawn, in frames
-        self.seconds_since_delta = 0.0  #: how long nothing has come from the server: what is drawn is a guess
+        self.seconds_since_delta = 0.0  #: time without a message from the server, while bodies are extrapolated
         self.alive_count = 0  #: slots that hold a body
         self.mode = SampleMode.EXTRAPOLATE  #: in force
         self.phase = Phase.SEARCHING  #: JOINING: the last bodies known, while the client joins again
@@ -72,12 +72,12 @@ class Client:
 
     Every method raises `Error`; its `code` is INVALID_HANDLE after close().
 
-    Threads: all methods may be called from any thread, also at the same time, with two exceptions: of update()
-    one at a time, and of a Sample that is written to one sample() at a time. Whatever may wait does so without
-    the interpreter's lock. `log` is called with it, from the thread that does the client's work, while the
+    Threads: all methods may be called from any thread, also at the same time, with two exceptions: only one thread
+    at a time may be in update(), and only one sample() at a time may write to a Sample. Methods that wait release
+    the interpreter's lock. `log` is called with that lock, from the thread that does the client's work, while the
     client is locked: return soon, and do not wait for a thread that may be in a call with this client. Methods
-    called from there raise `Error` IN_CALLBACK; what `log` itself raises is reported on stderr and goes no
-    further. After os.fork() the child has no clients.
+    called from `log` raise `Error` IN_CALLBACK; an exception in `log` is reported on stderr and ends there. After
+    os.fork() the child has no clients.
     """
 
     def __init__(
@@ -97,11 +97,11 @@ class Client:
         session     1..64 characters of [A-Za-z0-9._-]
         domain      DDS domain, 0..230
         observe     only watch: the server never waits for this client, and refuses its input
-        lead        frames to simulate beyond the last delta, 0 or 1; clamped to what the session allows
-        background  a thread of the client's own does the work. False: the application calls update(), at least
-                    once a frame, and everything happens in there
+        lead        frames to simulate beyond the last delta, 0 or 1; the session may allow less
+        background  the client has a thread of its own for its work. If False, the application must call update() at
+                    least once a frame, which does all the work
         echo        EXPERIMENTAL: sample() shows the application's own gravity at once
-        prefer      of the session's streams: "auto", "bandwidth", "computing", "error", or a stream's name
+        prefer      which stream to play: "auto", "bandwidth", "computing", "error", or a stream's name
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start).
@@ -113,7 +113,7 @@ class Client:
             raise Error(Result.INVALID_ARGUMENT, "a session's name has no NUL")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
         self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, told)
-        # At the end of the program, too: before the interpreter is gone that the log function needs.
+        # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
 
     def __enter__(self) -> "Client":
@@ -123,34 +123,34 @@ class Client:
         self.close()
 
     def close(self) -> None:
-        """Leaves the session. Calls of other threads with this client end soon, with INVALID_HANDLE. Once is
-        enough, more does nothing."""
+        """Leaves the session. Calls of other threads with this client soon end with INVALID_HANDLE. Further calls of
+        close() do nothing."""
         if not self._leave.alive:
             return
         try:
             self._connection.leave()
         except Error as error:
-            if error.code != Result.INVALID_HANDLE:  # that is: another thread was faster
+            if error.code != Result.INVALID_HANDLE:  # which means that another thread was faster
                 raise
         self._leave.detach()
 
     def update(self, wait: float = 0.0) -> None:
         """For a client without a thread: takes what arrived, follows the session, and waits for the next thing
-        to do, at most `wait` seconds. Also raises WRONG_THREAD: the client has a thread of its own, or another
-        thread is in here."""
+        to do for a maximum of `wait` seconds. Also raises WRONG_THREAD if the client has a thread of its own, or if
+        another thread is in update()."""
         self._connection.update(wait)
 
     def wait_until_playing(self, timeout: float) -> None:
-        """Blocks until the client plays, at most `timeout` seconds; updates it, where it has no thread. Also
-        raises TIMEOUT, and what update() raises where the client has no thread."""
+        """Blocks until the client plays, for a maximum of `timeout` seconds. Updates a client that has no thread. Also
+        raises TIMEOUT, and for a client without a thread the errors of update()."""
         self._connection.wait_until_playing(timeout)
 
     def prefer(self, preference: str) -> None:
-        """Of streams, as the argument of that name, from now on."""
+        """Changes the preference for a stream; see the argument `prefer` of the constructor."""
         self._connection.prefer(preference)
 
     def status(self) -> Status:
-        """How the client stands."""
+        """The state of the client and its figures."""
         return Status._of(self._connection.status())
 
     def sample(
@@ -160,17 +160,16 @@ class Client:
         smoothing: Optional[float] = None,
         out: Union[Sample, np.ndarray, Mapping[str, np.ndarray], None] = None,
     ) -> Sample:
-        """The bodies as they should be drawn at a moment; never changes what the client holds.
+        """The bodies as they should be drawn at a moment. Never changes the client's state.
 
         mode       which moment is drawn
-        at_ns      by clock_ns(), such as when the picture will be on the screen; 0: now. Far past or future gives
-                   the nearest that is held, and Sample.frame says which
-        smoothing  time constant with which corrections are blended in, seconds; 0: not at all, None: the
-                   default, 0.05
-        out        a Sample, whose arrays are written to where they are (and replaced only when the session has
-                   another number of slots), or arrays of the caller's own as for Sample.into(); None: new ones
+        at_ns      time by clock_ns(), such as when the picture will be on the screen; 0: now. For a time far in the
+                   past or future, the sample is of the nearest moment that the client holds; see Sample.frame
+        smoothing  time constant for blending in corrections, seconds; 0: no blending; None: the default, 0.05
+        out        a Sample, whose arrays are reused unless the session has another number of slots, or arrays of
+                   the caller as for Sample.into(); None: new arrays
 
-        At any rate, from any thread; waits neither for the network nor for decoding. Also raises NOT_READY
+        May be called at any rate and from any thread; waits neither for the network nor for decoding. Also raises NOT_READY
         (nothing to draw yet) and CAPACITY (the caller's arrays have fewer rows than the session has slots; those
         of `out.capacity` do).
         """
@@ -188,20 +187,20 @@ class Client:
         return sample
 
     def next_event(self) -> Optional[Event]:
-        """Takes the oldest event; None where there is none. 256 are kept; beyond, the oldest are dropped."""
+        """Takes the oldest event; None if there is none. The client keeps 256 events and drops the oldest ones."""
         event = self._connection.next_event()
         return None if event is None else Event._of(event)
 
     def events(self) -> Iterator[Event]:
-        """Takes the events that are there, oldest first; does not wait for more."""
+        """Takes all events that are there, oldest first; does not wait for more."""
         while (event := self.next_event()) is not None:
             yield event
 
     def send_gravity(self, gravity: Sequence[float]) -> int:
-        """Gravity from now on: x, y, z, scene units / s^2. Returns the input's number; an event tells on which
-        frame it acted, the same one everywhere, or why not.
+        """Changes gravity: x, y, z, scene units / s^2. Returns the input's number. An event reports the frame on which
+        it acted, the same one everywhere, or the reason why it was refused.
 
-        As the other send_ methods it also raises NOT_READY (not playing), OUT_OF_ORDER (joined as an observer)
+        Like the other send_ methods, it also raises NOT_READY (not playing), OUT_OF_ORDER (joined as an observer)
         and TRANSPORT; values that are not finite are INVALID_ARGUMENT."""
         return self._connection.send_gravity(gravity)
 
@@ -211,20 +210,21 @@ class Client:
         return self._connection.send_push(centre, radius, velocity)
 
     def send_seek(self, seconds: float) -> int:
-        """EXPERIMENTAL. Of a session that replays a recording: goes on at so many seconds after its first message, 0 up
-        to its length, for everybody, under another epoch; EventKind.NEW_EPOCH tells that it does. Refused beyond the
-        recording, in a session that is no replay, and less than a second after another. Returns the input's number."""
+        """EXPERIMENTAL. Makes a session that replays a recording continue at `seconds` after its first message (0 up to
+        its length), for all clients and in another epoch; EventKind.NEW_EPOCH reports it. The server refuses a time
+        beyond the recording, a session that is no replay, and a seek within a second of another. Returns the input's
+        number."""
         return self._connection.send_seek(seconds)
 
     def send_bytes(self, data: Union[bytes, bytearray, memoryview]) -> int:
-        """At most 1,024 bytes for the server's simulation, which knows what they mean. Returns the input's
+        """Sends up to 1,024 bytes to the server's simulation, which knows their meaning. Returns the input's
         number."""
         return self._connection.send_bytes(bytes(memoryview(data)))
 
     def scene(self) -> Scene:
-        """The scene of the session. As geometry() and types() it also raises NOT_READY before a session is known,
-        and MALFORMED where the server describes its scene in a way that cannot be read. With another epoch
-        (EventKind.NEW_EPOCH) everything may be another."""
+        """The scene of the session. Like geometry() and types(), it also raises NOT_READY before a session is known,
+        and MALFORMED if the server's description of its scene cannot be read. Everything may change with a new epoch
+        (EventKind.NEW_EPOCH)."""
         return Scene._of(self._connection.scene())
 
     def geometry(self) -> list[Solid]:

@@ -1,4 +1,4 @@
-"""What `tandem record` wrote, state by state."""
+"""Reads recordings of `tandem record`, state by state."""
 
 from __future__ import annotations
 
@@ -27,22 +27,21 @@ class State(Bodies):
         super().__init__(columns)
         self.frame = 0
         self.time_s = 0.0  #: when it was recorded, seconds since the recording's first message
-        self.state_hash = 0  #: by which all agreed, checked when it was read
-        self.starts = False  #: the state before it, if any, was of another epoch, or frames between are missing
+        self.state_hash = 0  #: checked against the state when it was read
+        self.starts = False  #: there is no state of the frame before in this epoch
 
 
 class Recording:
-    """A recording, from the first state that it holds.
+    """Reads a recording, from its first state on.
 
         with tandem.Recording("session.mcap") as recording:
             for state in recording:
                 print(state.frame, state.positions[state.alive].mean(axis=0))
 
-    Iterating goes on from where the recording stands, and gives new arrays each time; read(out) writes them to where
-    they are. Every state's hash is checked. What is in a file may be anybody's: nothing in it can do more than raise
-    `Error`: IO, MALFORMED, UNSUPPORTED (of another version) or MISMATCH (a hash). A file that was cut short is read up
-    to there, and `torn` tells. Decoding does without the interpreter's lock.
-    A recording is for one thread at a time.
+    Iterating continues from the current position and gives new arrays each time; read(out) reuses arrays. Every
+    state's hash is checked. A file may come from anybody: the worst it can do is to raise `Error`: IO, MALFORMED,
+    UNSUPPORTED (another version) or MISMATCH (a hash). A file that is cut short is read up to that place; see `torn`.
+    Decoding releases the interpreter's lock. Only one thread at a time may use a recording.
     """
 
     def __init__(self, path: "str | os.PathLike[str]") -> None:
@@ -60,7 +59,7 @@ class Recording:
         self.close()
 
     def close(self) -> None:
-        """Closes the file. Whatever else is called after it raises INVALID_HANDLE."""
+        """Closes the file. All other methods raise INVALID_HANDLE afterwards."""
         self._held = None
 
     def __iter__(self) -> Iterator[State]:
@@ -70,10 +69,10 @@ class Recording:
     def read(self, out: Union[State, np.ndarray, Mapping[str, np.ndarray], None] = None) -> Optional[State]:
         """The next state; None behind the last one.
 
-        out  a State, whose arrays are written to where they are (and replaced only when the session has another
-             number of slots), or arrays of the caller's own as for State.into(); None: new ones
+        out  a State, whose arrays are reused unless the session has another number of slots, or arrays of the caller
+             as for State.into(); None: new arrays
 
-        Also raises CAPACITY: the caller's arrays have fewer rows than the session has slots."""
+        Also raises CAPACITY if the caller's arrays have fewer rows than the session has slots."""
         reader = self._reader
         if self._at is None:
             self._at = reader.next()
@@ -88,10 +87,10 @@ class Recording:
         return state
 
     def seek(self, frame: int, epoch: Optional[int] = None) -> None:
-        """To a frame, which read() gives next, of an epoch of the recording; None: the one it stands in. Also raises
-        INVALID_ARGUMENT: that frame is not there; the recording then stands behind where it would be.
+        """Goes to a frame, which read() returns next. `epoch` None stands for the current epoch. Also raises
+        INVALID_ARGUMENT if that frame is missing; the position is then behind the place of the frame.
 
-        A snapshot before it, one in some ten seconds, is looked up, and what follows is decoded."""
+        Decoding begins at the snapshot before the frame; there is one for about every ten seconds."""
         reader = self._reader
         wanted = (self.epoch if epoch is None else epoch, frame)
         reader.seek(*wanted)
@@ -103,22 +102,22 @@ class Recording:
 
     @property
     def epoch(self) -> int:
-        """Of the run of the server that the recording stands in."""
+        """The epoch at the current position."""
         return self._reader.epoch()
 
     @property
     def length_s(self) -> float:
-        """From the first message to the last one, seconds."""
+        """The time from the first message to the last one, seconds."""
         return self._reader.length_s
 
     @property
     def torn(self) -> Optional[int]:
-        """Where the file is cut short: the first byte that cannot be read. None: it is whole."""
+        """The first byte that cannot be read, if the file is cut short; None if it is whole."""
         return self._reader.torn_at
 
     def scene(self) -> Scene:
-        """The scene of the session. This, geometry() and types() are those of the epoch that the recording stands in. Also
-        raises MALFORMED, as geometry() does: the server described its scene in a way that cannot be read."""
+        """The scene of the session. Like geometry() and types(), it belongs to the epoch at the current position. Also
+        raises MALFORMED, like geometry(), if the server's description of its scene cannot be read."""
         return Scene._of(self._reader.scene())
 
     def geometry(self) -> list[Solid]:

@@ -1,4 +1,4 @@
-"""What a session is made of, and how a client stands in it."""
+"""The parts of a session, and the state of a client in it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SampleMode(enum.IntEnum):
 
 
 class Change(enum.IntEnum):
-    """What a body did since the client's previous sample."""
+    """How a body changed since the client's previous sample."""
 
     NONE = 0
     NEW = 1  #: was not there, or another body took its slot
@@ -146,7 +146,7 @@ class Solid(_FromNative):
 
 @dataclass(frozen=True, eq=False)
 class BodyType(_FromNative):
-    """What bodies of a type look like."""
+    """The appearance of the bodies of a type."""
 
     name: str
     shape: Shape
@@ -157,7 +157,7 @@ class BodyType(_FromNative):
 
 @dataclass(frozen=True)
 class SessionInfo(_FromNative):
-    """A session on a domain. What is not known yet is 0 or empty: status comes once a second."""
+    """A session on a domain. Unknown values are 0 or empty; status comes once a second."""
 
     name: str  #: for Client(session=...)
     scene: str

@@ -1,5 +1,5 @@
-// What JavaScript sees of the module: one client for each instance of it. ../tandem/module.ts is the other
-// side. Times are milliseconds, texts UTF-8. A pointer that is handed out is valid until the next call.
+// The functions that JavaScript calls. Each instance of the module is one client. ../tandem/module.ts is the
+// other side. Times are milliseconds, texts UTF-8. A pointer that is handed out is valid until the next call.
 
 #include <cstddef>
 #include <cstdint>
@@ -70,13 +70,13 @@ TANDEM_EXPORT(create) Instance* tandem_create(std::uint64_t id, std::uint32_t ro
   return std::make_unique<Instance>(std::move(options)).release();  // lives as long as the module's instance
 }
 
-/// Room for what the next call takes; null for more than a message may have.
+/// Room for the input of the next call; null for more than a message may have.
 TANDEM_EXPORT(input) std::byte* tandem_input(Instance* instance, std::size_t size) {
   if (size > WebPort::kMaxMessageBytes) return nullptr;
   instance->input.resize(size);
   return instance->input.data();
 }
-/// What the last call wrote.
+/// The output of the last call.
 TANDEM_EXPORT(output) const char* tandem_output(const Instance* instance) { return instance->output.data(); }
 
 TANDEM_EXPORT(connected) void tandem_connected(Instance* instance) { instance->client.port().connected(); }

@@ -6,7 +6,7 @@
 namespace tandem::web {
 namespace {
 
-/// Length of the UTF-8 character at the front; 0 where there is none.
+/// Length of the UTF-8 character at the front; 0 if there is none.
 std::size_t character_bytes(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const std::size_t length = byte(0) < 0x80   ? 1

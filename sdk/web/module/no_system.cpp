@@ -1,4 +1,4 @@
-// What libraries for WASI expect of a system that a browser does not have.
+// Functions of a system that libraries for WASI expect and a browser does not have.
 
 #include <wasi/api.h>
 

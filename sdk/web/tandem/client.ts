@@ -19,15 +19,15 @@ import { TandemError } from './types';
 const PROTOCOL = 'tandem.1';
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 5000;
-/** A connection from which nothing came for so long, while the server should be there, is taken for dead. */
+/** A connection that is silent for so long, although there is a server, counts as dead. */
 const SILENCE_MS = 10_000;
-/** The longest that timers are asked to wait. */
+/** Maximum time of a timer. */
 const LONGEST_WAIT_MS = 1000;
 const RAW_BYTES_PER_BODY = 24;
 const BITS_PER_MBIT = 1048576;
 const OPEN = 1;
 
-/** Close codes with which a gateway says that it does not want this viewer: a violated policy, and its own. */
+/** Close codes with which a gateway refuses this viewer for good: a violated policy, and its own codes. */
 const isRefusal = (code: number): boolean => code === 1002 || code === 1003 || code === 1008 || (code >= 4000 && code < 5000);
 
 type HandlerSets = { [Name in keyof Handlers]: Set<Handlers[Name]> };
@@ -149,11 +149,11 @@ export class Client {
   ): number {
     return this.#send(InputKind.push, values([...centre, radius, ...velocity]));
   }
-  /** Of a session that is a recording's: goes on at `seconds` after its first message. A new session follows. */
+  /** Makes the replay of a recording continue at `seconds` after its first message. A new session follows. */
   sendSeek(seconds: number): number {
     return this.#send(InputKind.seek, values([seconds]));
   }
-  /** Bytes for the engine, 1,024 at most. */
+  /** Sends up to 1,024 bytes to the engine. */
   sendBytes(bytes: Uint8Array): number {
     return this.#send(InputKind.application, bytes);
   }
@@ -189,7 +189,7 @@ export class Client {
     if (!this.#closed) this.#open();
   }
 
-  /** Calls the module; undefined where there is none, or where it fails and is started anew. */
+  /** Calls the module. Undefined if there is none, or if it fails and is started anew. */
   #guard<T>(call: (module: Module) => T): T | undefined {
     if (this.#module === null) return undefined;
     try {
@@ -216,7 +216,7 @@ export class Client {
   }
 
   #send(kind: number, content: Uint8Array): number {
-    if (this.#phase !== 'playing') throw new TandemError('input is possible while playing only');
+    if (this.#phase !== 'playing') throw new TandemError('a client can send input only while it plays');
     const number = this.#guard((module) => module.send(kind, content));
     if (number === undefined) throw new TandemError('the module failed');
     this.#pump();
@@ -291,7 +291,7 @@ export class Client {
 
   // --- work
 
-  /** Lets the module do what is due, sends what it wants sent, and tells the handlers. */
+  /** Lets the module do what is due, sends its messages, and calls the handlers. */
   #pump(): void {
     if (this.#closed) return;
     clearTimeout(this.#pollTimer);
@@ -313,7 +313,7 @@ export class Client {
     this.#setPhase(this.#phaseOf(status));
     if (this.#socket?.readyState === OPEN && status.serverAlive && now - this.#heardMs > SILENCE_MS) {
       this.#drop(1001, 'silence');
-      this.#onClose(1006, 'nothing came for 10 s');
+      this.#onClose(1006, 'nothing was received for 10 s');
       return;
     }
     this.#pollTimer = setTimeout(() => this.#pump(), Math.min(Math.max(due - now, 0), LONGEST_WAIT_MS));

@@ -91,7 +91,7 @@ export class Module {
     if (!this.#put(message)) return 'a message above 64 MiB';
     return this.#text(this.#exports.tandem_receive(this.#self));
   }
-  /** Does what is due; the steady time when it wants to be called again. */
+  /** Does what is due. Returns the steady time at which it wants to be called again. */
   poll(): number {
     return this.#exports.tandem_poll(this.#self, this.#clock.steady(), this.#clock.wall());
   }
@@ -100,7 +100,7 @@ export class Module {
     const size = this.#exports.tandem_next_message(this.#self);
     return size === 0 ? undefined : this.#output(size).slice();
   }
-  /** The number of the input. Throws TandemError where it is refused. */
+  /** Sends an input and returns its number. Throws TandemError if it is refused. */
   send(kind: number, content: Uint8Array): number {
     if (!this.#put(content)) throw new TandemError('an input holds at most 1,024 bytes');
     const number = this.#exports.tandem_send(this.#self, kind, this.#clock.steady(), this.#clock.wall());

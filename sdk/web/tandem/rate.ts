@@ -1,4 +1,4 @@
-// Bytes a second, over the last one.
+// Counts bytes per second over the last second.
 
 const WINDOW_MS = 1000;
 const BITS_PER_MBIT = 1048576;

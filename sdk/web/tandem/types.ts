@@ -1,21 +1,22 @@
-// What an application sees. Units: scene units, milliseconds, Mbit of 2^20 bits.
+// The types of the public interface. Units: scene units, milliseconds, Mbit of 2^20 bits.
 
 import type { ClientFigures, ServerFigures } from './figures';
 
 export type Role = 'observer' | 'participant';
 
 /**
- * `connecting`: no connection was ever open. `searching`: no server behind the gateway yet. `refused`: by the gateway,
- * or because this client cannot play the session; see `reason`. `joining`: waits for a snapshot. `playing`: holds the
- * agreed state and follows it. `lost`: the connection or the session's server is gone; tried again until it is back.
+ * `connecting`: no connection was ever open. `searching`: there is no server behind the gateway yet. `refused`: the
+ * gateway refused this client, or the client cannot play the session; see `reason`. `joining`: the client waits for a
+ * snapshot. `playing`: the client holds the agreed state and follows it. `lost`: the connection or the session's server
+ * is gone; the client tries again until it is back.
  * `closed`: after close().
  */
 export type Phase = 'connecting' | 'searching' | 'refused' | 'joining' | 'playing' | 'lost' | 'closed';
 
-/** Where a WebAssembly module comes from. */
+/** The source of a WebAssembly module. */
 export type WasmSource = URL | string | BufferSource | WebAssembly.Module;
 
-/** What the client needs of a WebSocket. */
+/** The part of WebSocket that the client needs. */
 export interface SocketLike {
   binaryType: string;
   readonly protocol: string;
@@ -35,27 +36,27 @@ export interface Clock {
 }
 
 export interface ConnectOptions {
-  /** Of the gateway: `ws://HOST:PORT/tandem`, with `?token=TOKEN` where it asks for one. */
+  /** The gateway's address: `ws://HOST:PORT/tandem`, with `?token=TOKEN` if the gateway needs one. */
   url: string;
   /** Participants may send input. Default: participant. */
   role?: Role;
-  /** Frames to simulate beyond the last delta, 0 or 1; clamped to what the session allows. Default: 1. */
+  /** Frames to simulate beyond the last delta, 0 or 1; the session may allow less. Default: 1. */
   lead?: number;
-  /** `auto` uses SIMD where the browser has it. */
+  /** `auto` uses SIMD if the browser has it. */
   simd?: 'auto' | 'on' | 'off';
-  /** Default: `tandem.wasm` and `tandem-simd.wasm` beside this script. */
+  /** Default: `tandem.wasm` and `tandem-simd.wasm` next to this script. */
   wasm?: { plain: WasmSource; simd: WasmSource };
-  /** Instead of the browser's WebSocket, where there is none. */
+  /** Replaces the browser's WebSocket in other environments. */
   webSocket?: (url: string, protocol: string) => SocketLike;
-  /** Instead of performance.now() and Date.now(), for tests. */
+  /** Replaces performance.now() and Date.now() in tests. */
   clock?: Clock;
-  /** One line for a human. Default: warnings and errors go to the console. */
+  /** Receives one line for a human. Default: warnings and errors go to the console. */
   log?: (level: LogLevel, text: string) => void;
 }
 
 export type LogLevel = 'info' | 'warning' | 'error';
 
-/** What the gateway passes on of the server, once a second. */
+/** The server's status, which the gateway passes on once a second. */
 export interface ServerStatus extends ServerFigures {
   session: string;
   epoch: number;
@@ -64,21 +65,21 @@ export interface ServerStatus extends ServerFigures {
   predictor: string;
 }
 
-/** What the module tells of itself: WebClient::status(). */
+/** The module's own status: WebClient::status(). */
 export interface ModuleStatus extends ClientFigures {
   phase: 'searching' | 'refused' | 'joining' | 'playing';
   serverAlive: boolean;
-  /** Why phase or role are not what was asked for; empty when they are. */
+  /** The reason why phase or role differ from the wanted ones; empty if they do not. */
   reason: string;
-  /** As granted. */
+  /** The role that the server granted. */
   role: Role;
   /** 16 hex digits. */
   clientId: string;
   scene: string;
   epoch: number;
-  /** The last one agreed with the server. */
+  /** The last frame agreed with the server. */
   frame: number;
-  /** Of that frame, 16 hex digits; empty while not playing. */
+  /** The state hash of that frame, 16 hex digits; empty while not playing. */
   stateHash: string;
   frameRateHz: number;
   lead: number;
@@ -89,18 +90,18 @@ export interface ModuleStatus extends ClientFigures {
   atRest: number;
   /** Bodies that the last delta corrected. */
   corrected: number;
-  /** Published to applied, by the estimate of the server's clock. */
+  /** Time from publishing a delta to applying it, by the estimated clock of the server. */
   lagMs: number;
-  /** Of clientMsP50 and clientMsP99. */
+  /** Parts of clientMsP50 and clientMsP99. */
   frameMs: { p50: number; p99: number };
-  /** In force, scene units / s^2; zero before a snapshot. */
+  /** The gravity in force, scene units / s^2; zero before a snapshot. */
   gravity: [number, number, number];
   /** Null unless showUncorrected() is on and a state is held. */
   uncorrected: Uncorrected | null;
   server: ServerStatus | null;
 }
 
-/** How far the bodies that are shown without corrections are from where they are agreed to be; scene units. */
+/** Distances of the bodies shown without corrections from their agreed places; scene units. */
 export interface Uncorrected {
   /** Since the last correction. */
   frames: number;
@@ -112,13 +113,13 @@ export interface Uncorrected {
 
 export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {
   phase: Phase;
-  /** Of deltas' payload, over the last second. */
+  /** The rate of the deltas' payload over the last second. */
   mbitPerS: number;
-  /** Of all messages received, over the last second. */
+  /** The rate of all messages received over the last second. */
   receivedMbitPerS: number;
-  /** What the bodies' positions and velocities would need uncompressed: 24 bytes a body and frame. */
+  /** The rate of positions and velocities without compression: 24 bytes per body and frame. */
   rawMbitPerS: number;
-  /** Whether the module with SIMD runs. */
+  /** True if the module with SIMD runs. */
   simd: boolean;
   /** How often the module failed and was started anew. */
   restarts: number;
@@ -126,7 +127,7 @@ export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {
 
 export interface BodyType {
   name: string;
-  /** Of the sphere that holds the body. */
+  /** The radius of the sphere around the body. */
   radius: number;
   /** `#rrggbbaa` */
   colour: string;
@@ -151,7 +152,7 @@ export interface Sample {
   capacity: number;
   /** x, y, z of slot 0, of slot 1, ... */
   positions: Float32Array;
-  /** Quaternions x, y, z, w from the body's frame to the world's; null where bodies do not turn. */
+  /** Quaternions x, y, z, w from the body's frame to the world's; null if bodies do not turn. */
   orientations: Float32Array | null;
   alive: Uint8Array;
   /** Counts the bodies that the slot has held, modulo 256. */
@@ -159,9 +160,9 @@ export interface Sample {
   /** Index into types(). */
   types: Uint16Array;
   changes: Uint8Array;
-  /** 1 where the last delta applied corrected the body. */
+  /** 1 if the last applied delta corrected the body. */
   corrected: Uint8Array;
-  /** The frame, modulo 2^32, of the last delta that corrected the body; 0 where none of this epoch did. */
+  /** The frame, modulo 2^32, of the last delta that corrected the body; 0 if none of this epoch did. */
   correctedIn: Uint32Array;
 }
 
@@ -175,19 +176,19 @@ export interface AppliedEvent {
   frame: number;
   /** 16 hex digits. */
   hash: string;
-  /** Of the delta's payload. */
+  /** The size of the delta's payload. */
   bytes: number;
   corrected: number;
 }
 export interface OutcomeEvent {
   type: 'outcome';
-  /** What send...() returned. */
+  /** The number that send...() returned. */
   number: number;
   kind: 'acted' | 'refused' | 'unknown';
   /** The frame that it acted on. */
   frame: number;
   reason: string;
-  /** From sending to applying that frame. */
+  /** Time from sending the input to applying that frame. */
   latencyMs: number;
 }
 export type ModuleEvent = SessionEvent | AppliedEvent | OutcomeEvent;

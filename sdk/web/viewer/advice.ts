@@ -1,8 +1,8 @@
-// What to do where this device does not keep up.
+// Advises users whose device does not keep up.
 
 import type { Status } from '../tandem';
 
-/** Of a frame's time that the client's work may take; drawing needs the rest. */
+/** The share of a frame's time that the client's work may take; drawing needs the rest. */
 const mostShare = 0.5;
 /** More lag than any network explains: frames wait here. */
 const lateMs = 400;

@@ -1,4 +1,4 @@
-// Draws a sample: spheres as sprites, other shapes as instances, in the colours that somebody else has chosen.
+// Draws a sample: spheres as sprites, other shapes as instances, in colours that the caller has chosen.
 
 import { Group } from 'three';
 import type { BodyType, Sample } from '../tandem';

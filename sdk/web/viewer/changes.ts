@@ -1,4 +1,4 @@
-// Which bodies have come, gone or jumped since somebody last asked: a sample tells of the one before it only.
+// Collects which bodies have come, gone or jumped since the last call, because a sample compares only with the one before.
 
 import type { Sample } from '../tandem';
 
@@ -12,7 +12,7 @@ export class Changes {
     for (let slot = 0; slot < capacity; ++slot) if (changes[slot]) this.noted[slot] = changes[slot];
   }
 
-  /** The last change of every slot since the last call, 0 where there was none; valid until the next call. */
+  /** The last change of every slot since the last call, 0 for none; valid until the next call. */
   take(): Uint8Array {
     [this.noted, this.taken] = [this.taken, this.noted];
     this.noted.fill(0);

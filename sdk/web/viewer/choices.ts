@@ -36,7 +36,7 @@ export function chooseSpeed(chosen: (speed: Speed) => void): void {
   choose('speeds', speeds.map((value) => ({ value, label: labels[value], title: titles[value] })), chosen);
 }
 
-/** Says what the colours mean. */
+/** Explains the colours. */
 export function showLegend(colours: Colours, types: BodyType[]): void {
   const legend = colours.legend(types);
   const key = JSON.stringify(legend);

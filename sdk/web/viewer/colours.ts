@@ -1,4 +1,4 @@
-// What the colour of a body tells.
+// Chooses the colours of bodies.
 
 import type { BodyType, Sample } from '../tandem';
 import { Changes } from './changes';
@@ -41,7 +41,7 @@ export function rampColour(share: number): Rgb {
 const steps = 256;
 const packedRamp = Uint32Array.from({ length: steps }, (_, i) => packed(rampColour(i / (steps - 1))));
 
-/** Of "#rrggbb" or "#rrggbbaa"; grey where the text is neither. */
+/** The colour of "#rrggbb" or "#rrggbbaa"; grey for other text. */
 export function parseColour(text: string): Rgb {
   const hex = /^#([0-9a-f]{6})/i.exec(text);
   const rgb = hex ? parseInt(hex[1], 16) : 0x9aa7b3;
@@ -126,7 +126,7 @@ export class Colours {
     }
   }
 
-  /** What the colours mean: names with their colours, or the ends of the ramp. */
+  /** The meaning of the colours: names with their colours, or the ends of the ramp. */
   legend(types: BodyType[]): { names: [string, Rgb][] } | { ends: [string, string] } {
     switch (this.mode) {
       case 'type':

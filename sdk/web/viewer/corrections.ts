@@ -3,7 +3,7 @@
 import type { Status } from '../tandem';
 import { element, threeDigits } from './panel';
 
-/** What is seen without corrections; empty with them. */
+/** Describes the picture without corrections; empty with corrections. */
 export function driftLine({ uncorrected, frameRateHz, phase }: Pick<Status, 'uncorrected' | 'frameRateHz' | 'phase'>): string {
   if (!uncorrected) return phase === 'playing' ? '' : 'Without corrections, from the next join on.';
   const { frames, meanDrift, mostDrift } = uncorrected;

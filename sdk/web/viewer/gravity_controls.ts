@@ -6,7 +6,7 @@ import { element, threeDigits } from './panel';
 import { add } from './room';
 import { emptyScene, type Scene, type Vec3 } from './scene_text';
 
-/** Gravity is sent at most that often. */
+/** Minimum time between two gravities sent. */
 const sendEveryMs = 100;
 /** From sending gravity until it is surely in force. */
 const onItsWayMs = 500;
@@ -65,7 +65,7 @@ export class GravityControls {
     if (document.activeElement !== this.strength) this.strength.value = String(strength);
   }
 
-  /** Browsers tell the device's tilt to pages that came over TLS only, and some ask the user first. */
+  /** Browsers give the device's tilt only to pages that came over TLS, and some ask the user first. */
   private offerTilt(): void {
     const button = element('tilt');
     if (!window.isSecureContext || !('DeviceOrientationEvent' in window) || !matchMedia('(pointer: coarse)').matches) return;

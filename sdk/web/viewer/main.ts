@@ -1,4 +1,4 @@
-// The page: joins the session of the gateway that served it, draws its bodies, and sends what the user does to them.
+// The page: joins the session of the gateway that served it, draws its bodies, and sends the user's inputs.
 
 import { Client, type LogLevel, type OutcomeEvent, type Sample, type SampleMode, type Status } from '../tandem';
 import { chooseColours, chooseSpeed, showLegend } from './choices';
@@ -22,7 +22,7 @@ const pushReachRadii = 3;
 /** Radii a second; the server's own limit, where the scene names none, is 100. */
 const pushRadiiPerS = 30;
 
-/** Of the page's own address, with its token. */
+/** The gateway's address, made of the page's own, with its token. */
 function gatewayUrl(): string {
   const url = new URL(`tandem${location.search}`, document.baseURI);
   url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
@@ -79,7 +79,7 @@ class Page {
     requestAnimationFrame((now) => this.draw(now));
   }
 
-  /** What scripts see as globalThis.tandem. */
+  /** The object that scripts see as globalThis.tandem. */
   readonly forScripts = {
     status: (): Status & { drawing: Drawing } => ({ ...this.client.status(), drawing: this.drawing() }),
     sample: (mode?: SampleMode) => this.sample(mode),
@@ -136,7 +136,7 @@ class Page {
       element('scene').title = this.world.scene.description;
       if (this.world.sceneError) toast(`The scene’s geometry cannot be drawn: ${this.world.sceneError}`, true);
       this.timeLine.set(this.world.scene.recording);
-      // A replay says with each jump where it is.
+      // A replay announces its place with each jump.
       const shown = JSON.stringify({ ...this.world.scene, recording: null });
       if (shown !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
       this.sceneShown = shown;
@@ -214,7 +214,7 @@ class Page {
     else if (what !== 'gravity' && what !== 'seek') toast(`${what} acted in frame ${frame.toLocaleString('en')}, after ${latencyMs.toFixed(0)} ms`);
   }
 
-  /** The world keeps to what the panels leave free. */
+  /** Keeps the world in the space that the panels leave free. */
   private panelsChanged(): void {
     const panel = element('panel').getBoundingClientRect();
     const controls = element('controls').getBoundingClientRect();

@@ -1,4 +1,4 @@
-// What the page says in words: a card while there is nothing to see or something is wrong, and a line that passes.
+// The page's messages: a card while there is nothing to see or something is wrong, and a line that disappears.
 
 import type { Status } from '../tandem';
 import { element } from './panel';
@@ -9,7 +9,7 @@ export interface Notice {
   kind: 'wait' | 'bad';
 }
 
-/** What to say about a status; null while all is well. */
+/** The message for a status; null while all is well. */
 export function noticeOf(status: Pick<Status, 'phase' | 'reason'>): Notice | null {
   const { phase, reason } = status;
   switch (phase) {
@@ -22,7 +22,7 @@ export function noticeOf(status: Pick<Status, 'phase' | 'reason'>): Notice | nul
     case 'joining':
       return { title: 'Joining', text: reason || 'A snapshot is on its way …', kind: 'wait' };
     case 'lost':
-      // Without a reason the gateway is there, and says that its server is not.
+      // Without a reason, the gateway is there and reports that its server is not.
       return reason
         ? { title: 'Connection lost', text: `${reason}; trying again`, kind: 'wait' }
         : { title: 'The server is gone', text: 'This page goes on as soon as it is back.', kind: 'wait' };

@@ -42,7 +42,7 @@ export class Panel {
     });
   }
 
-  /** A new run of the server: what was before is not compared with it. */
+  /** Begins a new run of the server, which is not compared with the last one. */
   clear(): void {
     for (const history of Object.values(this.histories)) history.clear();
   }

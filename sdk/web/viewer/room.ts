@@ -108,7 +108,7 @@ export function join(a: Extent, b: Extent): Extent {
   };
 }
 
-/** What lies in both, where they overlap. */
+/** The intersection of two boxes that overlap. */
 export function meet(a: Extent, b: Extent): Extent {
   return {
     low: axes.map((axis) => Math.max(a.low[axis], b.low[axis])) as Vec3,
@@ -116,7 +116,7 @@ export function meet(a: Extent, b: Extent): Extent {
   };
 }
 
-/** Null where there are no points. */
+/** Null if there are no points. */
 export function extentOf(points: Iterable<Vec3>): Extent | null {
   let extent: Extent | null = null;
   for (const point of points) {

@@ -67,7 +67,7 @@ class Reader {
     return word;
   }
 
-  /** Strings side by side are one; null where there is none. */
+  /** Joins adjacent strings, as protobuf does; null if there is none. */
   private string(): string | null {
     let whole: string | null = null;
     for (;;) {
@@ -131,7 +131,7 @@ export interface Sphere {
 
 /** Where a replayed session is in its recording: `fromFrame` is `from` seconds after the first message. */
 export interface Recording {
-  /** Of the first message, ms since 1970. */
+  /** The time of the first message, ms since 1970. */
   started: number;
   /** Seconds. */
   length: number;
@@ -141,7 +141,7 @@ export interface Recording {
   rate: number;
 }
 
-/** What is drawn of a scene and what inputs are measured by. Metres, seconds. */
+/** The parts of a scene that are drawn, and the scales of inputs. Metres, seconds. */
 export interface Scene {
   description: string;
   dt: number;
@@ -173,7 +173,7 @@ export const emptyScene: Scene = {
 
 const maxSolids = 4096;
 
-/** What the viewer needs of a scene's text. Fields of a wrong type count as left out. Throws SceneTextError. */
+/** Reads the parts of a scene's text that the viewer needs. Ignores fields of a wrong type. Throws SceneTextError. */
 export function readScene(text: string): Scene {
   const scene = parseText(text);
   const gravity = vec3(child(scene, 'gravity'));

@@ -43,7 +43,7 @@ const solidMaterial = new ShaderMaterial({
       gl_FragColor = vec4(shade(vec3(0.23, 0.28, 0.33), normalize(vNormal), hazeAt(vDepth)), 1.0);
     }`,
 });
-// Behind what lies in the same place: lines and resting bodies win.
+// Draws surfaces behind lines and resting bodies in the same place.
 const wallMaterial = new MeshBasicMaterial({
   color: wallColour,
   polygonOffset: true,

@@ -1,5 +1,5 @@
-// Plays what was drawn again, slower: keeps the last seconds of samples and goes through them until it has fallen behind
-// all of them; then it goes on from the newest.
+// Replays in slow motion: keeps the last seconds of samples and plays them slowly until it is behind all of them, then
+// continues from the newest.
 
 import type { Sample } from '../tandem';
 import { Changes } from './changes';
@@ -32,12 +32,12 @@ export class SlowMotion {
     this.changes.take();
   }
 
-  /** To be called with a sample that play() does not get: what it tells of bodies that jump is told once. */
+  /** Call with each sample that play() does not get, because a sample reports a body's jump only once. */
   note(sample: Sample): void {
     if (this.share !== 1) this.changes.note(sample);
   }
 
-  /** What is seen while `newest` is the newest sample. */
+  /** The sample to draw while `newest` is the newest one. */
   seen(newest: Sample): Sample {
     return this.share === 1 ? newest : (this.shown ?? newest);
   }

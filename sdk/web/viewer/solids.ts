@@ -1,4 +1,4 @@
-// Bodies that are no spheres: an instanced mesh for each type, filled each frame with the bodies that have it.
+// Draws bodies that are not spheres: an instanced mesh for each type, filled each frame with the bodies of that type.
 
 import {
   BoxGeometry,
@@ -48,7 +48,7 @@ void main() {
 }
 `;
 
-/** The surface of a type; null for spheres and for what has no shape. */
+/** The surface of a type; null for spheres and types without a shape. */
 export function surfaceOf(type: BodyType): BufferGeometry | null {
   const values = type.shapeValues;
   switch (type.shape) {

@@ -1,4 +1,4 @@
-// All spheres of a session in one draw call: a point sprite each, whose fragments find their place on the sphere, so
+// Draws all spheres of a session in one call: each is a point sprite, whose fragments find their place on the sphere, so
 // that a body costs one vertex, and positions go to the graphics card as the client hands them out.
 
 import { BufferAttribute, BufferGeometry, Points, ShaderMaterial, Sphere, Vector2, Vector3 } from 'three';

@@ -33,7 +33,7 @@ export function framingDistance(extent: Extent, back: Vector3, right: Vector3, u
   return distance;
 }
 
-/** Throws where there is no WebGL 2. */
+/** Throws if there is no WebGL 2. */
 export class Stage {
   readonly camera = new PerspectiveCamera(40);
   private readonly renderer: WebGLRenderer;
@@ -69,7 +69,7 @@ export class Stage {
     this.scene.remove(object);
   }
 
-  /** What is looked at lies in the middle of what the panels leave free. */
+  /** Puts the camera's target in the middle of the space that the panels leave free. */
   setInsets(insets: Insets): void {
     this.insets = insets;
     this.resize();
@@ -105,7 +105,7 @@ export class Stage {
     return [right, up, back];
   }
 
-  /** The ray through a place of the page: origin, unit direction, and what a pixel spans at distance 1. */
+  /** The ray through a place of the page: origin, unit direction, and the size of a pixel at distance 1. */
   ray(clientX: number, clientY: number): { origin: Vec3; direction: Vec3; pixel: number } {
     const area = this.canvas.getBoundingClientRect();
     const at = new Vector2(((clientX - area.left) / area.width) * 2 - 1, 1 - ((clientY - area.top) / area.height) * 2);

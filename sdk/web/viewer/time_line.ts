@@ -1,4 +1,4 @@
-// Where a replay is in its recording, and where it shall go on: a slider that is there for replays only.
+// A slider that shows where a replay is in its recording, and lets the user seek. Other sessions have none.
 
 import { element } from './panel';
 import type { Recording } from './scene_text';

@@ -16,7 +16,7 @@ export class World {
   readonly scene: Scene;
   /** Why nothing of the scene's geometry is drawn; empty when it is. */
   readonly sceneError: string = '';
-  /** What the camera shows at first. */
+  /** The part of the world that the camera shows at first. */
   readonly extent: Extent;
   private readonly scenery: Scenery;
 
@@ -68,7 +68,7 @@ export class World {
   }
 }
 
-/** Of nearly all bodies: the few that have flown far away do not count. */
+/** The bounds of nearly all bodies, without the few that have flown far away. */
 export function bodiesExtent(sample: Sample, types: BodyType[]): Extent | null {
   const slots = Array.from({ length: sample.capacity }, (_, slot) => slot).filter((slot) => sample.alive[slot]);
   if (slots.length === 0) return null;
@@ -83,7 +83,7 @@ export function bodiesExtent(sample: Sample, types: BodyType[]): Extent | null {
   return extent;
 }
 
-/** Everything within these walls is drawn; `shown` is what the camera looks at first. */
+/** Everything within these walls is drawn; `shown` is the part that the camera shows at first. */
 export function extentsOf(scene: Scene, bodies: Extent | null): { shown: Extent; walls: Extent } {
   const bounds = scene.bounds ?? grown(bodies ?? { low: [-1, -1, -1], high: [1, 1, 1] }, 4);
   const corners = roomFaces(scene.planes, bounds).flatMap((face) => face.corners);

@@ -34,7 +34,7 @@ double length(const Vec3f& v) {
   return std::sqrt(squared);
 }
 
-// Why not; empty: it may act. Comparisons are such that what is not a number fails.
+// Returns why the input is refused; empty if it may act. Comparisons are written so that NaN fails.
 std::string refusal(const Spawn& spawn, const RigidWorld& rigid) {
   if (spawn.type >= rigid.shapes.size()) return "a body to spawn needs a type of the scene";
   if (!inside(spawn.position, rigid.world.low, rigid.world.high))
@@ -63,7 +63,7 @@ Result<void> check(const RigidWorld& world) {
 }
 
 MotionLimits motion_limits(const World& world) {
-  // A little less than what may be, which must hold after rounding, too.
+  // A little less than the limit, so that it also holds after rounding.
   return {world.low, world.high, 0.9999F * static_cast<float>(kMaxTurn) / world.dt_s};
 }
 

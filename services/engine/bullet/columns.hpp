@@ -1,5 +1,5 @@
 #pragma once
-// All that a simulation of rigid bodies remembers from one step to the next, but for Bullet's caches.
+// The state of a simulation of rigid bodies between two steps, except Bullet's caches.
 
 #include <array>
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace tandem::engine {
 
-/// Inputs beyond are dropped: no session lets its clients send as many in a step.
+/// Maximum number of inputs in a step, more than a session lets its clients send; others are dropped.
 inline constexpr std::size_t kMaxWaiting = 4096;
 
 /// An input that waits for the next step, in the order of arrival.
@@ -21,7 +21,7 @@ struct WaitingInput {
   enum class Kind : std::uint32_t { kPush, kSpawn, kRemove };
   Kind kind = Kind::kPush;
   std::uint32_t type = 0;  ///< kSpawn
-  Motion motion;           ///< kSpawn; of the others the position is the centre, the velocity the change
+  Motion motion;           ///< kSpawn; for other kinds, position is the centre and velocity the change
   float radius = 0;        ///< kPush, kRemove
 };
 
@@ -56,7 +56,8 @@ struct RigidColumns {
 /// Appends a checkpoint: little-endian machine layout, a fingerprint of the world and a checksum.
 void save_columns(const RigidColumns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out);
 
-/// Reads one back. False, leaving `columns` as it was, when the bytes are damaged or of another world.
+/// Reads a checkpoint. Returns false and leaves `columns` unchanged if the bytes are damaged or of another
+/// world.
 [[nodiscard]] bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint,
                                 RigidColumns& columns);
 

@@ -12,9 +12,9 @@
 
 namespace tandem::engine {
 
-/// A body appears in the lowest free slot; where none is free it is left out. Bytes, little-endian: u8 1, u8
-/// 0, u16 type, then float32 position x, y, z, velocity x, y, z, orientation x, y, z, w, angular velocity x,
-/// y, z; 56 in all.
+/// A body appears in the lowest free slot; without a free slot, nothing happens. Bytes, little-endian: u8 1,
+/// u8 0, u16 type, then float32 position x, y, z, velocity x, y, z, orientation x, y, z, w, angular velocity
+/// x, y, z; 56 in all.
 struct Spawn {
   std::uint16_t type = 0;
   Vec3f position{};

@@ -13,7 +13,7 @@ struct Motion {
   Vec3f angular_velocity{};  ///< rad / s
 };
 
-/// Largest difference of a quaternion's norm from 1.
+/// Maximum difference of a quaternion's norm from 1.
 inline constexpr float kNormSlack = 1e-3F;
 
 [[nodiscard]] bool is_unit(const Quaternion& q);
@@ -26,8 +26,8 @@ struct MotionLimits {
   float turn_per_s = 0;
 };
 
-/// kLost: something is not a number, the orientation is none, or the centre is out of bounds. kClamped: it
-/// turned too fast, and now turns about the same axis at the limit.
+/// kLost: a value is not a number, the orientation is not a rotation, or the centre is out of bounds.
+/// kClamped: the body turned too fast, and now turns about the same axis at the limit.
 [[nodiscard]] Condition mend(Motion& motion, const MotionLimits& limits);
 
 }  // namespace tandem::engine

@@ -10,8 +10,8 @@ namespace {
 // defaults, 0.8 and 1, stop bodies that are just tipping over.
 constexpr btScalar kSleepMPerS = 0.25F;
 constexpr btScalar kSleepRadPerS = 0.5F;
-// Scene units: without it a ball on a plane rolls for ever. Of round bodies only: it takes three more
-// constraints a contact, and most of the time of a heap of boxes.
+// In scene units. Without it, a ball on a plane rolls for ever. Only round bodies have it, as it takes three
+// more constraints a contact, and most of the time of a heap of boxes.
 constexpr btScalar kRollingFriction = 0.005F;
 // Relative to the hull's size; Bullet's default, 4 cm, is as large as a small hull. Hulls grow by it.
 constexpr btScalar kHullMargin = 0.02F;
@@ -46,8 +46,8 @@ std::unique_ptr<btCollisionShape> make_shape(const Shape& shape) {
   return std::make_unique<btSphereShape>(shape.radius);
 }
 
-// The point of a body nearest to `point`, both in the body's frame: of a sphere itself, of all others of the
-// box around them, which is close enough for a push.
+// The point of a body nearest to `point`, both in the body's frame. It is exact for a sphere; for other
+// shapes it is a point of the box around them, which is close enough for a push.
 btVector3 nearest(const Shape& shape, const btCollisionShape& built, const btVector3& point) {
   if (shape.kind == Shape::Kind::kSphere) {
     const btScalar distance = point.length();
@@ -122,7 +122,7 @@ void Physics::add(std::uint32_t slot, std::uint16_t type, const Motion& motion, 
   info.m_linearSleepingThreshold = kSleepMPerS;
   info.m_angularSleepingThreshold = kSleepRadPerS;
   auto body = std::make_unique<btRigidBody>(info);
-  // The predicted step takes a share of the velocity once a frame, Bullet raises what is left to the power of
+  // The predicted step takes a share of the velocity once a frame. Bullet raises the rest to the power of
   // seconds.
   const auto kept =
       1.0 - static_cast<double>(world_->world.damping_per_s) * static_cast<double>(world_->world.dt_s);
@@ -140,7 +140,8 @@ void Physics::add(std::uint32_t slot, std::uint16_t type, const Motion& motion, 
 
 void Physics::remove(std::uint32_t slot) {
   btRigidBody* body = bodies_[slot].get();
-  // Bullet leaves asleep what has lost its support. Sleeping bodies have pairs, but not always contacts.
+  // Bullet does not wake bodies that have lost their support. Sleeping bodies have pairs, but not always
+  // contacts.
   const btBroadphasePairArray& pairs = broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
     auto* a = static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject);
@@ -173,7 +174,7 @@ void Physics::set_angular_velocity(std::uint32_t slot, const Vec3f& angular_velo
   bodies_[slot]->setAngularVelocity(vector(angular_velocity));
 }
 
-// No sub-steps of Bullet's: it would keep a remainder of time.
+// Does not use Bullet's sub-steps, which would keep a remainder of time.
 void Physics::step(float dt_s) { dynamics_.stepSimulation(dt_s, 0); }
 
 Motion Physics::motion(std::uint32_t slot) const {

@@ -29,7 +29,7 @@ class Physics {
   /// slow.
   void add(std::uint32_t slot, std::uint16_t type, const Motion& motion, int activity = ACTIVE_TAG,
            float still_s = 0);
-  /// Wakes what may have rested on it.
+  /// Removes a body, and wakes those that may have rested on it.
   void remove(std::uint32_t slot);
   /// Wakes all bodies.
   void set_gravity(const Vec3& gravity);

@@ -13,8 +13,8 @@ namespace tandem::engine {
 using Quaternion = std::array<float, 4>;
 
 struct RigidWorld {
-  /// All but emitters, regions and materials, of which there must be none or which are not used. Of a type
-  /// its mass; the radius is for the predictors.
+  /// Must have no emitters and no regions; materials are not used. Of a type only the mass is used; its
+  /// radius is for the predictors.
   World world;
   std::vector<Shape> shapes;            ///< by type
   std::vector<Quaternion> orientation;  ///< of the bodies at the start, norm 1; empty: none is turned

@@ -1,6 +1,5 @@
 #pragma once
-// Checkpoints of engines: values and columns one after the other, in the machine's own layout, and a
-// checksum.
+// Checkpoints of engines consist of values and columns in the machine's own layout, and a checksum.
 
 #include <bit>
 #include <cstddef>
@@ -41,7 +40,7 @@ class CheckpointWriter {
   std::vector<std::byte>& out_;
 };
 
-/// Reads what a writer wrote; after the end nothing changes any more, and ok() is false.
+/// Reads what a writer wrote. Beyond the end it changes nothing, and ok() is false.
 class CheckpointReader {
  public:
   explicit CheckpointReader(std::span<const std::byte> in) : in_(in) {}

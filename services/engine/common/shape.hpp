@@ -14,7 +14,7 @@ namespace tandem::engine {
 struct Shape {
   enum class Kind : std::uint8_t { kSphere = 1, kBox = 2, kCapsule = 3, kCylinder = 4, kHull = 5 };
   Kind kind = Kind::kSphere;
-  float radius = 0;  ///< of a sphere; of others unused
+  float radius = 0;  ///< a sphere's; unused by others
   /// Box: half sizes x, y, z. Capsule: radius, half of the length between the centres of its caps, along y.
   /// Cylinder: radius, half of the height along y. Hull: points x, y, z.
   std::vector<float> values;
@@ -24,7 +24,7 @@ struct Shape {
 
 inline constexpr std::size_t kMostHullPoints = 256;
 
-/// The kind called sphere, box, capsule, cylinder or hull. Errors: kInvalidArgument for another name.
+/// The kind with the name sphere, box, capsule, cylinder or hull. Errors: kInvalidArgument for another name.
 [[nodiscard]] Result<Shape::Kind> shape_kind(std::string_view name);
 
 /// Errors: kInvalidArgument with the rule that `shape` breaks. A hull must have an extent along each axis.
@@ -32,7 +32,7 @@ inline constexpr std::size_t kMostHullPoints = 256;
 
 /// The distance from the centre to the farthest point, for a shape that check() accepts.
 [[nodiscard]] double bounding_radius(const Shape& shape);
-/// Half of the least extent along x, y and z: the size that errors are compared with.
+/// Half of the minimum extent along x, y and z: the size that errors are compared with.
 [[nodiscard]] double inner_radius(const Shape& shape);
 
 }  // namespace tandem::engine

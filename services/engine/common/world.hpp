@@ -14,8 +14,8 @@ using Vec3f = std::array<float, 3>;
 /// the unit vector n from this one to the other, relative velocity u (other - this) and its tangential part
 /// u_t,
 ///   force = -spring * o * n + damping * u + shear * u_t.
-/// What settles: with coordination z, about z * (damping + shear) * h / mass < 1 and spring * h^2 / mass <
-/// 0.25 for a step of h seconds; beyond that a deep pile boils for ever.
+/// For a step of h seconds and bodies with z neighbours, a pile settles if about z * (damping + shear) * h /
+/// mass < 1 and spring * h^2 / mass < 0.25. Otherwise a deep pile boils for ever.
 struct Material {
   float spring = 200;    ///< mass units / s^2, >= 0
   float damping = 1.5F;  ///< mass units / s, >= 0
@@ -54,8 +54,8 @@ struct StartBody {
   std::uint16_t type = 0;
 };
 
-/// Brings new bodies into free slots, lowest slot first, at random points of an axis-parallel box. Where no
-/// slot is free, the body is left out.
+/// Puts new bodies into free slots, lowest slot first, at random points of an axis-parallel box. Without a
+/// free slot, the body is left out.
 struct Emitter {
   Vec3f low{}, high{};
   Vec3f velocity{};
@@ -76,8 +76,8 @@ struct World {
   std::uint32_t capacity = 0;  ///< slots, 1 .. 2^20
   std::uint64_t seed = 0;      ///< for emitters
   float dt_s = 1.0F / 30.0F;
-  /// Contact sub-steps a step. Gravity and damping act once a step whatever their number, so that a body in
-  /// free flight moves as the predicted step says.
+  /// Contact sub-steps per step. Gravity and damping act once per step, so that a body in free flight moves
+  /// as the predicted step says.
   std::uint32_t substeps = 1;
   Vec3f gravity{0, -9.81F, 0};
   float damping_per_s = 0;                           ///< share of the velocity lost, >= 0, times dt_s < 1

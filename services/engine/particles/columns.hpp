@@ -1,5 +1,5 @@
 #pragma once
-// All that a particle simulation remembers from one step to the next.
+// The state of a particle simulation between two steps.
 
 #include <array>
 #include <cstddef>
@@ -19,7 +19,7 @@ struct Push {
   Vec3f velocity{};
 };
 
-/// Pushes beyond are dropped: no session lets its clients send as many in a step.
+/// Maximum number of pushes in a step, more than a session lets its clients send; others are dropped.
 inline constexpr std::size_t kMaxPushes = 4096;
 
 struct Columns {
@@ -35,16 +35,17 @@ struct Columns {
   std::vector<Contact> contact;  ///< the force accumulator of the thesis: acts in the next step
 
   std::uint64_t frame = 0;
-  std::uint64_t spawned = 0;  ///< bodies that emitters have let go or left out, counts their random numbers
+  std::uint64_t spawned = 0;  ///< bodies that emitters made or left out; counts their random numbers
   Vec3 gravity{};
-  std::vector<double> due;  ///< of each emitter: the share of a body that waits for the next step
+  std::vector<double> due;  ///< by emitter: the share of a body that waits for the next step
   std::vector<Push> pushes;
 };
 
 /// Appends a checkpoint: little-endian machine layout, a fingerprint of the world and a checksum.
 void save_columns(const Columns& columns, std::uint64_t world_fingerprint, std::vector<std::byte>& out);
 
-/// Reads one back. False, leaving `columns` as it was, when the bytes are damaged or of another world.
+/// Reads a checkpoint. Returns false and leaves `columns` unchanged if the bytes are damaged or of another
+/// world.
 [[nodiscard]] bool load_columns(std::span<const std::byte> bytes, std::uint64_t world_fingerprint,
                                 Columns& columns);
 

@@ -52,7 +52,7 @@ Touch touch(const Box& box, Float3 p, float radius) {
   const auto to_scene = [&box](const std::array<float, 3>& v) {
     return v[0] * to_float3(box.axes[0]) + v[1] * to_float3(box.axes[1]) + v[2] * to_float3(box.axes[2]);
   };
-  if (inside) {  // out through the nearest face, the first of equals
+  if (inside) {  // pushed out through the nearest face, the first of equally near ones
     std::size_t nearest = 0;
     std::array<float, 3> depth{};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -79,7 +79,7 @@ void add_touches(const Shapes& shapes, const Material& material, const Record& b
   }
 }
 
-// The partners of one body among a range of records, at most all of the grid's neighbourhood.
+// The bodies of a range of records that may touch one body.
 class Partners {
  public:
   // Collects the bodies of [from, to) around `self` that may touch it. No branch in the loop to mispredict.
@@ -103,11 +103,11 @@ class Partners {
   std::uint32_t count_ = 0;
 };
 
-// Force of `other` on `self`, which lies before it; the other one's is its negative, to the bit.
+// The force of `other` on `self`, which lies before it. The force on `other` is exactly the negative.
 inline Float3 pair_force(const Material& material, const Record& self, const Record& other) {
   const Float3 d = position(other) - position(self);
   const float distance = std::sqrt(dot(d, d));
-  // Two bodies in one point part along y, the earlier one downwards.
+  // Two bodies at the same point separate along y, the earlier one downwards.
   const Float3 n = distance > 0 ? (1.0F / distance) * d : Float3{0, 1, 0};
   const float overlap = self.radius + other.radius - distance;
   return penalty(material, overlap, n, velocity(other) - velocity(self));
@@ -137,7 +137,7 @@ void sum_contacts(const World& world, const Grid& grid, std::uint32_t begin, std
     if (cell != around_cell) around = grid.neighbourhood(cell, later_only);
     around_cell = cell;
   };
-  // Partners before the range first: they have the lowest places.
+  // Partners before the range come first, because they have the lowest places.
   for (std::uint32_t i = begin; begin > 0 && i < std::min(end, last); ++i) {
     look_around(records[i], false);
     partners.collect(records, around, records[i], 0, begin);

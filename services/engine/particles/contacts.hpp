@@ -17,8 +17,8 @@ struct Contact {
 
 /// Forces on the sorted records [begin, end), into `sums` by their place there. A pair within the range is
 /// computed once, a pair across its border by both sides; either way a body's forces are added in the order
-/// scene, then partners by ascending place, so that how records are cut into ranges changes no bit. Touches
-/// only its own range of `sums`.
+/// scene, then partners by ascending place, so the division into ranges changes no bit. Writes only to its
+/// own range of `sums`.
 void sum_contacts(const World& world, const Grid& grid, std::uint32_t begin, std::uint32_t end,
                   std::span<Contact> sums);
 

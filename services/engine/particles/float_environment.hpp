@@ -1,5 +1,5 @@
 #pragma once
-// Floating point as the engine needs it.
+// Sets up floating point as the engine needs it.
 
 #include <cfenv>
 

@@ -25,9 +25,9 @@ struct Run {
   std::uint32_t begin = 0, end = 0;
 };
 
-/// Maximum number of bodies of a cell that take part in contacts; it bounds a step when everything is in one
-/// place. The other bodies of the cell meet no body. Equal spheres that are squeezed to half their diameter
-/// are 16 in a cell.
+/// Maximum number of bodies of a cell that take part in contacts, which bounds a step if all bodies are in
+/// one place. The other bodies of the cell meet no body. A cell holds 16 equal spheres that are squeezed to
+/// half their diameter.
 inline constexpr std::uint32_t kMaxInCell = 128;
 inline constexpr std::uint32_t kMaxNeighbours = 27 * kMaxInCell;
 
@@ -47,7 +47,7 @@ class Grid {
 
   /// Sorts `unsorted` by cell, and within a cell by its order there. Call before the queries.
   void sort(std::span<const Record> unsorted);
-  /// First the bodies in cells, then those that found theirs full.
+  /// The bodies in cells come first, then those whose cell was full.
   [[nodiscard]] std::span<const Record> sorted() const { return {sorted_.data(), size_}; }
   [[nodiscard]] std::uint32_t in_cells() const { return first_.back(); }
   /// Cell of a point within the bounds.

@@ -15,7 +15,7 @@
 namespace tandem::engine {
 namespace {
 
-// Bodies; smaller blocks cost more to hand out than they even out.
+// Number of bodies; smaller blocks cost more to hand out than they gain.
 constexpr std::uint32_t kIntegrationBlock = 4096;
 constexpr float kCellSlack = 1.001F;  // rounding must not put touching bodies two cells apart
 

@@ -1,5 +1,5 @@
 #pragma once
-// The inputs of all viewers as those of one client.
+// Merges the inputs of all viewers into those of one client.
 
 #include <cstdint>
 #include <map>
@@ -15,15 +15,15 @@ namespace tandem::gateway {
 
 using ViewerId = std::uint64_t;
 
-/// Gravities are coalesced: the last one wins, and those before it share its fate. Everything else goes as it
-/// is, at a rate that all viewers share. Together they stay below what a server takes of one client. Not
+/// Coalesces gravities: the last one is sent, and its outcome counts for those before it. Other inputs are
+/// sent unchanged, at a rate that all viewers share. The sum stays below a server's limit for one client. Not
 /// thread-safe.
 class InputMerger {
  public:
   static constexpr double kGravitiesPerSecond = 20;
-  static constexpr double kOthersPerSecond = 30;  ///< and as many at once
+  static constexpr double kOthersPerSecond = 30;  ///< also the maximum burst
 
-  /// Which input of which viewer.
+  /// Identifies an input of a viewer.
   struct Claim {
     ViewerId viewer = 0;
     std::uint64_t number = 0;

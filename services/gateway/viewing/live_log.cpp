@@ -15,7 +15,7 @@ void LiveLog::push(OutgoingPtr message, std::int64_t now_ns) {
   }
 }
 
-// Places go on, so that none of before is one of now.
+// Places continue, so that an old place is never valid again.
 void LiveLog::clear() {
   begin_ = end();
   entries_.clear();

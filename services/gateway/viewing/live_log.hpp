@@ -1,5 +1,5 @@
 #pragma once
-// The deltas and scheduled inputs of the last seconds, once for all viewers.
+// Holds the deltas and scheduled inputs of the last seconds, once for all viewers.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,9 +10,8 @@
 
 namespace tandem::gateway {
 
-/// The queue of every viewer is a place in this log: what lies behind it is still to be sent. So a viewer
-/// costs no memory by being slow, and what is queued is held once. Bounded in bytes and in time. Not
-/// thread-safe.
+/// The queue of every viewer is a place in this log; the messages behind it are still to be sent. So a slow
+/// viewer costs no memory, and each message is held once. Bounded in bytes and in time. Not thread-safe.
 class LiveLog {
  public:
   using Place = std::uint64_t;  ///< counts messages since the start; never goes back
@@ -20,7 +19,7 @@ class LiveLog {
 
   explicit LiveLog(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// Appends, and drops the oldest messages beyond the bounds; never the newest.
+  /// Appends, and drops the oldest messages beyond the bounds, but never the newest.
   void push(OutgoingPtr message, std::int64_t now_ns);
   void clear();
 

@@ -21,7 +21,7 @@ class Outgoing {
   }
   [[nodiscard]] std::size_t size() const { return buffer_.size() - kHeadroom; }
   [[nodiscard]] std::span<const std::byte> envelope() const { return std::span(buffer_).subspan(kHeadroom); }
-  /// For the one thread that sends: it may write into the kHeadroom bytes before. A server's frames are
+  /// For the one thread that sends, which may write into the kHeadroom bytes before it. A server's frames are
   /// framed alike for every viewer.
   [[nodiscard]] std::byte* to_send() { return buffer_.data() + kHeadroom; }
 

@@ -13,7 +13,7 @@
 
 namespace tandem::gateway {
 
-/// Made once, shared by all viewers that join together.
+/// A snapshot in parts, which all viewers that join together share.
 struct SnapshotParts {
   /// Minimum size of a part; parts are larger if there would be more than kMostParts.
   static constexpr std::size_t kLeastPartBytes = 1'300;
@@ -44,7 +44,7 @@ class SnapshotPassage {
   /// When a part arrived last, or it began.
   [[nodiscard]] std::int64_t progress_ns() const { return progress_ns_; }
   [[nodiscard]] bool has_next() const;
-  /// The next message, of those that have one.
+  /// The next message; call it only if there is one.
   [[nodiscard]] OutgoingPtr next(std::int64_t now_ns);
   /// Notes what a joining viewer says it holds. Untrusted.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);

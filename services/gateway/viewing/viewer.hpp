@@ -16,9 +16,9 @@
 
 namespace tandem::gateway {
 
-// Per viewer; the bursts are as large.
+// Limits per viewer, which are also the maximum bursts.
 inline constexpr double kMessagesPerSecond = 200;   ///< a viewer that joins acknowledges 50 times a second
-inline constexpr double kOtherInputsPerSecond = 5;  ///< of its inputs, those that are not gravity
+inline constexpr double kOtherInputsPerSecond = 5;  ///< inputs other than gravity
 
 struct Viewer {
   enum class Flow : std::uint8_t {
@@ -28,14 +28,14 @@ struct Viewer {
   };
 
   ViewerId id = 0;
-  transport::ClientId client = 0;       ///< 0: nothing came yet
-  std::uint64_t told_announcement = 0;  ///< number of the newest it was sent
+  transport::ClientId client = 0;       ///< 0: nothing was received yet
+  std::uint64_t told_announcement = 0;  ///< number of the newest announcement it was sent
   std::uint64_t told_status = 0;
   accounts::TokenBucket messages{kMessagesPerSecond, kMessagesPerSecond};
   accounts::TokenBucket inputs = accounts::kInputs;
   accounts::TokenBucket other_inputs{kOtherInputsPerSecond, kOtherInputsPerSecond};
   accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;
-  /// Since when something waits to be sent and nothing was taken.
+  /// The time since which messages have waited without one being taken.
   std::optional<std::int64_t> waiting_since_ns;
 
   /// The data of one epoch; a new epoch starts with a new object.
@@ -52,7 +52,7 @@ struct Viewer {
     SnapshotPassage passage;
 
     std::uint64_t highest = 0;             ///< input number taken, whatever the outcome
-    std::vector<std::uint64_t> undecided;  ///< of these, no outcome yet; ascending
+    std::vector<std::uint64_t> undecided;  ///< inputs without an outcome yet; ascending
     accounts::Outcomes outcomes;
     accounts::ReplySchedule reply;
     transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only

@@ -14,14 +14,14 @@ class World {
  public:
   virtual ~World() = default;
 
-  /// It holds an agreed state and follows it.
+  /// True if it holds an agreed state and follows the session.
   [[nodiscard]] virtual bool playing() const = 0;
   /// The role that the server granted; an observer's inputs are refused.
   [[nodiscard]] virtual transport::Role role() const = 0;
-  /// The wall clock of the server's host at `now_ns`; nothing while it is not known.
+  /// The wall clock of the server's host at `now_ns`; empty while it is unknown.
   [[nodiscard]] virtual std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const = 0;
 
-  /// The agreed state as a snapshot; nothing unless playing.
+  /// The agreed state as a snapshot; empty unless playing.
   struct Cut {
     StreamId stream;
     Frame frame = 0;

@@ -55,8 +55,9 @@ void Claim::note(const Other& other, Notices& notices, std::int64_t now_ns) {
   if (noted_.size() >= kMostNoted) noted_.erase(noted_.begin());
   noted_.push_back(other.from);
   notices.add(
-      fmt::format("another participant announces this session, too: epoch {}, participant {}; staying",
-                  other.message.epoch, participant_name(other.from)),
+      fmt::format(
+          "another server announces this session, too (epoch {}, participant {}), but this one keeps it",
+          other.message.epoch, participant_name(other.from)),
       now_ns);
 }
 

@@ -43,12 +43,15 @@ std::string Overrun::frame_took(std::int64_t step_ns, std::int64_t frame_ns, std
   const bool slow = frame_ms > period_ms;
   if (slow ? now_ns - told_ns_ < kTellNs : !told_) return {};
   told_ = slow;
-  if (!slow) return fmt::format("a frame takes {:.3g} ms of {:.3g} ms again", frame_ms, period_ms);
+  if (!slow) {
+    return fmt::format("the session keeps its rate again: a frame takes {:.3g} of {:.3g} ms", frame_ms,
+                       period_ms);
+  }
   told_ns_ = now_ns;
   return fmt::format(
-      "a frame takes {:.3g} ms of {:.3g} ms, the simulation {:.3g} ms of them: the session runs at {:.3g} of "
-      "{:.3g} frames/s",
-      frame_ms, period_ms, step_ms, 1e3 / frame_ms, rate_hz_);
+      "the session runs at {:.3g} instead of {:.3g} frames/s: a frame takes {:.3g} ms, {:.3g} ms of them in "
+      "the simulation, but must take at most {:.3g} ms",
+      1e3 / frame_ms, rate_hz_, frame_ms, step_ms, period_ms);
 }
 
 }  // namespace tandem::host

@@ -191,7 +191,7 @@ void Roster::charge(std::int64_t duration_ns, const Now& now) {
     account.kept_up = false;
     account.reply.schedule.on_change();
     ++demotions_;
-    note(account, "held the others up for too long: observer until it keeps up for 10 s", now.ns);
+    note(account, "delayed the others for too long; it is an observer until it has kept up for 10 s", now.ns);
   }
 }
 
@@ -230,7 +230,7 @@ void Roster::refresh(const Now& now) {
       if (account.kept_up && abreast && now.ns - account.kept_up_since_ns >= kReturnNs) {
         account.demoted = false;
         account.reply.schedule.on_change();
-        note(account, "kept up for 10 s: participant again", now.ns);
+        note(account, "has kept up for 10 s and is a participant again", now.ns);
       }
     }
     if (abreast && account.role() == Role::kParticipant) account.counted = true;

@@ -222,9 +222,9 @@ void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lin
   noted_mishaps_ns_ = now_ns;
   noted_mishaps_ = now;
   const std::string& last = mirror_.last_removed();
-  const std::string told = last.empty() ? last : "; the last that clients cannot be told of: " + last;
+  const std::string told = last.empty() ? last : "; the last one that could not be sent: " + last;
   lines.push_back(
-      fmt::format("bodies of the simulation are not sound: {} removed and {} slowed down since its start{}",
+      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}",
                   now.removed, now.clamped, told));
 }
 
@@ -239,7 +239,7 @@ void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
         fmt::format("the target of {} Mbit/s{} is kept again", of.quality->target_mbit_per_s, which));
     return;
   }
-  lines.push_back(fmt::format("the target of {} Mbit/s{} is exceeded even at the largest threshold, {:.3g} m",
+  lines.push_back(fmt::format("the target of {} Mbit/s{} is exceeded even at the maximum threshold, {:.3g} m",
                               of.quality->target_mbit_per_s, which,
                               of.quality->largest_threshold * of.lattice.unit));
 }

@@ -113,7 +113,7 @@ void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
   constexpr std::string_view kAxes = "xyz";
   std::string why;
   if (bodies.type[slot] >= type_count_) {
-    why = fmt::format("its type is {}, and the session has {}", bodies.type[slot], type_count_);
+    why = fmt::format("its type is {}, but the session has only {} types", bodies.type[slot], type_count_);
   } else if (target_.groups().orientation) {
     double norm = 0;
     for (const auto& column : bodies.orientation) norm += double{column[slot]} * double{column[slot]};

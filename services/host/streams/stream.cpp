@@ -22,14 +22,15 @@ Result<void> check(const StreamConfig& config, const StreamStart& start) {
   };
   if (config.quality) {
     if (!(config.quality->target_mbit_per_s >= 0))
-      return refuse(
-          fmt::format("a target of {} Mbit/s: it is 0 (none) or more", config.quality->target_mbit_per_s));
+      return refuse(fmt::format("the target must be 0 (none) or more, not {} Mbit/s",
+                                config.quality->target_mbit_per_s));
     if (!valid_goal(*config.quality, config.layout.parameters.codec))
-      return refuse("automatic quality: the threshold must lie between its smallest and its largest");
+      return refuse("automatic quality: the threshold must lie between its minimum and its maximum");
     const std::size_t least = least_budget(*config.quality, start.frame_rate_hz);
     if (config.budget < least) {
       return refuse(fmt::format(
-          "a budget of {} bytes a frame is too tight for a target of {} Mbit/s, which needs at least {} bytes",
+          "a budget of {} bytes per frame is too small for a target of {} Mbit/s, which needs at least {} "
+          "bytes",
           config.budget, config.quality->target_mbit_per_s, least));
     }
   }
@@ -154,10 +155,11 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
                       kMostCharacters, name));
     }
     if (std::ranges::find(kPreferences, name) != kPreferences.end()) {
-      return refuse(fmt::format("a stream cannot be called '{}': to a client that is a preference", name));
+      return refuse(
+          fmt::format("a stream cannot be called '{}', which clients use as the name of a preference", name));
     }
     if (std::ranges::find(streams.begin(), stream, name, &StreamConfig::name) != stream)
-      return refuse(fmt::format("two streams are called '{}': give each a name of its own", name));
+      return refuse(fmt::format("two streams are called '{}': every stream needs a name of its own", name));
   }
   return {};
 }
@@ -177,7 +179,8 @@ Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::
   for (const StreamConfig& stream : streams) {
     if (stream.lattice != first.lattice || stream.layout.capacity != first.layout.capacity ||
         stream.layout.type_count != first.layout.type_count)
-      return fail(ErrorCode::kInvalidArgument, "streams of another lattice, capacity or number of types");
+      return fail(ErrorCode::kInvalidArgument,
+                  "all streams of a session need the same lattice, capacity and number of types");
     groups.orientation |= groups_of(stream.layout).orientation;
   }
   if (groups.orientation && bodies.orientation[0].empty()) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr Epoch kEpoch = 1;
 
-/// The largest of many lengths, and their root mean square.
+/// The maximum and the root mean square of many lengths.
 class Lengths {
  public:
   void add_squared(double squared) {
@@ -26,7 +26,7 @@ class Lengths {
     ++count_;
   }
   [[nodiscard]] double max() const { return std::sqrt(max_squared_); }
-  /// 0 of none.
+  /// 0 without any length.
   [[nodiscard]] double rms() const {
     return count_ == 0 ? 0 : std::sqrt(sum_squared_ / static_cast<double>(count_));
   }
@@ -122,7 +122,7 @@ class Snaps {
   Lengths snaps_;
 };
 
-/// The books of adaptive codecs: what their decisions took, and what they would have taken at best.
+/// Counts the bits of adaptive codecs' decisions, and the minimum that they could have taken.
 class CodeAccount final : public EncodeObserver {
  public:
   void decided(std::span<const std::uint16_t> p1,
@@ -160,7 +160,7 @@ class CodeAccount final : public EncodeObserver {
   std::vector<std::array<std::uint64_t, 2>> decisions_;
 };
 
-/// A stream with a client of its own, and what they were seen to do.
+/// A stream with a client of its own, and their measurements.
 struct Lane {
   Lane(host::Mirror bodies, host::Stream server_side, ClientTimeline client_side)
       : mirror(std::move(bodies)), stream(std::move(server_side)), client(std::move(client_side)) {}
@@ -227,7 +227,7 @@ Result<void> advance(Lane& lane, const Replay& replay) {
 }
 
 /// The size of the snapshot that a joiner would get after the last frame. It is cut one frame later, which is
-/// rounded for it and in which bodies move on.
+/// rounded for it; in that frame, bodies move on.
 std::size_t snapshot_bytes(host::Mirror& mirror, host::Stream& stream, const engine::Bodies& last) {
   std::array<std::vector<float>, 3> position;
   engine::Bodies bodies = last;
@@ -271,7 +271,7 @@ BandwidthRow row_of(Lane& lane, double frames, const engine::Bodies& bodies) {
   return row;
 }
 
-/// A peer at work.
+/// A peer and its measurements.
 struct PeerLane {
   const PeerKind* kind = nullptr;
   std::unique_ptr<Peer> peer;
@@ -286,7 +286,7 @@ Result<std::size_t> send(PeerLane& lane, const engine::Bodies& bodies) {
   return size;
 }
 
-/// The start state is free, as a session's snapshot is.
+/// The start state costs no bytes, as a session's snapshot is not counted either.
 Result<std::vector<PeerLane>> make_peers(const PeerSetting& setting, const engine::Bodies& start) {
   std::vector<PeerLane> lanes;
   for (const PeerKind& kind : peer_kinds()) {

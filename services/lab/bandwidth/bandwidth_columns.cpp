@@ -19,8 +19,8 @@ using Row = BandwidthRow;
 enum class Rows : std::uint8_t {
   kNone,  // the column is not in this output
   kAll,
-  kMeasured,  // not those of peers that are not in this build
-  kOurs,      // not those of peers
+  kMeasured,  // all but peers that this build lacks
+  kOurs,      // all but peers
   kSteered,   // ours with gains
 };
 using enum Rows;
@@ -93,7 +93,7 @@ constexpr Column kColumns[] = {
     {"rms_error", field<&Row::rms_error>, kMeasured, kMeasured, kMeasured, "rms err", 9, 5},
     {"max_surface_error", optional_field<&Row::max_surface_error>, kOurs, kOurs},
     {"rms_surface_error", optional_field<&Row::rms_surface_error>, kOurs, kOurs},
-    // People compare it with the errors.
+    // The table has the threshold so that people can compare it with the errors.
     {"threshold", field<&Row::threshold>, kNone, kNone, kMeasured, "threshold", 9, 5},
     {"max_surface_error", optional_field<&Row::max_surface_error>, kNone, kNone, kOurs, "max surf", 9, 5},
     {"rms_surface_error", optional_field<&Row::rms_surface_error>, kNone, kNone, kOurs, "rms surf", 9, 5},
@@ -116,7 +116,7 @@ Json value_of(const Column& column, Rows rows, const Row& row) {
   return is_among(row, rows) ? column.value(row) : Json(nullptr);
 }
 
-/// `digits` behind the point of what is no whole number, or as many as it takes.
+/// Fractions have `digits` digits behind the point, or as many as needed.
 std::string text_of(const Json& value, std::optional<int> digits) {
   if (value.is_text()) return value.text();
   if (!value.is_real()) return value.dump();

@@ -10,7 +10,7 @@ namespace tandem::lab {
 
 /// {"rows": [...]}, one line.
 [[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows);
-/// A line of names, then a line for each row; what a row does not have is empty.
+/// A line of names, then a line for each row, in which missing values are empty.
 [[nodiscard]] std::string to_csv(std::span<const BandwidthRow> rows);
 /// A table for people, with the thesis's numbers next to the measured ones.
 [[nodiscard]] std::string to_table(std::span<const BandwidthRow> rows);

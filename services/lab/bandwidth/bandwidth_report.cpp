@@ -21,7 +21,8 @@ namespace {
 
 using Rows = std::span<const BandwidthRow>;
 
-// Frames that one point of a figure averages; fewer show the noise of single frames, more hide the impacts.
+// Frames that one point of a figure averages. With fewer, single frames show as noise; with more, impacts
+// vanish.
 constexpr std::size_t kFramesAPoint = 10;
 
 Result<void> write_file(const std::string& path, std::string_view text) {
@@ -30,7 +31,7 @@ Result<void> write_file(const std::string& path, std::string_view text) {
   });
 }
 
-/// A trajectory's name is a path.
+/// Makes a file name of a row's name, because a trajectory's name is a path.
 std::string file_name(const BandwidthRow& row) {
   return fmt::format("{}-{}", std::filesystem::path(row.scene).stem().string(), row.bodies);
 }
@@ -61,7 +62,7 @@ bool drawn(const BandwidthRow& row) {
   return row.missing.empty() && !row.predictor.empty() && row.traits.reads_threshold;
 }
 
-/// Holds its data, so that a figure can be drawn again with other settings.
+/// The script holds its data, so that a figure can be drawn again with other settings.
 std::string gnuplot_script(Rows rows, const std::string& svg) {
   std::string script, curves;
   std::size_t curve = 0;
@@ -109,7 +110,7 @@ Result<void> run_gnuplot(const std::string& script) {
   return {};
 }
 
-/// gnuplot does not tell of a full disk: what it wrote must be whole.
+/// gnuplot does not report a full disk, so this checks that its file is whole.
 Result<void> keep_figure(const std::string& part, const std::string& svg) {
   std::ifstream in(part, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};

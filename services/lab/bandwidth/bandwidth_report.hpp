@@ -1,5 +1,5 @@
 #pragma once
-// `tandem bench bandwidth --report`: the rows and their course over time as files (figures 5.1 to 5.3).
+// `tandem bench bandwidth --report`: writes the rows, and how rates change over time (figures 5.1 to 5.3).
 
 #include <span>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace tandem::lab {
 
-/// Writes into `directory`, which is made where it is missing: rows.csv; for each scene and size
+/// Writes into `directory`, which is made if it is missing: rows.csv; for each scene and size
 /// NAME-BODIES.csv (each frame's bodies in contact, and Mbit/s of every codec), .gnuplot and .svg; last
 /// report.json. Files appear complete or not at all, and a report.json of an earlier run goes first, so that
 /// with a report.json the report is whole. `rows` of one scene and size follow each other. Errors: kIo,

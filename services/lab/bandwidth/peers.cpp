@@ -40,7 +40,7 @@ double off_squared(const Columns& seen, const engine::Bodies& bodies, std::size_
 }
 
 /// Dead reckoning (IEEE 1278.1): both sides extrapolate; a body that is off by more than the threshold is
-/// corrected. 24 bytes a correction, whatever it holds and without naming the body.
+/// corrected. A correction counts 24 bytes, whatever it holds; the body's name is not counted.
 class DeadReckoning : public Peer {
  public:
   DeadReckoning(const PeerSetting& setting, bool second_order)
@@ -102,7 +102,7 @@ std::unique_ptr<Peer> make_second_order(const PeerSetting& setting) {
 
 #ifdef TANDEM_HAVE_ZSTD
 /// Positions on the coarsest lattice that keeps to the threshold; the change of each since the last frame,
-/// as two's complement in four planes of bytes, which zstd likes better than whole numbers.
+/// as two's complement in four planes of bytes, which zstd compresses better than whole numbers.
 class Zstd : public Peer {
  public:
   explicit Zstd(const PeerSetting& setting)
@@ -147,7 +147,7 @@ constexpr std::unique_ptr<Peer> (*make_zstd)(const PeerSetting&) = nullptr;
 #endif
 
 #ifdef TANDEM_HAVE_ZFP
-/// The change since what the receiver holds, an array an axis, in zfp's fixed-accuracy mode. zfp stays far
+/// The change since what the receiver holds, one array per axis, in zfp's fixed-accuracy mode. zfp stays far
 /// below a tolerance, so it gets the largest that keeps the frame within the threshold.
 class Zfp : public Peer {
  public:
@@ -216,7 +216,7 @@ constexpr std::unique_ptr<Peer> (*make_zfp)(const PeerSetting&) = nullptr;
 #endif
 
 #ifdef TANDEM_HAVE_DRACO
-/// A point cloud a frame, in the order of the bodies (which bodies they are must survive), on the coarsest
+/// One point cloud per frame, in the order of the bodies so that they keep their identity, on the coarsest
 /// lattice that keeps to the threshold; Draco has no memory of earlier frames.
 class Draco : public Peer {
  public:
@@ -248,7 +248,7 @@ class Draco : public Peer {
  private:
   Result<std::size_t> pack(const draco::PointCloud& cloud, int id, const std::array<float, 3>& low,
                            double range, Columns& seen) {
-    // Draco divides a range into 2^bits - 1 steps: a larger range makes the step exactly the largest allowed.
+    // Draco divides a range into 2^bits - 1 steps: a larger range makes the step exactly the allowed maximum.
     const double step = 2 * setting_.threshold / std::sqrt(3.0);
     const int bits = std::max(1, static_cast<int>(std::ceil(std::log2(range / step + 1))));
     const double widened = step * (std::exp2(bits) - 1);

@@ -1,6 +1,6 @@
 #pragma once
-// What other methods would send for the same frames at the same maximum error: general compressors, and dead
-// reckoning as in DIS.
+// Computes what other methods would send for the same frames with the same maximum error: general
+// compressors, and dead reckoning as in DIS.
 
 #include <array>
 #include <cstddef>
@@ -18,24 +18,24 @@ namespace tandem::lab {
 /// The properties of a run that all peers need.
 struct PeerSetting {
   std::uint32_t bodies = 0;
-  double threshold = 0;  ///< scene units: the largest Euclidean error of a position
+  double threshold = 0;  ///< scene units: the maximum Euclidean error of a position
   double dt_s = 0;
 };
 
-/// Sends positions frame by frame. What it does not send at all (velocities, spawns) is in its favour.
+/// Sends positions frame by frame. It sends no velocities and no spawns, which is in its favour.
 class Peer {
  public:
   virtual ~Peer() = default;
-  /// The bytes for the bodies of the next frame; `seen` (three columns, one value a body) becomes what a
+  /// The bytes for the bodies of the next frame; `seen` (three columns, one value per body) becomes what a
   /// receiver shows. Errors: kUnsupported when a library fails.
   [[nodiscard]] virtual Result<std::size_t> send(const engine::Bodies& bodies,
                                                  std::array<std::vector<double>, 3>& seen) = 0;
 };
 
-/// One way to send; `make` is null when the library was not there at build time.
+/// One method; `make` is null if its library was missing at build time.
 struct PeerKind {
   std::string_view name;
-  std::string_view missing;  ///< the Debian package that would bring it
+  std::string_view missing;  ///< the Debian package of the missing library
   std::unique_ptr<Peer> (*make)(const PeerSetting& setting);
 };
 

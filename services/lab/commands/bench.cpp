@@ -44,7 +44,8 @@ std::vector<std::string> predictor_choices() {
 }
 
 void add_scene_option(commandline::Command command, std::vector<std::string>& scenes) {
-  command.add_option("--scene", scenes, "Scenes by name or file, separated by commas; all: the paper's five")
+  command
+      .add_option("--scene", scenes, "Scenes by name or file, separated by commas; all for the thesis's five")
       .separated_by(',')
       .required();
 }
@@ -58,25 +59,27 @@ void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>&
 
 commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
                                     const std::string& help) {
-  // The parser reads -1 as 2^64 - 1, and what is too large as that.
+  // The parser would read -1 and numbers that are too large as 2^64 - 1.
   return command.add_option("--seed", seed, help)
       .check([](const std::string& text) {
         std::uint64_t value = 0;
         const char* const end = text.data() + text.size();
         const auto read = std::from_chars(text.data(), end, value);
-        return read.ec == std::errc() && read.ptr == end ? "" : "a whole number below 2^64";
+        return read.ec == std::errc() && read.ptr == end ? "" : "must be a whole number below 2^64";
       })
       .show_default();
 }
 
 commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice) {
-  return command.add_option("--threshold-scale", choice.threshold_scale, "Error threshold, times the scene's")
+  return command
+      .add_option("--threshold-scale", choice.threshold_scale, "Factor for the scene's error threshold")
       .range(kLeastScale, kMostScale);
 }
 
 void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice) {
   const commandline::Option scale = add_threshold_scale(command, choice);
-  command.add_option("--threshold", choice.threshold_m, "Error threshold, scene units (default: the scene's)")
+  command
+      .add_option("--threshold", choice.threshold_m, "Error threshold in scene units (default: the scene's)")
       .range(planning::kLeastLength, planning::kMostLength)
       .excludes(scale);
 }
@@ -86,7 +89,7 @@ void add_threshold_options(commandline::Command command, sessions::SessionChoice
 void tandem::tool::add_bench(commandline::Command app, Run& run) {
   using namespace tandem::lab;
   commandline::Command bench = app.add_subcommand(
-      "bench", "Measures: bandwidth, update rates, training of codecs, memory, the engine, clients.");
+      "bench", "Measures bandwidth, update rates, memory, the engine and clients, and trains codecs.");
   bench.require_subcommand();
   add_bandwidth(bench, run);
   add_train(bench, run);

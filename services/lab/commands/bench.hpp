@@ -23,8 +23,8 @@ void add_client(commandline::Command bench, Run& run);
 void add_framerate(commandline::Command bench, Run& run);
 void add_smoothing(commandline::Command bench, Run& run);
 
-/// Prints the error to stderr; the exit code: 2 when the caller named something that does not exist or is out
-/// of range, else 1.
+/// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is
+/// out of range, else 1.
 int report(const std::string& command, const Error& error);
 
 /// The scenes of the thesis, in the order of their numbers.
@@ -33,7 +33,7 @@ int report(const std::string& command, const Error& error);
 /// load_scene().
 [[nodiscard]] Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names);
 
-inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of one run
+inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of a run
 
 /// The values of --predictor where it may be chosen automatically.
 [[nodiscard]] std::vector<std::string> predictor_choices();

@@ -43,7 +43,7 @@ struct Job {
   std::uint32_t bodies;
 };
 
-/// All codecs over one source; the rows lack only what the scene does not know.
+/// Measures all codecs over one source. The caller adds to the rows what only the scene knows.
 Result<std::vector<BandwidthRow>> measure(const scenes::Scene& scene, Source& source,
                                           const BandwidthOptions& options, std::uint64_t frames,
                                           const std::function<void(Frame)>& progress) {
@@ -86,7 +86,7 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   if (!source) return tl::unexpected(source.error());
   auto rows = measure(scene, *source, options, options.frames, progress);
   if (!rows) return rows;
-  // With another number of users it is not the scene of the thesis's table.
+  // With another number of users, the scene differs from that of the thesis's table.
   const bool as_in_paper = scene.number != 0 && (run.users == 0 || run.users == scene.users);
   for (BandwidthRow& row : *rows) {
     if (as_in_paper) row.number = static_cast<int>(scene.number);
@@ -96,7 +96,7 @@ Result<std::vector<BandwidthRow>> measure_scene(const scenes::Scene& scene, cons
   return rows;
 }
 
-/// What a session needs to know about a trajectory, in the form of a scene. Errors: kMalformed if the file
+/// Describes a trajectory as a scene, from which a session can be planned. Errors: kMalformed if the file
 /// that it names is not a scene.
 Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::string& path) {
   scenes::Scene scene;
@@ -124,7 +124,7 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   }
   scene.extent_m = std::max(scene.extent_m, named->extent_m);
   scene.world = std::move(named->world);
-  // A recording does not say which body is of which of the scene's types.
+  // A recording does not say which of the scene's types a body has.
   scene.world.types.resize(1);
   if (shapes.empty()) return scene;
   const engine::ParticleType first = scene.world.types.front();
@@ -134,14 +134,14 @@ Result<scenes::Scene> scene_of(const RecordedTrajectory& trajectory, const std::
   return scene;
 }
 
-/// The tiers that compute contacts need to know what the bodies are and where the walls stand.
+/// Predictors that compute contacts need the bodies' radius and materials, and the walls.
 Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const BandwidthOptions& options) {
   const std::string& predictor = options.choice.predictor;
   const auto is_ours = [](const std::string& codec) {
     const auto traits = codec_traits(codec);
     return traits && !traits->is_baseline;
   };
-  const auto named = find_predictor(predictor);  // none where it is chosen automatically
+  const auto named = find_predictor(predictor);  // none if it is chosen automatically
   const bool asked = named && (*named)->reads_world && std::ranges::any_of(options.codecs, is_ours);
   if (!asked || !trajectory.info().scene.empty()) return {};
   return fail(ErrorCode::kInvalidArgument,
@@ -150,8 +150,7 @@ Result<void> check_world_is_known(const RecordedTrajectory& trajectory, const Ba
                           sidecar_path(options.trajectory).value(), predictor));
 }
 
-/// There is no other run to train on, so the thesis's codecs are trained with the trajectory itself, which
-/// favours them.
+/// Trains the thesis's codecs with the trajectory itself, as there is no other run. This favours them.
 Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& options) {
   const auto make = [&] {
     return RecordedTrajectory::open(options.trajectory)
@@ -184,7 +183,7 @@ Result<std::vector<BandwidthRow>> measure_trajectory(const BandwidthOptions& opt
   return rows;
 }
 
-/// Runs jobs in parallel; their rows come in the order of the jobs.
+/// Runs jobs in parallel, and returns their rows in the order of the jobs.
 Result<std::vector<BandwidthRow>> measure_jobs(std::span<const Job> jobs, const BandwidthOptions& options) {
   std::vector<Result<std::vector<BandwidthRow>>> results(jobs.size());
   std::atomic<std::size_t> next = 0;
@@ -255,19 +254,20 @@ void add_quality_options(commandline::Command command, sessions::SessionChoice& 
             const char* const end = text.data() + text.size();
             const auto [rest, failure] = std::from_chars(text.data(), end, length);
             if (failure != std::errc{} || rest != end || !(length >= 1e-9 && length <= 1e9))
-              commandline::refuse("--threshold", "a length from 1e-9 to 1e9 scene units, or auto");
+              commandline::refuse("--threshold", "must be a length from 1e-9 to 1e9 scene units, or auto");
             choice.threshold_m = length;
           },
-          "Error threshold, scene units, or auto: chosen at run time (default: the scene's)")
+          "Error threshold in scene units, or auto to choose it at run time (default: the scene's)")
       .type_name("FLOAT|auto")
       .excludes(scale);
   command
-      .add_option("--target-bandwidth", choice.target_mbit_per_s,
-                  "Mbit/s of payload that --threshold auto keeps to (default: none, only ranges follow)")
+      .add_option(
+          "--target-bandwidth", choice.target_mbit_per_s,
+          "Target of --threshold auto, in Mbit/s of payload (default: none, so only ranges are chosen)")
       .range(0.001, 1e6);
   command
       .add_option("--max-error", choice.max_error_m,
-                  "Largest threshold of --threshold auto, scene units (default: four times the scene's)")
+                  "Maximum threshold of --threshold auto, in scene units (default: four times the scene's)")
       .range(1e-9, 1e9);
 }
 
@@ -275,13 +275,13 @@ void add_quality_options(commandline::Command command, sessions::SessionChoice& 
 
 void add_bandwidth(commandline::Command bench, Run& run) {
   commandline::Command command = bench.add_subcommand(
-      "bandwidth", "Codecs side by side over the same trajectory; a decoder checks every frame's hash.");
+      "bandwidth", "Compares codecs on the same trajectory; a decoder checks every frame's hash.");
   const auto options = std::make_shared<BandwidthOptions>();
   for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
   add_scene_option(command, options->scenes);
   add_bodies_option(command, options->bodies);
   command.option("--scene").required(false);
-  command.add_option("--frames", options->frames, "Frames, from the start block on")
+  command.add_option("--frames", options->frames, "Number of frames from the start block on")
       .range(std::uint64_t{1}, kMaxFrames)
       .show_default();
   command.add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
@@ -291,41 +291,48 @@ void add_bandwidth(commandline::Command bench, Run& run) {
   command
       .add_option(
           "--predictor", options->choice.predictor,
-          fmt::format("Predicted step of `tracker`: {}, or auto: {} for spheres, else {}; the paper's "
-                      "codecs have {}",
-                      fmt::join(predictor_names(), ", "), predictors().front().name, basic, basic))
+          fmt::format(
+              "Predicted step of `tracker`: {}, or auto ({} for spheres, else {}). The thesis's codecs use "
+              "{}",
+              fmt::join(predictor_names(), ", "), predictors().front().name, basic, basic))
       .one_of(predictor_choices())
       .show_default();
-  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");
+  add_seed_option(command, options->run.seed, "Seed of the start block and the scripted inputs");
   add_quality_options(command, options->choice);
-  command.add_option("--threads", options->run.threads, "Of the engine, and of the codec's blocks")
+  command
+      .add_option("--threads", options->run.threads, "Threads of the engine, and of the codec for its blocks")
       .range(1U, kMaxThreads)
       .show_default();
-  command.add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+  command.add_option("--users", options->run.users, "Number of scripted users (default: the scene's)")
       .range(1U, scenes::kMaxUsers);
   command
       .add_option(
           "--budget", options->choice.budget_bytes,
-          "Bytes of corrections a frame for `limited` (default: 6553) and `tracker` (default: no limit)")
+          "Maximum bytes of corrections per frame, for `limited` (default: 6553) and `tracker` (default: no "
+          "limit)")
       .range(planning::kLeastBudgetBytes, std::size_t{1} << 30U);
   command
-      .add_option("--trajectory", options->trajectory,
-                  "X.npy with X.json (see `tandem export --help`) in the place of a scene; trains on itself")
+      .add_option(
+          "--trajectory", options->trajectory,
+          "X.npy with X.json, see `tandem export --help`; measured instead of a scene, and also trained on")
       .excludes({"--scene", "--bodies", "--seed", "--users"});
-  command.add_option("--jobs", options->jobs, "Scenes measured at the same time; 1 for quiet times")
+  command
+      .add_option("--jobs", options->jobs,
+                  "Number of scenes measured at the same time; only 1 gives reliable times")
       .range(1, 64)
       .show_default();
-  command.add_flag("--peers", options->peers,
-                   "Also Draco, zfp, zstd and dead reckoning (DIS), at the threshold as the largest error");
+  command.add_flag(
+      "--peers", options->peers,
+      "Also measure Draco, zfp, zstd and dead reckoning (DIS), with the threshold as their maximum error");
   command.add_option("--report", options->report,
-                     "Directory for rows.csv, a CSV and an SVG (gnuplot) a scene, and report.json");
-  command.add_flag("--json", options->json, "One JSON object: rows[...]");
+                     "Directory for rows.csv, report.json, and a CSV and an SVG (gnuplot) for each scene");
+  command.add_flag("--json", options->json, "Print one JSON object: rows[...]");
   command.footer(
-      "Errors and the threshold are of centres; where a session has orientations the threshold is of surfaces:\n"
-      "max surf and rms surf, of the sphere around each body.\n"
-      "bound: Mbit/s of tracker's decisions at the best fixed probability of each context.\n"
-      "Times are medians in ms: encode includes putting the state on the lattice, apply the hash.\n"
-      "Bits and errors are the same on any number of --threads and --jobs; times are quiet with --jobs 1.");
+      "Errors and the threshold apply to centres. In a session with orientations, the threshold applies to\n"
+      "surfaces; max surf and rms surf are errors on the surface of the sphere around each body.\n"
+      "bound: Mbit/s of tracker's decisions with the best fixed probability of each context.\n"
+      "Times are medians in ms. encode includes putting the state on the lattice, apply includes the hash.\n"
+      "Bits and errors do not depend on --threads and --jobs; times are reliable with --jobs 1 only.");
   command.on_chosen([options, &run] {
     if (options->scenes.empty() && options->trajectory.empty())
       commandline::refuse_missing("--scene or --trajectory");

@@ -1,4 +1,4 @@
-// `tandem bench client`: the cost of a client, next to that of the full simulation that it does not have to
+// `tandem bench client`: the cost of a client, next to that of the full simulation, which a client need not
 // run.
 
 #include <fmt/format.h>
@@ -139,7 +139,7 @@ int run_client(ClientOptions options) {
   setup.stop = &stopped;
   if (!options.in_memory && access(setup.tandemd.c_str(), X_OK) != 0) {
     return report(kCommand,
-                  Error{ErrorCode::kInvalidArgument, "no tandemd found; say where it is with --server"});
+                  Error{ErrorCode::kInvalidArgument, "no tandemd found; give its path with --server"});
   }
   if (!options.in_memory) {
     std::signal(SIGINT, [](int) { stopped = true; });
@@ -177,7 +177,7 @@ int run_client(ClientOptions options) {
 
 void add_client(commandline::Command bench, Run& run) {
   commandline::Command command = bench.add_subcommand(
-      "client", "All that a client costs a frame, DDS included, beside the full simulation's step.");
+      "client", "Measures what a client costs per frame, with DDS, next to the full simulation's step.");
   const auto options = std::make_shared<ClientOptions>();
   ClientProcessSetup& process = options->process;
   for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
@@ -192,35 +192,43 @@ void add_client(commandline::Command bench, Run& run) {
       .one_of(options->codecs)
       .show_default();
   add_threshold_options(command, process.choice);
-  add_seed_option(command, process.seed, "Of the start block, the scripted inputs and the network");
-  command.add_option("--runs", process.runs, "Of each row, of which medians are printed")
+  add_seed_option(command, process.seed, "Seed of the start block, the scripted inputs and the network");
+  command.add_option("--runs", process.runs, "Number of runs of each row; their medians are printed")
       .range(1, 100)
       .show_default();
-  command.add_option("--seconds", process.seconds, "Measured in each run").range(1.0, 600.0).show_default();
+  command.add_option("--seconds", process.seconds, "Seconds to measure in each run")
+      .range(1.0, 600.0)
+      .show_default();
   command.add_option("--settle", process.settle_s, "Seconds from a client's start until it is measured")
       .range(1.0, 600.0)
       .show_default();
   command.add_option("--domain", process.domain, "DDS domain, on loopback").range(0, 230).show_default();
   command.add_option("--server", process.tandemd,
-                     "The program tandemd (default: beside this one, or in PATH)");
+                     "Path of tandemd (default: next to this program, or in PATH)");
   command.add_flag("--in-memory", options->in_memory,
-                   "Without processes and DDS: what the client's own code takes, and a sample of all bodies");
-  command.add_option("--frames", options->frames, "Measured for each row, with --in-memory")
+                   "Measure the client's own code and a sample of all bodies in this process, without DDS");
+  command
+      .add_option("--frames", options->frames, "Number of frames to measure for each row, with --in-memory")
       .range(1, 100000)
       .show_default();
-  command.add_flag("--json", options->json,
-                   "One JSON object: rows[scene, predictor, codec, bodies, runs, seconds, frames_per_s, "
-                   "engine_ms, cpu_ms{median, least, most}, kind_ms, thread_ms, syscalls, wakeups_per_s, "
-                   "idle_wakeups_per_s, resident_mb]; with --in-memory rows[scene, predictor, codec, bodies, "
-                   "frames, corrected_per_frame, engine_ms, frame_ms, predicted_ms, sampled_frame_ms, "
-                   "sample_ms, sample_beside_ms]");
+  command.add_flag(
+      "--json", options->json,
+      "Print one JSON object: rows[scene, predictor, codec, bodies, runs, seconds, frames_per_s, engine_ms, "
+      "cpu_ms{median, least, most}, kind_ms, thread_ms, syscalls, wakeups_per_s, idle_wakeups_per_s, "
+      "resident_mb]; with --in-memory rows[scene, predictor, codec, bodies, frames, corrected_per_frame, "
+      "engine_ms, frame_ms, predicted_ms, sampled_frame_ms, sample_ms, sample_beside_ms]");
   command.footer(
-      "A server and `tandem join` as processes on loopback; ms of processor time a frame of the whole client,\n"
-      "start and joining left out, by kind (its own stopwatches; dds: the rest) and by thread, system calls a\n"
-      "frame (-: the kernel does not tell, or not this user), wake-ups of all threads a second, also while the\n"
-      "server is suspended (idle). With --in-memory, in one process and simulated time: a frame is taking what\n"
-      "came, the predicted step, decoding, applying, checking the hash; a sample is positions, velocities, alive\n"
-      "and types of all bodies; beside: in a thread of its own while another one applies, by the wall clock.");
+      "A server and `tandem join` run as processes on loopback. Processor times are in ms per frame of the "
+      "whole\n"
+      "client after it has joined, by kind (measured by the client itself; dds is the rest) and by thread. "
+      "Also\n"
+      "printed are system calls per frame (- where the kernel does not show them to this user) and wake-ups "
+      "of\n"
+      "all threads per second, while playing and while the server is suspended (idle). With --in-memory, "
+      "all\n"
+      "runs in one process and in simulated time. A frame then consists of receiving, the predicted step,\n"
+      "decoding, applying and checking the hash; a sample, of positions, velocities, alive and types of all\n"
+      "bodies; beside means a sample in a thread of its own while another one applies, by the wall clock.");
   command.on_chosen([options, &run] { run = [options] { return run_client(*options); }; });
 }
 

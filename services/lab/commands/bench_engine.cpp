@@ -54,18 +54,18 @@ int run_engine(const EngineOptions& options) {
 
 void add_engine(commandline::Command bench, Run& run) {
   commandline::Command command = bench.add_subcommand(
-      "engine", "The full simulation alone, with its scripted users, as fast as it goes.");
+      "engine", "Runs the full simulation alone, with its scripted users, as fast as possible.");
   const auto options = std::make_shared<EngineOptions>();
   command.add_option("--scene", options->scene, "Scene by name or file").show_default();
   command.add_option("--bodies", options->run.bodies, "Number of bodies")
       .range(1U, engine::kMaxBodies)
       .show_default();
-  command.add_option("--threads", options->run.threads, "Of the engine")
+  command.add_option("--threads", options->run.threads, "Threads of the engine")
       .range(1U, kMaxThreads)
       .show_default();
-  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs");
-  command.add_option("--seconds", options->seconds, "How long").range(0.01, 3600.0).show_default();
-  command.add_flag("--json", options->json, "One JSON object");
+  add_seed_option(command, options->run.seed, "Seed of the start block and the scripted inputs");
+  command.add_option("--seconds", options->seconds, "Seconds to run").range(0.01, 3600.0).show_default();
+  command.add_flag("--json", options->json, "Print one JSON object");
   command.on_chosen([options, &run] { run = [options] { return run_engine(*options); }; });
 }
 

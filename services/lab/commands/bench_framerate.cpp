@@ -1,4 +1,4 @@
-// `tandem bench framerate`: updates a second of a user behind a slow link, as in the thesis's table 5.6.
+// `tandem bench framerate`: updates per second of a user behind a slow link, as in the thesis's table 5.6.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -47,7 +47,7 @@ bool streams(const FramerateOptions& options) {
                      [](const std::string& method) { return method != kClientOnly; });
 }
 
-/// All that can be wrong before minutes have passed.
+/// Checks at the start what would otherwise fail after minutes.
 Result<void> prepare(FramerateOptions& options) {
   options.setup.link.delay_ns = std::llround(options.delay_ms * 1e6);
   options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
@@ -55,7 +55,7 @@ Result<void> prepare(FramerateOptions& options) {
   if (!streams(options) || options.setup.kind == LinkKind::kMemory) return {};
   options.setup.tandemd = options.tandemd.empty() ? find_server() : options.tandemd;
   if (access(options.setup.tandemd.c_str(), X_OK) != 0)
-    return fail(ErrorCode::kInvalidArgument, "no tandemd found; say where it is with --server");
+    return fail(ErrorCode::kInvalidArgument, "no tandemd found; give its path with --server");
   if (const auto tried = make_enclave("10.77.0.1"); !tried) {
     return fail(ErrorCode::kIo,
                 fmt::format("cannot make a network of its own ({}): run it as root with /dev/net/tun, or "
@@ -69,7 +69,7 @@ void tell(const std::string& line) {
   if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K{}", line);
 }
 
-/// Empty for this machine as it is.
+/// Empty for this machine without a limit.
 Result<std::optional<Calibration>> set_up(FramerateOptions& options, const std::string& name,
                                           ThinDevice* processor) {
   options.setup.slowdown = 1;
@@ -108,7 +108,7 @@ int run_framerate(FramerateOptions options) {
   const auto scenes = load_scenes(options.scenes);
   if (!scenes) return report(kCommand, scenes.error());
   if (const auto ready = prepare(options); !ready) return report(kCommand, ready.error());
-  // Everything made here ends with the objects that hold it.
+  // The destructors of these objects remove all that is made here.
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
   options.setup.stop = &stopped;
@@ -146,67 +146,79 @@ int run_framerate(FramerateOptions options) {
 
 void add_framerate(commandline::Command bench, Run& run) {
   commandline::Command command = bench.add_subcommand(
-      "framerate", "Updates a second of a user behind a slow link, as the thesis's table 5.6.");
+      "framerate",
+      "Measures the updates per second of a user behind a slow link, as in the thesis's table 5.6.");
   const auto options = std::make_shared<FramerateOptions>();
   command
       .add_option("--scene", options->scenes,
-                  "Scenes by name or file, separated by commas; all: the rows of the paper's table")
+                  "Scenes by name or file, separated by commas; all for the rows of the thesis's table")
       .separated_by(',')
       .show_default();
   add_bodies_option(command, options->bodies);
   std::vector<std::string> methods{std::string(kClientOnly)};
   for (const std::string_view name : codec_names()) methods.emplace_back(name);
   for (const std::string_view name : {kBallistic, kField, kAsItComes}) methods.emplace_back(name);
-  std::erase(methods, "tracker");  // by its predicted step, or as it comes
+  std::erase(methods, "tracker");  // named by its predicted step, or by `auto`
   command
       .add_option(
           "--method", options->methods,
-          "client-only, codecs, tracker's predicted steps, or auto (as it comes), separated by commas")
+          "client-only, codecs, tracker's predicted steps, or auto (a server's default), separated by commas")
       .separated_by(',')
       .one_of(methods)
       .show_default();
   command
       .add_option(
           "--device", options->devices,
-          "Of the measured user, separated by commas: native (this machine), or a slow processor: thin or "
-          "thesis")
+          "Devices of the measured user, separated by commas: native (this machine), or a slow processor, "
+          "thin or thesis")
       .separated_by(',')
       .one_of({"native", "thin", "thesis"})
       .show_default();
   command
-      .add_option("--step-us", options->step_us, "Of a body, microseconds: what the thesis device is set by")
+      .add_option("--step-us", options->step_us,
+                  "Microseconds per body and step that the thesis device is to take")
       .range(0.01, 100.0)
       .show_default();
   command
       .add_option("--users", options->users,
-                  "Users of each scene (default: as in the paper's table 5.5, else the scene's)")
+                  "Number of users of each scene (default: as in the thesis's table 5.5, else the scene's)")
       .range(1, 16);
-  command.add_option("--seconds", options->setup.seconds, "Measured for each row, from the first update on")
+  command
+      .add_option("--seconds", options->setup.seconds,
+                  "Seconds to measure for each row, counted from the first update")
       .range(1.0, 600.0)
       .show_default();
-  add_seed_option(command, options->setup.seed, "Of the start block and the scripted inputs");
+  add_seed_option(command, options->setup.seed, "Seed of the start block and the scripted inputs");
   command
-      .add_choice<LinkKind>("--link", options->setup.kind,
-                            {{"namespaces", LinkKind::kNamespaces}, {"memory", LinkKind::kMemory}},
-                            "namespaces: DDS between processes, as root; memory: one process, simulated time")
+      .add_choice<LinkKind>(
+          "--link", options->setup.kind,
+          {{"namespaces", LinkKind::kNamespaces}, {"memory", LinkKind::kMemory}},
+          "namespaces for DDS between processes, which needs root; memory for one process and simulated time")
       .show_default("namespaces");
-  command.add_option("--rate", options->setup.link.bits_per_s, "Of the link, bit/s each way")
+  command.add_option("--rate", options->setup.link.bits_per_s, "Rate of the link each way, in bit/s")
       .range(1e4, 1e10)
       .show_default();
-  command.add_option("--delay", options->delay_ms, "Of the link, ms each way")
+  command.add_option("--delay", options->delay_ms, "Delay of the link each way, in ms")
       .range(0.0, 10000.0)
       .show_default();
-  command.add_option("--queue", options->queue_ms, "Of the link, ms: what would wait longer is dropped")
+  command
+      .add_option(
+          "--queue", options->queue_ms,
+          "Maximum time in ms that a packet waits for the link; the link drops packets that would wait "
+          "longer")
       .range(0.0, 10000.0)
       .show_default();
   command.add_option("--server", options->tandemd,
-                     "The program tandemd (default: beside this one, or in PATH)");
-  command.add_flag("--json", options->json, "One JSON object: devices[...], rows[...]");
+                     "Path of tandemd (default: next to this program, or in PATH)");
+  command.add_flag("--json", options->json, "Print one JSON object: devices[...], rows[...]");
   command.footer(
-      "Needs root unless with --link memory: server and users run in network namespaces joined by one link.\n"
-      "The thin device gets the share of a processor at which client-only, the engine as it is here, makes the "
-      "thesis's 4.4 updates/s\n"
-      "with 10,000 bodies; the thesis device that at which a plain grid, one body after another, does.");
+      "Without --link memory this needs root: server and users run in network namespaces that one link "
+      "joins.\n"
+      "The slow devices get the share of a processor at which client-only reaches the thesis's 4.4 "
+      "updates/s\n"
+      "with 10,000 bodies: the thin device with our engine, the thesis device with a plain grid that "
+      "computes\n"
+      "one body after another.");
   command.on_chosen([options, &run] { run = [options] { return run_framerate(*options); }; });
 }
 

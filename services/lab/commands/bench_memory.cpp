@@ -1,4 +1,4 @@
-// `tandem bench memory`: bytes that engine, server and client hold, in all and a slot.
+// `tandem bench memory`: bytes that engine, server and client hold, in total and per slot.
 
 #include <fmt/format.h>
 
@@ -46,7 +46,8 @@ int run_memory(const MemoryOptions& options) {
                {"client", &MemoryUse::client_bytes}};
   Json rows = Json::array();
   if (!options.json) fmt::print("{:>8} {:<8} {:>14} {:>14}\n", "bodies", "", "total bytes", "bytes a slot");
-  // Two sizes, each for itself: scratch may grow in steps, so that a line through both would tell nothing.
+  // Prints two sizes separately, because scratch may grow in steps, and a line through both would be
+  // misleading.
   for (const std::uint32_t bodies : {options.bodies, 2 * options.bodies}) {
     const auto use = measure_memory([&] { return host_scene(*scene, options, bodies); }, options.frames);
     if (!use) return report("bench memory", use.error());
@@ -66,19 +67,19 @@ int run_memory(const MemoryOptions& options) {
 }  // namespace
 
 void add_memory(commandline::Command bench, Run& run) {
-  commandline::Command command =
-      bench.add_subcommand("memory", "Heap bytes of engine, server and client while playing, DDS excluded.");
+  commandline::Command command = bench.add_subcommand(
+      "memory", "Measures the heap of engine, server and client while playing, without DDS.");
   const auto options = std::make_shared<MemoryOptions>();
   command.add_option("--scene", options->scene, "Scene by name or file").show_default();
-  command.add_option("--bodies", options->bodies, "Number of bodies; twice as many are measured too")
+  command.add_option("--bodies", options->bodies, "Number of bodies; twice that number is measured, too")
       .range(1U, engine::kMaxBodies / 2)
       .show_default();
   std::vector<std::string> names;
   for (const std::string_view name : codec_names()) names.emplace_back(name);
   command.add_option("--codec", options->codec, "Codec").one_of(names).show_default();
-  command.add_option("--frames", options->frames, "Frames to play").range(1, 100000).show_default();
+  command.add_option("--frames", options->frames, "Number of frames to play").range(1, 100000).show_default();
   command.add_flag("--json", options->json,
-                   "One JSON object: rows[scene, bodies, codec, engine, server, client]");
+                   "Print one JSON object: rows[scene, bodies, codec, engine, server, client]");
   command.on_chosen([options, &run] { run = [options] { return run_memory(*options); }; });
 }
 

@@ -64,13 +64,14 @@ int run_smoothing(const SmoothingOptions& options) {
 
 void add_smoothing(commandline::Command bench, Run& run) {
   commandline::Command command = bench.add_subcommand(
-      "smoothing", "What is seen of corrections: two clients sample one session, one of them smoothing.");
+      "smoothing",
+      "Measures how visible corrections are: two clients sample one session, one of them with smoothing.");
   const auto options = std::make_shared<SmoothingOptions>();
   SmoothingSetup& setup = options->setup;
   setup.choice.bodies = 1000;
   command
       .add_option("--scene", options->scenes,
-                  "Scenes by name or file, separated by commas; all: the paper's five")
+                  "Scenes by name or file, separated by commas; all for the thesis's five")
       .separated_by(',')
       .show_default();
   command.add_option("--predictor", options->predictors, "Predicted steps, separated by commas")
@@ -84,30 +85,32 @@ void add_smoothing(commandline::Command bench, Run& run) {
       .range(1U, engine::kMaxBodies)
       .show_default();
   add_threshold_options(command, setup.choice);
-  add_seed_option(command, setup.seed, "Of the start block, the scripted inputs and the network");
-  command.add_option("--seconds", setup.seconds, "Of simulated time, for each row")
+  add_seed_option(command, setup.seed, "Seed of the start block, the scripted inputs and the network");
+  command.add_option("--seconds", setup.seconds, "Seconds of simulated time for each row")
       .range(0.1, 3600.0)
       .show_default();
-  command.add_option("--rate", setup.rate_hz, "Samples a second").range(1.0, 1000.0).show_default();
+  command.add_option("--rate", setup.rate_hz, "Samples per second").range(1.0, 1000.0).show_default();
   command
       .add_option("--smoothing", setup.smoothing_s,
-                  "Time constant of the smoothed client, s (default: the client's own)")
+                  "Time constant of the smoothed client, in s (default: the client's own)")
       .range(0.0, 10.0);
-  command.add_option("--delay", setup.delay_ms, "Of the network, ms each way")
+  command.add_option("--delay", setup.delay_ms, "Delay of the network each way, in ms")
       .range(0.0, 1000.0)
       .show_default();
-  command.add_option("--jitter", setup.jitter_ms, "Of the network, ms: evenly added up to that")
+  command.add_option("--jitter", setup.jitter_ms, "Maximum extra delay in ms, evenly distributed from 0")
       .range(0.0, 1000.0)
       .show_default();
-  command.add_option("--outage", setup.outage_s, "Seconds that the link is cut for, every five")
+  command.add_option("--outage", setup.outage_s, "Seconds of every five for which the link is cut")
       .range(0.0, 4.0)
       .show_default();
-  command.add_flag("--json", options->json,
-                   "One JSON object: rows[scene, predictor, codec, bodies, threshold, samples, smoothed, "
-                   "unsmoothed]");
+  command.add_flag(
+      "--json", options->json,
+      "Print one JSON object: rows[scene, predictor, codec, bodies, threshold, samples, smoothed, "
+      "unsmoothed]");
   command.footer(
-      "Jump: the 99.9th percentile over bodies and samples of how far the second difference of the place shown\n"
-      "goes beyond that of the full simulation's at the same moments; scene units. All is seeded.");
+      "Jump compares the second differences of the places shown with those of the full simulation at the "
+      "same\n"
+      "moments: it is the 99.9th percentile of the excess over bodies and samples, in scene units.");
   command.on_chosen([options, &run] { run = [options] { return run_smoothing(*options); }; });
 }
 

@@ -1,4 +1,4 @@
-// `tandem bench train`: what the thesis's codecs need to know about a scene, written next to its file.
+// `tandem bench train`: writes next to a scene's file what the thesis's codecs need to know about the scene.
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 namespace tandem::lab {
 namespace {
 
-// Far from the seeds of measurements, so that no measurement uses a run that was trained on.
+// This is far from the seeds of measurements, so that no measurement uses a run that was trained on.
 constexpr std::uint64_t kTrainingSeed = 1001;
 
 struct TrainOptions {
@@ -75,15 +75,16 @@ void add_train(commandline::Command bench, Run& run) {
   options->run.seed = kTrainingSeed;
   add_scene_option(command, options->scenes);
   add_bodies_option(command, options->bodies);
-  command.add_option("--frames", options->frames, "Frames, from the start block on")
+  command.add_option("--frames", options->frames, "Number of frames from the start block on")
       .range(std::uint64_t{1}, kMaxFrames)
       .show_default();
-  add_seed_option(command, options->run.seed, "Of the training run");
+  add_seed_option(command, options->run.seed, "Seed of the training run");
   add_threshold_options(command, options->choice);
-  command.add_option("--threads", options->run.threads, "Of the engine")
+  command.add_option("--threads", options->run.threads, "Threads of the engine")
       .range(1U, kMaxThreads)
       .show_default();
-  command.add_flag("--json", options->json, "One JSON object: rows[scene, bodies, threshold, ranges, file]");
+  command.add_flag("--json", options->json,
+                   "Print one JSON object: rows[scene, bodies, threshold, ranges, file]");
   command.on_chosen([options, &run] { run = [options] { return run_train(*options); }; });
 }
 

@@ -81,8 +81,8 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
   using namespace tandem::lab;
   commandline::Command command = app.add_subcommand(
       "export",
-      "Writes a trajectory: X.npy, float32 [frames + 1][bodies][6] (position, velocity) or, of bodies that turn, "
-      "[13], and X.json; of a scene, or of a recording, which also becomes point clouds.");
+      "Writes the trajectory of a scene or a recording: X.npy, float32 [frames + 1][bodies][6] (position, "
+      "velocity) or, with orientations, [13]; and X.json. Can also turn a recording into point clouds.");
   command.footer(std::string(kTrajectoryFormat) + "\n\n" + kRecordingFormat);
   const auto options = std::make_shared<ExportOptions>();
   options->run.bodies = 10000;
@@ -91,14 +91,16 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
   const commandline::Option from =
       command
           .add_option("--from", options->recording,
-                      "Instead of a scene: the agreed states of what `tandem record` wrote")
+                      "Recording of `tandem record` whose agreed states are taken instead of a scene")
           .excludes(scene);
   const commandline::Option points =
       command
           .add_option("--points", options->points,
-                      "Instead of --out: an MCAP file of point clouds, as Foxglove opens them")
+                      "MCAP file of point clouds to write instead of --out; Foxglove opens it")
           .needs(from);
-  command.add_option("--every", options->every, "With --points: of the frames, those that this divides")
+  command
+      .add_option("--every", options->every,
+                  "With --points, write only frames whose numbers are multiples of this")
       .range(1U, 1U << 20U)
       .needs(points)
       .show_default();
@@ -106,19 +108,21 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
       .range(1U, engine::kMaxBodies)
       .excludes(from)
       .show_default();
-  command.add_option("--frames", options->run.frames, "Frames after the start")
+  command.add_option("--frames", options->run.frames, "Number of frames after the start")
       .range(std::uint64_t{1}, kMaxFrames)
       .excludes(from)
       .show_default();
-  add_seed_option(command, options->run.seed, "Of the start block and the scripted inputs").excludes(from);
-  command.add_option("--threads", options->run.threads, "Of the engine")
+  add_seed_option(command, options->run.seed, "Seed of the start block and the scripted inputs")
+      .excludes(from);
+  command.add_option("--threads", options->run.threads, "Threads of the engine")
       .range(1U, kMaxThreads)
       .excludes(from)
       .show_default();
-  command.add_option("--users", options->run.users, "Scripted users (default: the scene's)")
+  command.add_option("--users", options->run.users, "Number of scripted users (default: the scene's)")
       .range(1U, scenes::kMaxUsers)
       .excludes(from);
-  command.add_option("--out", options->out, "The .npy file; the .json beside it").excludes(points);
+  command.add_option("--out", options->out, "The .npy file to write; the .json file is written next to it")
+      .excludes(points);
   command.on_chosen([options, &run] {
     if (options->scene.empty() && options->recording.empty())
       commandline::refuse("--scene", "expected --scene or --from");

@@ -1,5 +1,5 @@
 #pragma once
-// How a value that may be missing looks in a table.
+// Prints values of a table that may be missing.
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 namespace tandem::lab {
 
-/// "-" where there is none.
+/// "-" for a missing value.
 inline std::string rounded(const std::optional<double>& value, int digits) {
   return value ? fmt::format("{:.{}f}", *value, digits) : "-";
 }

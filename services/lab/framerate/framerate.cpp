@@ -21,7 +21,7 @@ constexpr const char* kUsersAddress = "10.77.0.2";
 constexpr std::chrono::seconds kStart{60};
 constexpr std::uint32_t kCalibratedBodies = 10000;
 
-/// Unicast only; datagrams that need no fragments, as a home router's link loses fragments dearly.
+/// Unicast only, and datagrams without fragments, because a link that loses a fragment loses the datagram.
 std::string dds_config(const char* peer) {
   return fmt::format(
       "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"tandem0\" "
@@ -33,8 +33,8 @@ std::string dds_config(const char* peer) {
       peer);
 }
 
-/// Runs a program to its end, as the measured user; the JSON object it prints, and its processor time in
-/// that.
+/// Runs a program to its end, as the measured user. Returns the JSON object that it printed, with its
+/// processor time added.
 Result<Json> run(const FramerateSetup& setup, const std::vector<std::string>& arguments, ChildPlace place,
                  ThinDevice* device) {
   const auto at_most = kStart + std::chrono::seconds(std::llround(2 * setup.seconds));
@@ -116,7 +116,7 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device,
   const LinkCounts carried = link.finish(setup.seconds);
   const auto after = read_process(server->pid());
   const double server_busy = before && after ? between(*before, *after).cpu_ms / (1e3 * setup.seconds)
-                                             : 0;  // it waits for who joins
+                                             : 0;  // the server waits while the user joins
   if (!json) return tl::unexpected(json.error());
   row.updates_per_s = (*json)["frames_applied"].number() / setup.seconds;
   row.client_ms_p50 = (*json)["client_ms"]["p50"].number();
@@ -139,7 +139,7 @@ std::optional<double> in_paper(const FramerateRow& row) {
 std::string find_bound(const FramerateRow& row, double link_bits_per_s, double share, double server_busy) {
   if (row.link_mbit_per_s.value_or(0) * kBitsPerMbit >= 0.9 * link_bits_per_s) return "link";
   if (row.client_cpu_ms.value_or(0) * row.updates_per_s / 1e3 >= 0.8 * share) return "processor";
-  // Only then: a packet lost in a burst does not slow down whom the processor does.
+  // Only then, because a packet lost in a burst does not slow down a user whose processor is the limit.
   if (row.dropped.value_or(0) > 0) return "link";
   return server_busy >= 0.9 ? "server" : "round trip";
 }

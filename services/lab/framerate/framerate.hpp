@@ -1,6 +1,5 @@
 #pragma once
-// What `tandem bench framerate` measures: how often a user's picture of a scene is updated (thesis,
-// table 5.6).
+// Measures for `tandem bench framerate` how often a user's picture of a scene is updated (thesis, table 5.6).
 
 #include <atomic>
 #include <cstdint>
@@ -21,7 +20,7 @@ inline constexpr std::string_view kClientOnly = "client-only";
 
 /// `tracker` with this predicted step.
 inline constexpr std::string_view kBallistic = "ballistic", kField = "field";
-/// The defaults of server and user: the streams of the one, the choice of the other.
+/// The defaults of server and user: the server's streams, and the user's choice among them.
 inline constexpr std::string_view kAsItComes = "auto";
 
 /// One row of the result.
@@ -31,15 +30,15 @@ struct FramerateRow {
   std::uint32_t users = 1, bodies = 0;
   std::string method;  ///< client-only, a codec, a predicted step, or auto
   std::string device;  ///< native, thin or thesis
-  double seconds = 0;  ///< that were measured
+  double seconds = 0;  ///< measured time
   double updates_per_s = 0;
   // With a server:
   std::optional<double> client_ms_p50, latency_ms_p50;
-  std::optional<double> client_cpu_ms;            ///< an update; DDS, start and snapshot included
-  std::optional<double> link_mbit_per_s;          ///< to all users together, 2^20 bits, with all protocol
-  std::optional<std::uint64_t> dropped, resyncs;  ///< packets the link's queue had no room for; rejoins
-  std::string stream;                             ///< that the user played in the end
-  std::string bound;                              ///< what kept it from more; see find_bound()
+  std::optional<double> client_cpu_ms;    ///< per update, with DDS, start and snapshot
+  std::optional<double> link_mbit_per_s;  ///< to all users together, 2^20 bits, with protocol overhead
+  std::optional<std::uint64_t> dropped, resyncs;  ///< packets for which the link's queue had no room; rejoins
+  std::string stream;                             ///< the stream that the user played at the end
+  std::string bound;                              ///< what limited the rate; see find_bound()
   std::string missing;                            ///< not empty: why nothing was measured
 };
 
@@ -64,36 +63,36 @@ struct FramerateSetup {
   transport::simulated::BottleneckOptions link;
   LinkKind kind = LinkKind::kNamespaces;
   double slowdown = 1;  ///< kMemory: of the measured user's processor
-  double seconds = 10;  ///< from the first update on
+  double seconds = 10;  ///< counted from the first update
   std::uint64_t seed = 1;
   const std::atomic<bool>* stop = nullptr;  ///< ends a row early; must outlive the measurement
 };
 
-/// Fills a row's measured fields: runs the programs, on `device` as it was calibrated for the first of its
-/// users where that is not null. `row` says scene, users, bodies, method. Errors end up in `missing`.
+/// Runs the programs and fills a row's measured fields. The first user runs on `device`, as calibrated, if
+/// that is not null. `row` has scene, users, bodies and method. An error is stored in `missing`.
 void measure_row(const FramerateSetup& setup, ThinDevice* device,
                  const std::optional<Calibration>& calibration, FramerateRow& row);
 
-/// Of a row that was measured with a server: "link" (carries 0.9 of its rate), "processor" (takes 0.8 of its
-/// share), "link" too where it drops anything, "server" (0.9 of a processor there), or "round trip": the
-/// window of frames on their way.
+/// Returns what limits a row that was measured with a server: "link" if it carries 0.9 of its rate or drops
+/// anything, "processor" if the user takes 0.8 of its share, "server" if that takes 0.9 of a processor,
+/// otherwise "round trip", which stands for the window of frames on their way.
 [[nodiscard]] std::string find_bound(const FramerateRow& row, double link_bits_per_s, double share,
                                      double server_busy);
 
-/// The server's and the users' programs in one thread, on a simulated network with the setup's link. Time is
-/// simulated: what a program computes takes as long as it takes here, times the slowdown for the first user.
-/// Fills the row as measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
+/// Runs the server's and the users' programs in one thread, on a simulated network with the setup's link.
+/// Time is simulated: computing takes as long as it takes here, times the slowdown for the first user. Fills
+/// the row like measure_row(). Errors: kInvalidArgument for what the scene or the codec refuses.
 [[nodiscard]] Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row);
 
 /// Sets the device's share of a processor so that client-only makes `updates_per_s` of the thesis's first
-/// scene with 10,000 bodies. `progress` gets what is being tried. Returns what it makes in the end, and the
-/// share. Errors: kIo.
+/// scene with 10,000 bodies. `progress` gets each attempt. Returns the rate that is reached at the end, and
+/// the share. Errors: kIo.
 [[nodiscard]] Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device,
                                             double updates_per_s,
                                             const std::function<void(const std::string&)>& progress);
 
-/// Sets the share at which a step of `step_us` a body makes `updates_per_s` with 10,000 bodies: a plain grid,
-/// one body after another, as the thesis's, whatever engine is here. Errors: kIo.
+/// Sets the share at which a step that takes `step_us` per body makes `updates_per_s` with 10,000 bodies.
+/// That is the cost of a plain grid that computes one body after another, as the thesis's did. Errors: kIo.
 [[nodiscard]] Result<Calibration> calibrate_by_step(ThinDevice& device, double updates_per_s, double step_us);
 
 /// {"devices": [...], "rows": [...]}, one line. `limited_by`: what limits the processor.

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::duration;
 
-// The least that control groups give at a time: the shorter the turns, the more even the processor.
+// The minimum quota of control groups: shorter turns make the processor more even.
 constexpr std::int64_t kTurnUs = 1000;
 
 Result<void> write_text(const fs::path& path, const std::string& text) {
@@ -36,7 +36,7 @@ class ControlGroup final : public ThinDevice {
   ControlGroup(const ControlGroup&) = delete;
   ControlGroup& operator=(const ControlGroup&) = delete;
   ~ControlGroup() override {
-    // A process that was killed a moment ago may still be in it.
+    // A process that was just killed may still be in the group.
     std::error_code error;
     for (int i = 0; i < 50 && !fs::remove(path_, error) && error; ++i)
       std::this_thread::sleep_for(duration<double>(0.02));

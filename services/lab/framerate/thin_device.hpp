@@ -1,5 +1,5 @@
 #pragma once
-// A slow processor: a share of one of this machine's.
+// Simulates a slow processor by a share of one of this machine's.
 
 #include <sys/types.h>
 
@@ -10,8 +10,8 @@
 
 namespace tandem::lab {
 
-/// Limits the processor time of processes, all their threads together. By a control group where those can be
-/// made (version 1 or 2), else by stopping and continuing the process. Not thread-safe.
+/// Limits the processor time of processes, for all their threads together: by a control group (version 1 or
+/// 2) if one can be made, else by stopping and continuing the process. Not thread-safe.
 class ThinDevice {
  public:
   [[nodiscard]] static std::unique_ptr<ThinDevice> create();

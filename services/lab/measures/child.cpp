@@ -116,7 +116,7 @@ Result<std::string> Child::finish(std::chrono::seconds at_most, const std::atomi
     if (stop || left_ms <= 0) {
       kill_it();
       if (stop) return fail(ErrorCode::kIo, "stopped");
-      return fail(ErrorCode::kIo, fmt::format("nothing came of it within {} s", at_most.count()));
+      return fail(ErrorCode::kIo, fmt::format("it did not answer within {} s", at_most.count()));
     }
     pollfd ready{out_.get(), POLLIN, 0};
     if (poll(&ready, 1, static_cast<int>(std::min<std::int64_t>(left_ms, 200))) <= 0) continue;

@@ -1,5 +1,5 @@
 #pragma once
-// A program that this one starts, somewhere, and never leaves behind.
+// A child process, which never outlives this program.
 
 #include <sys/types.h>
 
@@ -25,7 +25,7 @@ struct ChildPlace {
   std::string dds_config;            ///< CYCLONEDDS_URI; empty: inherited
 };
 
-/// Killed at its end, and when this program dies. Not thread-safe.
+/// The destructor kills the process, and so does the death of this program. Not thread-safe.
 class Child {
  public:
   /// Runs `arguments[0]`; its stdout is kept, its stderr thrown away. Errors: kIo.
@@ -37,10 +37,10 @@ class Child {
   ~Child();
 
   [[nodiscard]] pid_t pid() const { return pid_; }
-  /// Processor time of all its threads, after finish().
+  /// The processor time of all its threads, valid after finish().
   [[nodiscard]] double cpu_ms() const { return cpu_ms_; }
-  /// Waits for its end; what it printed. Errors: kIo, when it takes longer than that, exits with an error, or
-  /// `stop` is set meanwhile.
+  /// Waits for its end and returns what it printed. Errors: kIo if it takes longer than that, exits with an
+  /// error, or `stop` is set meanwhile.
   Result<std::string> finish(std::chrono::seconds at_most, const std::atomic<bool>& stop);
 
  private:

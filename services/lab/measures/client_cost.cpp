@@ -52,7 +52,7 @@ class Costs {
   std::vector<std::int64_t> ns_;
 };
 
-/// Counts what the last delta corrected.
+/// Counts the bodies that deltas corrected.
 class Corrections final : public client::CoreListener {
  public:
   void on_applied(Epoch /*epoch*/, const client::CompleteDelta& /*delta*/) override {
@@ -70,7 +70,7 @@ class MeasuredClient {
   }
   client::ClientCore& core() { return core_; }
 
-  /// `counts`: what is over belongs to the measurement.
+  /// `counts`: add the measured time to the result.
   void poll(const client::Now& now, bool counts) {
     const std::uint64_t applied = core_.statistics().frames_applied;
     const Frame simulated = now_simulated();
@@ -104,7 +104,7 @@ class MeasuredClient {
   std::int64_t frame_ns_ = 0, step_ns_ = 0;
 };
 
-/// An app's arrays.
+/// Arrays as an application has them.
 class Arrays {
  public:
   explicit Arrays(std::size_t slots)

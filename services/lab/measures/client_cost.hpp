@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench client --in-memory` measures: the time that a client's own code takes.
+// Measures for `tandem bench client --in-memory` the time that a client's own code takes.
 
 #include <cstdint>
 #include <string>
@@ -32,7 +32,7 @@ struct ClientCostRow {
   /// applying, checking the hash, acknowledging.
   Cost frame = {};
   Cost predicted = {};      ///< the predicted step's part of it
-  Cost sampled_frame = {};  ///< `frame` of a client that is sampled: besides, what is drawn is made ready
+  Cost sampled_frame = {};  ///< like `frame`, for a client that also prepares what is sampled
   Cost sample = {};         ///< positions, velocities, alive and types of all bodies, at 144 Hz
   Cost beside = {};         ///< the same by the wall clock, in a thread of its own while another one applies
 };

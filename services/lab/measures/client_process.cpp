@@ -18,7 +18,7 @@
 namespace tandem::lab {
 namespace {
 
-constexpr double kIdleSettleS = 1;  // what was under way ends
+constexpr double kIdleSettleS = 1;  // messages on their way arrive
 constexpr double kIdleS = 4;
 constexpr std::chrono::seconds kEnd{20};
 
@@ -107,7 +107,7 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   if (!printed) return fail(ErrorCode::kIo, "the client printed no JSON");
   const Json& json = *printed;
   const double played_s = json["played_s"].number();
-  if (played_s < setup.seconds) return fail(ErrorCode::kIo, "the client joined too late: settle for longer");
+  if (played_s < setup.seconds) return fail(ErrorCode::kIo, "the client joined too late: increase --settle");
 
   ClientProcessRow row;
   row.frames_per_s = (json["frames_applied"].number() - 1) / played_s;
@@ -126,7 +126,7 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   return row;
 }
 
-/// The median of what `of` takes from each row.
+/// The median of `of(row)` over the rows.
 template <class Of>
 double median_of(const std::vector<ClientProcessRow>& rows, Of&& of) {
   std::vector<double> values;

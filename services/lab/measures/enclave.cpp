@@ -84,7 +84,7 @@ struct Packet {
   std::vector<char> bytes;
 };
 
-/// The traffic that was let through up to a moment.
+/// The traffic that was carried up to a moment.
 struct Mark {
   std::int64_t at_ns = 0;
   std::uint64_t bytes_there = 0;
@@ -100,7 +100,7 @@ struct Way {
     for (;;) {
       const ssize_t size = read(from, buffer.data(), buffer.size());
       if (size <= 0) return;
-      // Only IPv4: the kernel's own IPv6 chatter is not traffic of ours.
+      // Carries IPv4 only, because the IPv6 traffic is the kernel's own.
       if ((static_cast<unsigned char>(buffer[0]) >> 4U) != 4) continue;
       const auto bytes = static_cast<std::size_t>(size);
       if (const auto due = link.offer(steady_ns(), bytes))
@@ -110,7 +110,7 @@ struct Way {
   void give_out() {
     for (; !waiting.empty() && waiting.front().due_ns <= steady_ns(); waiting.pop_front()) {
       const Packet& packet = waiting.front();
-      // A device that takes no more drops, as a network card would.
+      // A device that is full drops packets, as a network card does.
       [[maybe_unused]] const ssize_t taken = write(to, packet.bytes.data(), packet.bytes.size());
     }
   }
@@ -145,7 +145,7 @@ struct Link::State {
   void run(const std::stop_token& stop) {
     std::vector<char> buffer(kMostPacketBytes);
     while (!stop.stop_requested()) {
-      std::int64_t wait_ns = 20'000'000;  // how late a stop may be noticed
+      std::int64_t wait_ns = 20'000'000;  // maximum delay until a stop is noticed
       if (const std::int64_t now_ns = steady_ns();
           marks.empty() || now_ns - marks.back().at_ns > kMarkEveryNs)
         marks.push_back({now_ns, there.link.bytes()});
@@ -162,7 +162,7 @@ struct Link::State {
     }
   }
 
-  /// The last mark not after `at_ns`, or nothing carried yet.
+  /// The last mark not after `at_ns`, or an empty one before the first.
   [[nodiscard]] Mark at(std::int64_t at_ns) const {
     const auto after =
         std::find_if(marks.begin(), marks.end(), [&](const Mark& mark) { return mark.at_ns > at_ns; });
@@ -170,7 +170,7 @@ struct Link::State {
   }
 
   Way there, back;
-  std::vector<Mark> marks;  // for at most minutes
+  std::vector<Mark> marks;  // of a few minutes
 };
 
 Link::Link(const Enclave& server, const Enclave& clients,

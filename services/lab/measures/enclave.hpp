@@ -1,6 +1,6 @@
 #pragma once
-// Two network namespaces and the link between them. Nothing outlives the objects: a namespace without
-// processes and descriptors is gone, and its devices with it.
+// Two network namespaces and the link between them. Nothing outlives the objects: the kernel removes a
+// namespace without processes and descriptors, and its devices with it.
 
 #include <memory>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace tandem::lab {
 
-/// A file descriptor that is closed at its end.
+/// A file descriptor that the destructor closes.
 class Descriptor {
  public:
   explicit Descriptor(int fd = -1) : fd_(fd) {}
@@ -33,7 +33,8 @@ struct Enclave {
   Descriptor device;
 };
 
-/// `address`: of its device, IPv4 in 10.77.0.0/24. Errors: kIo, with what was not permitted.
+/// `address`: the IPv4 address of its device in 10.77.0.0/24. Errors: kIo, which names what was not
+/// permitted.
 [[nodiscard]] Result<Enclave> make_enclave(const std::string& address);
 
 struct LinkCounts {
@@ -47,7 +48,7 @@ class Link {
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
-  /// Stops it; what it carried to the clients in its last `seconds`, and dropped in all its time.
+  /// Stops the link. Returns what it carried to the clients in its last `seconds`, and all that it dropped.
   LinkCounts finish(double seconds);
 
  private:

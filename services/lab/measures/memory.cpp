@@ -19,7 +19,7 @@ std::int64_t heap_bytes() {
   return static_cast<std::int64_t>(info.uordblks + info.hblkhd);
 }
 
-/// Destroys an object and says what the heap got back.
+/// Destroys an object and returns how many bytes the heap got back.
 template <class T>
 std::int64_t returned_by(std::unique_ptr<T>& object) {
   const std::int64_t before = heap_bytes();

@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench memory` measures: bytes that a server and a client hold while a session runs.
+// Measures for `tandem bench memory` the bytes that a server and a client hold while a session runs.
 
 #include <cstdint>
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace tandem::lab {
 
-/// Heap bytes, the allocator's overhead included.
+/// Heap bytes with the allocator's overhead.
 struct MemoryUse {
   std::int64_t engine_bytes = 0;  ///< the full simulation
   std::int64_t server_bytes = 0;  ///< the host without engine and transport
@@ -26,7 +26,7 @@ struct HostedSimulation {
 };
 
 /// Runs one server and one client over a network in memory for `frames` frames, then destroys one after the
-/// other and sees how much of the heap each returns; so what the transport holds is not counted. Errors: what
+/// other and measures how much of the heap each returns; memory of the transport is not counted. Errors: what
 /// `make` or the host refuse; kTimeout when the client never plays.
 [[nodiscard]] Result<MemoryUse> measure_memory(const std::function<Result<HostedSimulation>()>& make,
                                                std::uint64_t frames);

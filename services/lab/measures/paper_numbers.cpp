@@ -9,7 +9,7 @@ namespace {
 constexpr std::array<std::string_view, 5> kCodecs{"none", "selective", "quantized", "entropy", "limited"};
 constexpr std::array<std::string_view, 4> kMethods{"client-only", "none", "entropy", "limited"};
 
-// A line of tables 5.3 and 5.6; 0: not measured.
+// A line of tables 5.3 and 5.6; 0 means not measured.
 struct Line {
   int scene;
   std::uint32_t bodies;

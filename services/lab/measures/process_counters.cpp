@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The number behind `key` in a file with a `key: number` a line; 0 without.
+/// The number behind `key` in a file with lines `key: number`; 0 if there is none.
 std::uint64_t number_of(const fs::path& file, std::string_view key) {
   std::ifstream in(file);
   for (std::string word; in >> word;) {

@@ -17,7 +17,7 @@ namespace tandem::lab {
 struct ThreadReading {
   std::string name;
   std::int64_t cpu_ns = 0;
-  std::uint64_t wakeups = 0;  ///< times it gave up its core by itself
+  std::uint64_t wakeups = 0;  ///< number of times it gave up its core by itself
 };
 
 /// A process at one moment.
@@ -27,14 +27,14 @@ struct ProcessReading {
   double resident_mb = 0;  ///< 2^20 bytes
 };
 
-/// Errors: kIo, when there is no such process.
+/// Errors: kIo if there is no such process.
 [[nodiscard]] Result<ProcessReading> read_process(pid_t process);
 
 /// The difference between two readings, in threads that both have seen.
 struct ProcessSpan {
   double seconds = 0;
   double cpu_ms = 0;
-  std::map<std::string, double> cpu_ms_by_thread;  ///< threads of one name together
+  std::map<std::string, double> cpu_ms_by_thread;  ///< threads with the same name are added up
   double wakeups = 0;
 };
 [[nodiscard]] ProcessSpan between(const ProcessReading& before, const ProcessReading& after);
@@ -42,7 +42,7 @@ struct ProcessSpan {
 /// Counts the system calls of all threads that a process has at the moment, by the kernel's tracepoint.
 class SyscallCounter {
  public:
-  /// Empty where the kernel has no such tracepoint or does not let this user have it.
+  /// Empty if the kernel has no such tracepoint or does not let this user read it.
   static std::optional<SyscallCounter> start(const ProcessReading& process);
   [[nodiscard]] std::uint64_t calls() const;
 

@@ -1,5 +1,5 @@
 #pragma once
-// A simulation with its scripted inputs, frame by frame: what drives streams where there are no clients.
+// Runs a simulation with its scripted inputs frame by frame, to drive streams where there are no clients.
 
 #include <cstdint>
 #include <span>

@@ -12,7 +12,7 @@
 
 namespace tandem::lab {
 
-/// How a scene is run. Zero `users`: as many as the scene says.
+/// How a scene is run. Zero `users` stands for the scene's own number.
 struct SceneRun {
   std::uint32_t bodies = 0;
   std::uint64_t seed = 1;

@@ -38,7 +38,7 @@ class Lengths {
     sum_ += value;
   }
   [[nodiscard]] double mean() const { return count_ == 0 ? 0 : sum_ / static_cast<double>(count_); }
-  /// The length that a share `q` does not exceed.
+  /// The quantile `q` of the lengths.
   [[nodiscard]] double quantile(double q) const {
     auto left = static_cast<std::uint64_t>(q * static_cast<double>(count_));
     for (std::size_t step = 0; step < counts_.size(); ++step) {
@@ -121,7 +121,7 @@ class Watcher {
       shown.steady[body] = alive_[body] != 0 && shown.steady[body] == 0 ? 1 : 0;
     shown_.push_back(std::move(shown));
   }
-  /// Compares what is past.
+  /// Compares the moments that are past.
   void compare(const Truth& truth, bool counts) {
     while (shown_.size() >= 3 && truth.knows(shown_[2].frame)) {
       if (counts) compare_first(truth);
@@ -191,7 +191,7 @@ Result<SmoothingRow> measure_smoothing(const scenes::Scene& scene, const Smoothi
   if (!server_port) return tl::unexpected(server_port.error());
   client::CoreOptions options;
   options.session = config->session;
-  // Whoever is not waited for sees an outage as it is.
+  // An observer sees an outage as it is, because the server does not wait for it.
   options.role = setup.outage_s > 0 ? transport::Role::kObserver : transport::Role::kParticipant;
   config->wait_for = setup.outage_s > 0 ? 0 : 2;
   std::vector<std::unique_ptr<Watcher>> watchers;

@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench smoothing` measures: how visible corrections are, with and without smoothing.
+// Measures for `tandem bench smoothing` how visible corrections are, with and without smoothing.
 
 #include <cstdint>
 #include <string>
@@ -21,12 +21,12 @@ struct SmoothingSetup {
   double outage_s = 0;                 ///< the link is cut for this time every five seconds
 };
 
-/// The statistics of what one of the clients showed. Scene units, over all bodies and samples.
+/// Statistics of the places that one of the clients showed, over all bodies and samples, in scene units.
 struct Seen {
   /// 99.9th percentile of the second difference of the place shown (its length), less that of the true motion
   /// at the same moments. Bodies that are new or jumped are left out.
   double jump = 0;
-  double mean_error = 0;  ///< of the place shown to the true one at that moment
+  double mean_error = 0;  ///< between the place shown and the true one at that moment
   double p999_error = 0;
 };
 

@@ -14,7 +14,7 @@ constexpr double kMargin = 1.1;  // "slightly exceed the maximum error of experi
 
 double radians(std::uint32_t on_lattice) { return std::ldexp(static_cast<double>(on_lattice), -28); }
 
-/// The statistics of what a stream corrected in one pass over the source.
+/// Statistics of a stream's corrections in one pass over the source.
 Result<host::ResidualStatistics> observe(const host::StreamConfig& config,
                                          const std::function<Result<Source>()>& make, std::uint64_t frames,
                                          const std::function<void(Frame)>& progress) {
@@ -64,7 +64,7 @@ Result<scenes::TrainedTable> train(scenes::Scene scene, sessions::SessionChoice 
   scenes::TrainedTable table;
   table.bodies = choice.bodies;
   table.threshold_m = choice.threshold_m.value_or(scene.threshold_m * choice.threshold_scale);
-  // A run without any correction still needs a range; one unit is the least there is.
+  // A run without any correction still needs a range; one unit is the minimum.
   table.position_range_m = kMargin * std::max(1U, ranges->largest_position) / first->lattice.position_scale();
   table.velocity_range_m_per_s =
       kMargin * std::max(1U, ranges->largest_velocity) / first->lattice.velocity_scale();

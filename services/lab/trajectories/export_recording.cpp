@@ -26,7 +26,7 @@ using Step = Playback::Step;
 /// A playback whose errors name the file.
 class Reader {
  public:
-  /// At its first run.
+  /// Opens the recording at its first run.
   static Result<Reader> open(const std::string& path) {
     auto playback = Playback::open(path);
     if (!playback) return tl::unexpected(playback.error());
@@ -35,7 +35,7 @@ class Reader {
       reader.tell(fmt::format("is cut short at byte {}; exported up to there", *torn));
     const auto step = reader.next();
     if (!step) return tl::unexpected(step.error());
-    if (*step == Step::kEnd) return fail(ErrorCode::kMalformed, path + ": holds no snapshot to begin from");
+    if (*step == Step::kEnd) return fail(ErrorCode::kMalformed, path + ": it has no snapshot to begin from");
     return reader;
   }
   [[nodiscard]] Result<Step> next() {
@@ -79,7 +79,7 @@ double smallest_radius(const transport::SessionMessage& session) {
   return smallest;
 }
 
-/// Empty unless all of them can be given.
+/// Empty if one of them is unknown.
 std::vector<engine::Shape> shapes_of(const transport::SessionMessage& session) {
   std::vector<engine::Shape> shapes;
   for (const transport::BodyType& type : session.types) {

@@ -1,5 +1,5 @@
 #pragma once
-// A recording of a session as other tools want it: a trajectory, or point clouds.
+// Exports a recording of a session for other tools, as a trajectory or as point clouds.
 
 #include <cstdint>
 #include <string>
@@ -8,22 +8,22 @@
 
 namespace tandem::lab {
 
-/// For people who read them: the end of `tandem export --help`.
+/// The end of `tandem export --help`, for people who read the files.
 inline constexpr const char* kRecordingFormat =
-    "With --from, row 0 is the recording's first snapshot, and a body is a slot; an empty one is all zeros (w "
-    "of a\n"
-    "quaternion 1), which a reader cannot tell from a body at the origin. dt_s, radius and X.scene.textproto, "
-    "which\n"
-    "\"scene\" then names, are the recorded scene's; of a session without one, dt_s is 1 / its frame rate, "
-    "radius that\n"
-    "of the sphere around the smallest body, or the threshold, and there is no \"scene\". damping_per_s and "
-    "threshold are\n"
-    "those of row 0, gravity as the inputs changed it. The states end where the recording has a gap, where "
-    "another\n"
-    "server began, or where the file is cut short.\n"
-    "--points: messages foxglove.PointCloud (JSON) of topic /bodies, all of the recording, at the times it was "
-    "recorded:\n"
-    "of each body that is there, by slot, x, y, z, radius, red, green, blue, alpha, type.";
+    "With --from, row 0 is the recording's first snapshot, and each slot is a body. An empty slot is all "
+    "zeros\n"
+    "(w of a quaternion 1), which a reader cannot tell from a body at the origin. dt_s and radius come from "
+    "the\n"
+    "recorded scene, which becomes X.scene.textproto, and \"scene\" names that file. Without a recorded "
+    "scene\n"
+    "there is no \"scene\", dt_s is 1 / the frame rate, and radius is that of the sphere around the smallest "
+    "body,\n"
+    "or the threshold. damping_per_s and threshold are those of row 0; gravity is as the inputs changed it. "
+    "The\n"
+    "states end where the recording has a gap, where another server began, or where the file is cut short.\n"
+    "--points writes messages foxglove.PointCloud (JSON) of topic /bodies for the whole recording, at the "
+    "times\n"
+    "it was recorded: for each body, by slot, x, y, z, radius, red, green, blue, alpha, type.";
 
 /// The agreed states of the recording's first run as a pair X.npy and X.json: a row for the start and one for
 /// each frame. Where the recorded scene can be loaded, it becomes X.scene.textproto, and X.json names it.

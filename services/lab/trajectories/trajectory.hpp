@@ -16,29 +16,32 @@
 
 namespace tandem::lab {
 
-/// For people who write one: the end of `tandem export --help`.
+/// The end of `tandem export --help`, for people who write a trajectory.
 inline constexpr const char* kTrajectoryFormat =
-    "X.npy: row 0 is the start; little-endian float32 as numpy saves it, in any unit of length, and "
-    "seconds.\n"
-    "Of a body 6 columns: position, velocity; or 13: then the quaternion w, x, y, z (the SDK has x, y, z, w) from body to world, norm 1 "
-    "within\n"
-    "0.001, and the angular velocity in the world's frame, rad / s, at most 2 rad a row.\n"
+    "X.npy: little-endian float32 as numpy saves it, in any unit of length, and seconds. Row 0 is the "
+    "start.\n"
+    "A body has 6 columns, position and velocity, or 13: then also the quaternion w, x, y, z (the SDK uses\n"
+    "x, y, z, w) from body to world with norm 1 within 0.001, and the angular velocity in the world's "
+    "frame,\n"
+    "rad / s, at most 2 rad per row.\n"
     "X.json: an object with\n"
     "  dt_s           seconds between rows\n"
     "  damping_per_s  share of its velocity that a free body loses in a second, 0 for none\n"
-    "  radius         of the smallest body, with 13 columns and no shapes of the sphere around every body; or a\n"
-    "                 list, one a body, of the spheres around them\n"
-    "  shapes         optional: a list of objects with \"shape\" (sphere, box, capsule, cylinder, hull) and \"values\"\n"
-    "                 (a sphere's radius; half sizes x, y, z; radius and half length along y; points x, y, z)\n"
-    "  shape_of       with shapes: for each body its place in that list, from 0\n"
-    "  threshold      error of a position, with 13 columns of a surface, that a codec may leave\n"
-    "  gravity        [x, y, z] for each row: what acts in the step that leads to it\n"
-    "  scene          optional: a scene's name, or the path of a .textproto from the folder of X.json. Its "
-    "first\n"
-    "                 body type, pair, wall, substeps, planes, boxes and spheres are what the predictors "
-    "field\n"
-    "                 and contact compute with; without it, only ballistic is possible.\n"
-    "Any program may write the pair; `tandem bench bandwidth --trajectory X.npy` measures it.";
+    "  radius         the radius of the smallest body; with 13 columns and no shapes, that of the sphere "
+    "around\n"
+    "                 every body; or a list of the radii of the spheres around each body\n"
+    "  shapes         optional: a list of objects with \"shape\" (sphere, box, capsule, cylinder, hull) and "
+    "\"values\"\n"
+    "                 (a sphere's radius; half sizes x, y, z; radius and half length along y; points x, y, "
+    "z)\n"
+    "  shape_of       needed with shapes: for each body its place in that list, from 0\n"
+    "  threshold      error that a codec may leave, of a position or, with 13 columns, of a surface\n"
+    "  gravity        [x, y, z] for each row: the gravity in the step that leads to it\n"
+    "  scene          optional: a scene's name, or the path of a .textproto from the folder of X.json. The\n"
+    "                 predictors field and contact use its first body type, pair, wall, substeps, planes, "
+    "boxes\n"
+    "                 and spheres; without a scene, only ballistic is possible.\n"
+    "Any program may write the two files; `tandem bench bandwidth --trajectory X.npy` measures them.";
 
 /// X.json: what the numbers alone do not say. Scene units and seconds.
 struct TrajectoryInfo {

@@ -1,4 +1,5 @@
-// What orientations add to a predicted step: 10,000 bodies turned in place, one in `resting` at rest.
+// The cost that orientations add to a predicted step: 10,000 bodies turned in place, one in `resting` at
+// rest.
 
 #include <benchmark/benchmark.h>
 

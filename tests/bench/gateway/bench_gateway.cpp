@@ -37,7 +37,7 @@ struct Options {
   int bodies = 10'000, seconds = 20, domain = 91;
 };
 
-/// A program that is ended with this object; what it says goes to a file.
+/// A program that ends with this object; its output goes to a file.
 class Child {
  public:
   Child(const std::vector<std::string>& command, const std::string& log) : log_(log) {
@@ -65,7 +65,7 @@ class Child {
     std::ifstream in(log_);
     return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   }
-  /// Of all its threads since its start.
+  /// Processor time of all its threads since its start.
   [[nodiscard]] double cpu_s() const {
     std::ifstream in("/proc/" + std::to_string(pid_) + "/stat");
     std::string word;

@@ -1,5 +1,5 @@
 #pragma once
-// Many viewers in one thread, who look at frame numbers only.
+// Many viewers in one thread, which read only frame numbers.
 
 #include <cstdint>
 #include <map>

@@ -8,7 +8,7 @@ TIMEOUT_S = 480
 
 
 def run(command, **more):
-    """What the command printed; ends the program when it fails."""
+    """The output of a command; ends the program if it fails."""
     try:
         done = subprocess.run([str(part) for part in command], timeout=TIMEOUT_S, capture_output=True, check=False, **more)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -1,7 +1,7 @@
 #pragma once
-// What a recorder is told on standard input, as text: one start position a body and one gravity a step, made
-// by `generate` so that every engine gets the same. What it answers on standard output: float32 [frames +
-// 1][bodies][6], position and velocity.
+// The input of a recorder on standard input, as text: one start position per body and one gravity per step,
+// made by `generate` so that every engine gets the same. What it answers on standard output: float32 [frames
+// + 1][bodies][6], position and velocity.
 
 #include <array>
 #include <cstddef>

@@ -73,7 +73,7 @@ def turning_gravity(frames, dt_s, strength, seed):
 
 
 def world_text(dt_s, radius, low, high, spring, damping, shear):
-    """The scene file that tells `field` what the bodies are in a closed room: see scene_text()."""
+    """The scene file from which `field` knows the bodies in a closed room: see scene_text()."""
     planes = [(axis, side, bounds[axis]) for axis in range(3) for side, bounds in ((1, low), (-1, high))]
     return scene_text(dt_s, radius, low, high, planes, spring, damping, shear)
 

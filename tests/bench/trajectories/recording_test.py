@@ -1,4 +1,4 @@
-"""What `generate` writes is what `tandem bench bandwidth --trajectory` reads. recording_test.py PROGRAM"""
+"""Checks that `tandem bench bandwidth --trajectory` reads what `generate` writes. recording_test.py PROGRAM"""
 
 import array
 import json

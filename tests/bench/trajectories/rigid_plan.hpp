@@ -1,5 +1,5 @@
 #pragma once
-// What a recorder of rigid bodies is told on standard input, as text: shapes, bodies, the gravity of each row
+// The input of a recorder of rigid bodies on standard input, as text: shapes, bodies, the gravity of each row
 // and kicks, made by `rigid.py` so that every engine gets the same. What it answers on standard output:
 // float32 [frames + 1][bodies][13], position, velocity, quaternion w x y z, angular velocity.
 

@@ -1,4 +1,5 @@
-// Who joins over a random link plays within a bound, and somebody on a good link notices nothing of it.
+// A client that joins over a random link plays within a bound, and a client on a good link does not notice
+// it.
 //   TANDEM_FAULT_SEED=N    replays one
 //   TANDEM_FAULT_SEEDS=N   runs so many instead of the default
 #include <gtest/gtest.h>
@@ -42,7 +43,7 @@ std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
   return text != nullptr ? std::strtoull(text, nullptr, 10) : otherwise;
 }
 
-/// A link, the same both ways but for what is random, and who joins over it.
+/// A link, the same both ways except for random numbers, and the client that joins over it.
 struct Scenario {
   explicit Scenario(std::uint64_t seed) : dice(seed) {
     bodies = 100 + static_cast<std::uint32_t>(dice.below(6000));
@@ -97,7 +98,7 @@ struct Scenario {
   std::int64_t clock_jump_ns = 0;  // of the wall, in mid-join
 };
 
-/// A client that knows what it loaded and when it applied what.
+/// A client that records what it loaded, and when it applied each frame.
 class Listening final : public CoreListener {
  public:
   Listening(transport::simulated::Network& network, transport::ClientId id, transport::Role role)
@@ -119,7 +120,7 @@ class Listening final : public CoreListener {
   std::uint64_t applied = 0;
 };
 
-/// A server, a witness who plays on a good link, and from join() on somebody else.
+/// A server, a witness that plays on a good link, and from join() on another client.
 class Joining {
  public:
   Joining(std::uint64_t seed, const Scenario& scenario)
@@ -208,7 +209,7 @@ Outcome join_over(std::uint64_t seed, const Scenario& scenario) {
   for (int i = 0; i < 50'000 && session.joiner().core->session() == nullptr; ++i) session.tick();
   const double begin_s = session.now_s();
   const std::uint64_t applied = session.witness().applied;
-  // The snapshot's size is known once it is there; one that never came is taken to have 40 bytes a body.
+  // The snapshot's size is known once it has arrived; otherwise 40 bytes per body are assumed.
   const double longest_s = kPatience * scenario.bound_s(40U * scenario.bodies);
   while (!session.joined() && session.now_s() < begin_s + longest_s) {
     session.tick();

@@ -42,7 +42,7 @@ struct WorldOptions {
   transport::simulated::LinkModel link;
 };
 
-/// What the server says is true.
+/// The server's own hashes, and the frames on which its inputs acted.
 struct Truth {
   std::map<std::pair<Epoch, Frame>, std::uint64_t> hashes;
   /// By the value that makes each input unique: frame it acted on.
@@ -94,7 +94,8 @@ class World {
   void incident(bool restart);
   /// Ends all freezes and cuts.
   void heal();
-  /// Empty when every client plays the server's present state, else who does not and why.
+  /// Empty if every client plays the server's present state, otherwise the clients that do not, and the
+  /// reasons.
   [[nodiscard]] std::string not_playing();
   /// First broken rule of any client.
   [[nodiscard]] std::string fault() const;

@@ -1,4 +1,4 @@
-// Floods a session, as a stranger in its network can. What it did comes out as one JSON object.
+// Floods a session, as a stranger in its network can. Prints its counts as one JSON object.
 //   flood KIND SESSION RATE SECONDS
 // KIND is one of kFloods below. RATE: samples a second; 0: as fast as the middleware takes them.
 
@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t kSeed = 1;
 
-/// What an eavesdropper knows: the announcement and a client that plays.
+/// The knowledge of an eavesdropper: the announcement and a client that plays.
 struct Heard {
   SessionMessage session;
   AckMessage victim;

@@ -28,7 +28,7 @@ GRAVITY = "inputs {{ time_s: {:.2f} gravity {{ x: {:.2f} y: -3 }} }}\n"
 
 
 def flood(stage, kind, seconds):
-    """Runs a flood to its end; returns what it says. Nice, as strangers have machines of their own."""
+    """Runs a flood to its end and returns its JSON object. Runs it with `nice`, because strangers have their own machines."""
     flooder = stage.start("nice", "-n", "10", stage.options.flood, kind, "default", RATE, seconds)
     said = flooder.output(60)
     if not said.get("sent"):

@@ -36,7 +36,7 @@ TEST(Freeze, FrozenAndDeadClientsDelayTheOthersByTheStallTimeoutAtMost) {
       }
     }
     stage.run_ms(3000);
-    // A period is due anyway, and a round trip of up to 38 ms passes until who lives has acknowledged.
+    // A period passes anyway, and a round trip of up to 38 ms until the living clients have acknowledged.
     EXPECT_LE(longest_ns, kSecond / 2 + 72 * kMillisecond);
     EXPECT_EQ(server.host->participants(), 5U - victims);
     EXPECT_EQ(stage.clients[0]->core->statistics().resyncs, 0U);

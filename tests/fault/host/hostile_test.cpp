@@ -1,4 +1,4 @@
-// A participant that says anything to the server: nobody else may notice.
+// A participant sends arbitrary messages to the server, and no other client may notice.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -25,7 +25,7 @@ class Liar {
       ack.phase = static_cast<transport::Phase>(dice_.below(dice_.one_in(10) ? 5 : 2));
       ack.applied = some_frame();
       ack.simulated = some_frame();
-      ack.role_wanted = transport::Role::kObserver;  // what a participant may delay is another test's matter
+      ack.role_wanted = transport::Role::kObserver;  // another test covers delays by participants
       ack.clock_ns = static_cast<std::int64_t>(dice_.next());
       ack.join_attempt = static_cast<std::uint32_t>(dice_.below(4));
       static_cast<void>(port_->write(ack));

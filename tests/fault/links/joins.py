@@ -25,7 +25,7 @@ BODIES = 10_000
 SNAPSHOT_BYTES = 80_000  # with headers
 SETTLE_S = 3.0  # after those of Stage.server: who joins first does so 5 s into the session
 AT_ONCE = 20
-BLOCKED_S = 3.0  # what somebody who never answers may cost others
+BLOCKED_S = 3.0  # maximum delay of others by a client that never answers
 
 
 def link(delay_ms, jitter_ms=0, loss=0, **more):
@@ -151,7 +151,7 @@ def playing(stage, way, floor_ms, aim_ms):
 
 
 class Witness:
-    """A participant on a good link, who must notice nothing of what others suffer."""
+    """A participant on a good link, which must not notice the problems of others."""
 
     FRAMES_PER_S = 27  # of 30 in any second, as a machine may be busy
     CALM_S = 4.0
@@ -193,7 +193,7 @@ def until_carried(network, name, count):
 
 
 def begin_join(stage, network, name, seed):
-    """A participant, who has a part of the snapshot when this returns. The seed says which part."""
+    """A participant that has a part of the snapshot when this returns. The seed decides which part."""
     client = stage.client("--timeout", 90, namespace=network.clients[name])
     client.wait_for("found session", 20)
     until_carried(network, name, random.Random(seed).uniform(0.1, 0.6) * SNAPSHOT_BYTES)

@@ -99,7 +99,7 @@ def lost(stage, seconds, limit, *more):
     time.sleep(limit + 3)
     rate = client.live()[-1][1]
     caught = None
-    # A live line a second: the first whose frame is about the one due.
+    # There is a live line per second; this takes the first whose frame is about the one due.
     for at, line in client.live():
         due = before[0] + 30 * (at - before[1])
         if at > returned and line["frame"] > due - 40 - 3 and line["phase"] == "playing":

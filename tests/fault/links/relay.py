@@ -236,7 +236,7 @@ class Network:
         self.tell(seed=seed)
 
     def set(self, name, *ways, **changes):
-        """Of a client's link, in the directions "up" or "down", or both without any; all else stays as it is."""
+        """Changes a client's link in the direction "up" or "down", or in both if none is given; all else stays the same."""
         for way in ways or ("up", "down"):
             unknown = changes.keys() - PERFECT.keys()
             if unknown:

@@ -42,7 +42,7 @@ def play(options, folder):
     names = [client.partition("=")[0] for client in options.clients]
     server = subprocess.Popen(
         [options.tandemd, "--scene", "half_pipe", "--bodies", "400", "--session", SESSION, "--domain", domain,
-         "--predictor", "field", "--wait-for", str(len(names)), "--stall-timeout", "off", "--hash-log", log],  # none is too slow
+         "--predictor", "field", "--wait-for", str(len(names)), "--stall-timeout", "off", "--hash-log", log],  # no client is too slow
         env=environment, stdout=subprocess.DEVNULL, stderr=(folder / "server.err").open("wb"),
     )  # fmt: skip
     clients = {}

@@ -127,7 +127,7 @@ def restarts(stage):
 
 
 def raw(port, head, body=b""):
-    """What a connection says that is no good client."""
+    """Messages of a connection that is not a good client."""
     with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
         connection.sendall(head + body)
         connection.settimeout(3)
@@ -141,7 +141,7 @@ def raw(port, head, body=b""):
 
 
 def refusals(stage):
-    """Who may not connect, and what may not be said: refused with code and reason, counted, and nobody else notices."""
+    """Bad connections and messages are refused with code and reason and counted, and nobody else notices."""
     token = stage.folder / "token"
     token.write_text(TOKEN + "\n", encoding="ascii")
     stage.server("server")
@@ -237,7 +237,7 @@ def certificate(stage, name):
 
 
 def doors(stage):
-    """Through TLS with a token, and over IPv6: viewers hold the server's state, and whoever speaks otherwise stays out."""
+    """Through TLS with a token, and over IPv6: viewers hold the server's state, and connections without TLS or token are refused."""
     token = stage.folder / "token"
     token.write_text(TOKEN + "\n", encoding="ascii")
     cert, key = certificate(stage, "its own")

@@ -27,7 +27,7 @@ NOT_RUN = 77
 
 
 def install(folder):
-    """The npm packages, as locked. Exits where they cannot be had."""
+    """Installs the npm packages as locked. Exits if they are not available."""
     for program in ("npm", "node"):
         if shutil.which(program) is None:
             print(f"not run: {program} is not installed")
@@ -44,7 +44,7 @@ def install(folder):
 
 
 def read(file, folder):
-    """What read.mjs says of a file."""
+    """The summary that read.mjs prints of a file."""
     done = subprocess.run(["node", "read.mjs", file], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise AssertionError(f"{file.name} cannot be read: {done.stderr[-1000:]}")

@@ -1,4 +1,4 @@
-// Reads an MCAP file with nothing but what it says about itself, and prints a summary as JSON:
+// Reads an MCAP file with only its own schemas, and prints a summary as JSON:
 //   node read.mjs FILE
 import { readFileSync } from "node:fs";
 import { parseIDL } from "@foxglove/omgidl-parser";
@@ -6,7 +6,7 @@ import { MessageReader } from "@foxglove/omgidl-serialization";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { decompress } from "fzstd";
 
-// What decodes the messages of a schema.
+// The decoder for the messages of a schema.
 function readerOf({ name, encoding, data }) {
   const schema = new TextDecoder().decode(data);
   if (encoding === "omgidl") {

@@ -108,7 +108,7 @@ class Playing(unittest.TestCase):
     def test_arrays_of_any_stride_hold_the_same(self):
         wide = np.full((BODIES, 2, 3), -1, np.float32)
         tight = np.zeros((BODIES, 3), np.float32)
-        # Of one that nobody updates nothing moves.
+        # Nothing moves in a client that nobody updates.
         paused = self.enterContext(join(background=False, observe=True))
         paused.wait_until_playing(stage.LIMIT_S)
         at = tandem.clock_ns()

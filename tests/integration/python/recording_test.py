@@ -49,7 +49,7 @@ class Recorded(unittest.TestCase):
         self.assertEqual(last.positions.shape, (BODIES, 3))
         self.assertEqual((last.types.dtype, last.alive.dtype), (np.uint16, np.bool_))
         self.assertIsNone(last.orientations)
-        # What was published as integers moves as its velocities say.
+        # Bodies move by their velocities, up to the rounding to integers.
         moved = (last.positions - states[-2].positions) * 120
         np.testing.assert_allclose(moved[last.alive].mean(axis=0), last.velocities[last.alive].mean(axis=0), atol=0.5)
 

@@ -28,7 +28,7 @@ def common(session, domain=DOMAIN):
 def server(session, *arguments, scene="half_pipe", bodies=300, log=None, domain=DOMAIN):
     """Runs until the block ends; its hashes go to `log`."""
     hashes = ["--hash-log", log] if log else []
-    # One stream, so that there is one hash of a frame.
+    # There is one stream, so that a frame has one hash.
     hashes += [] if {"--predictor", "--codec", "--stream"} & set(arguments) else ["--predictor", "field"]
     command = [os.environ["TANDEMD"], "--scene", scene, "--bodies", bodies, *common(session, domain), *hashes, *arguments]
     with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
@@ -42,7 +42,7 @@ def server(session, *arguments, scene="half_pipe", bodies=300, log=None, domain=
 
 @contextlib.contextmanager
 def refused(case, code):
-    """What the block does raises tandem.Error with that code."""
+    """Checks that the block raises tandem.Error with that code."""
     import tandem
 
     with case.assertRaises(tandem.Error) as raised:

@@ -81,7 +81,7 @@ def expect_same(programs, name, truth, least):
 
 
 def check_whole(programs, file, truth):
-    """A participant from the first frame on, whose inputs are refused, and one that comes late."""
+    """A participant plays from the first frame on and its inputs are refused; another one comes late."""
     script = programs.folder / "inputs.textproto"
     script.write_text(INPUTS, encoding="utf-8")
     first = programs.join("first", "--input-script", script, "--seconds", 4)
@@ -150,7 +150,7 @@ def check_seek(programs, file, truth):
 
 
 def check_end(programs, file, truth):
-    """Somebody goes to the end: the replay stays there, with those who are there, and nobody is waited for again."""
+    """After a seek to the end the replay stays there with its clients, and does not wait for participants again."""
     script = programs.folder / "to_end.textproto"
     script.write_text("inputs { frame: 30 seek_s: 5.7 }", encoding="utf-8")
     replay = programs.start(programs.tandem, "replay", file, "--wait-for", 2)
@@ -175,7 +175,7 @@ def check_loop(programs, file, truth):
     replay.send_signal(signal.SIGINT)
     finish(replay, "replay")
     rounds = expect_epochs(programs, "rounds", truth, 2)
-    # Nobody is waited for again: the second round goes on while the client joins.
+    # The replay does not wait again: the second round goes on while the client joins.
     assert min(truth) < rounds[0][0] <= rounds[1][0] < rounds[0][-1], rounds
     assert [each["session"] for each in seen["sessions"]] == ["default"], seen
 

@@ -61,7 +61,7 @@ class Stage:
             )  # fmt: skip
 
     def server(self, name, *arguments, scene="half_pipe", bodies=400):
-        # One stream, so that there is one hash of a frame.
+        # There is one stream, so that a frame has one hash.
         predictor = () if {"--predictor", "--codec", "--stream"} & set(arguments) else ("--predictor", "field")
         self.start(
             name, self.options.tandemd, "--scene", scene, "--bodies", bodies, "--json",
@@ -324,7 +324,7 @@ def rigid_codecs(stage):
 
 
 def no_server(stage):
-    """A client without a server says so, waits, gives up when told to; then one starts late and it plays."""
+    """A client without a server reports it and gives up after --timeout; a server that starts late is found."""
     stage.client("alone", "--timeout", 3, "--seconds", 1)
     stage.client("patient", "--seconds", 2)
     report = stage.end("alone", 1)
@@ -399,7 +399,7 @@ def emitter(stage):
     for name in visitors:
         compare(stage, ["server"], name, 300)
     for process, sizes in memory.items():
-        # The first minute fills what is bounded: histories, hash logs' buffers, tables of clients.
+        # The first minute fills all bounded memory: histories, buffers of hash logs, tables of clients.
         settled = max(sizes[: max(1, min(6, len(sizes) // 2))])
         if max(sizes) > settled + MEMORY_SLACK_KB:
             raise Failed(f"{process} grew from {settled} to {max(sizes)} KiB")

@@ -27,7 +27,7 @@ class DdsCdr : public ::testing::Test {
     writer_ = Entity(dds_create_writer(participant_.get(), topic_.get(), qos.get(), nullptr));
     reader_ = Entity(dds_create_reader(participant_.get(), topic_.get(), qos.get(), nullptr));
   }
-  /// What Cyclone DDS makes of a message, with its header.
+  /// The bytes that Cyclone DDS makes of a message, with its header.
   Bytes cyclones(const M& message) {
     EXPECT_EQ(dds::write_sample(writer_.get(), message), DDS_RETCODE_OK);
     ddsi_serdata* sample = nullptr;
@@ -46,7 +46,7 @@ class DdsCdr : public ::testing::Test {
     ddsi_serdata_unref(sample);
     return bytes;
   }
-  /// What it reads from our bytes of the message before.
+  /// Cyclone's reading of our bytes of the message before.
   M reread() {
     EXPECT_NE(reread_, nullptr) << "Cyclone DDS refuses our bytes";
     if (reread_ == nullptr) return {};

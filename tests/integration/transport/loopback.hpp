@@ -1,5 +1,5 @@
 #pragma once
-// What the DDS tests share: loopback only, a domain and session of their own, waiting for a condition.
+// Shared by the DDS tests: loopback only, a domain and session of their own, waiting for a condition.
 
 #include <unistd.h>
 

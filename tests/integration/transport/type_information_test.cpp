@@ -1,4 +1,4 @@
-// What a type-driven monitoring tool does. This process links none of our types: it finds a topic by its
+// Works like a type-driven monitoring tool. This process links none of our types: it finds a topic by its
 // name, fetches the type from the writer's process and decodes samples with nothing else.
 
 #include <dds/dds.h>

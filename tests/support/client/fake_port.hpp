@@ -1,5 +1,5 @@
 #pragma once
-// A client port whose other side is the test.
+// A client port with the test on its other side.
 
 #include <set>
 #include <utility>

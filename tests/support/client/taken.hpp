@@ -1,5 +1,5 @@
 #pragma once
-// A sample in memory of its own.
+// A sample with its own memory.
 
 #include <vector>
 

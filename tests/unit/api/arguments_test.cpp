@@ -1,4 +1,4 @@
-// What an application may pass that it should not.
+// Wrong arguments that an application may pass.
 #include <gtest/gtest.h>
 
 #include <array>

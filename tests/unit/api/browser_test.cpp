@@ -1,4 +1,4 @@
-// What a browser tells of the sessions on a domain.
+// The sessions on a domain, as a browser lists them.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -12,7 +12,7 @@
 namespace tandem::api {
 namespace {
 
-/// What is announced and heard is the test's.
+/// The test supplies announcements and status.
 class FakeMonitor final : public transport::Monitor {
  public:
   struct Domain {

@@ -1,4 +1,4 @@
-// What an application is told, and when.
+// The events that an application receives, and when.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -140,7 +140,7 @@ TEST_F(Events, TheOldestAreDroppedAndCounted) {
   EXPECT_FALSE(log.take().has_value());
 }
 
-// What is thrown within the client's work leaves it half-way: it says so from then on, and does no harm.
+// An exception within the client's work leaves it half-way. From then on it reports that, and does no harm.
 TEST_F(Events, WithoutMemoryAClientStopsAndSaysSo) {
   playground.on_write = [] { throw std::bad_alloc(); };
   tandem_result result = TANDEM_OK;

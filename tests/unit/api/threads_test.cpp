@@ -1,4 +1,4 @@
-// Calls from several threads at once. The port is nobody's: what matters is who waits for whom.
+// Calls from several threads at once. The port is silent; the tests check which call waits for which.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>

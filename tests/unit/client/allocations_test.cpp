@@ -1,4 +1,4 @@
-// No memory is asked for per frame or per sample, and a sample for which there is none leaves a client whole.
+// Frames and samples allocate no memory, and a sample that gets no memory leaves a client whole.
 
 #include <atomic>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// One stream by itself: what is lost is returned, and who follows it decides.
+// One stream by itself: a follower returns a loss, and the caller decides what to do.
 #include "sdk/client/following/follower.hpp"
 
 #include "tests/support/client/fake_server.hpp"

@@ -26,7 +26,7 @@ class OrientationTest : public ::testing::Test {
     steady.forget(kSlots);
   }
 
-  /// What a client shows once `state` is agreed, with one frame simulated ahead of it.
+  /// The picture of a client once `state` is agreed, with one frame simulated ahead.
   void agree(const State& state) {
     std::swap(frames[0], frames[1]);
     picture.before = frame_number == 0 ? nullptr : &frames[0];

@@ -1,4 +1,4 @@
-// Where samples go, and of which moment they are.
+// The memory that samples are written to, and their moments.
 
 #include <algorithm>
 #include <array>

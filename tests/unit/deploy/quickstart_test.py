@@ -77,7 +77,7 @@ class Usage(unittest.TestCase):
     def test_what_is_of_the_viewer_goes_with_view(self):
         for flags in (["--port", "9000"], ["--lan"]):
             done = subprocess.run([path.with_name("quickstart"), *flags], capture_output=True, text=True, check=False, timeout=60)
-            self.assertEqual((done.returncode, done.stderr), (2, f"quickstart: {flags[0]} goes with --view\n"))
+            self.assertEqual((done.returncode, done.stderr), (2, f"quickstart: {flags[0]} needs --view\n"))
 
 
 class Tilts(unittest.TestCase):

@@ -108,11 +108,11 @@ TEST(Overrun, TellsThatFramesTakeTooLongEveryTenSecondsAndThatItIsOver) {
   const std::vector<std::string> slow = seconds(25, 41);
   ASSERT_EQ(slow.size(), 3U);
   EXPECT_EQ(slow[1],
-            "a frame takes 41 ms of 33.3 ms, the simulation 36 ms of them: the session runs at 24.4 of 30 "
-            "frames/s");
+            "the session runs at 24.4 instead of 30 frames/s: a frame takes 41 ms, 36 ms of them in the "
+            "simulation, but must take at most 33.3 ms");
   const std::vector<std::string> over = seconds(25, 20);
   ASSERT_EQ(over.size(), 1U);
-  EXPECT_EQ(over[0], "a frame takes 20 ms of 33.3 ms again");
+  EXPECT_EQ(over[0], "the session keeps its rate again: a frame takes 20 of 33.3 ms");
 }
 
 TEST(Pacing, DeadlinesAreAbsoluteSoThatLatenessDoesNotAddUp) {

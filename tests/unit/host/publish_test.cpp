@@ -50,7 +50,7 @@ TEST(Publish, AnEngineThatExplodesIsSaidOnceASecond) {
   const auto said = [&](const char* text) {
     return std::ranges::count_if(notices, [&](const auto& line) { return line.find(text) != line.npos; });
   };
-  EXPECT_EQ(said("not sound"), 3) << "the first, then after one second, then the rest";
+  EXPECT_EQ(said("faulty bodies"), 3) << "the first, then after one second, then the rest";
   EXPECT_EQ(said("40 removed"), 1);
 }
 

@@ -1,4 +1,4 @@
-// Who holds the others up, for how long, and what follows from it.
+// Which client delays the others, for how long, and with what consequences.
 #include <gtest/gtest.h>
 
 #include <set>

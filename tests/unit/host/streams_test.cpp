@@ -366,8 +366,8 @@ TEST_F(StreamsTest, ThatTheConfigurationGetsWrongAreRefusedByName) {
             }).find("1 to 8 streams, not 9"),
             std::string::npos);
   EXPECT_NE(refusal([](Streams& s) { s.clear(); }).find("not 0"), std::string::npos);
-  EXPECT_NE(refusal([](Streams& s) { s[1].lattice.unit *= 2; }).find("another lattice"), std::string::npos);
-  EXPECT_NE(refusal([](Streams& s) { s[1].layout.lead = 0; }).find("one lead"), std::string::npos);
+  EXPECT_NE(refusal([](Streams& s) { s[1].lattice.unit *= 2; }).find("the same lattice"), std::string::npos);
+  EXPECT_NE(refusal([](Streams& s) { s[1].layout.lead = 0; }).find("the same lead"), std::string::npos);
   EXPECT_NE(refusal([](Streams& s) { s[1].layout.codec = "morse"; }).find("stream rich: "),
             std::string::npos);
 }

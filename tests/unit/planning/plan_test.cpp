@@ -96,7 +96,7 @@ TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
   EXPECT_NE(with([](W& w, S&) { w.automatic = true, w.target_mbit_per_s = 1e-9; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.predictor = "rubbish", w.streams = {read_stream("x:ballistic").value()}; }),
             "accepted");
-  EXPECT_EQ(with([](W& w, S&) { w.streams = {{"", {}}}; }), "each stream needs a name");
+  EXPECT_EQ(with([](W& w, S&) { w.streams = {{"", {}}}; }), "every stream needs a name");
   EXPECT_NE(with([](W& w, S&) { w.streams = {read_stream("x:max-error=1").value()}; }), "accepted");
   EXPECT_NE(with([](W&, S& s) { s.client_limit = 100'000; }), "accepted");
   EXPECT_NE(with([](W&, S& s) { s.rate_hz = std::numeric_limits<double>::quiet_NaN(); }), "accepted");
@@ -133,10 +133,10 @@ TEST(Plan, EveryStreamOptionIsReadAndReachesItsStream) {
   EXPECT_EQ(config->window, 3U);
 }
 
-TEST(Plan, AStreamOptionThatIsNoneIsSaidInOneLine) {
-  EXPECT_NE(read_stream("a:speed=3").error().message.find("'speed' is none of codec, predictor"),
+TEST(Plan, AnUnknownStreamOptionIsRefusedInOneLine) {
+  EXPECT_NE(read_stream("a:speed=3").error().message.find("unknown key 'speed'; known are codec, predictor"),
             std::string::npos);
-  EXPECT_FALSE(read_stream("a:field,predictor=ballistic")) << "said twice";
+  EXPECT_FALSE(read_stream("a:field,predictor=ballistic")) << "set twice";
   EXPECT_FALSE(read_stream("a:budget=1.5"));
 }
 

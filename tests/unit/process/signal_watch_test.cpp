@@ -97,7 +97,7 @@ TEST(SignalWatch, WhoIsStuckAtWorkAfterASignalFails) {
   EXPECT_EQ(ended.exit_code, 1);
   EXPECT_EQ(
       ended.err,
-      "test: the work had not ended 0.05 s after the signal. The program broke it off: reports are missing, "
+      "test: the work had not ended 0.05 s after the signal. The program stopped it: reports are missing, "
       "and files may lack their end.\n");
 }
 

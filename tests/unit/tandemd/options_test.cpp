@@ -333,13 +333,13 @@ TEST(StreamOption, WhatMakesNoSessionIsSaidInOneLine) {
   };
   says({"thin:ballistic", "thin:field"}, "two streams are called 'thin'");
   says({"Thin:ballistic"}, "a stream's name has 1 to 32");
-  says({":ballistic"}, "each needs a name");
+  says({":ballistic"}, "every stream needs a name");
   says({"a:field", "b:field", "c:field", "d:field", "e:field", "f:field", "g:field", "h:field", "i:field"},
        "1 to 8 streams, not 9");
-  says({"thin:ballistic", "rich:field"}, "--stream rich says field",
+  says({"thin:ballistic", "rich:field"}, "--stream rich, which sets field",
        [](Config& config) { config.set_predictor("ballistic"); });
-  says({"a:threshold=-1"}, "a threshold is a length from 1e-9 to 1e9 metres");
-  says({"a:threshold=1,target-bandwidth=1"}, "either a threshold");
+  says({"a:threshold=-1"}, "threshold must be a length from 1e-9 to 1e9 metres");
+  says({"a:threshold=1,target-bandwidth=1"}, "threshold cannot be combined with target-bandwidth");
   says({"a:codec=none,target-bandwidth=1"}, "codec none has no threshold");
   says({"a:max-error=1"}, "max-error needs target-bandwidth");
   says({"a:codec=entropy,budget=900"}, "a budget needs codec");

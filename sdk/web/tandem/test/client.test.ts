@@ -178,7 +178,7 @@ describe('a connection', () => {
     await vi.advanceTimersByTimeAsync(2500);
     expect(sockets[0]?.closed).not.toBeNull();
     expect(sockets.length).toBeGreaterThan(1);
-    expect(client.status()).toMatchObject({ phase: 'lost', reason: 'nothing came for 10 s' });
+    expect(client.status()).toMatchObject({ phase: 'lost', reason: 'nothing was received for 10 s' });
   });
 
   test('stays while the server is gone, and plays its next epoch', async () => {
@@ -231,7 +231,7 @@ describe('inputs', () => {
     expect(() => client.sendBytes(new Uint8Array(1025))).toThrow('1,024');
     expect(client.status().inputsSent).toBe(0);
     client.close();
-    expect(() => client.sendGravity([0, 0, 0])).toThrow('while playing only');
+    expect(() => client.sendGravity([0, 0, 0])).toThrow('can send input only while it plays');
   });
 
   test('that were under way when the server started again are told as unknown', async () => {

@@ -58,7 +58,7 @@ describe.each(VARIANTS)('the module, %s', (variant) => {
   test('refuses inputs unless playing, and says so', async () => {
     const { module } = await start(variant);
     expect(() => module.send(1, new Uint8Array(24))).toThrow(TandemError);
-    expect(() => module.send(1, new Uint8Array(24))).toThrow('while playing only');
+    expect(() => module.send(1, new Uint8Array(24))).toThrow('can send input only while it plays');
     const observer = await start(variant, 'observer');
     expect(() => observer.module.send(1, new Uint8Array(24))).toThrow('observers');
   });
