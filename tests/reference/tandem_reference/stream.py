@@ -10,7 +10,7 @@ CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
 PREDICTORS = ("ballistic", "contact", "field")
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
-VERSION = 1
+VERSION = 2
 
 
 @dataclass
