@@ -12,13 +12,11 @@ struct Recording {
   double length_s = 0, from_s = 0;
   std::uint64_t from_frame = 0;
   double frame_rate_hz = 0;  ///< > 0
-  std::uint32_t stream = 0;  ///< of the recorded session's, the one that was recorded
 };
 
-/// A scene's text with `recording` in the place of the one it had, of the names of streams the recorded one's
-/// alone, and, where it tells no dt_s, that of the
-/// recorded frame rate, so that another rate of the replay changes no velocity. What is no scene's text stays
-/// as it is.
+/// A scene's text with `recording` in the place of the one it had. Where it tells no dt_s, the result has
+/// that of the recorded frame rate, so that another rate of the replay changes no velocity. What is no
+/// scene's text stays as it is.
 [[nodiscard]] std::string replayed(const std::string& text, const Recording& recording);
 
 }  // namespace tandem::scenes

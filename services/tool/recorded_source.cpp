@@ -1,5 +1,7 @@
 #include "services/tool/recorded_source.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "sdk/transport/units.hpp"
@@ -23,8 +25,7 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
                                                     .length_s = playback.length_s(),
                                                     .from_s = playback.time_s(),
                                                     .from_frame = frame(),
-                                                    .frame_rate_hz = playback.session().frame_rate_hz,
-                                                    .stream = playback.stream().id.id});
+                                                    .frame_rate_hz = playback.session().frame_rate_hz});
   session_.window_ceiling = config.window_ceiling;
   playback.timeline().rename(config.epoch, {});
 }
@@ -48,16 +49,23 @@ std::optional<host::MadeFrame> RecordedSource::next(host::StreamSet /*snapshots_
   return host::MadeFrame{.frame = delta.frame, .last_input = delta.last_input, .deltas = {&delta_, 1}};
 }
 
-transport::Reason RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,
-                                         host::Outbox& /*outbox*/, Frame& acts_on) {
+bool RecordedSource::refresh_names() {
+  if (session_.names == playback_->session().names) return false;
+  session_.names = playback_->session().names;
+  return true;
+}
+
+host::InputVerdict RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,
+                                          host::Outbox& /*outbox*/) {
   using transport::Reason;
-  if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return Reason::kRecording;
-  if (input.values.size() != 1 || !input.bytes.empty()) return Reason::kInvalid;
-  if (!(input.values[0] >= 0 && input.values[0] <= playback_->length_s())) return Reason::kInvalid;
-  if (sought_s_ || !seeks_->take(clock_ns_())) return Reason::kRateLimited;
+  if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return {Reason::kRecording};
+  if (input.values.size() != 1 || !input.bytes.empty()) return {Reason::kInvalid};
+  if (!(input.values[0] >= 0 && input.values[0] <= playback_->length_s())) {
+    return {Reason::kInvalid, 0, fmt::format("the recording is {:.1f} s long", playback_->length_s())};
+  }
+  if (sought_s_ || !seeks_->take(clock_ns_())) return {Reason::kRateLimited};
   sought_s_ = input.values[0];
-  acts_on = frame();
-  return Reason::kNone;
+  return {Reason::kNone, frame()};
 }
 
 }  // namespace tandem::tool

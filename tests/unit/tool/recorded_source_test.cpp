@@ -78,8 +78,7 @@ class RecordedSourceTest : public ::testing::Test {
     return played;
   }
   Reason accept(transport::InputKind kind, std::vector<double> values) {
-    Frame acts_on = 0;
-    return source->accept({static_cast<std::uint32_t>(kind), std::move(values), {}}, {1, 1}, outbox, acts_on);
+    return source->accept({static_cast<std::uint32_t>(kind), std::move(values), {}}, {1, 1}, outbox).reason;
   }
 
   const std::string path =
