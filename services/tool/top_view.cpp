@@ -29,6 +29,15 @@ double share_percent(const transport::ServerStatusMessage& s) {
   return s.raw_mbit_per_s > 0 ? 100 * s.mbit_per_s / s.raw_mbit_per_s : 0;
 }
 
+/// Names come from the network: what is not printable must not reach the terminal.
+std::string printable(const std::string& text) {
+  std::string clean = text.substr(0, 64);
+  for (char& c : clean) {
+    if (c < 0x20 || c > 0x7e) c = '?';
+  }
+  return clean;
+}
+
 /// The names that bytes have in JSON: of one object together.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
     {{"delta_bytes", "deltas"},
@@ -37,7 +46,12 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
      {"snapshot_bytes", "snapshots"}}};
 
 Json json_of(const transport::ServerStatusMessage& s) {
-  Json out{{"session", s.session}, {"stream", s.stream}, {"epoch", s.epoch}, {"frame", s.frame}};
+  Json out{{"session", s.session},
+           {"stream", s.stream},
+           {"epoch", s.epoch},
+           {"frame", s.frame},
+           {"role", s.server_role == transport::ServerRole::kLive ? "live" : "standby"},
+           {"behind_frames", s.behind_frames}};
   each_server_figure(
       [&out](std::string_view name, auto value) {
         const auto* const bytes = std::ranges::find(kBytes, name, &decltype(kBytes)::value_type::first);
@@ -59,7 +73,8 @@ Json json_of(const transport::ClientStatusMessage& c) {
            {"phase", phase_word(c.phase)},
            {"lag_ms", c.lag_ms},
            {"too_slow", c.too_slow != 0},
-           {"queue_high_water", c.queue_high_water}};
+           {"queue_high_water", c.queue_high_water},
+           {"stream_reason", printable(c.stream_reason)}};
   each_reported_figure([&out](const char* name, auto value) { out[name] = value; }, c);
   return out;
 }
@@ -100,15 +115,6 @@ std::string short_bytes(std::uint64_t bytes) {
     ++unit;
   }
   return fmt::format("{:.0f}{}", value, kUnits.at(unit));
-}
-
-/// Names come from the network: what is not printable must not reach the terminal.
-std::string printable(const std::string& text) {
-  std::string clean = text.substr(0, 64);
-  for (char& c : clean) {
-    if (c < 0x20 || c > 0x7e) c = '?';
-  }
-  return clean;
 }
 
 }  // namespace
@@ -173,15 +179,16 @@ std::string TopView::to_table() const {
                     short_bytes(s.input_bytes), short_bytes(s.snapshot_bytes)),
         printable(s.codec), printable(s.predictor), s.threshold);
   }
-  text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}\n", "CLIENT",
-                      "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS", "MBIT/S",
-                      "REJOINS", "WRONG");
+  text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}  {}\n",
+                      "CLIENT", "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS",
+                      "MBIT/S", "REJOINS", "WRONG", "WHY THIS STREAM");
   for (const auto& [id, heard] : clients_) {
     const transport::ClientStatusMessage& c = heard.status;
-    text += fmt::format("{:016x} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}{}\n",
-                        c.client, printable(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
-                        c.applied, c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
-                        c.too_slow != 0 ? "  too slow" : "");
+    text +=
+        fmt::format("{:016x} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}  {}{}\n",
+                    c.client, printable(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
+                    c.applied, c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
+                    printable(c.stream_reason), c.too_slow != 0 ? "  too slow" : "");
   }
   return text;
 }

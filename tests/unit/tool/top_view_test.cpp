@@ -37,6 +37,7 @@ transport::ClientStatusMessage client(transport::ClientId id, const std::string&
   status.phase = static_cast<std::uint32_t>(transport::Phase::kPlaying);
   status.applied = 299;
   status.lag_ms = 12.5;
+  status.stream_reason = "fewest bits";
   return status;
 }
 
@@ -57,6 +58,9 @@ TEST(TopView, shows_the_newest_status_of_each_session_and_client) {
   EXPECT_EQ(json["clients"][0]["role"], "participant");
   EXPECT_EQ(json["clients"][0]["phase"], "playing");
   EXPECT_EQ(json["clients"][0]["lag_ms"], 12.5);
+  EXPECT_EQ(json["clients"][0]["stream_reason"], "fewest bits");
+  EXPECT_THAT(view.to_table(), HasSubstr("fewest bits"));
+  EXPECT_EQ(json["sessions"][0]["role"], "live");
   EXPECT_THAT(view.to_table(), HasSubstr("1.50 (3.0 %)"));
   EXPECT_THAT(view.to_table(), HasSubstr("2+1"));
 }
