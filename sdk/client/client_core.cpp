@@ -134,8 +134,8 @@ void ClientCore::take_sessions(Now now) {
   do {
     inbox_.sessions.clear();
     port_.take_sessions(inbox_.sessions);
-    for (const auto& announcement : inbox_.sessions) {
-      const auto& message = announcement.message;
+    for (auto& announcement : inbox_.sessions) {
+      auto& message = announcement.message;
       if (!options_.session.empty() && message.session != options_.session) continue;
       if (message.server_role != transport::ServerRole::kLive) continue;
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
@@ -145,7 +145,7 @@ void ClientCore::take_sessions(Now now) {
       } else if (other_streams) {
         adopt_streams(message, now);
       } else {
-        adopt_names(message);
+        adopt_names(std::move(message.names));
       }
       if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
     }
@@ -183,9 +183,9 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   tell_stream();
 }
 
-void ClientCore::adopt_names(const transport::SessionMessage& announcement) {
-  if (announcement.names == session_->names) return;
-  session_->names = announcement.names;
+void ClientCore::adopt_names(std::vector<transport::BodyName> names) {
+  if (names == session_->names) return;
+  session_->names = std::move(names);
   listener_.on_names(*session_);
 }
 

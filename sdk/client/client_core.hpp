@@ -145,7 +145,7 @@ class ClientCore {
   // client_core.cpp: sessions, acknowledgements, input, status
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
-  void adopt_names(const transport::SessionMessage& announcement);
+  void adopt_names(std::vector<transport::BodyName> names);
   void refuse(const Error& why);
   void take_replies(Now now);
   void report_outcomes();

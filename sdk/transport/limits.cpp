@@ -68,15 +68,17 @@ Result<void> check(const StreamMessage& stream) {
   return {};
 }
 
+bool is_name_of_body(const BodyName& body, std::uint32_t capacity) {
+  return body.slot < capacity && body.reuse <= 255 && !body.name.empty() && is_name(body.name) &&
+         is_plain_text(body.name);
+}
+
 Result<void> check(const std::vector<BodyName>& names, std::uint32_t capacity) {
-  const auto refuse = [](const char* what) { return fail(ErrorCode::kInvalidArgument, what); };
-  if (names.size() > kMaxBodyNames) return refuse("more than 65,535 names of bodies");
+  std::uint32_t least = 0;  // the slots ascend
   for (const BodyName& body : names) {
-    if (&body != names.data() && body.slot <= (&body - 1)->slot)
-      return refuse("names of bodies ascend by slot, one a slot");
-    if (body.slot >= capacity || body.reuse > 255) return refuse("a name of a body that cannot be");
-    if (body.name.empty() || body.name.size() > kMaxNameBytes || !is_plain_text(body.name))
-      return refuse("a body's name has 1 to 64 bytes of UTF-8 without control characters");
+    if (names.size() > kMaxBodyNames || body.slot < least || !is_name_of_body(body, capacity))
+      return fail(ErrorCode::kInvalidArgument, "a name of a body breaks a rule");
+    least = body.slot + 1;
   }
   return {};
 }
@@ -101,7 +103,7 @@ Result<void> check_announcement(const SessionMessage& message) {
   if (!std::all_of(message.gravity.begin(), message.gravity.end(), [](double g) { return std::isfinite(g); }))
     return refuse("gravity is finite");
   if (message.up_axis > UpAxis::kZ) return refuse("the axis that is up is 0, 1 or 2");
-  if (!is_role(message.server_role)) return refuse("a server is live or stands by");
+  if (!is_role(message.server_role)) return refuse("an unknown role");
   if (message.window_ceiling < 1 || message.window_ceiling > kMaxWindowCeiling)
     return refuse("a window ceiling is 1 to 1024 frames");
   if (!is_name(message.scene)) return refuse("a scene's name has at most 64 bytes");
