@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "sdk/transport/units.hpp"
@@ -10,6 +12,21 @@
 namespace tandem::tool {
 
 using recording::Playback;
+
+namespace {
+
+// The drive tells it but for rounding. Where the two agree, the session's own number is the exact one.
+std::array<double, 3> gravity_now(const transport::SessionMessage& session, const Drive& drive) {
+  const double quantum = session.lattice_unit / 64 / (session.dt_s * session.dt_s);
+  std::array<double, 3> gravity = session.gravity;
+  for (std::size_t axis = 0; axis < gravity.size(); ++axis) {
+    const double now = drive.gravity[axis] * quantum;
+    if (!(std::abs(now - gravity[axis]) <= quantum)) gravity[axis] = now;
+  }
+  return gravity;
+}
+
+}  // namespace
 
 RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& config,
                                accounts::TokenBucket& seeks)
@@ -27,6 +44,8 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
                                                     .from_frame = frame(),
                                                     .frame_rate_hz = playback.session().frame_rate_hz});
   session_.window_ceiling = config.window_ceiling;
+  session_.gravity = gravity_now(session_, timeline().drive());
+  session_.continues_epoch = session_.continues_frame = 0;
   playback.timeline().rename(config.epoch, {});
 }
 

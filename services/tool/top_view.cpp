@@ -120,7 +120,8 @@ std::string short_bytes(std::uint64_t bytes) {
 }  // namespace
 
 void TopView::update(const transport::ServerStatusMessage& status, std::int64_t now_ns) {
-  const StreamKey key{status.session, status.stream};
+  const bool live = status.server_role == transport::ServerRole::kLive;
+  const StreamKey key{status.session + (live ? "" : " (standby)"), status.stream};
   if (!shown(status.session) || (streams_.size() >= kMostShown && !streams_.contains(key))) return;
   streams_[key] = {status, now_ns};
 }
@@ -171,7 +172,7 @@ std::string TopView::to_table() const {
     const transport::ServerStatusMessage& s = heard.status;
     text += fmt::format(
         "{:<20} {:>9} {:>6.1f} {:>8} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {:<20} {}, {}, {:.3g}\n",
-        several(s.session) ? fmt::format("{}/{}", printable(s.session), s.stream) : printable(s.session),
+        several(key.first) ? fmt::format("{}/{}", printable(key.first), s.stream) : printable(key.first),
         s.frame, s.frame_rate_hz, s.bodies, s.at_rest,
         fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
         s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls,

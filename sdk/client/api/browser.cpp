@@ -16,7 +16,9 @@ void Browser::hear(std::int64_t now_ns) {
   std::vector<transport::Received<transport::ServerStatusMessage>> statuses;
   monitor_->take(statuses);
   for (auto& [status, from] : statuses) {
-    if (status.stream != 0 || (heard_.size() >= kMostHeard && !heard_.contains(status.session))) continue;
+    if (status.stream != 0 || status.server_role != transport::ServerRole::kLive ||
+        (heard_.size() >= kMostHeard && !heard_.contains(status.session)))
+      continue;
     const std::string name = status.session;
     heard_[name] = {std::move(status), now_ns};
   }

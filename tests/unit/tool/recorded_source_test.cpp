@@ -94,6 +94,17 @@ class RecordedSourceTest : public ::testing::Test {
   std::optional<RecordedSource> source;
 };
 
+TEST_F(RecordedSourceTest, TellsTheGravityInForceWhereItBegins) {
+  open(60);
+  const transport::SessionMessage& session = source->session();
+  const double quantum = session.lattice_unit / 64 / (session.dt_s * session.dt_s);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(session.gravity[axis], playback->timeline().drive().gravity[axis] * quantum, quantum);
+  EXPECT_NE(session.gravity[1], 0) << "the recording has a drive by then";
+  EXPECT_EQ(session.dt_s, playback->session().dt_s);
+  EXPECT_EQ(session.continues_epoch, 0U);
+}
+
 TEST_F(RecordedSourceTest, PublishesEveryFrameUnderItsOwnEpoch) {
   open(0);
   EXPECT_EQ(source->session().epoch, 5000U);

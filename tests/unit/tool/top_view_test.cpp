@@ -41,6 +41,22 @@ transport::ClientStatusMessage client(transport::ClientId id, const std::string&
   return status;
 }
 
+TEST(TopView, shows_a_standby_beside_the_live_server) {
+  TopView view;
+  view.update(server("a"), 0);
+  transport::ServerStatusMessage standby = server("a");
+  standby.server_role = transport::ServerRole::kStandby;
+  standby.behind_frames = 3;
+  view.update(standby, 0);
+  const auto json = nlohmann::json::parse(view.to_json());
+  ASSERT_EQ(json["sessions"].size(), 2U);
+  EXPECT_EQ(json["sessions"][0]["role"], "live");
+  EXPECT_EQ(json["sessions"][1]["role"], "standby");
+  EXPECT_EQ(json["sessions"][1]["session"], "a");
+  EXPECT_EQ(json["sessions"][1]["behind_frames"], 3);
+  EXPECT_THAT(view.to_table(), HasSubstr("a (standby)"));
+}
+
 TEST(TopView, shows_the_newest_status_of_each_session_and_client) {
   TopView view;
   view.update(server("a"), 0);
