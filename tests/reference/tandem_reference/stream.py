@@ -31,7 +31,7 @@ class Stream:
     lead: int = 0
 
     def __post_init__(self):
-        require(1 <= self.capacity <= 2**20, "session", f"capacity {self.capacity}")
+        require(1 <= self.capacity <= 2**22, "session", f"capacity {self.capacity}")
         require(1 <= self.types <= 65535, "session", f"{self.types} types")
         require(self.groups in GROUPS, "session", f"groups {self.groups}")
         require(self.region_blocks == 0, "session", "regions are not played")
