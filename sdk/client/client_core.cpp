@@ -7,6 +7,7 @@
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/client/session/session_check.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/plain_text.hpp"
 #include "sdk/transport/units.hpp"
 
 namespace tandem::client {
@@ -133,15 +134,18 @@ void ClientCore::take_sessions(Now now) {
   do {
     inbox_.sessions.clear();
     port_.take_sessions(inbox_.sessions);
-    for (const auto& announcement : inbox_.sessions) {
-      const auto& message = announcement.message;
+    for (auto& announcement : inbox_.sessions) {
+      auto& message = announcement.message;
       if (!options_.session.empty() && message.session != options_.session) continue;
+      if (message.server_role != transport::ServerRole::kLive) continue;
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
       const bool other_streams = same && message.streams != session_->streams;
       if (!same || (other_streams && !epoch_)) {
         adopt(announcement, now);
       } else if (other_streams) {
         adopt_streams(message, now);
+      } else {
+        adopt_names(std::move(message.names));
       }
       if (!epoch_) port_.pass_over_session(transport::PassOver::kUntilAnnouncedAnew);
     }
@@ -177,6 +181,12 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
                            std::to_string(session_->capacity) + " slots, epoch " +
                            std::to_string(session_->epoch));
   tell_stream();
+}
+
+void ClientCore::adopt_names(std::vector<transport::BodyName> names) {
+  if (names == session_->names) return;
+  session_->names = std::move(names);
+  listener_.on_names(*session_);
 }
 
 void ClientCore::refuse(const Error& why) {
@@ -269,6 +279,7 @@ void ClientCore::send_status(Now now) {
     }
     status.epoch = epoch_->session.epoch;
     status.stream = epoch_->played->stream().id;
+    status.stream_reason = transport::plain_text(chooser_->reason(), transport::kMaxReasonBytes);
     status.applied = epoch_->played->joining() ? 0 : epoch_->played->timeline().applied();
     status.role =
         static_cast<std::uint32_t>(epoch_->reply ? epoch_->reply->role : transport::Role::kObserver);
@@ -316,7 +327,7 @@ void ClientCore::echo(const transport::InputMessage& gravity, Now now) {
   EpochState& e = *epoch_;
   if (gravity.values.size() != kPositionChannels || !e.pacer.known()) return;
   // Lattice velocities are in 1/64 of the lattice unit.
-  const double scale = 64 / (e.session.lattice_unit * e.session.frame_rate_hz * e.session.frame_rate_hz);
+  const double scale = 64 * e.session.dt_s * e.session.dt_s / e.session.lattice_unit;
   std::array<float, kPositionChannels> in_lattice{};
   for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
     constexpr double kMost = kVelocityLimit;
@@ -336,6 +347,17 @@ void ClientCore::show_clock() {
 const transport::SessionMessage* ClientCore::session() const { return session_ ? &*session_ : nullptr; }
 const transport::StreamMessage* ClientCore::stream() const {
   return epoch_ ? &epoch_->played->stream() : nullptr;
+}
+std::string_view ClientCore::body_name(Slot slot) const {
+  const ClientTimeline* const held = timeline();
+  if (held == nullptr || slot >= session_->capacity) return {};
+  const State& state = held->state(held->applied());
+  const auto& names = session_->names;
+  const auto found = std::lower_bound(names.begin(), names.end(), slot,
+                                      [](const transport::BodyName& name, Slot s) { return name.slot < s; });
+  const bool named = found != names.end() && found->slot == slot && state.alive()[slot] != 0 &&
+                     found->reuse == state.reuse()[slot];
+  return named ? std::string_view(found->name) : std::string_view();
 }
 const ClientTimeline* ClientCore::timeline() const {
   return phase() == ClientPhase::kPlaying ? &epoch_->played->timeline() : nullptr;

@@ -47,6 +47,8 @@ class CoreListener {
  public:
   virtual ~CoreListener() = default;
   virtual void on_session(const transport::SessionMessage& /*session*/) {}
+  /// The session in the last on_session() gives its bodies other names; nothing else of it changed.
+  virtual void on_names(const transport::SessionMessage& /*session*/) {}
   /// A stream of the session in the last on_session(). The client joins it. If the client already plays, it
   /// now has this stream's state of the frame applied last, and the following calls are for this stream.
   virtual void on_stream(const transport::StreamMessage& /*stream*/) {}
@@ -105,6 +107,8 @@ class ClientCore {
   [[nodiscard]] std::optional<std::int64_t> server_wall_ns(std::int64_t steady_ns) const;
   [[nodiscard]] ClientStatus status() const;
   [[nodiscard]] std::uint32_t join_attempt() const;
+  /// The name of the body that is in a slot now; empty if it has none or the client does not play.
+  [[nodiscard]] std::string_view body_name(Slot slot) const;
   /// The newest reply of this epoch; null before the first.
   [[nodiscard]] const transport::ReplyMessage* reply() const;
 
@@ -141,6 +145,7 @@ class ClientCore {
   // client_core.cpp: sessions, acknowledgements, input, status
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
+  void adopt_names(std::vector<transport::BodyName> names);
   void refuse(const Error& why);
   void take_replies(Now now);
   void report_outcomes();

@@ -170,6 +170,16 @@ Result<M> read_cdr(std::span<const std::byte> bytes, Padding padding) {
   return message;
 }
 
+std::optional<std::uint32_t> session_version(std::span<const std::byte> bytes) {
+  if (bytes.size() < kCdrHeaderBytes || bytes[0] != kLittleEndianCdr[0] || bytes[1] != kLittleEndianCdr[1])
+    return std::nullopt;
+  Reader reader(bytes.subspan(kCdrHeaderBytes));
+  Epoch epoch = 0;
+  std::uint32_t version = 0;
+  primitives(reader, epoch, version);
+  return reader.ok() ? std::optional(version) : std::nullopt;
+}
+
 template void write_cdr(const SessionMessage&, Bytes&);
 template void write_cdr(const DeltaMessage&, Bytes&);
 template void write_cdr(const ScheduledInputMessage&, Bytes&);

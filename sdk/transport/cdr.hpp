@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "sdk/transport/messages.hpp"
@@ -26,6 +27,10 @@ enum class Padding : std::uint8_t { kAnnounced, kAny };
 /// (another encapsulation), kMalformed.
 template <class M>
 [[nodiscard]] Result<M> read_cdr(std::span<const std::byte> bytes, Padding padding = Padding::kAnnounced);
+
+/// The protocol version of a TandemSession of any version: its epoch and its version stay first. Empty if the
+/// bytes are too short or of another encapsulation.
+[[nodiscard]] std::optional<std::uint32_t> session_version(std::span<const std::byte> bytes);
 
 extern template void write_cdr(const SessionMessage&, Bytes&);
 extern template void write_cdr(const DeltaMessage&, Bytes&);

@@ -32,6 +32,12 @@ void fields(Visitor& visit, M& m) {
   numbers(visit, m.shape_values);
 }
 
+template <class Visitor, Is<BodyName> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.slot, m.reuse);
+  visit.text(m.name);
+}
+
 template <class Visitor, Is<Parameter> M>
 void fields(Visitor& visit, M& m) {
   primitives(visit, m.id, m.value);
@@ -41,6 +47,7 @@ template <class Visitor, Is<StreamMessage> M>
 void fields(Visitor& visit, M& m) {
   primitives(visit, m.id.id, m.id.generation, m.layout.region_blocks, m.client_cost_ns, m.max_delta_bytes,
              m.max_snapshot_bytes, m.layout_hash);
+  visit.text(m.name);
   visit.text(m.layout.codec);
   visit.text(m.layout.predictor);
   visit.sequence(m.layout.groups, [&](auto& group) { visit.text(group); });
@@ -52,13 +59,15 @@ void fields(Visitor& visit, M& m) {
 
 template <class Visitor, Is<SessionMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.protocol_version, m.capacity, m.frame_rate_hz, m.lattice_unit, m.lead,
-             m.window_ceiling);
+  primitives(visit, m.epoch, m.protocol_version, m.capacity, m.frame_rate_hz, m.dt_s, m.lattice_unit,
+             m.gravity[0], m.gravity[1], m.gravity[2], m.up_axis, m.lead, m.window_ceiling, m.server_role,
+             m.standby_rank, m.continues_epoch, m.continues_frame);
   visit.text(m.session);
   visit.text(m.scene);
   visit.text(m.scene_description);
   visit.sequence(m.types, [&](auto& type) { fields(visit, type); });
   visit.sequence(m.streams, [&](auto& stream) { fields(visit, stream); });
+  visit.sequence(m.names, [&](auto& name) { fields(visit, name); });
 }
 
 template <class Visitor, Is<DeltaMessage> M>
@@ -85,11 +94,18 @@ void fields(Visitor& visit, M& m) {
   primitives(visit, m.number, m.frame, m.code);
 }
 
+template <class Visitor, Is<ReplyText> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.number);
+  visit.text(m.text);
+}
+
 template <class Visitor, Is<ReplyMessage> M>
 void fields(Visitor& visit, M& m) {
   primitives(visit, m.client, m.epoch, m.role, m.phase, m.reason, m.highest_input, m.client_clock_ns,
              m.server_time_ns);
   visit.sequence(m.entries, [&](auto& entry) { fields(visit, entry); });
+  visit.sequence(m.texts, [&](auto& text) { fields(visit, text); });
 }
 
 template <class Visitor, Is<InputMessage> M>
@@ -114,7 +130,7 @@ auto figure(Visitor& visit) {
 
 template <class Visitor, Is<ServerStatusMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.frame);
+  primitives(visit, m.epoch, m.frame, m.behind_frames, m.server_role);
   each_server_figure(figure(visit), m);
   primitives(visit, m.stream);
   visit.text(m.session);
@@ -128,6 +144,7 @@ void fields(Visitor& visit, M& m) {
              m.too_slow, m.queue_high_water, m.lag_ms);
   each_reported_figure(figure(visit), m);
   visit.text(m.session);
+  visit.text(m.stream_reason);
 }
 
 }  // namespace tandem::transport

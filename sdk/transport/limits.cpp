@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "sdk/transport/plain_text.hpp"
 #include "sdk/transport/port.hpp"
 
 namespace tandem::transport {
@@ -12,6 +13,7 @@ namespace {
 bool is_name(const std::string& text) { return text.size() <= kMaxNameBytes; }
 bool is_positive(double value) { return std::isfinite(value) && value > 0; }
 bool is_role(Role role) { return role == Role::kObserver || role == Role::kParticipant; }
+bool is_role(ServerRole role) { return role == ServerRole::kLive || role == ServerRole::kStandby; }
 bool is_phase(Phase phase) { return phase == Phase::kJoining || phase == Phase::kPlaying; }
 
 bool is_finite(const std::vector<float>& values) {
@@ -52,8 +54,10 @@ Result<void> check(const StreamMessage& stream) {
   const auto refuse = [&stream](const char* what) {
     return fail(ErrorCode::kInvalidArgument, "stream " + std::to_string(stream.id.id) + ": " + what);
   };
-  if (stream.max_delta_bytes > kMaxSampleBytes || stream.max_snapshot_bytes > kMaxSampleBytes)
-    return refuse("deltas or snapshots above 64 MiB");
+  if (stream.max_delta_bytes > kMaxDeltaBytes) return refuse("deltas above 128 MiB");
+  if (stream.max_snapshot_bytes > kMaxSnapshotBytes) return refuse("snapshots above 256 MiB");
+  if (!stream.name.empty() && !is_stream_name(stream.name))
+    return refuse("a stream's name has 1 to 32 characters of a-z, 0-9, '_' and '-'");
   if (!is_name(layout.codec) || !is_name(layout.predictor)) return refuse("a name has at most 64 bytes");
   if (layout.groups.empty() || layout.groups.size() > kMaxGroups ||
       !std::all_of(layout.groups.begin(), layout.groups.end(), is_name))
@@ -64,14 +68,42 @@ Result<void> check(const StreamMessage& stream) {
   return {};
 }
 
+bool is_name_of_body(const BodyName& body, std::uint32_t capacity) {
+  return body.slot < capacity && body.reuse <= 255 && !body.name.empty() && is_name(body.name) &&
+         is_plain_text(body.name);
+}
+
+Result<void> check(const std::vector<BodyName>& names, std::uint32_t capacity) {
+  std::uint32_t least = 0;  // the slots ascend
+  for (const BodyName& body : names) {
+    if (names.size() > kMaxBodyNames || body.slot < least || !is_name_of_body(body, capacity))
+      return fail(ErrorCode::kInvalidArgument, "a name of a body breaks a rule");
+    least = body.slot + 1;
+  }
+  return {};
+}
+
 }  // namespace
+
+bool is_stream_name(std::string_view name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  return !name.empty() && name.size() <= kMaxStreamNameBytes &&
+         std::all_of(name.begin(), name.end(), allowed);
+}
 
 Result<void> check_announcement(const SessionMessage& message) {
   const auto refuse = [](const char* what) { return fail(ErrorCode::kInvalidArgument, what); };
   if (auto named = check_session_name(message.session); !named) return named;
-  if (message.capacity < 1 || message.capacity > kMaxCapacity) return refuse("capacity is 1 to 2^20 slots");
+  if (message.capacity < 1 || message.capacity > kMaxCapacity) return refuse("capacity is 1 to 2^22 slots");
   if (!is_positive(message.frame_rate_hz)) return refuse("a frame rate is positive");
+  if (!is_positive(message.dt_s)) return refuse("the time of a frame is positive");
   if (!is_positive(message.lattice_unit)) return refuse("a lattice unit is positive");
+  if (!std::all_of(message.gravity.begin(), message.gravity.end(), [](double g) { return std::isfinite(g); }))
+    return refuse("gravity is finite");
+  if (message.up_axis > UpAxis::kZ) return refuse("the axis that is up is 0, 1 or 2");
+  if (!is_role(message.server_role)) return refuse("an unknown role");
   if (message.window_ceiling < 1 || message.window_ceiling > kMaxWindowCeiling)
     return refuse("a window ceiling is 1 to 1024 frames");
   if (!is_name(message.scene)) return refuse("a scene's name has at most 64 bytes");
@@ -85,7 +117,7 @@ Result<void> check_announcement(const SessionMessage& message) {
   for (const StreamMessage& stream : message.streams) {
     if (auto good = check(stream); !good) return good;
   }
-  return {};
+  return check(message.names, message.capacity);
 }
 
 bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
@@ -109,7 +141,10 @@ bool within_limits(const SnapshotMessage& message, const Limits& limits) {
 
 bool within_limits(const ReplyMessage& message, const Limits& /*limits*/) {
   return message.client != 0 && is_role(message.role) && is_phase(message.phase) &&
-         message.entries.size() <= kReplyRing;
+         message.entries.size() <= kReplyRing && message.texts.size() <= kMaxReplyTexts &&
+         std::all_of(message.texts.begin(), message.texts.end(), [](const ReplyText& of) {
+           return of.text.size() <= kMaxReplyTextBytes && is_plain_text(of.text);
+         });
 }
 
 bool within_limits(const InputMessage& message, const Limits& /*limits*/) {
@@ -124,11 +159,12 @@ bool within_limits(const AckMessage& message, const Limits& /*limits*/) {
 
 bool within_limits(const ServerStatusMessage& message, const Limits& /*limits*/) {
   return check_session_name(message.session).has_value() && is_name(message.codec) &&
-         is_name(message.predictor);
+         is_name(message.predictor) && is_role(message.server_role);
 }
 
 bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/) {
-  return message.client != 0 && check_session_name(message.session).has_value();
+  return message.client != 0 && check_session_name(message.session).has_value() &&
+         message.stream_reason.size() <= kMaxReasonBytes && is_plain_text(message.stream_reason);
 }
 
 std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling, std::size_t largest_delta_bytes,

@@ -4,20 +4,27 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "sdk/transport/messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {
 
-/// Maximum size of a sample, whatever a session declares; transports refuse larger ones on the wire where
-/// they can.
+/// Maximum size of a DDS sample, whatever a session declares; transports refuse larger ones on the wire where
+/// they can. A larger delta or snapshot travels in parts.
 inline constexpr std::uint32_t kMaxSampleBytes = 64U << 20U;
+inline constexpr std::uint32_t kMaxDeltaBytes = 1U << 27U;     ///< maximum that a stream may declare
+inline constexpr std::uint32_t kMaxSnapshotBytes = 1U << 28U;  ///< maximum that a stream may declare
 inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
-inline constexpr std::uint32_t kMaxParts = 4096;           ///< maximum parts of one delta
-inline constexpr std::uint32_t kMaxSnapshotParts = 65536;  ///< maximum parts of one snapshot
+inline constexpr std::uint32_t kMaxParts = 4096;               ///< maximum parts of one delta
+inline constexpr std::uint32_t kMaxSnapshotParts = 1U << 18U;  ///< maximum parts of one snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
+inline constexpr std::size_t kMaxBodyNames = 65535;
+inline constexpr std::size_t kMaxStreamNameBytes = 32;
+inline constexpr std::size_t kMaxReasonBytes = 64;  ///< why a client plays its stream
+inline constexpr std::size_t kMaxReplyTexts = 8, kMaxReplyTextBytes = 200;
 inline constexpr std::size_t kMaxHullValues = 768;
 inline constexpr std::size_t kMaxStreams = 8, kMaxGroups = 8;
 inline constexpr std::size_t kMaxPredictorConstants = 1U << 20U;
@@ -30,9 +37,12 @@ inline constexpr std::size_t kMaxMissingRuns = 32;  ///< in an acknowledgement
 
 /// The limits that the stream declares; until a stream is known, the fixed maximum.
 struct Limits {
-  std::uint32_t max_delta_bytes = kMaxSampleBytes;
-  std::uint32_t max_snapshot_bytes = kMaxSampleBytes;
+  std::uint32_t max_delta_bytes = kMaxDeltaBytes;
+  std::uint32_t max_snapshot_bytes = kMaxSnapshotBytes;
 };
+
+/// True for a name that a stream may have: 1 to 32 characters of [a-z0-9_-].
+[[nodiscard]] bool is_stream_name(std::string_view name);
 
 /// True if lengths, counts and enumerations are in range. Does not check epochs, numbers or values: a message
 /// with wrong ones is answered, not dropped.

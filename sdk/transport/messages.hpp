@@ -33,7 +33,7 @@ enum class Reason : std::uint32_t {
 };
 
 // Declared after Reason; otherwise g++ 12 warns that its enumerator shadows this.
-inline constexpr std::uint32_t kProtocolVersion = 1;
+inline constexpr std::uint32_t kProtocolVersion = 2;
 using ClientId = std::uint64_t;  ///< random, never 0
 using Bytes = std::vector<std::byte>;
 
@@ -56,9 +56,28 @@ struct BodyType {
   bool operator==(const BodyType&) const = default;
 };
 
+/// The name of a body, for people. It is the name of the body that the slot holds while the slot has this
+/// count of reuse.
+struct BodyName {
+  Slot slot = 0;
+  std::uint32_t reuse = 0;
+  std::string name;  ///< 1..64 bytes of UTF-8 without control characters
+  bool operator==(const BodyName&) const = default;
+};
+
+/// The axis of the scene that points up.
+enum class UpAxis : std::uint32_t { kX = 0, kY = 1, kZ = 2 };
+
+/// What a server does in its session.
+enum class ServerRole : std::uint32_t {
+  kLive = 0,
+  kStandby = 1,  ///< it follows the live server and can take over; clients do not join it
+};
+
 /// One stream of the session's world. All streams share epoch, rate, lead, lattice, slots and inputs.
 struct StreamMessage {
   StreamId id;
+  std::string name;                      ///< 1..32 characters of [a-z0-9_-]; empty: none
   std::uint32_t client_cost_ns = 0;      ///< cost of a client's predicted step and hash, per body and frame
   std::uint32_t max_delta_bytes = 0;     ///< maximum size of a whole payload
   std::uint32_t max_snapshot_bytes = 0;  ///< maximum size of a whole snapshot
@@ -76,13 +95,21 @@ struct SessionMessage {
   std::uint32_t protocol_version = kProtocolVersion;
   std::uint32_t capacity = 0;  ///< slots
   double frame_rate_hz = 30;
-  double lattice_unit = 0;  ///< scene units per lattice unit
-  std::uint32_t lead = 1;   ///< frames that a client may simulate beyond its last delta, 0 or 1
+  double dt_s = 1.0 / 30;           ///< seconds that one frame simulates
+  double lattice_unit = 0;          ///< scene units per lattice unit
+  std::array<double, 3> gravity{};  ///< scene units / s^2, in force at the epoch's first frame
+  UpAxis up_axis = UpAxis::kY;
+  std::uint32_t lead = 1;  ///< frames that a client may simulate beyond its last delta, 0 or 1
   std::uint32_t window_ceiling = 24;
-  std::string scene;              ///< name
-  std::string scene_description;  ///< the geometry as protobuf text (idl/scene.proto), for drawing
+  ServerRole server_role = ServerRole::kLive;
+  std::uint32_t standby_rank = 0;  ///< order in which standbys take over, from 1; 0: a live server
+  Epoch continues_epoch = 0;       ///< the epoch that this one continues; 0: none
+  Frame continues_frame = 0;       ///< the frame of that epoch from which this one continues
+  std::string scene;               ///< name
+  std::string scene_description;   ///< the geometry as protobuf text (idl/scene.proto), for drawing
   std::vector<BodyType> types;
   std::vector<StreamMessage> streams;  ///< at least one; a client chooses among those that it can play
+  std::vector<BodyName> names;         ///< ascending by slot, each slot once
   bool operator==(const SessionMessage&) const = default;
 };
 
@@ -137,6 +164,13 @@ struct ReplyEntry {
 };
 inline constexpr std::size_t kReplyRing = 32;
 
+/// The words in which the simulation refused an input.
+struct ReplyText {
+  std::uint64_t number = 0;  ///< the client's input number
+  std::string text;          ///< at most 200 bytes of UTF-8 without control characters
+  bool operator==(const ReplyText&) const = default;
+};
+
 struct ReplyMessage {
   static constexpr const char* kTopic = "TandemReply";
   ClientId client = 0;  ///< key
@@ -148,6 +182,7 @@ struct ReplyMessage {
   std::int64_t client_clock_ns = 0;  ///< echo of the client's clock from its last acknowledgement
   std::int64_t server_time_ns = 0;
   std::vector<ReplyEntry> entries;  ///< at most the last 32, oldest first
+  std::vector<ReplyText> texts;     ///< at most 8, oldest first: of entries that the simulation refused
   bool operator==(const ReplyMessage&) const = default;
 };
 
@@ -195,6 +230,8 @@ struct ServerStatusMessage : ServerFigures {
   std::uint32_t stream = 0;  ///< key
   Epoch epoch = 0;
   Frame frame = 0;
+  std::uint64_t behind_frames = 0;  ///< frames that a standby is behind the live server
+  ServerRole server_role = ServerRole::kLive;
   std::string codec, predictor;
   bool operator==(const ServerStatusMessage&) const = default;
 };
@@ -211,6 +248,7 @@ struct ClientStatusMessage : ReportedFigures {
   std::uint32_t too_slow = 0;  ///< 1: the median frame takes more than half a period
   std::uint32_t queue_high_water = 0;
   double lag_ms = 0;
+  std::string stream_reason;  ///< why the client plays this stream, at most 64 bytes
   bool operator==(const ClientStatusMessage&) const = default;
 };
 

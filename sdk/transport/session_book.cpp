@@ -42,7 +42,7 @@ void SessionBook::update(const StateOf& state_of) {
 }
 
 void SessionBook::take_current(std::vector<Received<SessionMessage>>& out) {
-  const auto usable = [](const Entry& entry) { return entry.live && !entry.passed_over; };
+  const auto usable = [](const Entry& entry) { return entry.serves() && !entry.passed_over; };
   auto current = std::ranges::find_if(
       entries_, [&](const Entry& entry) { return entry.writer == current_ && usable(entry); });
   if (current == entries_.end()) current = std::ranges::find_if(entries_, usable);
@@ -71,12 +71,12 @@ void SessionBook::list_live(std::vector<Received<SessionMessage>>& out) const {
 }
 
 bool SessionBook::any_live() const {
-  return std::any_of(entries_.begin(), entries_.end(), [](const Entry& entry) { return entry.live; });
+  return std::any_of(entries_.begin(), entries_.end(), [](const Entry& entry) { return entry.serves(); });
 }
 
 bool SessionBook::epoch_live(Epoch epoch) const {
   return std::any_of(entries_.begin(), entries_.end(), [epoch](const Entry& entry) {
-    return entry.live && entry.announcement.message.epoch == epoch;
+    return entry.serves() && entry.announcement.message.epoch == epoch;
   });
 }
 

@@ -18,7 +18,8 @@ enum class WriterState : std::uint8_t { kLive, kSilent, kGone };
 /// thread-safe.
 ///
 /// One of them is current: the one seen first among those that are alive and were not passed over. It stays
-/// current as long as it is alive, whatever others announce.
+/// current as long as it is alive, whatever others announce. The announcement of a server that stands by is
+/// never current and counts as nobody's.
 class SessionBook {
  public:
   using StateOf = std::function<WriterState(std::uint64_t writer, const ParticipantId& participant)>;
@@ -43,6 +44,9 @@ class SessionBook {
     bool live = true;
     std::optional<PassOver> passed_over = {};
     Received<SessionMessage> announcement;
+    [[nodiscard]] bool serves() const {
+      return live && announcement.message.server_role == ServerRole::kLive;
+    }
   };
   void make_room();
 

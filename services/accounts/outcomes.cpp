@@ -1,12 +1,15 @@
 #include "services/accounts/outcomes.hpp"
 
 #include <algorithm>
+#include <utility>
+
+#include "sdk/transport/limits.hpp"
 
 namespace tandem::accounts {
 
-void Outcomes::add(const transport::ReplyEntry& entry, std::int64_t now_ns) {
+void Outcomes::add(const transport::ReplyEntry& entry, std::int64_t now_ns, std::string text) {
   if (outcomes_.size() == transport::kReplyRing) outcomes_.erase(outcomes_.begin());
-  outcomes_.push_back({entry, now_ns});
+  outcomes_.push_back({entry, now_ns, std::move(text)});
 }
 
 bool Outcomes::has(std::uint64_t number) const {
@@ -14,12 +17,16 @@ bool Outcomes::has(std::uint64_t number) const {
                              [number](const Outcome& outcome) { return outcome.entry.number == number; });
 }
 
-std::vector<transport::ReplyEntry> Outcomes::told(std::int64_t now_ns) const {
-  std::vector<transport::ReplyEntry> entries;
+void Outcomes::tell(transport::ReplyMessage& reply, std::int64_t now_ns) const {
+  reply.entries.clear();
+  reply.texts.clear();
   for (const Outcome& outcome : outcomes_) {
-    if (now_ns - outcome.at_ns <= kToldNs) entries.push_back(outcome.entry);
+    if (now_ns - outcome.at_ns > kToldNs) continue;
+    reply.entries.push_back(outcome.entry);
+    if (!outcome.text.empty()) reply.texts.push_back({outcome.entry.number, outcome.text});
   }
-  return entries;
+  if (reply.texts.size() > transport::kMaxReplyTexts)
+    reply.texts.erase(reply.texts.begin(), reply.texts.end() - transport::kMaxReplyTexts);
 }
 
 }  // namespace tandem::accounts

@@ -2,6 +2,7 @@
 // The outcomes of the inputs of one client.
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
@@ -16,15 +17,18 @@ class Outcomes {
   /// link.
   static constexpr std::int64_t kToldNs = 5 * kSecond;
 
-  void add(const transport::ReplyEntry& entry, std::int64_t now_ns);
+  /// `text`: the words of the simulation that refused the input; empty if there are none.
+  void add(const transport::ReplyEntry& entry, std::int64_t now_ns, std::string text = {});
   [[nodiscard]] bool has(std::uint64_t number) const;
-  /// The entries of a reply that is made now.
-  [[nodiscard]] std::vector<transport::ReplyEntry> told(std::int64_t now_ns) const;
+  /// Fills in the entries and texts of a reply that is made now. Of more than kMaxReplyTexts texts the newest
+  /// are told.
+  void tell(transport::ReplyMessage& reply, std::int64_t now_ns) const;
 
  private:
   struct Outcome {
     transport::ReplyEntry entry;
     std::int64_t at_ns = 0;
+    std::string text;
   };
   std::vector<Outcome> outcomes_;
 };

@@ -46,6 +46,12 @@ void Gateway::on_session(const transport::SessionMessage& session) {
   merger_.clear();
 }
 
+void Gateway::on_names(const std::vector<transport::BodyName>& names) {
+  if (!session_) return;
+  session_->names = names;
+  if (alive_) announce(make_outgoing(*session_));
+}
+
 void Gateway::on_server_alive(bool alive) {
   if (alive == alive_ || !session_) return;
   alive_ = alive;
@@ -181,7 +187,7 @@ OutgoingPtr Gateway::reply(Viewer& viewer, std::int64_t now_ns) const {
     reply.client_clock_ns = state.clock_ns;
     reply.server_time_ns = *server_ns;
   }
-  reply.entries = state.outcomes.told(now_ns);
+  state.outcomes.tell(reply, now_ns);
   state.reply.sent(reply.role, now_ns);
   state.once = Reason::kNone;
   return make_outgoing(reply);

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sdk/client/following/delta_assembly.hpp"
@@ -72,6 +73,8 @@ class Gateway {
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns);
   void on_status(const transport::ServerStatusMessage& status);
   void on_server_alive(bool alive);
+  /// The session's bodies are called otherwise; nothing else of it changed.
+  void on_names(const std::vector<transport::BodyName>& names);
 
   /// Does what is due. Returns when it wants to be called again; INT64_MAX means when something happens.
   std::int64_t poll(std::int64_t now_ns);
@@ -107,7 +110,8 @@ class Gateway {
                                         std::int64_t now_ns) const;
   [[nodiscard]] transport::Role role_of(const Viewer& viewer) const;
   void tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now_ns);
-  void refuse_input(Viewer& viewer, std::uint64_t number, transport::Reason reason, std::int64_t now_ns);
+  void refuse_input(Viewer& viewer, std::uint64_t number, transport::Reason reason, std::int64_t now_ns,
+                    const std::string& text = {});
 
   Limits limits_;
   World& world_;

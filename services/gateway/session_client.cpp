@@ -45,6 +45,11 @@ Result<std::uint64_t> SessionClient::send(transport::InputKind kind, std::vector
 // themselves.
 void SessionClient::on_session(const transport::SessionMessage& session) { untold_ = session; }
 
+void SessionClient::on_names(const transport::SessionMessage& session) {
+  if (untold_) untold_->names = session.names;
+  gateway_->on_names(session.names);
+}
+
 void SessionClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
   told.streams = {stream};

@@ -32,6 +32,7 @@ class SessionClient final : public World, private client::CoreListener {
 
  private:
   void on_session(const transport::SessionMessage& session) override;
+  void on_names(const transport::SessionMessage& session) override;
   void on_stream(const transport::StreamMessage& stream) override;
   void on_server_status(const transport::ServerStatusMessage& status) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;

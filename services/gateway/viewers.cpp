@@ -155,9 +155,11 @@ Role Gateway::role_of(const Viewer& viewer) const {
   return world_.role() == Role::kObserver ? Role::kObserver : viewer.now.wanted;
 }
 
-void Gateway::refuse_input(Viewer& viewer, std::uint64_t number, Reason reason, std::int64_t now_ns) {
+void Gateway::refuse_input(Viewer& viewer, std::uint64_t number, Reason reason, std::int64_t now_ns,
+                           const std::string& text) {
   ++counts_.inputs_refused;
-  viewer.now.outcomes.add({.number = number, .frame = 0, .code = static_cast<std::uint32_t>(reason)}, now_ns);
+  viewer.now.outcomes.add({.number = number, .frame = 0, .code = static_cast<std::uint32_t>(reason)}, now_ns,
+                          text);
   viewer.now.reply.on_outcome();
 }
 
@@ -170,7 +172,7 @@ void Gateway::tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now
     viewer.now.reply.on_outcome();
     if (!verdict.known) continue;
     if (verdict.reason != Reason::kNone) {
-      refuse_input(viewer, verdict.claim.number, verdict.reason, now_ns);
+      refuse_input(viewer, verdict.claim.number, verdict.reason, now_ns, verdict.text);
     } else {
       viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.frame, .code = 0}, now_ns);
     }

@@ -19,7 +19,7 @@ namespace {
 
 static_assert(Outgoing::kHeadroom >= LWS_PRE);
 
-constexpr const char* kSubprotocol = "tandem.1";
+constexpr const char* kSubprotocol = "tandem.2";
 constexpr std::string_view kPath = "/tandem";
 // Maximum unsent bytes in the kernel for one connection. A small value decides late what is sent next; a
 // larger one makes only slow viewers wait.
@@ -214,7 +214,7 @@ int WebServer::Impl::confirm_upgrade(lws* wsi) {
   if (header(wsi, WSI_TOKEN_GET_URI) != kPath)
     return refuse(HTTP_STATUS_NOT_FOUND, "the WebSocket is at /tandem");
   if (!names(header(wsi, WSI_TOKEN_PROTOCOL), kSubprotocol))
-    return refuse(HTTP_STATUS_BAD_REQUEST, "the WebSocket speaks tandem.1 only");
+    return refuse(HTTP_STATUS_BAD_REQUEST, "the WebSocket speaks tandem.2 only");
   return 0;
 }
 

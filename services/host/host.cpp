@@ -32,6 +32,8 @@ using transport::Reason;
 constexpr std::int64_t kLongestWakeNs = 50 * kMillisecond;
 constexpr std::int64_t kShortWakeNs = 10 * kMillisecond;
 constexpr std::int64_t kLookNs = kSecond / 4;  // time between checks for rivals and for dead clients
+// Time between two announcements with other names: an announcement has the whole scene.
+constexpr std::int64_t kNamesNs = kSecond;
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
 
@@ -146,6 +148,7 @@ struct Host::Impl {
   bool advance_if_due(StreamSet snapshots_due);
   void choose_streams(StreamSet joined);
   void make_snapshots(StreamSet due);
+  void announce_names();
   void publish_status();
   void plan_wake();
 
@@ -188,6 +191,7 @@ struct Host::Impl {
   std::optional<Error> error;
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
   std::optional<std::int64_t> first_poll_ns;
+  std::int64_t names_announced_ns = -kNamesNs;
   std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
   Waiting waiting = Waiting::kNothing;  // what the due frame has waited for since the last poll
   Frame written_then = 0;               // last frame written, as of the last poll
@@ -217,6 +221,7 @@ bool Host::Impl::poll() {
     roster.refresh(moment());
     const StreamSet due = snapshots_due();
     produced = advance_if_due(due);
+    if (produced) announce_names();
     if (due.any() && (produced || now_ns >= frame_awaited_until_ns())) make_snapshots(due);
     // Streams take turns as well, as one alone may fill the outbox.
     first_to_send = (first_to_send + 1) % lanes.size();
@@ -411,6 +416,13 @@ void Host::Impl::make_snapshots(StreamSet due) {
     lane.joins.served(roster, now_ns);
     ++lane.totals.snapshots;
   }
+}
+
+void Host::Impl::announce_names() {
+  if (now_ns - names_announced_ns < kNamesNs || !outbox.has_control_room() || !source->refresh_names())
+    return;
+  names_announced_ns = now_ns;
+  static_cast<void>(outbox.push(source->session()));  // there is room
 }
 
 HostTotals Host::Impl::totals_now() const {

@@ -195,6 +195,7 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
   if (auto named = host::check_stream_names(config.streams); !named) return tl::unexpected(named.error());
   config.extent = world.extent;
   config.frame_rate_hz = 1 / world.dt_s;
+  config.up_axis = world.up_axis;
   config.scene = world.name;
   config.scene_description = world.description;
   config.types.clear();

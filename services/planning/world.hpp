@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/transport/messages.hpp"
 #include "services/planning/trained_table.hpp"
 #include "tandem/body_shape.hpp"
 #include "tandem/scenery.hpp"
@@ -31,6 +32,7 @@ struct World {
   double extent = 0;     ///< maximum |coordinate|
   double threshold = 0;  ///< error threshold unless the operator wishes another
   bool turns = false;    ///< bodies have orientations
+  transport::UpAxis up_axis = transport::UpAxis::kY;
   std::vector<BodyType> types = {};
   std::optional<Scenery> scenery = {};     ///< empty: contacts cannot be predicted
   std::vector<TrainedTable> trained = {};  ///< tables of the thesis's codecs

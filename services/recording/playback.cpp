@@ -23,6 +23,16 @@ Result<M> read(const McapMessage& message) {
   return read;
 }
 
+// The rest of an announcement may be laid out otherwise in another version.
+Result<void> check_version(const McapMessage& session) {
+  const auto version = transport::session_version(session.content);
+  if (!version || *version == transport::kProtocolVersion) return {};
+  return fail(ErrorCode::kUnsupported, "recorded with protocol version " + std::to_string(*version) +
+                                           ", and this program reads version " +
+                                           std::to_string(transport::kProtocolVersion) +
+                                           ". Play it with a tandem of that time");
+}
+
 }  // namespace
 
 Playback::Run::Run(transport::SessionMessage announced, client::Playable playable)
@@ -123,6 +133,7 @@ Result<Playback::Step> Playback::next() {
 Result<std::optional<Playback::Step>> Playback::take(const McapMessage& message) {
   constexpr std::optional<Step> kNothing;
   if (message.topic == transport::SessionMessage::kTopic) {
+    if (auto known = check_version(message); !known) return tl::unexpected(known.error());
     auto session = read<transport::SessionMessage>(message);
     if (!session) return tl::unexpected(session.error());
     return take(std::move(*session)).map([&] { return kNothing; });
@@ -149,10 +160,13 @@ Result<std::optional<Playback::Step>> Playback::take(const McapMessage& message)
   return kNothing;
 }
 
-// Announced again, in front of a snapshot or with other figures, a session goes on.
+// Announced again, in front of a snapshot or with other names, a session goes on.
 Result<void> Playback::take(transport::SessionMessage message) {
   transport::complete_layouts(message);
-  if (run_ && message == run_->session) return {};
+  if (run_ && message.epoch == run_->session.epoch && message.streams == run_->session.streams) {
+    run_->session.names = std::move(message.names);
+    return {};
+  }
   auto playable = client::choose_stream(message);
   if (!playable) return tl::unexpected(playable.error());
   run_ = std::make_unique<Run>(std::move(message), std::move(*playable));

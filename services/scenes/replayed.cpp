@@ -16,11 +16,6 @@ std::string replayed(const std::string& text, const Recording& recording) {
   told.set_from_s(recording.from_s);
   told.set_from_frame(recording.from_frame);
   told.set_frame_rate_hz(recording.frame_rate_hz);
-  const std::string stream = recording.stream < static_cast<std::uint32_t>(scene.stream_names_size())
-                                 ? scene.stream_names(static_cast<int>(recording.stream))
-                                 : std::string();
-  scene.clear_stream_names();
-  if (!stream.empty()) scene.add_stream_names(stream);
   if (scene.dt_s() == 0) scene.set_dt_s(1 / recording.frame_rate_hz);
   std::string out;
   google::protobuf::TextFormat::PrintToString(scene, &out);

@@ -12,12 +12,10 @@ struct Recording {
   double length_s = 0, from_s = 0;
   std::uint64_t from_frame = 0;
   double frame_rate_hz = 0;  ///< > 0
-  std::uint32_t stream = 0;  ///< the recorded stream's id in the recorded session
 };
 
-/// Puts `recording` into a scene's text, and keeps only the recorded stream's name. If the text has no dt_s,
-/// adds that of the recorded frame rate, so that another rate of the replay changes no velocity. Other text
-/// stays unchanged.
+/// Puts `recording` into a scene's text. If the text has no dt_s, adds that of the recorded frame rate, so that
+/// another rate of the replay changes no velocity. Other text stays unchanged.
 [[nodiscard]] std::string replayed(const std::string& text, const Recording& recording);
 
 }  // namespace tandem::scenes

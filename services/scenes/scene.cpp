@@ -170,7 +170,6 @@ Scene to_scene(const idl::Scene& file, const std::string& path) {
   idl::Scene drawn = file;
   drawn.clear_script();
   drawn.clear_recording();
-  drawn.clear_stream_names();
   google::protobuf::TextFormat::PrintToString(drawn, &scene.text);
   scene.dt_s = file.dt_s();
   scene.damping_per_s = file.damping_per_s();

@@ -32,6 +32,7 @@ planning::World world_of(const scenes::Scene& scene, std::uint32_t bodies) {
                         .extent = scene.extent_m,
                         .threshold = scene.threshold_m,
                         .turns = scene.turns,
+                        .up_axis = transport::UpAxis::kY,
                         .types = {},
                         .scenery = {},
                         .trained = scene.trained};

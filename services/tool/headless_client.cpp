@@ -133,11 +133,20 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
 }
 
 // A recording holds one stream at a time, and a change of the stream begins with a snapshot of its state.
-void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
-  if (!recorder_) return;
+void HeadlessClient::record_session(const transport::StreamMessage& stream) {
   transport::SessionMessage session = *core_->session();
   session.streams = {stream};
   recorder_->add(session, transport::wall_ns());
+}
+
+void HeadlessClient::on_names(const transport::SessionMessage& /*session*/) {
+  if (recorder_ && core_->stream() != nullptr) record_session(*core_->stream());
+}
+
+// Whatever is told of a stream begins with where it is held.
+void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
+  if (!recorder_) return;
+  record_session(stream);
   if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), transport::wall_ns());
 }
 

@@ -70,7 +70,9 @@ class HeadlessClient final : public client::CoreListener {
   explicit HeadlessClient(HeadlessOptions options) : options_(std::move(options)) {}
   Result<void> open();
   Result<void> load_script(double dt_s);
+  void record_session(const transport::StreamMessage& stream);
   void on_session(const transport::SessionMessage& session) override;
+  void on_names(const transport::SessionMessage& session) override;
   void on_stream(const transport::StreamMessage& stream) override;
   void on_snapshot(const transport::SnapshotMessage& snapshot) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;

@@ -1,5 +1,9 @@
 #include "services/tool/recorded_source.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "sdk/transport/units.hpp"
@@ -8,6 +12,21 @@
 namespace tandem::tool {
 
 using recording::Playback;
+
+namespace {
+
+// The drive tells it but for rounding. Where the two agree, the session's own number is the exact one.
+std::array<double, 3> gravity_now(const transport::SessionMessage& session, const Drive& drive) {
+  const double quantum = session.lattice_unit / 64 / (session.dt_s * session.dt_s);
+  std::array<double, 3> gravity = session.gravity;
+  for (std::size_t axis = 0; axis < gravity.size(); ++axis) {
+    const double now = drive.gravity[axis] * quantum;
+    if (!(std::abs(now - gravity[axis]) <= quantum)) gravity[axis] = now;
+  }
+  return gravity;
+}
+
+}  // namespace
 
 RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& config,
                                accounts::TokenBucket& seeks)
@@ -23,9 +42,10 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
                                                     .length_s = playback.length_s(),
                                                     .from_s = playback.time_s(),
                                                     .from_frame = frame(),
-                                                    .frame_rate_hz = playback.session().frame_rate_hz,
-                                                    .stream = playback.stream().id.id});
+                                                    .frame_rate_hz = playback.session().frame_rate_hz});
   session_.window_ceiling = config.window_ceiling;
+  session_.gravity = gravity_now(session_, timeline().drive());
+  session_.continues_epoch = session_.continues_frame = 0;
   playback.timeline().rename(config.epoch, {});
 }
 
@@ -48,16 +68,23 @@ std::optional<host::MadeFrame> RecordedSource::next(host::StreamSet /*snapshots_
   return host::MadeFrame{.frame = delta.frame, .last_input = delta.last_input, .deltas = {&delta_, 1}};
 }
 
-transport::Reason RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,
-                                         host::Outbox& /*outbox*/, Frame& acts_on) {
+bool RecordedSource::refresh_names() {
+  if (session_.names == playback_->session().names) return false;
+  session_.names = playback_->session().names;
+  return true;
+}
+
+host::InputVerdict RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,
+                                          host::Outbox& /*outbox*/) {
   using transport::Reason;
-  if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return Reason::kRecording;
-  if (input.values.size() != 1 || !input.bytes.empty()) return Reason::kInvalid;
-  if (!(input.values[0] >= 0 && input.values[0] <= playback_->length_s())) return Reason::kInvalid;
-  if (sought_s_ || !seeks_->take(clock_ns_())) return Reason::kRateLimited;
+  if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return {Reason::kRecording};
+  if (input.values.size() != 1 || !input.bytes.empty()) return {Reason::kInvalid};
+  if (!(input.values[0] >= 0 && input.values[0] <= playback_->length_s())) {
+    return {Reason::kInvalid, 0, fmt::format("the recording is {:.1f} s long", playback_->length_s())};
+  }
+  if (sought_s_ || !seeks_->take(clock_ns_())) return {Reason::kRateLimited};
   sought_s_ = input.values[0];
-  acts_on = frame();
-  return Reason::kNone;
+  return {Reason::kNone, frame()};
 }
 
 }  // namespace tandem::tool

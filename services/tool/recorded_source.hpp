@@ -34,8 +34,9 @@ class RecordedSource final : public host::FrameSource {
   }
   std::optional<host::MadeFrame> next(host::StreamSet snapshots_follow, host::Outbox& outbox) override;
   void snapshot(std::uint32_t /*stream*/, std::vector<std::byte>& out) override { timeline().snapshot(out); }
-  transport::Reason accept(const engine::Input& input, const host::InputOrigin& origin, host::Outbox& outbox,
-                           Frame& acts_on) override;
+  host::InputVerdict accept(const engine::Input& input, const host::InputOrigin& origin,
+                            host::Outbox& outbox) override;
+  bool refresh_names() override;
 
   /// The time to continue at, in seconds since the recording's first message, after a client has asked for
   /// one.

@@ -29,6 +29,15 @@ double share_percent(const transport::ServerStatusMessage& s) {
   return s.raw_mbit_per_s > 0 ? 100 * s.mbit_per_s / s.raw_mbit_per_s : 0;
 }
 
+/// Names come from the network: what is not printable must not reach the terminal.
+std::string printable(const std::string& text) {
+  std::string clean = text.substr(0, 64);
+  for (char& c : clean) {
+    if (c < 0x20 || c > 0x7e) c = '?';
+  }
+  return clean;
+}
+
 /// The names of byte counts in JSON; they share one object.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
     {{"delta_bytes", "deltas"},
@@ -37,7 +46,12 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
      {"snapshot_bytes", "snapshots"}}};
 
 Json json_of(const transport::ServerStatusMessage& s) {
-  Json out{{"session", s.session}, {"stream", s.stream}, {"epoch", s.epoch}, {"frame", s.frame}};
+  Json out{{"session", s.session},
+           {"stream", s.stream},
+           {"epoch", s.epoch},
+           {"frame", s.frame},
+           {"role", s.server_role == transport::ServerRole::kLive ? "live" : "standby"},
+           {"behind_frames", s.behind_frames}};
   each_server_figure(
       [&out](std::string_view name, auto value) {
         const auto* const bytes = std::ranges::find(kBytes, name, &decltype(kBytes)::value_type::first);
@@ -59,7 +73,8 @@ Json json_of(const transport::ClientStatusMessage& c) {
            {"phase", phase_word(c.phase)},
            {"lag_ms", c.lag_ms},
            {"too_slow", c.too_slow != 0},
-           {"queue_high_water", c.queue_high_water}};
+           {"queue_high_water", c.queue_high_water},
+           {"stream_reason", printable(c.stream_reason)}};
   each_reported_figure([&out](const char* name, auto value) { out[name] = value; }, c);
   return out;
 }
@@ -102,19 +117,11 @@ std::string short_bytes(std::uint64_t bytes) {
   return fmt::format("{:.0f}{}", value, kUnits.at(unit));
 }
 
-/// Names come from the network: what is not printable must not reach the terminal.
-std::string printable(const std::string& text) {
-  std::string clean = text.substr(0, 64);
-  for (char& c : clean) {
-    if (c < 0x20 || c > 0x7e) c = '?';
-  }
-  return clean;
-}
-
 }  // namespace
 
 void TopView::update(const transport::ServerStatusMessage& status, std::int64_t now_ns) {
-  const StreamKey key{status.session, status.stream};
+  const bool live = status.server_role == transport::ServerRole::kLive;
+  const StreamKey key{status.session + (live ? "" : " (standby)"), status.stream};
   if (!shown(status.session) || (streams_.size() >= kMostShown && !streams_.contains(key))) return;
   streams_[key] = {status, now_ns};
 }
@@ -165,7 +172,7 @@ std::string TopView::to_table() const {
     const transport::ServerStatusMessage& s = heard.status;
     text += fmt::format(
         "{:<20} {:>9} {:>6.1f} {:>8} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {:<20} {}, {}, {:.3g}\n",
-        several(s.session) ? fmt::format("{}/{}", printable(s.session), s.stream) : printable(s.session),
+        several(key.first) ? fmt::format("{}/{}", printable(key.first), s.stream) : printable(key.first),
         s.frame, s.frame_rate_hz, s.bodies, s.at_rest,
         fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
         s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls,
@@ -173,15 +180,16 @@ std::string TopView::to_table() const {
                     short_bytes(s.input_bytes), short_bytes(s.snapshot_bytes)),
         printable(s.codec), printable(s.predictor), s.threshold);
   }
-  text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}\n", "CLIENT",
-                      "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS", "MBIT/S",
-                      "REJOINS", "WRONG");
+  text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}  {}\n",
+                      "CLIENT", "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS",
+                      "MBIT/S", "REJOINS", "WRONG", "WHY THIS STREAM");
   for (const auto& [id, heard] : clients_) {
     const transport::ClientStatusMessage& c = heard.status;
-    text += fmt::format("{:016x} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}{}\n",
-                        c.client, printable(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
-                        c.applied, c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
-                        c.too_slow != 0 ? "  too slow" : "");
+    text +=
+        fmt::format("{:016x} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}  {}{}\n",
+                    c.client, printable(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
+                    c.applied, c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
+                    printable(c.stream_reason), c.too_slow != 0 ? "  too slow" : "");
   }
   return text;
 }

@@ -214,7 +214,7 @@ class Run {
   tandem_result look() {
     std::size_t count = 0;
     std::vector<float> values(program_.u8() % 5);
-    switch (program_.u8() % 4) {
+    switch (program_.u8() % 5) {
       case 0: {
         AnyStruct<tandem_scene> scene(program_, TANDEM_SCENE_INIT);
         return tandem_get_scene(handle(), scene.get());
@@ -226,6 +226,12 @@ class Run {
       case 2: {
         AnyStruct<tandem_body_type> type(program_, TANDEM_BODY_TYPE_INIT);
         return tandem_get_type(handle(), static_cast<std::uint32_t>(program_.number()), type.get());
+      }
+      case 3: {
+        std::vector<char> name(program_.u8() % 70);
+        const auto slot = static_cast<std::uint32_t>(program_.number() % (2 * Playground::kBodies));
+        if (playground_.serving()) playground_.name({{slot, std::string(slot * 3, 'n')}});
+        return tandem_get_body_name(handle(), slot, name.data(), name.size());
       }
       default:
         return tandem_get_type_values(handle(), program_.u8() % 2, values.data(), values.size(), &count);

@@ -88,7 +88,7 @@ class Run {
   transport::SessionMessage damaged_session() {
     auto session = honest_.server.session;
     auto& stream = session.streams[0];
-    switch (program_.u8() % 24) {
+    switch (program_.u8() % 30) {
       case 0:
         session.epoch = program_.number();
         break;
@@ -158,6 +158,25 @@ class Run {
         break;
       case 22:
         stream.layout.groups.pop_back();
+        break;
+      case 23:
+        session.server_role = static_cast<transport::ServerRole>(program_.u8() % 3);
+        break;
+      case 24:
+        session.dt_s = program_.real();
+        break;
+      case 25:
+        session.gravity[program_.u8() % 3] = program_.real();
+        break;
+      case 26:
+        session.up_axis = static_cast<transport::UpAxis>(program_.u8() % 4);
+        break;
+      case 27:
+        stream.name = program_.u8() % 2 == 0 ? "thin" : "Not One";
+        break;
+      case 28:
+        for (int count = program_.u8() % 12; count > 0; --count)
+          session.names.push_back({program_.u8() % (kCapacity + 1), program_.u8() % 3U, "crane"});
         break;
       default:
         stream.max_snapshot_bytes = static_cast<std::uint32_t>(program_.number());
@@ -242,6 +261,7 @@ class Run {
     reply.server_time_ns = static_cast<std::int64_t>(program_.u64());
     for (unsigned count = program_.u8() % 40; count > 0; --count) {
       reply.entries.push_back({program_.number(), program_.number(), program_.u8() % 16U});
+      if (reply.entries.back().code == 3) reply.texts.push_back({reply.entries.back().number, "beyond 100"});
     }
     return reply;
   }
@@ -250,6 +270,11 @@ class Run {
     now_ns_ += later_ns;
     core_->poll({now_ns_, now_ns_});
     core_->sample(sample_, SampleMode::kExtrapolate, {now_ns_, now_ns_});
+    for (Slot slot = 0; slot <= kCapacity; ++slot) {
+      const std::string_view name = core_->body_name(slot);
+      require(name.empty() ||
+              (name == "crane" && core_->timeline()->state(core_->timeline()->applied()).alive()[slot] != 0));
+    }
     if (program_.u8() % 4 == 1) {
       static_cast<void>(
           core_->send(transport::InputKind::kGravity, {program_.real(), 0, 0}, {}, {now_ns_, now_ns_}));

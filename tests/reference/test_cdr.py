@@ -26,26 +26,34 @@ class Cdr(unittest.TestCase):
             "0600000000000000 0700000000000000"  # highest input, client's clock
             "0800000000000000 01000000 00000000"  # server's time, one entry, padding
             "0900000000000000 0a00000000000000 0b000000"
+            "01000000 0900000000000000 02000000 7900"  # one text, "y"
         )
         reply = cdr.decode("TandemReply", sample)
         self.assertEqual([reply.role, reply.phase, reply.reason, reply.highest_input], [3, 4, 5, 6])
+        self.assertEqual([(one.number, one.text) for one in reply.texts], [(9, "y")])
         self.assertEqual([reply.entries[0].number, reply.entries[0].frame, reply.entries[0].code], [9, 10, 11])
 
     def test_strings_and_nested_sequences(self):
         sample = bytes.fromhex(
             "00010000"
             "0100000000000000 01000000 10000000"  # epoch, version, capacity
-            "0000000000003e40 000000000000503f"  # 30 Hz, 2^-10
-            "01000000 18000000"  # lead, window
+            "0000000000003e40 000000000000a03f 000000000000503f"  # 30 Hz, 2^-5 s, 2^-10
+            "0000000000000000 00000000000024c0 0000000000000000"  # gravity 0, -10, 0
+            "01000000 01000000 18000000 00000000 00000000 00000000"  # up, lead, window, role, rank, padding
+            "0200000000000000 0300000000000000"  # continued epoch and frame
             "02000000 6100 0000 01000000 00 000000 02000000 7800 0000"  # session "a", scene "", description "x"
             "01000000 0000003f ff0000ff 01000000 02000000 6200 0000 00000000"  # one type "b", no values
             "00000000"  # no streams
+            "01000000 07000000 02000000 02000000 6300"  # one name, of slot 7 and reuse 2: "c"
         )
         session = cdr.decode("TandemSession", sample)
         self.assertEqual([session.session, session.scene, session.scene_description], ["a", "", "x"])
         self.assertEqual([session.frame_rate_hz, session.lattice_unit], [30.0, 2.0**-10])
         self.assertEqual([(one.name, one.radius, one.shape_values) for one in session.types], [("b", 0.5, [])])
         self.assertEqual(session.streams, [])
+        self.assertEqual([session.dt_s, session.gravity_y, session.up_axis], [2.0**-5, -10.0, 1])
+        self.assertEqual([session.continues_epoch, session.continues_frame], [2, 3])
+        self.assertEqual([(one.slot, one.reuse, one.name) for one in session.names], [(7, 2, "c")])
 
     def test_every_topic_type_comes_back(self):
         zero = {"string": "abc", "[octet]": b"\1\2\3", "float": 0.5, "double": -2.0}

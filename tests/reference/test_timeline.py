@@ -47,15 +47,16 @@ class Capture:
         self.line = worlds.timeline(self.of, {1: ((0, 0, 0), (0, 0, 0)), 2: ((9, 9, 9), (0, 0, 0))}, frame=10)
         announced = dict(
             id=0, generation=0, region_blocks=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000,
-            layout_hash=self.of.layout_hash(), codec=codec, predictor="ballistic", groups=["position"], radii=[],
+            layout_hash=self.of.layout_hash(), name="", codec=codec, predictor="ballistic", groups=["position"], radii=[],
             parameters=[{"id": i, "value": v} for i, v in self.of.parameters.items()], predictor_constants=[],
             codec_tables=b"",
         )  # fmt: skip
         self.samples = []
         kind = {"radius": 1.0, "colour_rgba": 0, "shape": 0, "name": "ball", "shape_values": []}
-        self.add("TandemSession", epoch=5, protocol_version=1, capacity=8, frame_rate_hz=30.0, lattice_unit=1.0,
-                 lead=0, window_ceiling=24, session="s", scene="", scene_description="", types=[kind],
-                 streams=[announced])  # fmt: skip
+        self.add("TandemSession", epoch=5, protocol_version=2, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
+                 lattice_unit=1.0, gravity_x=0.0, gravity_y=0.0, gravity_z=0.0, up_axis=1, lead=0, window_ceiling=24,
+                 server_role=0, standby_rank=0, continues_epoch=0, continues_frame=0, session="s", scene="",
+                 scene_description="", types=[kind], streams=[announced], names=[])  # fmt: skip
 
     def add(self, kind, /, **fields):
         self.samples.append((kind, writer.sample(kind, **fields)))

@@ -1,6 +1,7 @@
 // Implements "Finding sessions" of tandem.h.
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 
 #include "sdk/client/api/boundary.hpp"
 #include "sdk/client/api/browsers.hpp"
@@ -29,6 +30,11 @@ tandem_session_info describe(const FoundSession& found) {
   out.frame_rate_hz = s.frame_rate_hz;
   out.mbit_per_s = found.status.mbit_per_s;
   out.protocol_version = s.protocol_version;
+  out.dt_s = s.dt_s;
+  std::copy(s.gravity.begin(), s.gravity.end(), std::begin(out.gravity));
+  out.up_axis = static_cast<std::uint32_t>(s.up_axis);
+  out.continues_epoch = s.continues_epoch;
+  out.continues_frame = s.continues_frame;
   write_text(s.session, out.name);
   write_text(s.scene, out.scene);
   if (found.stream != nullptr) {

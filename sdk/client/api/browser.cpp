@@ -16,7 +16,9 @@ void Browser::hear(std::int64_t now_ns) {
   std::vector<transport::Received<transport::ServerStatusMessage>> statuses;
   monitor_->take(statuses);
   for (auto& [status, from] : statuses) {
-    if (status.stream != 0 || (heard_.size() >= kMostHeard && !heard_.contains(status.session))) continue;
+    if (status.stream != 0 || status.server_role != transport::ServerRole::kLive ||
+        (heard_.size() >= kMostHeard && !heard_.contains(status.session)))
+      continue;
     const std::string name = status.session;
     heard_[name] = {std::move(status), now_ns};
   }
@@ -26,7 +28,7 @@ void Browser::hear(std::int64_t now_ns) {
 std::size_t Browser::playable_stream(const transport::Received<transport::SessionMessage>& announced) {
   const auto [at, first] = playable_.try_emplace(Run{announced.from, announced.message.epoch}, kNone);
   if (first) {
-    if (const auto playable = client::choose_stream(announced.message)) at->second = playable->stream;
+    if (const auto playable = client::playable_streams(announced.message)) at->second = playable->front();
   }
   return at->second;
 }
@@ -38,6 +40,7 @@ void Browser::refresh(std::int64_t now_ns) {
   sessions_.clear();
   std::map<Run, std::size_t> playable;
   for (auto& announced : live) {
+    if (announced.message.server_role != transport::ServerRole::kLive) continue;
     const std::size_t stream = playable_stream(announced);
     playable.emplace(Run{announced.from, announced.message.epoch}, stream);
     const auto [at, first] = sessions_.try_emplace(announced.message.session);

@@ -50,8 +50,7 @@ class Browser {
   std::unique_ptr<transport::Monitor> monitor_;
   std::map<std::string, FoundSession> sessions_;
   std::map<std::string, Heard> heard_;   // by session
-  std::map<Run, std::size_t> playable_;  // of the live sessions; kept because finding out takes as much
-                                         // memory as playing
+  std::map<Run, std::size_t> playable_;  // of the live sessions; kept because finding out takes time
 };
 
 }  // namespace tandem::api

@@ -220,7 +220,7 @@ tandem_result tandem_next_event(tandem_client client, tandem_event* event) noexc
     out.at_ns = next->at_ns;
     out.reason = next->reason;
     out.dropped = next->dropped;
-    write_text(next->reason != 0 ? client::describe(next->reason) : next->text, out.text);
+    write_text(next->text.empty() ? client::describe(next->reason) : next->text, out.text);
     write_struct(out, event);
     return kOk;
   });

@@ -54,6 +54,7 @@ void EventLog::on_outcome(const client::InputOutcome& outcome) {
     case client::InputOutcome::Kind::kRefused:
       event.kind = TANDEM_EVENT_INPUT_REFUSED;
       event.reason = outcome.reason;
+      event.text = outcome.text;
       break;
     case client::InputOutcome::Kind::kUnknown:
       event.kind = TANDEM_EVENT_INPUT_UNKNOWN;

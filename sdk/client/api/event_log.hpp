@@ -20,7 +20,7 @@ struct Event {
   Frame frame = 0;
   Epoch epoch = 0;
   std::int64_t at_ns = 0;
-  std::string text;  ///< used if there is no reason
+  std::string text;  ///< empty: that of the reason
 };
 
 /// Listens to a core and stores events. Bounded; allocates only if an event has a text. Not thread-safe.

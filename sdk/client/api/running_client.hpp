@@ -58,6 +58,12 @@ class RunningClient {
     const std::lock_guard lock(mutex_);
     return look(core_.session());
   }
+  /// Calls `look(core)` while the client is locked.
+  template <class Look>
+  auto with_core(Look&& look) const {
+    const std::lock_guard lock(mutex_);
+    return look(core_);
+  }
   /// The scene that was read last; null before the first.
   [[nodiscard]] std::shared_ptr<const KnownScene> scene() const;
   void hold_scene(std::shared_ptr<const KnownScene> scene);

@@ -126,18 +126,36 @@ tandem_result tandem_get_scene(tandem_client client, tandem_scene* scene) noexce
       out.capacity = session->capacity;
       out.type_count = static_cast<std::uint32_t>(session->types.size());
       out.frame_rate_hz = session->frame_rate_hz;
+      out.dt_s = session->dt_s;
+      std::copy(session->gravity.begin(), session->gravity.end(), std::begin(out.gravity));
+      out.up_axis = static_cast<std::uint32_t>(session->up_axis);
+      out.continues_epoch = session->continues_epoch;
+      out.continues_frame = session->continues_frame;
       write_text(session->scene, out.name);
       return true;
     });
     if (!still) return no_session();
     out.solid_count = static_cast<std::uint32_t>(text.solids.size());
-    std::copy(text.gravity.begin(), text.gravity.end(), std::begin(out.gravity));
     out.max_gravity = text.max_gravity;
     out.max_push = text.max_push;
     copy(text.low, out.low);
     copy(text.high, out.high);
     write_struct(out, scene);
     return kOk;
+  });
+}
+
+tandem_result tandem_get_body_name(tandem_client client, uint32_t slot, char* name, size_t size) noexcept {
+  return with_client(client, [&](RunningClient& running) {
+    if (name == nullptr || size == 0) return null_pointer("`name` has no room");
+    return running.with_core([&](const client::ClientCore& core) {
+      if (core.session() == nullptr) return no_session();
+      if (slot >= core.session()->capacity)
+        return refuse(TANDEM_INVALID_ARGUMENT, "the session has fewer slots");
+      if (core.timeline() == nullptr) return refuse(TANDEM_NOT_READY, "the client does not play");
+      write_text(core.body_name(slot), name, size);
+      return kOk;
+    });
   });
 }
 

@@ -92,14 +92,17 @@ void write_struct(const T& ours, T* theirs) {
 }
 
 /// Copies a text. A text that is too long is cut at the end of a character.
-template <std::size_t kSize>
-void write_text(std::string_view text, char (&to)[kSize]) {  // NOLINT(*-avoid-c-arrays): C's
-  std::size_t length = std::min(text.size(), kSize - 1);
+inline void write_text(std::string_view text, char* to, std::size_t size) {
+  std::size_t length = std::min(text.size(), size - 1);
   while (length < text.size() && length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0U) == 0x80U) {
     --length;
   }
-  std::memset(to, 0, kSize);
+  std::memset(to, 0, size);
   text.copy(to, length);
+}
+template <std::size_t kSize>
+void write_text(std::string_view text, char (&to)[kSize]) {  // NOLINT(*-avoid-c-arrays): C's
+  write_text(text, to, kSize);
 }
 
 }  // namespace tandem::api

@@ -21,7 +21,10 @@ void SentInputs::on_reply(const transport::ReplyMessage& reply, std::vector<Inpu
       return true;
     }
     if (entry->code != static_cast<std::uint32_t>(transport::Reason::kNone)) {
-      outcomes.push_back({InputOutcome::Kind::kRefused, input.number, 0, entry->code, 0});
+      const auto of = std::find_if(reply.texts.begin(), reply.texts.end(),
+                                   [&](const transport::ReplyText& t) { return t.number == input.number; });
+      outcomes.push_back({InputOutcome::Kind::kRefused, input.number, 0, entry->code, 0,
+                          of != reply.texts.end() ? of->text : std::string()});
       return true;
     }
     input.frame = std::max<Frame>(1, entry->frame);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
@@ -24,6 +25,7 @@ struct InputOutcome {
   Frame frame = 0;
   std::uint32_t reason = 0;     ///< transport::Reason
   std::int64_t latency_ns = 0;  ///< kActed: from sending to applying the frame it acted on
+  std::string text = {};        ///< kRefused: the simulation's own words; empty if it gave none
 };
 
 /// Numbers inputs 1, 2, ... and matches the replies with them. Bounded. Not thread-safe.

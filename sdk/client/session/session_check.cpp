@@ -70,7 +70,11 @@ Result<std::vector<std::size_t>> playable_streams(const transport::SessionMessag
   for (std::size_t i = 0; i < session.streams.size(); ++i) {
     const transport::StreamMessage& stream = session.streams[i];
     const auto good = check_stream(session, stream);
-    const auto timeline = good ? ClientTimeline::create(stream.layout) : tl::unexpected<Error>(good.error());
+    // Codec, predictor and tables are refused alike with one slot. So nothing of the announced size is
+    // allocated for a stream that is not chosen.
+    Layout one_slot = stream.layout;
+    one_slot.capacity = 1;
+    const auto timeline = good ? ClientTimeline::create(one_slot) : tl::unexpected<Error>(good.error());
     const bool listed_twice = std::any_of(playable.begin(), playable.end(), [&](std::size_t other) {
       return session.streams[other].id.id == stream.id.id;
     });

@@ -6,7 +6,6 @@
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "sdk/transport/text_message.hpp"
 
 namespace tandem::client {
 namespace {
@@ -24,24 +23,6 @@ std::string milliseconds(double ns) {
   return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10);
 }
 
-std::vector<std::string> names_of(const transport::SessionMessage& session) {
-  std::vector<std::string> names;
-  // One stream needs no name, and most scenes are long.
-  const auto scene = session.streams.size() > 1 ? transport::read_text_message(session.scene_description)
-                                                : transport::TextMessage{};
-  if (scene) {
-    for (const transport::TextField& field : *scene) {
-      if (field.name == "stream_names" && !field.is_message) names.emplace_back(field.scalar);
-    }
-  }
-  names.resize(session.streams.size());
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    constexpr std::size_t kMostBytes = 32;
-    if (names[i].empty() || names[i].size() > kMostBytes) names[i] = std::to_string(session.streams[i].id.id);
-  }
-  return names;
-}
-
 }  // namespace
 
 StreamPreference read_preference(std::string_view text) {
@@ -55,13 +36,12 @@ StreamPreference read_preference(std::string_view text) {
 
 std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                                      const std::vector<std::size_t>& playable) {
-  const std::vector<std::string> names = names_of(session);
   std::vector<StreamOffer> offers;
   for (const std::size_t index : playable) {
     const transport::StreamMessage& stream = session.streams[index];
     offers.push_back({.index = index,
                       .id = stream.id,
-                      .name = names[index],
+                      .name = stream.name.empty() ? std::to_string(stream.id.id) : stream.name,
                       .is_ballistic = stream.layout.predictor == basic_predictor().name,
                       .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .per_body_ns = double{1} * stream.client_cost_ns,

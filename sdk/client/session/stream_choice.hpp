@@ -40,8 +40,8 @@ struct StreamOffer {
   double per_body_ns = 0;   ///< cost of a client's predicted step and hash, on the server's machine
   double announced_ns = 0;  ///< the same cost for all slots
 };
-/// The offers for `playable`, which holds indices into the session's streams. Names come from the scene's
-/// text; a stream without one is named by its number.
+/// The offers for `playable`, which holds indices into the session's streams. A stream without a name is
+/// called by its number.
 [[nodiscard]] std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                                                    const std::vector<std::size_t>& playable);
 

@@ -17,7 +17,7 @@ using TypeId = std::uint16_t;
 
 /// Number of channels of the group that every stream has.
 inline constexpr std::size_t kPositionChannels = 3;
-inline constexpr std::uint32_t kMaxCapacity = 1U << 20U;
+inline constexpr std::uint32_t kMaxCapacity = 1U << 22U;
 /// Number of slots of a block. Each block is coded on its own, with local indices.
 inline constexpr std::uint32_t kBlockSlots = 16384;
 

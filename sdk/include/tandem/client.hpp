@@ -74,10 +74,13 @@ struct Scene {
   std::string name;
   std::uint32_t capacity = 0;  ///< slots
   double frame_rate_hz = 0;
-  std::array<double, 3> gravity{};       ///< gravity at the start; scene units / s^2
+  std::array<double, 3> gravity{};       ///< gravity at the epoch's first frame; scene units / s^2
   double max_gravity = 0, max_push = 0;  ///< the server refuses more; 0: unknown
   std::array<float, 3> low{}, high{};    ///< bounds; all 0: unknown
   std::vector<Solid> solids;
+  double dt_s = 0;                                         ///< seconds that one frame simulates
+  std::uint32_t up_axis = 1;                               ///< the axis that points up: 0 x, 1 y, 2 z
+  std::uint64_t continues_epoch = 0, continues_frame = 0;  ///< see tandem_scene; 0: none
 };
 
 /// A session on a domain; see tandem_session_info.
@@ -89,6 +92,10 @@ struct SessionInfo {
   double frame_rate_hz = 0;
   double client_ms = 0;   ///< computing time of a client for one frame, measured on the server's processor
   double mbit_per_s = 0;  ///< current payload rate
+  double dt_s = 0;        ///< seconds that one frame simulates
+  std::array<double, 3> gravity{};                         ///< at the epoch's first frame; scene units / s^2
+  std::uint32_t up_axis = 1;                               ///< the axis that points up: 0 x, 1 y, 2 z
+  std::uint64_t continues_epoch = 0, continues_frame = 0;  ///< see tandem_session_info; 0: none
 };
 
 /// Where Client::sample() writes one kind of value of each body: a plain array, or a member of an array of
@@ -252,6 +259,14 @@ class Client {
   [[nodiscard]] std::vector<BodyTypeInfo> types() const;
   /// Geometry, gravity and bounds. Errors: kNotReady (no session is known yet), kMalformed.
   [[nodiscard]] Result<Scene> scene() const;
+  /// The name of the body that is in a slot now; empty if it has none. Errors: kNotReady (not playing),
+  /// kInvalidArgument (the session has fewer slots).
+  [[nodiscard]] Result<std::string> body_name(std::uint32_t slot) const {
+    std::array<char, TANDEM_BODY_NAME_SIZE> name{};
+    if (const auto got = checked(tandem_get_body_name(handle_, slot, name.data(), name.size())); !got)
+      return unexpected(got);
+    return std::string(name.data());
+  }
 
  private:
   friend class Browser;
@@ -342,7 +357,8 @@ inline Result<std::vector<SessionInfo>> Browser::sessions() const {
   for (std::size_t i = 0; i < count; ++i) {
     const tandem_session_info& c = found[i];
     out.push_back({c.name, c.scene, c.codec, c.predictor, c.playable != 0, c.epoch, c.capacity, c.bodies,
-                   c.participants, c.observers, c.frame_rate_hz, c.client_ms, c.mbit_per_s});
+                   c.participants, c.observers, c.frame_rate_hz, c.client_ms, c.mbit_per_s, c.dt_s,
+                   std::to_array(c.gravity), c.up_axis, c.continues_epoch, c.continues_frame});
   }
   return out;
 }
@@ -359,6 +375,10 @@ inline Result<Scene> Client::scene() const {
   scene.gravity = std::to_array(c.gravity);
   scene.low = std::to_array(c.low);
   scene.high = std::to_array(c.high);
+  scene.dt_s = c.dt_s;
+  scene.up_axis = c.up_axis;
+  scene.continues_epoch = c.continues_epoch;
+  scene.continues_frame = c.continues_frame;
   std::vector<tandem_solid> solids(c.solid_count, TANDEM_SOLID_INIT);
   std::size_t count = 0;
   const tandem_result result = tandem_get_geometry(handle_, solids.data(), solids.size(), &count);

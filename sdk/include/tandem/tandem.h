@@ -384,7 +384,8 @@ typedef struct tandem_event {
   uint32_t reason;  /**< the server's reason: "Reasons" in idl/PROTOCOL.md */
   uint32_t dropped; /**< events dropped between the previously taken one and this one, because the queue was
                        full */
-  char text[256];   /**< for a human; may be empty */
+  char text[256];   /**< for a human; may be empty. Of a refused input: the simulation's own words, if it gave
+                       some */
 } tandem_event;
 /** An empty one, to be filled in. */
 #define TANDEM_EVENT_INIT                            \
@@ -448,18 +449,21 @@ typedef struct tandem_scene {
   uint32_t type_count;  /**< for tandem_get_type() */
   uint32_t solid_count; /**< for tandem_get_geometry() */
   double frame_rate_hz;
-  double gravity[3];  /**< gravity at the start; scene units / s^2 */
+  double gravity[3];  /**< gravity at the epoch's first frame; scene units / s^2 */
   double max_gravity; /**< scene units / s^2; the server refuses more; 0: unknown */
   double max_push;    /**< scene units / s; the server refuses more; 0: unknown */
   float low[3];       /**< bodies outside of low..high are removed; all 0: unknown */
   float high[3];
   char name[72];
+  double dt_s;              /**< seconds that one frame simulates */
+  uint64_t continues_epoch; /**< the epoch that this one continues; 0: none */
+  uint64_t continues_frame; /**< the frame of that epoch from which this one continues */
+  uint32_t up_axis;         /**< the axis that points up: 0 x, 1 y, 2 z */
+  uint32_t reserved;        /**< 0 */
 } tandem_scene;
 /** An empty one, to be filled in. */
-#define TANDEM_SCENE_INIT                                                          \
-  {                                                                                \
-    sizeof(tandem_scene), 0, 0, 0, 0, {0, 0, 0}, 0, 0, {0, 0, 0}, {0, 0, 0}, { 0 } \
-  }
+#define TANDEM_SCENE_INIT \
+  { sizeof(tandem_scene), 0, 0, 0, 0, {0, 0, 0}, 0, 0, {0, 0, 0}, {0, 0, 0}, {0}, 0, 0, 0, 0, 0 }
 
 /** Fills in the scene of the session.
  * @return also TANDEM_MALFORMED (the server's description of the scene cannot be read) */
@@ -516,6 +520,15 @@ TANDEM_API tandem_result tandem_get_type(tandem_client client, uint32_t index,
  */
 TANDEM_API tandem_result tandem_get_type_values(tandem_client client, uint32_t index, float* values,
                                                 size_t capacity, size_t* count) TANDEM_NOEXCEPT;
+/** The size of an array that every name of a body fits into, with the 0 at its end. */
+#define TANDEM_BODY_NAME_SIZE 65
+/** Writes the name of the body that is in a slot now: an empty text if the body has none or there is no body.
+ * Names may change while the client plays.
+ * @param name  receives UTF-8 without control characters
+ * @param size  bytes of `name`, at least 1; a name that is too long is cut at the end of a character
+ * @return also TANDEM_NOT_READY: not playing */
+TANDEM_API tandem_result tandem_get_body_name(tandem_client client, uint32_t slot, char* name,
+                                              size_t size) TANDEM_NOEXCEPT;
 /** @} */
 
 /** @name Finding sessions
@@ -542,11 +555,18 @@ typedef struct tandem_session_info {
   char scene[72];
   char codec[72];
   char predictor[72];
+  double dt_s;              /**< seconds that one frame simulates */
+  double gravity[3];        /**< at the epoch's first frame; scene units / s^2 */
+  uint64_t continues_epoch; /**< the epoch that this one continues; 0: none */
+  uint64_t continues_frame; /**< the frame of that epoch from which this one continues */
+  uint32_t up_axis;         /**< the axis that points up: 0 x, 1 y, 2 z */
+  uint32_t reserved2;       /**< 0 */
 } tandem_session_info;
 /** An empty one, to be filled in. */
-#define TANDEM_SESSION_INFO_INIT                                                       \
-  {                                                                                    \
-    sizeof(tandem_session_info), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, {0}, { 0 } \
+#define TANDEM_SESSION_INFO_INIT                                                                             \
+  {                                                                                                          \
+    sizeof(tandem_session_info), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, {0}, {0}, 0, {0, 0, 0}, 0, 0, 0, \
+        0                                                                                                    \
   }
 
 /** Starts watching a domain without joining anything.

@@ -189,7 +189,15 @@ class Connection {
     return py::dict(
         "name"_a = s.name, "capacity"_a = s.capacity, "frame_rate_hz"_a = s.frame_rate_hz,
         "gravity"_a = triple(s.gravity), "max_gravity"_a = s.max_gravity, "max_push"_a = s.max_push,
-        "bounds"_a = told ? py::object(py::make_tuple(triple(s.low), triple(s.high))) : py::none());
+        "bounds"_a = told ? py::object(py::make_tuple(triple(s.low), triple(s.high))) : py::none(),
+        "dt_s"_a = s.dt_s, "up_axis"_a = s.up_axis, "continues_epoch"_a = s.continues_epoch,
+        "continues_frame"_a = s.continues_frame);
+  }
+
+  [[nodiscard]] std::string body_name(std::uint32_t slot) const {
+    std::array<char, TANDEM_BODY_NAME_SIZE> name{};
+    check(unlocked([&] { return tandem_get_body_name(client_, slot, name.data(), name.size()); }));
+    return name.data();
   }
 
   [[nodiscard]] py::list geometry() const {
@@ -274,12 +282,14 @@ class Browser {
     }));
     py::list list;
     for (const tandem_session_info& s : sessions) {
-      list.append(py::dict("name"_a = s.name, "scene"_a = s.scene, "codec"_a = s.codec,
-                           "predictor"_a = s.predictor, "playable"_a = s.playable != 0, "epoch"_a = s.epoch,
-                           "capacity"_a = s.capacity, "bodies"_a = s.bodies,
-                           "participants"_a = s.participants, "observers"_a = s.observers,
-                           "frame_rate_hz"_a = s.frame_rate_hz, "client_ms"_a = s.client_ms,
-                           "mbit_per_s"_a = s.mbit_per_s, "protocol_version"_a = s.protocol_version));
+      list.append(py::dict(
+          "name"_a = s.name, "scene"_a = s.scene, "codec"_a = s.codec, "predictor"_a = s.predictor,
+          "playable"_a = s.playable != 0, "epoch"_a = s.epoch, "capacity"_a = s.capacity,
+          "bodies"_a = s.bodies, "participants"_a = s.participants, "observers"_a = s.observers,
+          "frame_rate_hz"_a = s.frame_rate_hz, "client_ms"_a = s.client_ms, "mbit_per_s"_a = s.mbit_per_s,
+          "protocol_version"_a = s.protocol_version, "dt_s"_a = s.dt_s,
+          "gravity"_a = py::make_tuple(s.gravity[0], s.gravity[1], s.gravity[2]), "up_axis"_a = s.up_axis,
+          "continues_epoch"_a = s.continues_epoch, "continues_frame"_a = s.continues_frame));
     }
     return list;
   }
@@ -308,6 +318,7 @@ PYBIND11_MODULE(_client, m) {
       .def("send_seek", &Connection::send_seek)
       .def("send_bytes", &Connection::send_bytes)
       .def("scene", &Connection::scene)
+      .def("body_name", &Connection::body_name)
       .def("geometry", &Connection::geometry)
       .def("types", &Connection::types);
   py::class_<Browser>(m, "Browser").def(py::init<std::uint32_t>()).def("list", &Browser::list);

@@ -227,6 +227,10 @@ class Client:
         (EventKind.NEW_EPOCH)."""
         return Scene._of(self._connection.scene())
 
+    def body_name(self, slot: int) -> str:
+        """The name of the body that is in a slot now; empty if it has none. Raises NOT_READY while not playing."""
+        return self._connection.body_name(slot)
+
     def geometry(self) -> list[Solid]:
         """The pieces of the scene that do not move."""
         return [Solid._of(solid) for solid in self._connection.geometry()]

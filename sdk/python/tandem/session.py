@@ -116,7 +116,7 @@ class Event(_FromNative):
     at_ns: int  #: when the client noted it, by clock_ns()
     reason: int  #: the server's: "Reasons" in idl/PROTOCOL.md
     dropped: int  #: older events that there was no room for since the one taken before
-    text: str  #: for a human; may be empty
+    text: str  #: for a human; may be empty. Of a refused input: the simulation's own words, if it gave some
 
 
 @dataclass(frozen=True)
@@ -126,10 +126,14 @@ class Scene(_FromNative):
     name: str
     capacity: int  #: slots
     frame_rate_hz: float
-    gravity: Vector  #: at the start; scene units / s^2
+    gravity: Vector  #: at the epoch's first frame; scene units / s^2
     max_gravity: float  #: beyond, the server refuses it; 0: not told
     max_push: float  #: scene units / s; beyond, the server refuses it; 0: not told
     bounds: Optional[tuple[Vector, Vector]]  #: bodies outside of low..high are removed; None: not told
+    dt_s: float  #: seconds that one frame simulates
+    up_axis: int  #: the axis that points up: 0 x, 1 y, 2 z
+    continues_epoch: int  #: the epoch that this one continues; 0: none
+    continues_frame: int  #: the frame of that epoch from which this one continues
 
 
 @dataclass(frozen=True)
@@ -173,3 +177,8 @@ class SessionInfo(_FromNative):
     client_ms: float  #: what a client computes in a frame, on the server's processor
     mbit_per_s: float  #: of payload, now; from status
     protocol_version: int
+    dt_s: float  #: seconds that one frame simulates
+    gravity: Vector  #: at the epoch's first frame; scene units / s^2
+    up_axis: int  #: the axis that points up: 0 x, 1 y, 2 z
+    continues_epoch: int  #: the epoch that this one continues; 0: none
+    continues_frame: int  #: the frame of that epoch from which this one continues

@@ -23,7 +23,7 @@ namespace tandem::transport::dds {
 /// Maximum size of a sample, with its header, that keeps to `limits`.
 template <class M>
 [[nodiscard]] std::size_t most_bytes(const Limits& limits) {
-  constexpr std::size_t kFieldBytes = 2048;  // size without a payload; several times what is needed
+  constexpr std::size_t kFieldBytes = 4096;  // size without a payload; a reply needs 2,700
   if constexpr (std::is_same_v<M, SessionMessage>) return kMaxSampleBytes;
   if constexpr (std::is_same_v<M, DeltaMessage>) return kFieldBytes + limits.max_delta_bytes;
   if constexpr (std::is_same_v<M, SnapshotMessage>) return kFieldBytes + limits.max_snapshot_bytes;

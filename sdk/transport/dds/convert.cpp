@@ -47,6 +47,7 @@ tandem_SessionStream to_wire(const StreamMessage& stream, const LentStream& lent
   wire.max_delta_bytes = stream.max_delta_bytes;
   wire.max_snapshot_bytes = stream.max_snapshot_bytes;
   wire.layout_hash = stream.layout_hash;
+  wire.name = lend(stream.name);
   wire.codec = lend(layout.codec);
   wire.predictor = lend(layout.predictor);
   lend(wire.groups, lent.groups);
@@ -84,19 +85,34 @@ dds_return_t write_sample(dds_entity_t writer, const SessionMessage& message) {
   const std::vector<LentStream> lent(message.streams.begin(), message.streams.end());
   std::vector<tandem_SessionStream> streams;
   for (std::size_t i = 0; i < lent.size(); ++i) streams.push_back(to_wire(message.streams[i], lent[i]));
+  std::vector<tandem_BodyName> names;
+  names.reserve(message.names.size());
+  for (const BodyName& body : message.names) {
+    names.push_back(tandem_BodyName{.slot = body.slot, .reuse = body.reuse, .name = lend(body.name)});
+  }
   tandem_TandemSession wire{};
   wire.epoch = message.epoch;
   wire.protocol_version = message.protocol_version;
   wire.capacity = message.capacity;
   wire.frame_rate_hz = message.frame_rate_hz;
+  wire.dt_s = message.dt_s;
   wire.lattice_unit = message.lattice_unit;
+  wire.gravity_x = message.gravity[0];
+  wire.gravity_y = message.gravity[1];
+  wire.gravity_z = message.gravity[2];
+  wire.up_axis = static_cast<std::uint32_t>(message.up_axis);
   wire.lead = message.lead;
   wire.window_ceiling = message.window_ceiling;
+  wire.server_role = static_cast<std::uint32_t>(message.server_role);
+  wire.standby_rank = message.standby_rank;
+  wire.continues_epoch = message.continues_epoch;
+  wire.continues_frame = message.continues_frame;
   wire.session = lend(message.session);
   wire.scene = lend(message.scene);
   wire.scene_description = lend(message.scene_description);
   lend(wire.types, types);
   lend(wire.streams, streams);
+  lend(wire.names, names);
   return dds_write(writer, &wire);
 }
 
@@ -146,6 +162,11 @@ dds_return_t write_sample(dds_entity_t writer, const ReplyMessage& message) {
   for (const ReplyEntry& entry : message.entries) {
     entries.push_back(tandem_ReplyEntry{entry.number, entry.frame, entry.code});
   }
+  std::vector<tandem_ReplyText> texts;
+  texts.reserve(message.texts.size());
+  for (const ReplyText& of : message.texts) {
+    texts.push_back(tandem_ReplyText{.number = of.number, .text = lend(of.text)});
+  }
   tandem_TandemReply wire{};
   wire.client = message.client;
   wire.epoch = message.epoch;
@@ -156,6 +177,7 @@ dds_return_t write_sample(dds_entity_t writer, const ReplyMessage& message) {
   wire.client_clock_ns = message.client_clock_ns;
   wire.server_time_ns = message.server_time_ns;
   lend(wire.entries, entries);
+  lend(wire.texts, texts);
   return dds_write(writer, &wire);
 }
 
@@ -194,6 +216,8 @@ dds_return_t write_sample(dds_entity_t writer, const ServerStatusMessage& messag
   tandem_TandemServerStatus wire{};
   wire.epoch = message.epoch;
   wire.frame = message.frame;
+  wire.behind_frames = message.behind_frames;
+  wire.server_role = static_cast<std::uint32_t>(message.server_role);
   each_server_figure(CopyFigure{}, wire, message);
   wire.stream = message.stream;
   wire.session = lend(message.session);
@@ -216,6 +240,7 @@ dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& messag
   wire.lag_ms = message.lag_ms;
   each_reported_figure(CopyFigure{}, wire, message);
   wire.session = lend(message.session);
+  wire.stream_reason = lend(message.stream_reason);
   return dds_write(writer, &wire);
 }
 

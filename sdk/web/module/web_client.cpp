@@ -60,8 +60,8 @@ std::string colour(std::uint32_t rgba) { return "#" + to_hex(rgba).substr(8); }
 std::array<double, 3> gravity(const client::ClientCore& core) {
   std::array<double, 3> result{};
   if (core.timeline() == nullptr || core.session() == nullptr) return result;
-  const double rate_hz = core.session()->frame_rate_hz;
-  const double scale = core.session()->lattice_unit / 64 * rate_hz * rate_hz;
+  const double dt_s = core.session()->dt_s;
+  const double scale = core.session()->lattice_unit / 64 / (dt_s * dt_s);
   for (std::size_t axis = 0; axis < 3; ++axis) result[axis] = core.timeline()->drive().gravity[axis] * scale;
   return result;
 }
@@ -141,7 +141,7 @@ void WebClient::on_outcome(const client::InputOutcome& outcome) {
     json.member("number", outcome.number)
         .member("kind", name_of(outcome.kind))
         .member("frame", outcome.frame)
-        .member("reason", client::describe(outcome.reason))
+        .member("reason", outcome.text.empty() ? client::describe(outcome.reason) : outcome.text)
         .member("latencyMs", static_cast<double>(outcome.latency_ns) / 1e6);
   });
 }
@@ -184,6 +184,12 @@ std::string WebClient::status() const {
       .member("p99", status.client_ms_p99)
       .end_object();
   each_client_figure(WriteFigure{json}, status);
+  if (const transport::SessionMessage* session = core_.session()) {
+    json.member("dtS", session->dt_s)
+        .member("upAxis", static_cast<std::uint32_t>(session->up_axis))
+        .member("continuesEpoch", session->continues_epoch)
+        .member("continuesFrame", session->continues_frame);
+  }
   json.name("gravity").begin_list();
   for (const double axis : gravity(core_)) json.value(axis);
   json.end_list().name("uncorrected");

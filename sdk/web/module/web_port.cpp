@@ -29,7 +29,7 @@ void WebPort::disconnected() {
 
 Result<void> WebPort::receive(std::span<const std::byte> bytes) {
   auto message = bytes.size() <= kMaxMessageBytes ? transport::read_gateway_envelope(bytes, limits_)
-                                                  : fail(ErrorCode::kMalformed, "a message above 64 MiB");
+                                                  : fail(ErrorCode::kMalformed, "a message above 128 MiB");
   Result<void> accepted;
   if (!message) {
     accepted = tl::unexpected<Error>(std::move(message.error()));

@@ -25,9 +25,10 @@ class WebPort final : public transport::ClientPort {
  public:
   /// Maximum size of a WebSocket message; the owner of the connection refuses a larger one before it is
   /// copied.
-  static constexpr std::size_t kMaxMessageBytes = transport::kMaxSampleBytes + (1U << 16U);
-  /// Decoded bytes that wait in one queue; what comes beyond it is dropped, and the client joins again.
-  static constexpr std::size_t kMaxQueuedBytes = kMaxMessageBytes;
+  static constexpr std::size_t kMaxMessageBytes = transport::kMaxDeltaBytes + (1U << 16U);
+  /// Decoded bytes that wait in one queue; what comes beyond it is dropped, and the client joins again. A
+  /// message that waits alone always has room.
+  static constexpr std::size_t kMaxQueuedBytes = transport::kMaxSampleBytes + (1U << 16U);
   static constexpr std::size_t kMaxQueuedOut = 256;  ///< messages that wait to be sent
 
   /// A connection was opened. It counts as a participant of its own: what came before it is void.

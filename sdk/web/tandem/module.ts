@@ -88,7 +88,7 @@ export class Module {
   }
   /** Takes in one message; why it was refused, or an empty text. */
   receive(message: Uint8Array): string {
-    if (!this.#put(message)) return 'a message above 64 MiB';
+    if (!this.#put(message)) return 'a message above 128 MiB';
     return this.#text(this.#exports.tandem_receive(this.#self));
   }
   /** Does what is due. Returns the steady time at which it wants to be called again. */

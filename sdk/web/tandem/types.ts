@@ -82,6 +82,13 @@ export interface ModuleStatus extends ClientFigures {
   /** The state hash of that frame, 16 hex digits; empty while not playing. */
   stateHash: string;
   frameRateHz: number;
+  /** Seconds that one frame simulates; absent before a session is known, as are the next three. */
+  dtS?: number;
+  /** The axis of the scene that points up: 0 x, 1 y, 2 z. */
+  upAxis?: number;
+  /** The epoch that this one continues, and from which of its frames; 0: none. */
+  continuesEpoch?: number;
+  continuesFrame?: number;
   lead: number;
   predictor: string;
   codec: string;
@@ -187,6 +194,7 @@ export interface OutcomeEvent {
   kind: 'acted' | 'refused' | 'unknown';
   /** The frame that it acted on. */
   frame: number;
+  /** The simulation's own words where it refused the input and gave some. */
   reason: string;
   /** Time from sending the input to applying that frame. */
   latencyMs: number;

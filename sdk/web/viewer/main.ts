@@ -128,7 +128,9 @@ class Page {
     if (!sample) return;
     if (this.sessionChanged || !this.world) {
       this.world?.dispose();
-      this.world = new World(this.stage, types, description, sample);
+      const up = this.client.status().upAxis ?? 1;
+      this.stage.setUp(up);
+      this.world = new World(this.stage, types, description, sample, up);
       this.world.slowMotion.setSpeed(this.speed);
       this.sessionChanged = false;
       this.radii = types.map((type) => type.radius);

@@ -16,7 +16,13 @@ export interface Insets {
 
 const maxPixelRatio = 2;
 const slowFrameMs = 40;
-const viewFrom = new Vector3(0.5, 0.42, 1).normalize();
+
+/** Where the camera is at first, seen from what it looks at: a little above and to the side. `up`: 0 x, 1 y, 2 z. */
+function viewFrom(up: number): Vector3 {
+  const from = new Vector3();
+  from.setComponent(up, 0.42).setComponent((up + 1) % 3, 1).setComponent((up + 2) % 3, 0.5);
+  return from.normalize();
+}
 
 /**
  * How far from the extent's centre a camera that looks along -`back` must be for all of it to be seen: every corner
@@ -38,7 +44,8 @@ export class Stage {
   readonly camera = new PerspectiveCamera(40);
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly controls: OrbitControls;
+  private controls: OrbitControls;
+  private up = 1;
   private insets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
   private pixelRatio = Math.min(window.devicePixelRatio, maxPixelRatio);
   private slowFrames = 0;
@@ -54,9 +61,7 @@ export class Stage {
     if (!context) throw new Error('there is no WebGL 2');
     this.renderer = new WebGLRenderer({ canvas, context });
     this.scene.background = background;
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.12;
+    this.controls = this.newControls();
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
   }
@@ -75,18 +80,36 @@ export class Stage {
     this.resize();
   }
 
+  /** The axis of the world that points up: 0 x, 1 y, 2 z. To be called before frame(). */
+  setUp(axis: number): void {
+    if (axis === this.up) return;
+    this.up = axis;
+    this.camera.up.set(0, 0, 0).setComponent(axis, 1);
+    this.controls.dispose();
+    this.controls = this.newControls();
+  }
+
+  /** They take what is up from the camera, once. */
+  private newControls(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.enableDamping = true;
+    controls.dampingFactor = 0.12;
+    return controls;
+  }
+
   /** Looks at all of the extent. */
   frame(extent: Extent): void {
     const { camera, controls } = this;
     controls.target.set(...(add(extent.low, extent.high).map((x) => x / 2) as Vec3));
-    camera.position.copy(controls.target).add(viewFrom);
+    const from = viewFrom(this.up);
+    camera.position.copy(controls.target).add(from);
     camera.lookAt(controls.target);
     const [right, up, back] = this.axes();
     const tan = Math.tan((camera.fov * Math.PI) / 360);
     const { width, height, free } = this.sizes();
     const distance = 1.04 * framingDistance(extent, back, right, up, (tan * free.x) / height, (tan * free.y) / height);
     const size = Math.hypot(...add(extent.high, extent.low, -1));
-    camera.position.copy(controls.target).addScaledVector(viewFrom, distance);
+    camera.position.copy(controls.target).addScaledVector(from, distance);
     camera.near = Math.max(size, distance) / 1000;
     camera.far = distance + 20 * size;
     controls.minDistance = 5 * camera.near;
@@ -131,7 +154,7 @@ export class Stage {
   render(nowMs: number): void {
     this.controls.update();
     this.camera.updateMatrixWorld();
-    shadingUniforms.skyUp.value.set(0, 1, 0).transformDirection(this.camera.matrixWorldInverse);
+    shadingUniforms.skyUp.value.copy(this.camera.up).transformDirection(this.camera.matrixWorldInverse);
     this.renderer.render(this.scene, this.camera);
     this.keepUp(nowMs - this.lastRender);
     this.lastRender = nowMs;

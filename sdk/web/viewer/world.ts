@@ -20,12 +20,13 @@ export class World {
   readonly extent: Extent;
   private readonly scenery: Scenery;
 
-  /** From the first sample of a session. */
+  /** From the first sample of a session. `up`: the axis that points up. */
   constructor(
     private readonly stage: Stage,
     readonly types: BodyType[],
     sceneDescription: string,
     sample: Sample,
+    up: number,
   ) {
     try {
       this.scene = readScene(sceneDescription);
@@ -33,7 +34,7 @@ export class World {
       this.scene = emptyScene;
       this.sceneError = error instanceof Error ? error.message : String(error);
     }
-    const { shown, walls } = extentsOf(this.scene, bodiesExtent(sample, types));
+    const { shown, walls } = extentsOf(this.scene, bodiesExtent(sample, types), up);
     this.extent = shown;
     this.scenery = new Scenery(this.scene, walls);
     this.bodies = new Bodies(sample.capacity, types);
@@ -84,7 +85,7 @@ export function bodiesExtent(sample: Sample, types: BodyType[]): Extent | null {
 }
 
 /** Everything within these walls is drawn; `shown` is the part that the camera shows at first. */
-export function extentsOf(scene: Scene, bodies: Extent | null): { shown: Extent; walls: Extent } {
+export function extentsOf(scene: Scene, bodies: Extent | null, up = 1): { shown: Extent; walls: Extent } {
   const bounds = scene.bounds ?? grown(bodies ?? { low: [-1, -1, -1], high: [1, 1, 1] }, 4);
   const corners = roomFaces(scene.planes, bounds).flatMap((face) => face.corners);
   const inner = grown(bounds, -1e-6);
@@ -98,8 +99,8 @@ export function extentsOf(scene: Scene, bodies: Extent | null): { shown: Extent;
   if (!room || !closed) return { shown: core, walls: meet(bounds, grown(core, 0.6)) };
   // Rooms may be far higher than anything in them will jump.
   const near = grown(core, 1.5);
-  near.low[1] = room.low[1];
-  near.high[1] = core.high[1] + 0.5 * Math.max(...add(core.high, core.low, -1));
+  near.low[up] = room.low[up];
+  near.high[up] = core.high[up] + 0.5 * Math.max(...add(core.high, core.low, -1));
   return { shown: meet(room, near), walls: bounds };
 }
 

@@ -73,7 +73,7 @@ struct Region {
 };
 
 struct World {
-  std::uint32_t capacity = 0;  ///< slots, 1 .. 2^20
+  std::uint32_t capacity = 0;  ///< slots, 1 .. 2^22
   std::uint64_t seed = 0;      ///< for emitters
   float dt_s = 1.0F / 30.0F;
   /// Contact sub-steps per step. Gravity and damping act once per step, so that a body in free flight moves

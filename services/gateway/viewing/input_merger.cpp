@@ -51,8 +51,11 @@ void InputMerger::on_outcome(const client::InputOutcome& outcome, std::vector<Ve
   const auto reason =
       outcome.kind == Kind::kRefused ? static_cast<Reason>(outcome.reason) : transport::Reason::kNone;
   for (const Claim& claim : claims.mapped()) {
-    out.push_back(
-        {.claim = claim, .known = outcome.kind != Kind::kUnknown, .reason = reason, .frame = outcome.frame});
+    out.push_back({.claim = claim,
+                   .known = outcome.kind != Kind::kUnknown,
+                   .reason = reason,
+                   .frame = outcome.frame,
+                   .text = outcome.text});
   }
 }
 

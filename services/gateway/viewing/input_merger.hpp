@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "sdk/client/session/sent_inputs.hpp"
@@ -34,6 +35,7 @@ class InputMerger {
     bool known = true;
     transport::Reason reason = transport::Reason::kNone;
     Frame frame = 0;
+    std::string text = {};  ///< the words of a simulation that refuses it
   };
 
   /// Takes one well-formed input. Verdicts that are known at once are appended to `out`, here as below.

@@ -32,6 +32,7 @@ planning::World world_of(const ServerOptions& options, const engine::Simulation&
                         .extent = options.extent,
                         .threshold = options.threshold,
                         .turns = !simulation.bodies().orientation[0].empty(),
+                        .up_axis = static_cast<transport::UpAxis>(options.up_axis),
                         .types = {},
                         .scenery = options.scenery,
                         .trained = {}};

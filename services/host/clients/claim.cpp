@@ -69,7 +69,7 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
     return std::ranges::none_of(others_, [&](const Other& o) { return o.from == entry.first; });
   });
   for (const Other& other : others_) {
-    if (other.from == self_) continue;
+    if (other.from == self_ || other.message.server_role != transport::ServerRole::kLive) continue;
     if (!gives_way(other, now_ns)) {
       note(other, notices, now_ns);
       continue;

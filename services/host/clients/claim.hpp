@@ -15,7 +15,8 @@ namespace tandem::host {
 /// Looks for other servers of the same session. Before this server announces, any live server keeps the
 /// session. Afterwards the server with more followers keeps it, even if it started later. A follower is a DDS
 /// participant whose clients acknowledge the server's epoch. So a server that was away while another took
-/// over does not end the other, and an announcement without followers ends nobody.
+/// over does not end the other, and an announcement without followers ends nobody. A server that stands by
+/// has no claim.
 class Claim {
  public:
   /// Two servers that started at the same time may both have announced by then: one of them leaves, even if

@@ -40,23 +40,23 @@ Reason InputDesk::handle(Account& account, const transport::InputMessage& input,
     if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
     return Reason::kDuplicate;
   }
-  const Reason reason = decide(account, input, now_ns, entry.frame);
-  if (reason != Reason::kNone) ++refused_;
-  entry.code = static_cast<std::uint32_t>(reason);
+  InputVerdict verdict = decide(account, input, now_ns);
+  if (verdict.reason != Reason::kNone) ++refused_;
+  entry.frame = verdict.acts_on;
+  entry.code = static_cast<std::uint32_t>(verdict.reason);
   account.inputs.highest = input.number;
-  account.inputs.outcomes.add(entry, now_ns);
-  return reason;
+  account.inputs.outcomes.add(entry, now_ns, std::move(verdict.text));
+  return verdict.reason;
 }
 
-Reason InputDesk::decide(Account& account, const transport::InputMessage& input, std::int64_t now_ns,
-                         Frame& acts_on) {
-  if (!account.inputs.rate.take(now_ns)) return Reason::kRateLimited;
-  if (!may_play(account)) return Reason::kNotPlaying;
-  if (account.demoted) return Reason::kDemoted;
-  if (account.role() == transport::Role::kObserver) return Reason::kObserver;
-  if (!well_formed(input)) return Reason::kInvalid;
+InputVerdict InputDesk::decide(Account& account, const transport::InputMessage& input, std::int64_t now_ns) {
+  if (!account.inputs.rate.take(now_ns)) return {Reason::kRateLimited};
+  if (!may_play(account)) return {Reason::kNotPlaying};
+  if (account.demoted) return {Reason::kDemoted};
+  if (account.role() == transport::Role::kObserver) return {Reason::kObserver};
+  if (!well_formed(input)) return {Reason::kInvalid};
   return source_->accept({.kind = input.kind, .values = input.values, .bytes = input.bytes},
-                         {input.client, input.number}, *outbox_, acts_on);
+                         {input.client, input.number}, *outbox_);
 }
 
 }  // namespace tandem::host

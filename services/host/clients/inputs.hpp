@@ -21,8 +21,8 @@ class InputDesk {
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
  private:
-  transport::Reason decide(Account& account, const transport::InputMessage& input, std::int64_t now_ns,
-                           Frame& acts_on);
+  [[nodiscard]] InputVerdict decide(Account& account, const transport::InputMessage& input,
+                                    std::int64_t now_ns);
 
   Epoch epoch_;
   FrameSource* source_;

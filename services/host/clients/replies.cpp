@@ -1,6 +1,7 @@
 #include "services/host/clients/replies.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace tandem::host {
 namespace {
@@ -31,17 +32,18 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
     if (!account.present || !reply.schedule.due(account.role(), now_ns)) continue;
     if (!account.open && !outbox_->push(OpenClient{id})) return;
     account.open = true;
-    const bool queued =
-        outbox_->push(transport::ReplyMessage{.client = id,
-                                              .epoch = epoch_,
-                                              .role = account.role(),
-                                              .phase = account.phase,
-                                              .reason = static_cast<std::uint32_t>(standing_reason(account)),
-                                              .highest_input = account.inputs.highest,
-                                              .client_clock_ns = account.clock_ns,
-                                              .server_time_ns = wall_ns,
-                                              .entries = account.inputs.outcomes.told(now_ns)});
-    if (!queued) return;
+    transport::ReplyMessage message{.client = id,
+                                    .epoch = epoch_,
+                                    .role = account.role(),
+                                    .phase = account.phase,
+                                    .reason = static_cast<std::uint32_t>(standing_reason(account)),
+                                    .highest_input = account.inputs.highest,
+                                    .client_clock_ns = account.clock_ns,
+                                    .server_time_ns = wall_ns,
+                                    .entries = {},
+                                    .texts = {}};
+    account.inputs.outcomes.tell(message, now_ns);
+    if (!outbox_->push(std::move(message))) return;
     reply.schedule.sent(account.role(), now_ns);
     reply.once = Reason::kNone;
   }

@@ -24,6 +24,10 @@ constexpr std::size_t kSlackBytes = 64U << 10U;
 // Maximum number of parts queued for one receiver at a time, so that many receivers take turns.
 constexpr int kTurn = 16;
 
+static_assert((transport::kMaxSnapshotBytes + SnapshotTransfer::kPartBytes - 1) /
+                  SnapshotTransfer::kPartBytes <=
+              transport::kMaxSnapshotParts);
+
 // Returns for each part whether the acknowledgement says that it is held. An acknowledgement with the maximum
 // number of runs says nothing about the parts after the last run.
 std::vector<bool> held_parts(const transport::AckMessage& ack, std::size_t parts) {

@@ -48,6 +48,9 @@ struct HostConfig : ServiceConfig {
 
   std::string scene;
   std::string scene_description;
+  transport::UpAxis up_axis = transport::UpAxis::kY;
+  Epoch continues_epoch = 0;  ///< the epoch that this one continues; 0: none
+  Frame continues_frame = 0;  ///< the frame of that epoch from which this one continues
   /// What clients draw for each type; layout.type_count elements.
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
 };

@@ -23,6 +23,13 @@ struct InputOrigin {
   std::uint64_t number = 0;
 };
 
+/// What became of an input.
+struct InputVerdict {
+  transport::Reason reason = transport::Reason::kNone;  ///< kNone: it acts
+  Frame acts_on = 0;                                    ///< the frame that it acts on
+  std::string text = {};                                ///< the words of a simulation that refuses it
+};
+
 /// A subset of a session's streams, by their ids.
 using StreamSet = std::bitset<transport::kMaxStreams>;
 
@@ -53,10 +60,10 @@ class FrameSource {
   /// Writes a snapshot of agreed(stream) for joiners. Replaces the content of `out`.
   virtual void snapshot(std::uint32_t stream, std::vector<std::byte>& out) = 0;
 
-  /// Decides a well-formed input of a client that may send it. Returns kNone if it acts, on frame `acts_on`;
-  /// otherwise the reason.
-  virtual transport::Reason accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
-                                   Frame& acts_on) = 0;
+  /// Decides a well-formed input of a client that may send it.
+  virtual InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) = 0;
+  /// Brings the names of bodies in session() up to date. Returns true if they changed since the last call.
+  virtual bool refresh_names() { return false; }
 
   // The following functions are for a running simulation; other sources do not implement them.
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/transport/plain_text.hpp"
 #include "services/host/frames/announcement.hpp"
 
 namespace tandem::host {
@@ -14,6 +15,20 @@ namespace tandem::host {
 using transport::Reason;
 
 namespace {
+
+// As clients are told of them: ascending by slot, and only of bodies that they see.
+std::vector<transport::BodyName> names_of(std::vector<engine::BodyName> given, const State& shown) {
+  std::ranges::stable_sort(given, {}, &engine::BodyName::slot);
+  std::vector<transport::BodyName> names;
+  for (const engine::BodyName& body : given) {
+    if (names.size() == transport::kMaxBodyNames) break;
+    if (body.slot >= shown.capacity() || shown.alive()[body.slot] == 0) continue;
+    if (!names.empty() && names.back().slot == body.slot) continue;
+    std::string name = transport::plain_text(body.name, transport::kMaxNameBytes);
+    if (!name.empty()) names.push_back({body.slot, shown.reuse()[body.slot], std::move(name)});
+  }
+  return names;
+}
 
 // A stream uses more than one core only for its blocks: StreamConfig::local.
 std::uint32_t threads_for(std::size_t streams) {
@@ -32,6 +47,7 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       clock_ns_(config.clock_ns),
       frame_(config.start_frame),
       drive_(drive) {
+  session_.gravity = simulation.gravity();
   for (const StreamConfig& stream : config.streams) lanes_.push_back({stream, {}});
 }
 
@@ -51,6 +67,7 @@ Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
     list_stream(*stream, source->session_);
     if (id == 0) source->lanes_[id].stream.emplace(std::move(*stream));
   }
+  source->refresh_names();
   return source;
 }
 
@@ -107,6 +124,7 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     return std::nullopt;
   }
   mirror_.update(bodies, simulation_->events());
+  note_births();
   ++frame_;
   deltas_.clear();
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
@@ -115,6 +133,11 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     deltas_.push_back({.stream = id});
   }
   make_deltas();
+  for (const MadeDelta& made : deltas_) {
+    if (made.payload.size() <= session_.streams[made.stream].max_delta_bytes) continue;
+    error_ = {ErrorCode::kCapacity, "more bodies appeared in a frame than a delta can tell"};
+    return std::nullopt;
+  }
   return MadeFrame{
       .frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = stepped_ns - start_ns};
 }
@@ -131,43 +154,59 @@ void LiveSource::make_deltas() {
   });
 }
 
-Reason LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
-                          Frame& acts_on) {
+void LiveSource::note_births() {
+  names_are_old_ =
+      names_are_old_ || std::ranges::any_of(mirror_.lifecycle(), [](const LifecycleRecord& record) {
+        return record.kind == LifecycleKind::kSpawn;
+      });
+}
+
+bool LiveSource::refresh_names() {
+  const std::uint64_t version = simulation_->names_version();
+  if (!names_are_old_ && version == names_version_) return false;
+  names_are_old_ = false;
+  names_version_ = version;
+  auto names = names_of(simulation_->names(), mirror_.target());
+  if (names == session_.names) return false;
+  session_.names = std::move(names);
+  return true;
+}
+
+InputVerdict LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) {
   const engine::Classification effect = simulation_->classify(input);
   switch (effect.effect) {
     case engine::Classification::Effect::kScheduled:
-      return schedule(input, effect, origin, outbox, acts_on);
+      return schedule(input, effect, origin, outbox);
     case engine::Classification::Effect::kImmediate:
-      if (immediate_.size() >= kMostImmediate) return Reason::kRateLimited;
+      if (immediate_.size() >= kMostImmediate) return {Reason::kRateLimited};
       immediate_.push_back(input);
-      acts_on = next_frame();
-      return Reason::kNone;
+      return {Reason::kNone, next_frame()};
     case engine::Classification::Effect::kRefused:
       note_refusal(origin, effect.reason);
       break;
   }
-  return Reason::kInvalid;
+  return {Reason::kInvalid, 0, transport::plain_text(effect.reason, transport::kMaxReplyTextBytes)};
 }
 
-Reason LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
-                            const InputOrigin& origin, Outbox& outbox, Frame& acts_on) {
+InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
+                                  const InputOrigin& origin, Outbox& outbox) {
   const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);
-  if (!drive) return Reason::kInvalid;
+  if (!drive)
+    return {Reason::kInvalid, 0, transport::plain_text(drive.error().message, transport::kMaxReplyTextBytes)};
   // s + A: no client can have simulated it, because none is further than A beyond delta s - 1.
   const Frame frame = next_frame() + session_.lead;
   if (scheduling_frame_ != frame) scheduled_now_ = 0;
-  if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return Reason::kRateLimited;
-  if (scheduled_.size() >= kMaxPendingInputs) return Reason::kRateLimited;
+  if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return {Reason::kRateLimited};
+  if (scheduled_.size() >= kMaxPendingInputs) return {Reason::kRateLimited};
   const ScheduledDrive scheduled{.number = last_input_ + 1, .frame = frame, .drive = *drive};
   for (Lane& lane : lanes_) {
     // If one stream refuses an input, all do: they hold the same inputs, and the drive is checked above.
-    if (lane.stream && !lane.stream->schedule(scheduled)) return Reason::kInvalid;
+    if (lane.stream && !lane.stream->schedule(scheduled)) return {Reason::kInvalid};
   }
   ++last_input_;
   scheduling_frame_ = frame;
   ++scheduled_now_;
   scheduled_.push_back({scheduled, input});
-  acts_on = frame;
   const bool queued = outbox.push(transport::ScheduledInputMessage{
       .epoch = session_.epoch,
       .number = scheduled.number,
@@ -176,19 +215,17 @@ Reason LiveSource::schedule(const engine::Input& input, const engine::Classifica
       .source_number = origin.number,
       .kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive),
       .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping}});
-  return queued ? Reason::kNone : Reason::kRateLimited;
+  return {queued ? Reason::kNone : Reason::kRateLimited, frame};
 }
 
 Result<Frame> LiveSource::inject(const engine::Input& input, Outbox& outbox) {
-  Frame acts_on = 0;
-  switch (accept(input, {}, outbox, acts_on)) {
+  const InputVerdict verdict = accept(input, {}, outbox);
+  switch (verdict.reason) {
     case Reason::kNone:
-      return acts_on;
-    case Reason::kInvalid: {
-      const std::string reason = simulation_->classify(input).reason;
+      return verdict.acts_on;
+    case Reason::kInvalid:
       return fail(ErrorCode::kInvalidArgument,
-                  "the simulation refuses this input" + (reason.empty() ? reason : ": " + reason));
-    }
+                  "the simulation refuses this input" + (verdict.text.empty() ? "" : ": " + verdict.text));
     default:
       return fail(ErrorCode::kCapacity, "too many inputs at once");
   }

@@ -39,8 +39,8 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t id) const override;
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
-  transport::Reason accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
-                           Frame& acts_on) override;
+  InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;
+  bool refresh_names() override;
 
   [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
   Result<Frame> inject(const engine::Input& input, Outbox& outbox) override;
@@ -61,8 +61,10 @@ class LiveSource final : public FrameSource {
   LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror, const Drive& drive);
 
   [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
-  transport::Reason schedule(const engine::Input& input, const engine::Classification& effect,
-                             const InputOrigin& origin, Outbox& outbox, Frame& acts_on);
+  [[nodiscard]] InputVerdict schedule(const engine::Input& input, const engine::Classification& effect,
+                                      const InputOrigin& origin, Outbox& outbox);
+  /// Notes whether a body appeared in the last step, so that names() has to be asked.
+  void note_births();
   /// Hands the simulation all inputs that act on frame s, the one that is about to be stepped.
   void apply(Frame s);
   void make_deltas();
@@ -92,6 +94,8 @@ class LiveSource final : public FrameSource {
   std::vector<std::string> refusals_;              // not told yet
   std::int64_t noted_mishaps_ns_ = -kSecond;
   engine::Mishaps noted_mishaps_;
+  bool names_are_old_ = true;
+  std::uint64_t names_version_ = 0;
   std::optional<Error> error_;
 };
 

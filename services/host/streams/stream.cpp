@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "sdk/core/codec/lifecycle.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/tables/codec_table.hpp"
@@ -121,6 +122,7 @@ struct Stream::Impl final : EncodeObserver {
 
   void choose_parameters(const FrameResult& result);
   std::span<const LifecycleRecord> records_of(const Mirror& mirror);
+  [[nodiscard]] std::size_t room_for_corrections(std::size_t record_count) const;
 
   StreamConfig config;
   ServerTimeline timeline;
@@ -142,17 +144,13 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
     return refuse(
         fmt::format("a session has 1 to {} streams, not {}", transport::kMaxStreams, streams.size()));
   if (streams.size() == 1 && streams.front().name.empty()) return {};
-  constexpr std::size_t kMostCharacters = 32;
   constexpr std::array<std::string_view, 4> kPreferences{"auto", "bandwidth", "computing", "error"};
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  };
   for (auto stream = streams.begin(); stream != streams.end(); ++stream) {
     const std::string& name = stream->name;
-    if (name.empty() || name.size() > kMostCharacters || !std::ranges::all_of(name, allowed)) {
+    if (!transport::is_stream_name(name)) {
       return refuse(
           fmt::format("a stream's name has 1 to {} characters of a-z, 0-9, '_' and '-', unlike '{}'",
-                      kMostCharacters, name));
+                      transport::kMaxStreamNameBytes, name));
     }
     if (std::ranges::find(kPreferences, name) != kPreferences.end()) {
       return refuse(
@@ -201,7 +199,7 @@ Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams) {
     if (!timeline) {
       return fail(timeline.error().code, fmt::format("stream {}: {}", stream.name, timeline.error().message));
     }
-    largest = std::max(largest, timeline->payload_bound());
+    largest = std::max(largest, std::min<std::size_t>(timeline->payload_bound(), transport::kMaxDeltaBytes));
   }
   return largest;
 }
@@ -226,6 +224,15 @@ std::span<const LifecycleRecord> Stream::Impl::records_of(const Mirror& mirror) 
   return records;
 }
 
+// With millions of slots, the largest payload that could be is more than a session may declare.
+std::size_t Stream::Impl::room_for_corrections(std::size_t record_count) const {
+  if (timeline.payload_bound() <= transport::kMaxDeltaBytes) return kNoBudget;
+  constexpr std::size_t kHeaderBytes = 4096;  // of sections, and parameters
+  const std::size_t others =
+      kHeaderBytes + record_count * most_lifecycle_bytes_per_slot(groups_of(config.layout));
+  return transport::kMaxDeltaBytes - std::min<std::size_t>(others, transport::kMaxDeltaBytes);
+}
+
 Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer) {
   Impl& m = *impl_;
   const std::span<const LifecycleRecord> records = m.records_of(mirror);
@@ -235,7 +242,8 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
   }
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains ? &m : observer;
-  const FrameResult result{m.timeline.advance(mirror.target(), records, m.config.budget, listener), records};
+  const std::size_t budget = std::min(m.config.budget, m.room_for_corrections(records.size()));
+  const FrameResult result{m.timeline.advance(mirror.target(), records, budget, listener), records};
   m.choose_parameters(result);
   return result;
 }
@@ -298,7 +306,11 @@ const State& Stream::agreed() const { return impl_->timeline.state(); }
 std::uint64_t Stream::hash() const { return impl_->timeline.hash(); }
 std::uint64_t Stream::last_input() const { return impl_->timeline.last_input(); }
 std::uint32_t Stream::bodies() const { return impl_->bodies; }
-std::size_t Stream::payload_bound() const { return impl_->timeline.payload_bound(); }
-std::size_t Stream::snapshot_bound() const { return impl_->timeline.snapshot_bound(); }
+std::size_t Stream::payload_bound() const {
+  return std::min<std::size_t>(impl_->timeline.payload_bound(), transport::kMaxDeltaBytes);
+}
+std::size_t Stream::snapshot_bound() const {
+  return std::min<std::size_t>(impl_->timeline.snapshot_bound(), transport::kMaxSnapshotBytes);
+}
 
 }  // namespace tandem::host

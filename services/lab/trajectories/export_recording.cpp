@@ -105,7 +105,7 @@ Result<void> export_states(const std::string& recording, const std::string& npy)
   if (!writer) return tl::unexpected(writer.error());
 
   TrajectoryInfo info;
-  info.dt_s = 1 / session.frame_rate_hz;
+  info.dt_s = session.dt_s;
   info.threshold = reader->timeline().parameters().codec.threshold * session.lattice_unit;
   info.radius = smallest_radius(session);
   // For a session without a scene file the announcement has to suffice.
@@ -113,7 +113,6 @@ Result<void> export_states(const std::string& recording, const std::string& npy)
   const std::filesystem::path scene_file =
       std::filesystem::path(*sidecar).replace_extension(".scene.textproto");
   if (scene) {
-    info.dt_s = scene->dt_s;
     info.radius = scene->smallest_radius_m;
     info.scene = scene_file.filename().string();
   }
@@ -162,7 +161,7 @@ Result<void> export_points(const std::string& recording, const std::string& mcap
     if (step == Step::kStarted || reader->timeline().applied() % every == 0) {
       const transport::SessionMessage& session = reader->playback().session();
       const std::uint64_t time_ns = reader->playback().time_ns();
-      RecordedBodies recorded(session.lattice_unit, 1 / session.frame_rate_hz);
+      RecordedBodies recorded(session.lattice_unit, session.dt_s);
       const std::string cloud = point_cloud(recorded.of(reader->state()), session.types, time_ns);
       const auto wall_ns = static_cast<std::int64_t>(time_ns);
       writer.add(kTopic, std::as_bytes(std::span(cloud)), wall_ns, wall_ns);

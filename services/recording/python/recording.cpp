@@ -158,12 +158,14 @@ class Reader {
     const transport::SessionMessage s = locked([this] { return session_; });
     const api::SceneText text = read_scene(s);
     const bool told = text.low != api::Vector{} || text.high != api::Vector{};
-    return py::dict("name"_a = s.scene, "capacity"_a = s.capacity, "frame_rate_hz"_a = s.frame_rate_hz,
-                    "gravity"_a = py::tuple(py::cast(text.gravity)), "max_gravity"_a = text.max_gravity,
-                    "max_push"_a = text.max_push,
-                    "bounds"_a = told ? py::object(py::make_tuple(py::tuple(py::cast(text.low)),
-                                                                  py::tuple(py::cast(text.high))))
-                                      : py::none());
+    return py::dict(
+        "name"_a = s.scene, "capacity"_a = s.capacity, "frame_rate_hz"_a = s.frame_rate_hz,
+        "gravity"_a = py::tuple(py::cast(s.gravity)), "max_gravity"_a = text.max_gravity,
+        "max_push"_a = text.max_push, "dt_s"_a = s.dt_s, "up_axis"_a = static_cast<std::uint32_t>(s.up_axis),
+        "continues_epoch"_a = s.continues_epoch, "continues_frame"_a = s.continues_frame,
+        "bounds"_a =
+            told ? py::object(py::make_tuple(py::tuple(py::cast(text.low)), py::tuple(py::cast(text.high))))
+                 : py::none());
   }
   [[nodiscard]] py::list geometry() {
     constexpr auto kPlane = static_cast<int>(BodyShape::kHull) + 1;  // as tandem.h counts

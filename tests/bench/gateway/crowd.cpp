@@ -132,7 +132,7 @@ int Crowd::Impl::on_event(lws* wsi, lws_callback_reasons reason, void* /*user*/,
 
 Crowd::Crowd(int port, std::size_t viewers, std::size_t sleepers) : impl_(std::make_unique<Impl>()) {
   impl_->viewers.resize(viewers);
-  impl_->protocols[0] = {"tandem.1", Impl::on_event, 0, 65'536, 0, nullptr, 0};
+  impl_->protocols[0] = {"tandem.2", Impl::on_event, 0, 65'536, 0, nullptr, 0};
   lws_set_log_level(0, nullptr);
   lws_context_creation_info info{};
   info.port = CONTEXT_PORT_NO_LISTEN;
@@ -150,7 +150,7 @@ Crowd::Crowd(int port, std::size_t viewers, std::size_t sleepers) : impl_(std::m
     connect.address = connect.host = "127.0.0.1";
     connect.port = port;
     connect.path = "/tandem";
-    connect.protocol = connect.local_protocol_name = "tandem.1";
+    connect.protocol = connect.local_protocol_name = "tandem.2";
     connect.opaque_user_data = &viewer;
     lws_client_connect_via_info(&connect);
     // A few at a time, as the queue of a listening socket is short.

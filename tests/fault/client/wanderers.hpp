@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -38,6 +39,8 @@ class Wanderers final : public engine::Simulation {
     } else if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kPush) &&
                input.values.size() == 7 && fine) {
       c.effect = engine::Classification::Effect::kImmediate;
+    } else if (!fine) {
+      c.reason = "beyond 100";
     }
     return c;
   }
@@ -77,9 +80,13 @@ class Wanderers final : public engine::Simulation {
   }
   [[nodiscard]] std::span<const engine::Event> events() const override { return {}; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
+  [[nodiscard]] std::vector<engine::BodyName> names() const override { return body_names; }
+  [[nodiscard]] std::uint64_t names_version() const override { return names_version_now; }
   void save(std::vector<std::byte>& out) const override { out.clear(); }
   [[nodiscard]] bool load(std::span<const std::byte> /*bytes*/) override { return false; }
 
+  std::vector<engine::BodyName> body_names;
+  std::uint64_t names_version_now = 0;  ///< another value tells that body_names changed
   /// Values of each input and the step it acted in.
   std::vector<std::pair<std::vector<double>, std::uint64_t>> acted;
 

@@ -221,6 +221,15 @@ def check_refusals(programs, file):
         _, errors = finish(programs.start(programs.tandem, "replay", bad), "replay", 1)
         lines = [line for line in errors.splitlines() if "cut short" not in line]
         assert len(lines) == 1 and said in lines[0], errors
+    # Of a program that spoke version 1 of the protocol.
+    old = pathlib.Path(__file__).parent / "version1.mcap"
+    npy = programs.folder / "old.npy"
+    for command in (("replay", old), ("export", "--from", old, "--out", npy), ("export", "--from", old, "--points", npy)):
+        _, errors = finish(programs.start(programs.tandem, *command), command[0], 1)
+        assert len(errors.splitlines()) == 1, errors
+        for said in ("version1.mcap: ", "recorded with protocol version 1", "reads version 2"):
+            assert said in errors, errors
+        assert not npy.exists(), "a file of a recording that cannot be read"
     _, errors = finish(programs.start(programs.tandem, "replay", programs.folder / "none.mcap"), "replay", 1)
     assert "No such file" in errors, errors
     _, errors = finish(programs.start(programs.tandem, "replay", file, "--from", 1000), "replay", 1)

@@ -167,7 +167,7 @@ TEST(Streams, OneServerServesTwoToWhomeverPlaysThem) {
   EXPECT_EQ(reader.failure, "");
   EXPECT_FALSE(reader.strange);
   EXPECT_EQ(reader.session->streams[kRich].layout.predictor, "field");
-  EXPECT_NE(reader.session->scene_description.find("stream_names: \"rich\""), std::string::npos);
+  EXPECT_EQ(reader.session->streams[kRich].name, "rich");
   const auto said = hashes(second_log);
   const Frame applied = reader.timeline->applied();
   ASSERT_TRUE(said.contains(applied));

@@ -53,6 +53,7 @@ int main(int argc, char** argv) {
   for (tandem_SessionStream& stream : streams) {
     stream.id = static_cast<std::uint32_t>(&stream - streams);
     stream.layout_hash = UINT64_MAX;
+    stream.name = text("thin");
     stream.codec = text("tracker");
     stream.predictor = text("ballistic");
     lend(stream.groups, groups);
@@ -63,13 +64,18 @@ int main(int argc, char** argv) {
   tandem_BodyType types[1] = {};
   types[0].name = text("box");
   lend(types[0].shape_values, half_sizes);
+  tandem_BodyName names[1] = {};
+  names[0].slot = 7;
+  names[0].name = text("crane");
   tandem_TandemSession session{};
   session.lattice_unit = 1.0 / 1024;
   session.session = text("arena");
   session.scene = text("half_pipe");
   session.scene_description = text("");
   lend(session.types, types);
+  session.gravity_y = -9.5;
   lend(session.streams, streams);
+  lend(session.names, names);
 
   std::puts("ready");
   std::fflush(stdout);

@@ -213,6 +213,10 @@ TEST_F(TypeInformation, AToolReadsStructuresWithinTheAnnouncement) {
   EXPECT_EQ(session["streams[1].groups[1]"], "other");
   EXPECT_EQ(session["streams[1].parameters[1].value"], "-7");
   EXPECT_EQ(session["streams[1].codec_tables[2]"], "250");
+  EXPECT_EQ(session["streams[1].name"], "thin");
+  EXPECT_EQ(session["gravity_y"], "-9.5");
+  EXPECT_EQ(session["names[0].slot"], "7");
+  EXPECT_EQ(session["names[0].name"], "crane");
 }
 
 }  // namespace

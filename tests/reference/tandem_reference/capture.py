@@ -6,6 +6,7 @@ from .snapshot import check_drive
 from .timeline import Recording
 
 DRIVE = 1
+MOST_PARTS = {"TandemDelta": 4096, "TandemSnapshot": 1 << 18}
 
 
 def kind_of(channel):
@@ -26,7 +27,8 @@ class Parts:
     def add(self, key, sample, data):
         """Take one part; a copy of one that is held changes nothing."""
         what = f"{sample.type_name} of frame {sample.frame}"
-        require(1 <= sample.parts <= 4096 and sample.part < sample.parts, "sample", f"{what}: parts out of range")
+        most = MOST_PARTS[sample.type_name]
+        require(1 <= sample.parts <= most and sample.part < sample.parts, "sample", f"{what}: parts out of range")
         require(data or sample.parts == 1, "sample", f"{what}: an empty part of several")
         parts = self.held.setdefault(key, {})
         shared = [getattr(sample, name) for name in self.same]
@@ -59,6 +61,9 @@ class Capture:
 
     def add(self, kind, data):
         """Take one sample; kinds that do not bear on the state are decoded and dropped."""
+        if kind == "TandemSession":
+            version = cdr.version_of(data)
+            require(version == stream.VERSION, "session", f"protocol version {version}, this program reads {stream.VERSION}")
         sample = cdr.decode(kind, data)
         if kind == "TandemSession":
             for announced in sample.streams:

@@ -14,17 +14,21 @@ TYPES = {
         ("float", "radius"), ("uint32", "colour_rgba"), ("uint32", "shape"), ("string", "name"),
         ("[float]", "shape_values"),
     ],
+    "BodyName": [("uint32", "slot"), ("uint32", "reuse"), ("string", "name")],
     "Parameter": [("uint32", "id"), ("int32", "value")],
     "Stream": [
         ("uint32", "id"), ("uint32", "generation"), ("uint32", "region_blocks"), ("uint32", "client_cost_ns"),
         ("uint32", "max_delta_bytes"), ("uint32", "max_snapshot_bytes"), ("uint64", "layout_hash"),
-        ("string", "codec"), ("string", "predictor"), ("[string]", "groups"), ("[int32]", "radii"),
+        ("string", "name"), ("string", "codec"), ("string", "predictor"), ("[string]", "groups"), ("[int32]", "radii"),
         ("[Parameter]", "parameters"), ("[int32]", "predictor_constants"), ("[octet]", "codec_tables"),
     ],
     "TandemSession": [
         ("uint64", "epoch"), ("uint32", "protocol_version"), ("uint32", "capacity"), ("double", "frame_rate_hz"),
-        ("double", "lattice_unit"), ("uint32", "lead"), ("uint32", "window_ceiling"), ("string", "session"),
-        ("string", "scene"), ("string", "scene_description"), ("[BodyType]", "types"), ("[Stream]", "streams"),
+        ("double", "dt_s"), ("double", "lattice_unit"), ("double", "gravity_x"), ("double", "gravity_y"),
+        ("double", "gravity_z"), ("uint32", "up_axis"), ("uint32", "lead"), ("uint32", "window_ceiling"),
+        ("uint32", "server_role"), ("uint32", "standby_rank"), ("uint64", "continues_epoch"),
+        ("uint64", "continues_frame"), ("string", "session"), ("string", "scene"), ("string", "scene_description"),
+        ("[BodyType]", "types"), ("[Stream]", "streams"), ("[BodyName]", "names"),
     ],
     "TandemDelta": [
         ("uint64", "epoch"), ("uint32", "stream"), ("uint32", "generation"), ("uint64", "frame"), ("uint32", "part"),
@@ -40,10 +44,11 @@ TYPES = {
         ("uint32", "parts"), ("uint32", "total_bytes"), ("[octet]", "bytes"),
     ],
     "ReplyEntry": [("uint64", "number"), ("uint64", "frame"), ("uint32", "code")],
+    "ReplyText": [("uint64", "number"), ("string", "text")],
     "TandemReply": [
         ("uint64", "client"), ("uint64", "epoch"), ("uint32", "role"), ("uint32", "phase"), ("uint32", "reason"),
         ("uint64", "highest_input"), ("int64", "client_clock_ns"), ("int64", "server_time_ns"),
-        ("[ReplyEntry]", "entries"),
+        ("[ReplyEntry]", "entries"), ("[ReplyText]", "texts"),
     ],
     "TandemInput": [
         ("uint64", "client"), ("uint64", "epoch"), ("uint64", "number"), ("uint64", "client_frame"),
@@ -56,7 +61,8 @@ TYPES = {
         ("uint32", "snapshot_parts"), ("[uint32]", "missing"),
     ],
     "TandemServerStatus": [
-        ("uint64", "epoch"), ("uint64", "frame"), ("double", "uptime_s"), ("double", "frame_rate_hz"),
+        ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "behind_frames"), ("uint32", "server_role"),
+        ("double", "uptime_s"), ("double", "frame_rate_hz"),
         ("double", "mbit_per_s"), ("double", "raw_mbit_per_s"), ("double", "frame_ms_p50"), ("double", "frame_ms_p99"),
         ("double", "corrected_per_frame"), ("double", "threshold"), ("uint32", "bodies"), ("uint32", "at_rest"),
         ("uint32", "participants"), ("uint32", "observers"), ("uint32", "window"), ("uint32", "queue_high_water"),
@@ -70,7 +76,7 @@ TYPES = {
         ("uint32", "generation"), ("uint32", "role"), ("uint32", "phase"), ("uint32", "too_slow"),
         ("uint32", "queue_high_water"), ("double", "lag_ms"), ("double", "client_ms_p50"), ("double", "mbit_per_s"),
         ("uint64", "frames_applied"), ("uint64", "resyncs"), ("uint64", "hash_mismatches"), ("uint64", "inputs_sent"),
-        ("uint64", "inputs_refused"), ("string", "session"),
+        ("uint64", "inputs_refused"), ("string", "session"), ("string", "stream_reason"),
     ],
 }  # fmt: skip
 TOPICS = [name for name in TYPES if name.startswith("Tandem")]
@@ -136,6 +142,12 @@ class Decoder:
         if kind in SCALARS:
             return self.scalars(kind, count)
         return [self.value(kind) for _ in range(count)]
+
+
+def version_of(session):
+    """The protocol version of a TandemSession of any version: behind the header, the epoch and the version stay first."""
+    require(len(session) >= 16, "sample", "a sample ends too soon")
+    return struct.unpack_from("<I", session, 12)[0]
 
 
 def decode(kind, sample):

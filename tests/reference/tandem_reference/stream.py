@@ -10,7 +10,7 @@ CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
 PREDICTORS = ("ballistic", "contact", "field")
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
-VERSION = 1
+VERSION = 2
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Stream:
     lead: int = 0
 
     def __post_init__(self):
-        require(1 <= self.capacity <= 2**20, "session", f"capacity {self.capacity}")
+        require(1 <= self.capacity <= 2**22, "session", f"capacity {self.capacity}")
         require(1 <= self.types <= 65535, "session", f"{self.types} types")
         require(self.groups in GROUPS, "session", f"groups {self.groups}")
         require(self.region_blocks == 0, "session", "regions are not played")

@@ -1,6 +1,7 @@
 #include "tests/support/playground/playground.hpp"
 
 #include <stdexcept>
+#include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "services/host/host.hpp"
@@ -97,6 +98,9 @@ void Playground::start_server() {
   config.streams.resize(1);
   config.epoch = ++epoch_;
   config.scene = "playground";
+  config.up_axis = transport::UpAxis::kZ;
+  config.continues_epoch = 900;
+  config.continues_frame = 77;
   config.scene_description =
       "gravity { y: -5 } bounds { low { x: -2 y: -2 z: -2 } high { x: 2 y: 2 z: 2 } }"
       " planes { normal { y: 2 } } spheres { centre { x: 1 } radius_m: 0.5 }";
@@ -109,6 +113,11 @@ void Playground::start_server() {
       must(host::codec_parameters(config.streams[0].lattice, 0.01, 0.1, 2));
   config.types = {{"plank", 0.1F, 0xFFU, transport::Shape::kBox, {1, 2, 0.5F}}};
   host_ = must(host::Host::create(config, *simulation_, *server_port_));
+}
+
+void Playground::name(std::vector<engine::BodyName> names) {
+  simulation_->body_names = std::move(names);
+  ++simulation_->names_version_now;
 }
 
 void Playground::stop_server() {

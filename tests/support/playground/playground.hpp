@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "sdk/client/api/join.hpp"
 #include "sdk/transport/simulated/network.hpp"
@@ -33,6 +34,8 @@ class Playground {
   void pass(double seconds);
   void start_server();
   void stop_server();
+  /// Gives the bodies other names.
+  void name(std::vector<engine::BodyName> names);
   [[nodiscard]] bool serving() const { return host_ != nullptr; }
   [[nodiscard]] static client::Now now();
 

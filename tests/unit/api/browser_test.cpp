@@ -105,6 +105,30 @@ TEST_F(Browsing, WhatCannotBePlayedSaysSo) {
   EXPECT_STREQ(sessions[0].codec, "");
 }
 
+TEST_F(Browsing, TheWorldsTimeGravityAndOriginAreTold) {
+  auto session = client::FakeServer(5).session;
+  session.dt_s = 0.02;
+  session.gravity = {0, 0, -9};
+  session.up_axis = transport::UpAxis::kZ;
+  session.continues_epoch = 3;
+  session.continues_frame = 400;
+  announce("zoo", session);
+  const auto sessions = list();
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].dt_s, 0.02);
+  EXPECT_EQ(sessions[0].gravity[2], -9);
+  EXPECT_EQ(sessions[0].up_axis, 2U);
+  EXPECT_EQ(sessions[0].continues_epoch, 3U);
+  EXPECT_EQ(sessions[0].continues_frame, 400U);
+}
+
+TEST_F(Browsing, AServerThatStandsByIsNoSession) {
+  auto standby = client::FakeServer(5).session;
+  standby.server_role = transport::ServerRole::kStandby;
+  announce("zoo", standby);
+  EXPECT_TRUE(list().empty());
+}
+
 TEST_F(Browsing, OfTwoServersOfANameTheFirstIsListed) {
   announce("zoo");
   auto second = client::FakeServer(9).session;

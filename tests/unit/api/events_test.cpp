@@ -77,8 +77,8 @@ TEST_F(Events, AnInputThatIsRefusedTellsWhy) {
   run(1);
   const auto events = take();
   ASSERT_EQ(kinds(events), std::vector<int>{TANDEM_EVENT_INPUT_REFUSED});
-  EXPECT_NE(events[0].reason, 0U);
-  EXPECT_NE(std::string(events[0].text), "");
+  EXPECT_EQ(events[0].reason, 3U);
+  EXPECT_STREQ(events[0].text, "beyond 100") << "in the simulation's own words";
 }
 
 TEST_F(Events, ASeekIsRefusedWhereNothingIsReplayed) {
@@ -90,6 +90,7 @@ TEST_F(Events, ASeekIsRefusedWhereNothingIsReplayed) {
   ASSERT_EQ(kinds(events), std::vector<int>{TANDEM_EVENT_INPUT_REFUSED});
   EXPECT_EQ(events[0].number, number);
   EXPECT_EQ(events[0].reason, 3U);
+  EXPECT_NE(std::string(events[0].text), "") << "the simulation gave no words of its own";
 }
 
 TEST_F(Events, TheEndOfASessionAndAnotherEpochAreTold) {

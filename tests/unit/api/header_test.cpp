@@ -33,10 +33,12 @@ TEST(TheHeader, KeepsTheSizesThatWereReleased) {
   EXPECT_EQ(sizeof(tandem_sample_options), 24U);
   EXPECT_EQ(sizeof(tandem_frame), 48U);
   EXPECT_EQ(sizeof(tandem_event), 304U);
-  EXPECT_EQ(sizeof(tandem_scene), 160U);
+  EXPECT_EQ(sizeof(tandem_scene), 192U);
+  EXPECT_EQ(offsetof(tandem_scene, dt_s), 160U);
   EXPECT_EQ(sizeof(tandem_solid), 64U);
   EXPECT_EQ(sizeof(tandem_body_type), 104U);
-  EXPECT_EQ(sizeof(tandem_session_info), 352U);
+  EXPECT_EQ(sizeof(tandem_session_info), 408U);
+  EXPECT_EQ(offsetof(tandem_session_info, dt_s), 352U);
 }
 
 TEST(TheHeader, HasTheVersionOfTheLibrary) {

@@ -204,6 +204,10 @@ TEST_F(Playing, TheSceneIsToldInStructs) {
   EXPECT_EQ(scene.max_gravity, 50);
   EXPECT_EQ(scene.low[0], -2);
   EXPECT_EQ(scene.high[2], 2);
+  EXPECT_EQ(scene.dt_s, 1.0 / 30);
+  EXPECT_EQ(scene.up_axis, 2U);
+  EXPECT_EQ(scene.continues_epoch, 900U);
+  EXPECT_EQ(scene.continues_frame, 77U);
   std::array<tandem_solid, 3> solids{{TANDEM_SOLID_INIT}};
   std::size_t count = 0;
   ASSERT_EQ(tandem_get_geometry(client, solids.data(), solids.size(), &count), TANDEM_OK);
@@ -217,6 +221,39 @@ TEST_F(Playing, TheSceneIsToldInStructs) {
   EXPECT_EQ(tandem_get_geometry(client, solids.data(), 1, &count), TANDEM_CAPACITY);
   EXPECT_EQ(count, 2U);
   EXPECT_EQ(tandem_get_geometry(client, nullptr, 0, &count), TANDEM_OK);
+}
+
+TEST_F(Playing, ABodyIsCalledAsTheSimulationSays) {
+  const auto name = [&](std::uint32_t slot, std::size_t size = TANDEM_BODY_NAME_SIZE) {
+    std::array<char, TANDEM_BODY_NAME_SIZE> text{};
+    text.fill('x');
+    EXPECT_EQ(tandem_get_body_name(client, slot, text.data(), size), TANDEM_OK) << tandem_error_text();
+    return std::string(text.data());
+  };
+  EXPECT_EQ(name(3), "") << "it has none yet";
+  playground.name({{5, "J\xC3\xBCrgen"}, {3, "crane"}});
+  run(1);
+  EXPECT_EQ(name(3), "crane");
+  EXPECT_EQ(name(5), "J\xC3\xBCrgen");
+  EXPECT_EQ(name(5, 3), "J") << "cut at the end of a character";
+  EXPECT_EQ(name(4), "");
+  playground.name({{3, "hook"}});
+  run(2);
+  EXPECT_EQ(name(3), "hook");
+  EXPECT_EQ(name(5), "");
+  EXPECT_EQ(status().resyncs, 0U) << "other names are no reason to join again";
+  std::array<char, 8> text{};
+  EXPECT_EQ(tandem_get_body_name(client, kBodies, text.data(), text.size()), TANDEM_INVALID_ARGUMENT);
+  EXPECT_EQ(tandem_get_body_name(client, 0, nullptr, 8), TANDEM_INVALID_ARGUMENT);
+  EXPECT_EQ(tandem_get_body_name(client, 0, text.data(), 0), TANDEM_INVALID_ARGUMENT);
+}
+
+TEST_F(Playing, ABodyWithoutASessionHasNoName) {
+  playground.stop_server();
+  const tandem_client searching = playground.join();
+  std::array<char, 8> text{};
+  EXPECT_EQ(tandem_get_body_name(searching, 0, text.data(), text.size()), TANDEM_NOT_READY);
+  EXPECT_EQ(tandem_leave(searching), TANDEM_OK);
 }
 
 TEST_F(Playing, TypesTellWhatBodiesLookLike) {

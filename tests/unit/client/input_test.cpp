@@ -120,7 +120,22 @@ TEST_F(InputTest, ARefusalIsCountedWithItsReason) {
   ASSERT_EQ(recorder.outcomes.size(), 1U);
   EXPECT_EQ(recorder.outcomes[0].kind, InputOutcome::Kind::kRefused);
   EXPECT_EQ(recorder.outcomes[0].reason, static_cast<std::uint32_t>(transport::Reason::kRateLimited));
+  EXPECT_EQ(recorder.outcomes[0].text, "");
   EXPECT_EQ(figures().inputs_refused, 1U);
+}
+
+TEST_F(InputTest, TheSimulationsWordsComeWithItsRefusal) {
+  join();
+  constexpr auto kInvalid = static_cast<std::uint32_t>(transport::Reason::kInvalid);
+  for (int i = 0; i < 2; ++i)
+    static_cast<void>(core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}));
+  auto answer = reply({{1, 0, kInvalid}, {2, 0, kInvalid}}, 2);
+  answer.texts = {{2, "beyond 8"}};
+  port.replies.push_back(from_server(answer));
+  poll();
+  ASSERT_EQ(recorder.outcomes.size(), 2U);
+  EXPECT_EQ(recorder.outcomes[0].text, "");
+  EXPECT_EQ(recorder.outcomes[1].text, "beyond 8");
 }
 
 TEST_F(InputTest, AnInputThatTheServerPassedOverIsUnknownAndNotSentAgain) {

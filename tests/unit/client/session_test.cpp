@@ -40,9 +40,40 @@ TEST_F(SessionTest, AnotherProtocolVersionIsRefusedAndSaid) {
   port.sessions.push_back(from_server(other));
   poll();
   EXPECT_EQ(core->phase(), ClientPhase::kRefused);
-  EXPECT_NE(core->status().reason.find("protocol version 2"), std::string::npos);
+  EXPECT_NE(core->status().reason.find("protocol version 3"), std::string::npos);
   EXPECT_EQ(figures().refused_messages, 1U);
   EXPECT_TRUE(port.acks.empty());
+}
+
+TEST_F(SessionTest, AServerThatStandsByIsNotJoined) {
+  start();
+  auto standby = server.session;
+  standby.server_role = transport::ServerRole::kStandby;
+  standby.standby_rank = 1;
+  port.sessions.push_back(from_server(standby));
+  for (int i = 0; i < 10; ++i) poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kSearching);
+  EXPECT_TRUE(port.acks.empty());
+  join();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+}
+
+TEST_F(SessionTest, OtherNamesOfTheSameEpochAreTakenAndNothingElse) {
+  join();
+  EXPECT_EQ(core->body_name(3), "");
+  auto again = server.session;
+  again.names = {{3, 0, "crane"}, {4, 1, "of another body"}};
+  again.scene = "other";
+  port.sessions.push_back(from_server(again));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(core->body_name(3), "crane");
+  EXPECT_EQ(core->body_name(4), "") << "the slot holds another body than the one with this name";
+  EXPECT_EQ(core->body_name(5), "");
+  EXPECT_EQ(core->body_name(1'000'000), "");
+  EXPECT_EQ(core->session()->scene, server.session.scene);
+  EXPECT_EQ(figures().resyncs, 0U);
+  EXPECT_EQ(figures().epochs, 1U);
 }
 
 TEST_F(SessionTest, AnotherLayoutHashIsRefused) {

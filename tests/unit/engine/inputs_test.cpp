@@ -81,7 +81,7 @@ TEST(Inputs, AWorldWithAValueOutOfRangeIsRefusedAtTheStart) {
   };
   EXPECT_FALSE(refused([](World&) {}));
   EXPECT_TRUE(refused([](World& w) { w.capacity = 0; }));
-  EXPECT_TRUE(refused([](World& w) { w.capacity = (1U << 20U) + 1; }));
+  EXPECT_TRUE(refused([](World& w) { w.capacity = (1U << 22U) + 1; }));
   EXPECT_TRUE(refused([](World& w) { w.dt_s = 0; }));
   EXPECT_TRUE(refused([](World& w) { w.substeps = 0; }));
   EXPECT_TRUE(refused([](World& w) { w.damping_per_s = 30; }));

@@ -46,6 +46,21 @@ TEST_F(GatewayTest, SaysThatThereIsNoSessionAndThenWhichOne) {
   EXPECT_TRUE(read(id).empty());
 }
 
+TEST_F(GatewayTest, OtherNamesAreToldAndViewersGoOn) {
+  gateway.on_session(fake_session());
+  frame();
+  const ViewerId id = join(7);
+  gateway.on_names({{3, 0, "crane"}});
+  const auto told = only<SessionMessage>(read(id));
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].epoch, kEpoch);
+  EXPECT_EQ(told[0].names, (std::vector<transport::BodyName>{{3, 0, "crane"}}));
+  const int cuts = world.cuts;
+  frame();
+  EXPECT_EQ(only<DeltaMessage>(read(id)).size(), 1U);
+  EXPECT_EQ(world.cuts, cuts);
+}
+
 TEST_F(GatewayTest, AJoinerGetsASnapshotAndEveryDeltaAfterIt) {
   gateway.on_session(fake_session());
   frame();

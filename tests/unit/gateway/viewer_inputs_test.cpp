@@ -28,11 +28,14 @@ TEST_F(ViewerInputs, EachViewerIsToldOfItsOwn) {
   EXPECT_FALSE(say(b, input(2, 1, push())));
   ASSERT_EQ(world.sent.size(), 2U);
   acts(1, 20);
-  gateway.on_outcome({client::InputOutcome::Kind::kRefused, 2, 0, code(Reason::kInvalid), 0}, now_ns);
+  gateway.on_outcome({client::InputOutcome::Kind::kRefused, 2, 0, code(Reason::kInvalid), 0, "too far"},
+                     now_ns);
   const ReplyMessage to_a = reply(a), to_b = reply(b);
   EXPECT_EQ(to_a.entries, (std::vector<ReplyEntry>{{1, 20, 0}}));
   EXPECT_EQ(to_a.highest_input, 1U);
   EXPECT_EQ(to_b.entries, (std::vector<ReplyEntry>{{1, 0, code(Reason::kInvalid)}}));
+  EXPECT_TRUE(to_a.texts.empty());
+  EXPECT_EQ(to_b.texts, (std::vector<transport::ReplyText>{{1, "too far"}}));
 }
 
 TEST_F(ViewerInputs, HighestIsUpToWhereEveryOutcomeIsKnown) {
@@ -168,7 +171,7 @@ TEST_F(ViewerInputs, BytesThatAreNoMessageAreRefused) {
 TEST_F(ViewerInputs, AnotherProtocolVersionIsRefused) {
   const ViewerId id = *gateway.admit();
   auto foreign = ack(1, Phase::kJoining);
-  foreign.protocol_version = 2;
+  foreign.protocol_version = transport::kProtocolVersion - 1;
   EXPECT_EQ(say(id, foreign), Refusal::kProtocolVersion);
 }
 

@@ -44,6 +44,16 @@ TEST(Claim, ASecondServerSeesTheFirstAndRefusesNamingIt) {
   EXPECT_TRUE(bench.port.order.empty());
 }
 
+TEST(Claim, AServerThatStandsByHasNoClaim) {
+  Bench bench(claiming_config());
+  auto standby = rival(-60'000, 0x0B);
+  standby.message.server_role = transport::ServerRole::kStandby;
+  bench.port.rivals.push_back(standby);
+  bench.poll();
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.host->state(), Host::State::kRunning);
+}
+
 TEST(Claim, BeforeAnnouncingEvenAHigherGuidWins) {
   Bench bench(claiming_config());
   bench.port.rivals.push_back(rival(10, 0xFF));

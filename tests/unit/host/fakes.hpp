@@ -65,6 +65,11 @@ class FakeSimulation final : public engine::Simulation {
   [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
   [[nodiscard]] engine::Mishaps mishaps() const override { return mishaps_so_far; }
+  [[nodiscard]] std::vector<engine::BodyName> names() const override {
+    ++asked_for_names;
+    return body_names;
+  }
+  [[nodiscard]] std::uint64_t names_version() const override { return names_version_now; }
   void save(std::vector<std::byte>& out) const override { out.clear(); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override { return bytes.empty(); }
 
@@ -83,6 +88,9 @@ class FakeSimulation final : public engine::Simulation {
   std::vector<engine::Event> events_now;
   engine::Vec3 gravity_in_force{};
   engine::Mishaps mishaps_so_far;
+  std::vector<engine::BodyName> body_names;
+  std::uint64_t names_version_now = 0;
+  mutable int asked_for_names = 0;
   std::function<void(std::uint64_t step)> on_step;
   std::uint64_t steps = 0;
   std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in

@@ -216,9 +216,26 @@ TEST_F(InputTest, TheSimulationsOwnReasonForARefusalIsLoggedAndTold) {
   bench.run_ms(50);
   EXPECT_THAT(bench.host->take_notices(),
               ::testing::Contains("the simulation refuses input 7 of client 0000000000000001: beyond 1000"));
+  bench.run_ms(500);
+  const auto told = bench.last_reply(1);
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->texts, (std::vector<transport::ReplyText>{{7, "beyond 1000"}}));
   const auto injected = bench.host->inject({.kind = 1, .values = {0, 0, 1001}});
   ASSERT_FALSE(injected);
   EXPECT_EQ(injected.error().message, "the simulation refuses this input: beyond 1000");
+}
+
+TEST_F(InputTest, OfManyReasonsTheNewestEightAreToldAndNoneForLongerThanItsOutcome) {
+  for (std::uint64_t number = 1; number <= 10; ++number) send(bench.gravity(1, number, 1001));
+  bench.run_ms(600);
+  const auto told = bench.last_reply(1);
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->entries.size(), 10U);
+  ASSERT_EQ(told->texts.size(), 8U);
+  EXPECT_EQ(told->texts.front().number, 3U);
+  EXPECT_EQ(told->texts.back().number, 10U);
+  bench.run_ms(6000);
+  EXPECT_TRUE(bench.last_reply(1)->texts.empty());
 }
 
 TEST_F(InputTest, UnknownKindsAndOversizedValuesAreRefusedAsInvalid) {

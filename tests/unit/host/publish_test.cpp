@@ -240,6 +240,60 @@ TEST(Publish, BodiesThatComeAndGoTravelAsLifecycleAndTheCountFollows) {
   EXPECT_EQ(bench.host->agreed().alive_count(), 4U);
 }
 
+TEST(Publish, TheSessionTellsItsTimeGravityAndOrigin) {
+  HostConfig config = test_config();
+  config.up_axis = transport::UpAxis::kZ;
+  config.continues_epoch = 5;
+  config.continues_frame = 1234;
+  FakeSimulation simulation(4);
+  simulation.gravity_in_force = {0, 0, -9.5};
+  simulation.body_names = {{3, "crane"}};
+  FakePort port(participant(1));
+  const auto host = Host::create(config, simulation, port);
+  ASSERT_TRUE(host) << host.error().message;
+  const transport::SessionMessage& session = (*host)->session();
+  EXPECT_EQ(session.dt_s, 1.0 / 30);
+  EXPECT_EQ(session.gravity, (std::array<double, 3>{0, 0, -9.5}));
+  EXPECT_EQ(session.up_axis, transport::UpAxis::kZ);
+  EXPECT_EQ(session.continues_epoch, 5U);
+  EXPECT_EQ(session.continues_frame, 1234U);
+  EXPECT_EQ(session.server_role, transport::ServerRole::kLive);
+  EXPECT_EQ(session.standby_rank, 0U);
+  EXPECT_EQ(session.names, (std::vector<transport::BodyName>{{3, 0, "crane"}}));
+}
+
+TEST(Publish, NamesGoOutWithTheSessionAndAgainWhenTheyChange) {
+  using Names = std::vector<transport::BodyName>;
+  Bench bench;
+  bench.simulation.body_names = {{2, "b\n"}, {0, "a"}, {9, "nobody"}};
+  bench.poll();
+  bench.simulation.names_version_now = 1;
+  bench.run_to(5);
+  ASSERT_EQ(bench.port.sessions.size(), 2U) << "the names that the simulation has by now are told";
+  EXPECT_EQ(bench.port.sessions[0].names, Names{});
+  EXPECT_EQ(bench.port.sessions[1].names, (Names{{0, 0, "a"}, {2, 0, "b?"}}));
+  const int asked = bench.simulation.asked_for_names;
+  bench.run_to(60);
+  EXPECT_EQ(bench.simulation.asked_for_names, asked) << "nothing changed";
+  // The slot holds another body now.
+  bench.simulation.alive[2] = 0;
+  bench.run_to(61);
+  bench.simulation.alive[2] = 1;
+  bench.run_to(62);
+  ASSERT_EQ(bench.port.sessions.size(), 3U);
+  EXPECT_EQ(bench.port.sessions[2].names, (Names{{0, 0, "a"}, {2, 1, "b?"}}));
+  EXPECT_EQ(bench.port.sessions[2].epoch, bench.port.sessions[0].epoch);
+  EXPECT_EQ(bench.port.sessions[2].streams, bench.port.sessions[0].streams);
+  // Changes in every frame go out once a second.
+  bench.simulation.on_step = [&](std::uint64_t step) {
+    bench.simulation.body_names = {{0, "frame " + std::to_string(step)}};
+    bench.simulation.names_version_now = step;
+  };
+  bench.run_to(152);
+  EXPECT_GE(bench.port.sessions.size(), 5U);
+  EXPECT_LE(bench.port.sessions.size(), 7U);
+}
+
 TEST(Publish, ABodyThatTurnsIntoNanIsDespawnedAndTheStreamGoesOn) {
   Bench bench;
   bench.poll();

@@ -93,7 +93,9 @@ TEST_F(StreamsTest, AreAnnouncedWithTheirNamesAndWritersOfTheirOwn) {
   EXPECT_EQ(session.streams[kThin].layout.codec, "selective");
   EXPECT_EQ(session.streams[kRich].layout.codec, "tracker");
   EXPECT_EQ(session.streams[kRich].id, (StreamId{kRich, 0}));
-  EXPECT_EQ(session.scene_description, "stream_names: \"thin\"\nstream_names: \"rich\"\n");
+  EXPECT_EQ(session.streams[kThin].name, "thin");
+  EXPECT_EQ(session.streams[kRich].name, "rich");
+  EXPECT_EQ(session.scene_description, "");
   EXPECT_EQ(bench.port.open_stream_count, 2U);
 }
 

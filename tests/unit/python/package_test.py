@@ -42,10 +42,10 @@ class Header(unittest.TestCase):
         for kind, struct, left_out, added in (
             (tandem.Status, "tandem_status", {"size"}, set()),
             (tandem.Event, "tandem_event", {"size"}, set()),
-            (tandem.SessionInfo, "tandem_session_info", {"size", "reserved"}, set()),
+            (tandem.SessionInfo, "tandem_session_info", {"size", "reserved", "reserved2"}, set()),
             (tandem.Solid, "tandem_solid", {"size"}, set()),
             (tandem.BodyType, "tandem_body_type", {"size", "value_count"}, set()),
-            (tandem.Scene, "tandem_scene", {"size", "type_count", "solid_count", "low", "high"}, {"bounds"}),
+            (tandem.Scene, "tandem_scene", {"size", "type_count", "solid_count", "low", "high", "reserved"}, {"bounds"}),
         ):
             fields = {field.name for field in dataclasses.fields(kind)}
             self.assertEqual(fields, (members(struct) - left_out) | added, kind)

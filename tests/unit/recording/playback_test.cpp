@@ -94,6 +94,28 @@ TEST_F(PlaybackTest, PlaysEveryFrameWithTheServersHash) {
   EXPECT_FALSE((*playback)->torn_at());
 }
 
+TEST_F(PlaybackTest, OtherNamesOfTheSameSessionBeginNoRun) {
+  begin();
+  frames(3);
+  server.session.names = {{1, 0, "crane"}};
+  recorder->add(server.session, wall_ns);
+  frames(3);
+  ASSERT_TRUE(recorder->finish());
+  const auto playback = Playback::open(path);
+  ASSERT_TRUE(playback);
+  EXPECT_EQ(play(**playback), "S......");
+  EXPECT_EQ((*playback)->session().names, server.session.names);
+}
+
+TEST_F(PlaybackTest, ARecordingOfAnotherVersionIsRefusedByThatVersion) {
+  const auto playback = Playback::open(std::string(TANDEM_TEST_VERSION_1));
+  ASSERT_TRUE(playback) << playback.error().message;
+  const auto step = (*playback)->next();
+  ASSERT_FALSE(step);
+  EXPECT_EQ(step.error().code, ErrorCode::kUnsupported);
+  EXPECT_NE(step.error().message.find("protocol version 1"), std::string::npos) << step.error().message;
+}
+
 TEST_F(PlaybackTest, AFrameBringsTheInputsThatItIsTheFirstToPromise) {
   begin();
   frames(3);

@@ -48,7 +48,7 @@ class CommandLine(unittest.TestCase):
     def test_wrong_usage_exits_2_and_says_what_is_expected(self):
         self.assert_usage("subcommand")
         self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", "0")
-        self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", 2**20 + 1)
+        self.assert_usage("--bodies", "bench", "bandwidth", "--scene", "half_pipe", "--bodies", 2**22 + 1)
         for codec in ("entropy", "tracker"):
             self.assert_usage("--predictor", "bench", "bandwidth", "--scene", "cube", "--codec", codec, "--predictor", "foo")
         self.assert_usage("--budget", "bench", "bandwidth", "--scene", "cube", "--codec", "tracker", "--budget", "63")

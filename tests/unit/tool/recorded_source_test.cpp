@@ -78,8 +78,7 @@ class RecordedSourceTest : public ::testing::Test {
     return played;
   }
   Reason accept(transport::InputKind kind, std::vector<double> values) {
-    Frame acts_on = 0;
-    return source->accept({static_cast<std::uint32_t>(kind), std::move(values), {}}, {1, 1}, outbox, acts_on);
+    return source->accept({static_cast<std::uint32_t>(kind), std::move(values), {}}, {1, 1}, outbox).reason;
   }
 
   const std::string path =
@@ -94,6 +93,17 @@ class RecordedSourceTest : public ::testing::Test {
   static inline std::int64_t now_ns = 0;
   std::optional<RecordedSource> source;
 };
+
+TEST_F(RecordedSourceTest, TellsTheGravityInForceWhereItBegins) {
+  open(60);
+  const transport::SessionMessage& session = source->session();
+  const double quantum = session.lattice_unit / 64 / (session.dt_s * session.dt_s);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(session.gravity[axis], playback->timeline().drive().gravity[axis] * quantum, quantum);
+  EXPECT_NE(session.gravity[1], 0) << "the recording has a drive by then";
+  EXPECT_EQ(session.dt_s, playback->session().dt_s);
+  EXPECT_EQ(session.continues_epoch, 0U);
+}
 
 TEST_F(RecordedSourceTest, PublishesEveryFrameUnderItsOwnEpoch) {
   open(0);

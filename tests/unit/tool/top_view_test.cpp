@@ -37,7 +37,24 @@ transport::ClientStatusMessage client(transport::ClientId id, const std::string&
   status.phase = static_cast<std::uint32_t>(transport::Phase::kPlaying);
   status.applied = 299;
   status.lag_ms = 12.5;
+  status.stream_reason = "fewest bits";
   return status;
+}
+
+TEST(TopView, shows_a_standby_beside_the_live_server) {
+  TopView view;
+  view.update(server("a"), 0);
+  transport::ServerStatusMessage standby = server("a");
+  standby.server_role = transport::ServerRole::kStandby;
+  standby.behind_frames = 3;
+  view.update(standby, 0);
+  const auto json = nlohmann::json::parse(view.to_json());
+  ASSERT_EQ(json["sessions"].size(), 2U);
+  EXPECT_EQ(json["sessions"][0]["role"], "live");
+  EXPECT_EQ(json["sessions"][1]["role"], "standby");
+  EXPECT_EQ(json["sessions"][1]["session"], "a");
+  EXPECT_EQ(json["sessions"][1]["behind_frames"], 3);
+  EXPECT_THAT(view.to_table(), HasSubstr("a (standby)"));
 }
 
 TEST(TopView, shows_the_newest_status_of_each_session_and_client) {
@@ -57,6 +74,9 @@ TEST(TopView, shows_the_newest_status_of_each_session_and_client) {
   EXPECT_EQ(json["clients"][0]["role"], "participant");
   EXPECT_EQ(json["clients"][0]["phase"], "playing");
   EXPECT_EQ(json["clients"][0]["lag_ms"], 12.5);
+  EXPECT_EQ(json["clients"][0]["stream_reason"], "fewest bits");
+  EXPECT_THAT(view.to_table(), HasSubstr("fewest bits"));
+  EXPECT_EQ(json["sessions"][0]["role"], "live");
   EXPECT_THAT(view.to_table(), HasSubstr("1.50 (3.0 %)"));
   EXPECT_THAT(view.to_table(), HasSubstr("2+1"));
 }

@@ -97,10 +97,10 @@ TEST(CdrBytes, AreThoseOfPlainCdr) {
 
 TEST(CdrBytes, EightByteNumbersStandAtMultiplesOfEight) {
   ClientStatusMessage status;
-  status.session = "ab";
+  status.stream_reason = "ab";
   const Bytes bytes = to_cdr(status);
-  // 3 x 8, 6 x 4, 3 x 8, 5 x 8, then the text: its length and its bytes with NUL.
-  ASSERT_EQ(bytes.size(), 4U + 24 + 24 + 24 + 40 + 4 + 3);
+  // 3 x 8, 6 x 4, 3 x 8, 5 x 8, then two texts: length and bytes with NUL, and padding between them.
+  ASSERT_EQ(bytes.size(), 4U + 24 + 24 + 24 + 40 + 4 + 1 + 3 + 4 + 3);
   EXPECT_EQ(Bytes(bytes.end() - 7, bytes.end()), from_hex("03000000 616200"));
   AckMessage ack;
   ack.join_attempt = 0x11111111;
@@ -109,13 +109,13 @@ TEST(CdrBytes, EightByteNumbersStandAtMultiplesOfEight) {
   EXPECT_EQ(to_cdr(ack)[4 + 16 + 16 + 16 + 8], std::byte{0x22});
   ServerStatusMessage server;
   server.at_rest = 0x33333333;
-  EXPECT_EQ(to_cdr(server)[4 + 10 * 8 + 4], std::byte{0x33});
+  EXPECT_EQ(to_cdr(server)[4 + 12 * 8 + 4], std::byte{0x33});
 }
 
 TEST(CdrBytes, ATextEndsWithOneNul) {
   const std::string long_name(10, 'n');
   ClientStatusMessage status;
-  status.session = long_name;
+  status.stream_reason = long_name;
   Bytes bytes = to_cdr(status);
   ASSERT_TRUE(read_cdr<ClientStatusMessage>(bytes));
   Bytes unended = bytes;
@@ -124,15 +124,30 @@ TEST(CdrBytes, ATextEndsWithOneNul) {
   Bytes early = bytes;
   early[early.size() - 3] = std::byte{0};
   EXPECT_FALSE(read_cdr<ClientStatusMessage>(early));
-  status.session = std::string("ab\0cd", 5);
-  EXPECT_EQ(read_cdr<ClientStatusMessage>(to_cdr(status))->session, "ab");
+  status.stream_reason = std::string("ab\0cd", 5);
+  EXPECT_EQ(read_cdr<ClientStatusMessage>(to_cdr(status))->stream_reason, "ab");
+}
+
+TEST(CdrBytes, TheVersionOfASessionOfAnyLayoutIsRead) {
+  SessionMessage session;
+  session.epoch = 0x0102030405060708;
+  session.protocol_version = 7;
+  Bytes bytes = to_cdr(session);
+  EXPECT_EQ(session_version(bytes), 7U);
+  bytes.resize(kCdrHeaderBytes + 12);
+  EXPECT_EQ(session_version(bytes), 7U) << "whatever follows";
+  bytes.pop_back();
+  EXPECT_EQ(session_version(bytes), std::nullopt);
+  bytes.resize(kCdrHeaderBytes + 12);
+  bytes[1] = std::byte{0};
+  EXPECT_EQ(session_version(bytes), std::nullopt) << "big-endian";
 }
 
 TEST(CdrBytes, ACountWithoutElementsAllocatesNothing) {
   SessionMessage session;
   Bytes bytes = to_cdr(session);
-  // The last word counts the streams, the one before it the types.
-  for (const std::size_t from_end : {4U, 8U}) {
+  // The last word counts the names, those before it the streams and the types.
+  for (const std::size_t from_end : {4U, 8U, 12U}) {
     Bytes forged = bytes;
     std::fill_n(forged.end() - static_cast<std::ptrdiff_t>(from_end), 4, std::byte{0xFF});
     EXPECT_FALSE(read_cdr<SessionMessage>(forged));

@@ -20,6 +20,9 @@ M lawful(std::uint64_t seed) {
   if constexpr (requires { message.role; }) message.role = {};
   if constexpr (requires { message.phase; }) message.phase = {};
   if constexpr (requires { message.session; }) message.session = "arena";
+  if constexpr (requires { message.server_role; }) message.server_role = {};
+  if constexpr (requires { message.texts; }) message.texts = {{seed, "beyond 100"}};
+  if constexpr (requires { message.stream_reason; }) message.stream_reason = "the only one";
   if constexpr (requires { message.part; }) {
     message.part = 0;
     message.parts = 1;
@@ -31,6 +34,7 @@ M lawful(std::uint64_t seed) {
     message.lattice_unit = 1;
     message.types.resize(1);
     message.streams.resize(1);
+    message.names = {{1, 2, "crane"}};
   } else if constexpr (std::is_same_v<M, ScheduledInputMessage>) {
     message.number |= 1U;
   } else if constexpr (std::is_same_v<M, SnapshotMessage>) {

@@ -44,6 +44,10 @@ TEST(Limits, ASessionBeyondAnyLimitIsRefused) {
   EXPECT_FALSE(session_passes([](auto& s) { s.session = "a*"; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.capacity = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.capacity = kMaxCapacity + 1; }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.dt_s = 0; }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.gravity[1] = std::numeric_limits<double>::infinity(); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.up_axis = static_cast<UpAxis>(3); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.server_role = static_cast<ServerRole>(2); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.frame_rate_hz = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.lattice_unit = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = 0; }));
@@ -58,9 +62,47 @@ TEST(Limits, ASessionBeyondAnyLimitIsRefused) {
   EXPECT_FALSE(session_passes([](auto& s) { s.streams.resize(kMaxStreams + 1); }));
 }
 
+TEST(Limits, ASessionOfFourMillionBodiesPassesAndOneOfOneMoreDoesNot) {
+  const auto passes = [](std::uint32_t capacity) {
+    return session_passes([capacity](auto& s) {
+      s.capacity = capacity;
+      s.streams[0].max_delta_bytes = 1U << 27U;
+      s.streams[0].max_snapshot_bytes = 1U << 28U;
+    });
+  };
+  EXPECT_TRUE(passes(1U << 22U));
+  EXPECT_FALSE(passes((1U << 22U) + 1));
+}
+
+TEST(Limits, NamesOfBodiesAscendAndAreTextsForPeople) {
+  const auto passes = [](std::vector<BodyName> names) {
+    return session_passes([&](auto& s) {
+      s.capacity = 100'000;
+      s.names = std::move(names);
+    });
+  };
+  EXPECT_TRUE(passes({{0, 0, "crane"}, {7, 255, "J\xC3\xBCrgen"}, {99'999, 1, std::string(64, 'n')}}));
+  EXPECT_FALSE(passes({{7, 0, "b"}, {0, 0, "a"}})) << "out of order";
+  EXPECT_FALSE(passes({{7, 0, "b"}, {7, 1, "a"}})) << "a slot twice";
+  EXPECT_FALSE(passes({{100'000, 0, "a"}})) << "no such slot";
+  EXPECT_FALSE(passes({{0, 256, "a"}})) << "no such reuse";
+  EXPECT_FALSE(passes({{0, 0, ""}}));
+  EXPECT_FALSE(passes({{0, 0, std::string(65, 'n')}}));
+  EXPECT_FALSE(passes({{0, 0, "a\nb"}})) << "a control character";
+  EXPECT_FALSE(passes({{0, 0, "\xC3"}})) << "no UTF-8";
+  std::vector<BodyName> many;
+  for (std::uint32_t slot = 0; slot < kMaxBodyNames; ++slot) many.push_back({slot, 0, "n"});
+  EXPECT_TRUE(passes(many));
+  many.push_back({kMaxBodyNames, 0, "n"});
+  EXPECT_FALSE(passes(many));
+}
+
 TEST(Limits, AStreamBeyondAnyLimitIsRefused) {
-  EXPECT_FALSE(stream_passes([](auto& s) { s.max_delta_bytes = kMaxSampleBytes + 1; }));
-  EXPECT_FALSE(stream_passes([](auto& s) { s.max_snapshot_bytes = kMaxSampleBytes + 1; }));
+  EXPECT_TRUE(stream_passes([](auto& s) { s.name = "thin_2-b"; }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.name = "Thin"; }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.name = std::string(33, 'n'); }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.max_delta_bytes = (1U << 27U) + 1; }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.max_snapshot_bytes = (1U << 28U) + 1; }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.layout.codec = std::string(65, 'c'); }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.layout.predictor = std::string(65, 'p'); }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.layout.groups.clear(); }));
@@ -158,12 +200,33 @@ TEST(Limits, WhatAClientSendsIsBounded) {
   EXPECT_FALSE(within_limits(ack, kLimits));
 }
 
+TEST(Limits, WhyAClientPlaysAStreamIsAShortText) {
+  ClientStatusMessage status;
+  status.client = 1;
+  status.session = "a";
+  status.stream_reason = std::string(64, 'r');
+  EXPECT_TRUE(within_limits(status, kLimits));
+  status.stream_reason += 'r';
+  EXPECT_FALSE(within_limits(status, kLimits));
+  status.stream_reason = "a\tb";
+  EXPECT_FALSE(within_limits(status, kLimits));
+}
+
 TEST(Limits, WhatAServerAnswersIsBounded) {
   ReplyMessage reply;
   reply.client = 1;
   reply.entries.resize(kReplyRing);
   EXPECT_TRUE(within_limits(reply, kLimits));
   reply.entries.resize(kReplyRing + 1);
+  EXPECT_FALSE(within_limits(reply, kLimits));
+  reply.entries.clear();
+  reply.texts.resize(kMaxReplyTexts, {1, std::string(200, 't')});
+  EXPECT_TRUE(within_limits(reply, kLimits));
+  reply.texts[3].text += 't';
+  EXPECT_FALSE(within_limits(reply, kLimits));
+  reply.texts[3].text = "\x1b[2J";
+  EXPECT_FALSE(within_limits(reply, kLimits)) << "a control character";
+  reply.texts.assign(kMaxReplyTexts + 1, {1, "t"});
   EXPECT_FALSE(within_limits(reply, kLimits));
   ScheduledInputMessage scheduled;
   EXPECT_FALSE(within_limits(scheduled, kLimits)) << "numbers start at 1";

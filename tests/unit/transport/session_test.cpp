@@ -130,6 +130,21 @@ TEST_F(Book, ListsEveryLiveServerInTheOrderSeen) {
   EXPECT_EQ(out[1].message.epoch, 10U);
 }
 
+TEST_F(Book, AServerThatStandsByIsNotFollowedUntilItIsLive) {
+  auto standby = announcement(20);
+  standby.message.server_role = ServerRole::kStandby;
+  book_.put(2, standby);
+  EXPECT_EQ(current(), Epochs{});
+  EXPECT_FALSE(book_.any_live());
+  EXPECT_FALSE(book_.epoch_live(20));
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
+  states_[1] = WriterState::kGone;
+  EXPECT_EQ(current(), Epochs{});
+  book_.put(2, announcement(21));
+  EXPECT_EQ(current(), Epochs{21});
+}
+
 TEST_F(Book, IsBoundedInTheNumberOfWriters) {
   for (std::uint64_t writer = 1; writer <= 1000; ++writer) {
     states_[writer] = WriterState::kLive;
@@ -172,7 +187,7 @@ TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
     change(changed.layout);
     return hashes.insert(layout_hash(session, changed)).second;
   };
-  EXPECT_TRUE(session_differs([](auto& s) { s.protocol_version = 2; }));
+  EXPECT_TRUE(session_differs([](auto& s) { s.protocol_version = kProtocolVersion + 1; }));
   EXPECT_TRUE(session_differs([](auto& s) { s.lattice_unit = 0.5; }));
   EXPECT_TRUE(differs([](auto& l) { l.capacity = 1; }));
   EXPECT_TRUE(differs([](auto& l) { l.type_count = 2; }));
@@ -202,7 +217,7 @@ TEST(LayoutHash, OfTheProtocolsExampleIsTheNumberItGives) {
   stream.layout.type_count = 2;
   stream.layout.codec = "tracker";
   stream.layout.parameters.codec.threshold = 100;
-  EXPECT_EQ(to_hex(layout_hash(session, stream)), "ca623bc703a235bd")
+  EXPECT_EQ(to_hex(layout_hash(session, stream)), "75b1b6f050878bff")
       << "part of the protocol: other clients would refuse the session";
 }
 

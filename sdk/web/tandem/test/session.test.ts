@@ -134,11 +134,20 @@ describe.each(VARIANTS)('%s', (variant) => {
     const { messages } = recorded['field'] as Trace;
     const session = (messages[0] as Trace['messages'][number]).bytes.slice();
     // Behind kind, header and epoch.
-    new DataView(session.buffer).setUint32(1 + 4 + 8, 2, true);
+    new DataView(session.buffer).setUint32(1 + 4 + 8, 3, true);
     const player = await new Player().start(variant);
     player.play({ atMs: 1, bytes: session });
     expect(player.module.status()).toMatchObject({ phase: 'refused' });
     expect(player.module.status().reason).toContain('version');
+  });
+
+  test('the world of a session is told', async () => {
+    const { messages } = recorded['field'] as Trace;
+    const player = await new Player().start(variant);
+    expect(player.module.status().dtS).toBeUndefined();
+    player.play(messages[0] as Trace['messages'][number]);
+    expect(player.module.status()).toMatchObject({ upAxis: 1, continuesEpoch: 0, continuesFrame: 0 });
+    expect(player.module.status().dtS).toBeCloseTo(1 / 30, 4);
   });
 
   test('a server that starts again is another epoch, played from its snapshot', async () => {

@@ -79,6 +79,7 @@ struct ServerOptions {
   /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
   /// start() refuses text that clients could not read and names the line.
   std::string scene_description = "";
+  std::uint32_t up_axis = 1;         ///< the axis that points up: 0 x, 1 y, 2 z
   std::uint32_t wait_for = 0;        ///< participants that must play before frame 1
   std::uint32_t client_limit = 256;  ///< maximum number of clients at once
   /// Maximum number of frames that the server runs ahead of its slowest participant, 1..24; empty: chosen

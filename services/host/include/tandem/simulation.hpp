@@ -13,7 +13,7 @@ namespace tandem::engine {
 
 using Vec3 = std::array<double, 3>;
 
-inline constexpr std::uint32_t kMaxBodies = 1U << 20U;  ///< maximum number of bodies of a simulation
+inline constexpr std::uint32_t kMaxBodies = 1U << 22U;  ///< maximum number of bodies of a simulation
 
 enum class InputKind : std::uint32_t {
   kGravity = 1,  ///< values: x, y, z in scene units / s^2; also changes the predicted step
@@ -66,6 +66,12 @@ struct Event {
   std::uint32_t slot = 0;
 };
 
+/// The name of the body that is in a slot now, for people.
+struct BodyName {
+  std::uint32_t slot = 0;
+  std::string name = {};  ///< UTF-8; clients are told the first 64 bytes, control characters become '?'
+};
+
 /// Bodies that an engine repaired since its start so that the session could go on: rigid bodies sometimes
 /// explode.
 struct Mishaps {
@@ -106,6 +112,13 @@ class Simulation {
   /// Number of bodies in contact with another body or the scene in the last step, for the thesis's tables.
   [[nodiscard]] virtual std::uint32_t colliding() const { return 0; }
   [[nodiscard]] virtual Mishaps mishaps() const { return {}; }
+
+  /// The names of bodies, in any order. A body that is not listed has no name; of two names for a slot the
+  /// first counts; the 65,535 lowest slots are told. The host asks at the start, and then at most once a
+  /// second: after a body appeared, and when names_version() changed.
+  [[nodiscard]] virtual std::vector<BodyName> names() const { return {}; }
+  /// Another value tells that names() changed although no body appeared.
+  [[nodiscard]] virtual std::uint64_t names_version() const { return 0; }
 
   /// A checkpoint holds everything that decides the following steps. load() returns false and changes nothing
   /// if the bytes are not a checkpoint of this simulation. After load(), bodies(), gravity and waiting inputs
