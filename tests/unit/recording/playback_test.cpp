@@ -1,6 +1,7 @@
 #include "services/recording/playback.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -247,3 +248,38 @@ TEST_F(PlaybackTest, AFrameOfAnotherHashIsAnError) {
 
 }  // namespace
 }  // namespace tandem::recording
+TEST_F(PlaybackTest, AFileThatBecomesShorterWhileItIsReadIsAnError) {
+  begin();
+  frames(150);
+  const std::uint64_t middle = std::filesystem::file_size(path);
+  frames(150);
+  ASSERT_TRUE(recorder->finish());
+  auto playback = Playback::open(path);
+  ASSERT_TRUE(playback);
+  ASSERT_EQ((*playback)->next(), Step::kStarted);
+  std::filesystem::resize_file(path, middle);
+  auto step = (*playback)->next();
+  std::size_t played = 0;
+  for (; step == Step::kFrame; step = (*playback)->next()) ++played;
+  ASSERT_FALSE(step);
+  EXPECT_EQ(step.error().code, ErrorCode::kIo);
+  EXPECT_EQ(step.error().message, "it became shorter while it was read");
+  EXPECT_GT(played, 140U) << "what is still there is read";
+  const auto sought = (*playback)->seek(server.session.epoch, 290);
+  ASSERT_FALSE(sought);
+  EXPECT_EQ(sought.error().message, "it became shorter while it was read");
+}
+
+TEST_F(PlaybackTest, WhatIsNoRegularFileIsRefused) {
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  for (const auto& [what, named] : {std::pair{path.c_str(), "a FIFO"},
+                                    {"/tmp", "a directory"},
+                                    {"/dev/zero", "a device"},
+                                    {"/dev/tty", "a device"}}) {
+    const auto playback = Playback::open(what);
+    ASSERT_FALSE(playback) << what;
+    EXPECT_EQ(playback.error().message,
+              std::string(what) + ": cannot read: it is " + named + ", and no regular file");
+  }
+}
+
