@@ -133,6 +133,8 @@ Result<void> Recorder::finish() {
   totals_.fixed_bytes += writer_->size_bytes() - before;
   totals_.file_bytes = file_->written_bytes();
   if (!file_->has_name()) totals_ = {};  // there will be no file
+  // Now, and not with this object: DDS, which ends before it, may keep the process until it is broken off.
+  file_->discard();
   if (!named_) return named_;
   if (!finished) return finished;
   return file_->has_name() ? file_->close() : Result<void>();

@@ -45,7 +45,7 @@ class Recorder {
 
   /// Returns false after an error; nothing more is written then.
   [[nodiscard]] bool good() const { return named_ && writer_->written(); }
-  /// Ends the file, or drops it where no snapshot came. Errors: kIo, also of anything written before.
+  /// Ends the file, or removes it where no snapshot came. Errors: kIo, also of anything written before.
   [[nodiscard]] Result<void> finish();
 
   /// For each topic: number of messages, and their bytes before compression.

@@ -37,14 +37,15 @@ Result<void> HeadlessClient::open() {
     // known.
     if (auto loaded = load_script(1.0 / 30); !loaded) return loaded;
   }
-  if (!options_.hash_log.empty()) {
-    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
-    if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
-  }
   if (!options_.capture.empty()) {
     auto recorder = recording::Recorder::create(options_.capture, options_.compression);
     if (!recorder) return tl::unexpected<Error>(recorder.error());
     recorder_ = std::make_unique<recording::Recorder>(std::move(*recorder));
+  }
+  // After the recording, so that one that is refused leaves the log of who writes it.
+  if (!options_.hash_log.empty()) {
+    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
+    if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
   }
   client::CoreOptions core;
   core.session = options_.session;
