@@ -139,11 +139,11 @@ void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage session = *core_->session();
   session.streams = {stream};
   recorder_->add(session, transport::wall_ns());
-  if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), transport::wall_ns());
+  if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), client::now());
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  if (recorder_) recorder_->add(snapshot, transport::wall_ns());
+  if (recorder_) recorder_->add(snapshot, client::now());
 }
 
 void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
@@ -163,8 +163,8 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
 
 void HeadlessClient::record(client::Now now) {
   if (!recorder_) return;
-  if (core_->timeline() != nullptr && recorder_->snapshot_due(now.wall_ns))
-    recorder_->cut_snapshot(*core_->timeline(), now.wall_ns);
+  if (core_->timeline() != nullptr && recorder_->snapshot_due(now.steady_ns))
+    recorder_->cut_snapshot(*core_->timeline(), now);
 }
 
 void HeadlessClient::send_script(client::Now now) {

@@ -40,7 +40,8 @@ class PlaybackTest : public ::testing::Test {
       ASSERT_TRUE(client->apply(delta.frame, delta.last_input, delta.hash, delta.payload));
       recorder->add(server.session.epoch, delta, wall_ns);
       wall_ns += kSecond;
-      if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, wall_ns);
+      steady_ns += kSecond;
+      if (recorder->snapshot_due(steady_ns)) recorder->cut_snapshot(*client, {steady_ns, wall_ns});
     }
   }
   void schedule(std::int32_t gravity_y) {
@@ -50,7 +51,7 @@ class PlaybackTest : public ::testing::Test {
   void join() {
     const auto snapshot = server.snapshot();
     ASSERT_TRUE(client->load(snapshot.bytes, server.session.epoch));
-    recorder->add(snapshot, wall_ns);
+    recorder->add(snapshot, {steady_ns, wall_ns});
   }
   void begin() {
     recorder.emplace(std::move(*Recorder::create(path, Compression::kZstd)));
@@ -76,6 +77,7 @@ class PlaybackTest : public ::testing::Test {
   std::optional<ClientTimeline> client;
   std::optional<Recorder> recorder;
   std::int64_t wall_ns = 1'700'000'000 * kSecond;
+  std::int64_t steady_ns = 5 * kSecond;
 };
 
 TEST_F(PlaybackTest, PlaysEveryFrameWithTheServersHash) {
@@ -93,6 +95,25 @@ TEST_F(PlaybackTest, PlaysEveryFrameWithTheServersHash) {
   EXPECT_EQ(play(**playback), "S" + std::string(155, '.'));
   EXPECT_EQ((*playback)->length_s(), 154);
   EXPECT_FALSE((*playback)->torn_at());
+}
+
+TEST_F(PlaybackTest, AWallClockThatJumpsAnHourChangesNoSnapshot) {
+  begin();
+  frames(70);
+  wall_ns -= 3600 * kSecond;
+  frames(80);
+  wall_ns += 2 * 3600 * kSecond;
+  frames(50);
+  ASSERT_TRUE(recorder->finish());
+  EXPECT_EQ(recorder->totals().snapshots_cut, 3U) << "of frames 60, 120 and 180";
+  const auto playback = Playback::open(path);
+  ASSERT_TRUE(playback) << playback.error().message;
+  EXPECT_EQ(play(**playback), "S" + std::string(200, '.'));
+  for (const Frame frame : {59U, 119U, 179U, 199U}) {
+    ASSERT_TRUE((*playback)->seek(server.session.epoch, frame));
+    ASSERT_EQ((*playback)->next(), Step::kStarted);
+    EXPECT_EQ((*playback)->timeline().applied(), frame / 60 * 60);
+  }
 }
 
 TEST_F(PlaybackTest, AFrameBringsTheInputsThatItIsTheFirstToPromise) {
@@ -160,8 +181,9 @@ TEST_F(PlaybackTest, AnInputOnItsWayWhenASnapshotIsCutIsThereBehindIt) {
   recorder->add(server.session.epoch, delta, wall_ns);
   schedule(-60);
   wall_ns += kSecond;
-  ASSERT_TRUE(recorder->snapshot_due(wall_ns));
-  recorder->cut_snapshot(*client, wall_ns);
+  steady_ns += kSecond;
+  ASSERT_TRUE(recorder->snapshot_due(steady_ns));
+  recorder->cut_snapshot(*client, {steady_ns, wall_ns});
   frames(10);
   ASSERT_TRUE(recorder->finish());
   auto playback = Playback::open(path);
@@ -230,24 +252,6 @@ TEST_F(PlaybackTest, WhatCannotBeReadIsToldWithTheFilesName) {
             path + ": not an MCAP file: its first eight bytes are others");
 }
 
-TEST_F(PlaybackTest, AFrameOfAnotherHashIsAnError) {
-  begin();
-  frames(3);
-  auto delta = complete(server.advance());
-  delta.hash ^= 1U;
-  recorder->add(server.session.epoch, delta, wall_ns);
-  ASSERT_TRUE(recorder->finish());
-  auto playback = Playback::open(path);
-  ASSERT_TRUE(playback);
-  for (int i = 0; i < 4; ++i) ASSERT_TRUE((*playback)->next());
-  const auto step = (*playback)->next();
-  ASSERT_FALSE(step);
-  EXPECT_EQ(step.error().code, ErrorCode::kMismatch);
-  EXPECT_EQ(step.error().message.substr(0, 9), "frame 4: ");
-}
-
-}  // namespace
-}  // namespace tandem::recording
 TEST_F(PlaybackTest, AFileThatBecomesShorterWhileItIsReadIsAnError) {
   begin();
   frames(150);
@@ -283,3 +287,21 @@ TEST_F(PlaybackTest, WhatIsNoRegularFileIsRefused) {
   }
 }
 
+TEST_F(PlaybackTest, AFrameOfAnotherHashIsAnError) {
+  begin();
+  frames(3);
+  auto delta = complete(server.advance());
+  delta.hash ^= 1U;
+  recorder->add(server.session.epoch, delta, wall_ns);
+  ASSERT_TRUE(recorder->finish());
+  auto playback = Playback::open(path);
+  ASSERT_TRUE(playback);
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE((*playback)->next());
+  const auto step = (*playback)->next();
+  ASSERT_FALSE(step);
+  EXPECT_EQ(step.error().code, ErrorCode::kMismatch);
+  EXPECT_EQ(step.error().message.substr(0, 9), "frame 4: ");
+}
+
+}  // namespace
+}  // namespace tandem::recording
