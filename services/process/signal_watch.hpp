@@ -1,5 +1,5 @@
 #pragma once
-// SIGINT and SIGTERM as a flag, and an end in time whatever a library waits for.
+// SIGINT, SIGTERM and SIGHUP as a flag, and an end in time whatever a library waits for.
 
 #include <atomic>
 #include <chrono>
@@ -11,7 +11,8 @@
 namespace tandem {
 
 /// A thread waits for the signals, so that no handler and no global is needed. Make it before other threads:
-/// its mask holds for those started later.
+/// its mask holds for those started later. SIGHUP counts unless the parent has it ignored, as nohup(1) does.
+/// A file at its size limit (SIGXFSZ) is an error of the write, and does not end the process.
 ///
 /// The same thread is the guard of the end. Cyclone DDS, when it stops, waits for a packet to itself, which
 /// never comes once the network interface is gone. So from the first signal, or from finish() where that is
