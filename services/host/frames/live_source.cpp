@@ -134,19 +134,37 @@ void LiveSource::make_deltas() {
 Reason LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox,
                           Frame& acts_on) {
   const engine::Classification effect = simulation_->classify(input);
+  Reason reason = Reason::kInvalid;
   switch (effect.effect) {
     case engine::Classification::Effect::kScheduled:
-      return schedule(input, effect, origin, outbox, acts_on);
+      reason = schedule(input, effect, origin, outbox, acts_on);
+      break;
     case engine::Classification::Effect::kImmediate:
-      if (immediate_.size() >= kMostImmediate) return Reason::kRateLimited;
+      if (immediate_.size() >= kMostImmediate || too_dear(effect.cost, origin)) return Reason::kRateLimited;
       immediate_.push_back(input);
       acts_on = next_frame();
-      return Reason::kNone;
+      reason = Reason::kNone;
+      break;
     case engine::Classification::Effect::kRefused:
       note_refusal(origin, effect.reason);
       break;
   }
-  return Reason::kInvalid;
+  if (reason == Reason::kNone && origin.client != 0) senders_.sent(origin.client, origin.now_ns);
+  return reason;
+}
+
+bool LiveSource::too_dear(double cost, const InputOrigin& origin) {
+  constexpr std::int64_t kTellNs = 10 * kSecond;
+  if (origin.budget == nullptr) return false;
+  const engine::InputBudget rule = simulation_->input_budget();
+  if (origin.budget->take(cost, {rule.per_second, rule.most}, origin.now_ns)) return false;
+  if (origin.now_ns - told_budget_ns_ >= kTellNs) {
+    told_budget_ns_ = origin.now_ns;
+    refusals_.push_back(fmt::format(
+        "client {:016x} has used up its budget of pushes; what costs more than comes back is refused (push_budget)",
+        origin.client));
+  }
+  return true;
 }
 
 Reason LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
@@ -220,12 +238,21 @@ void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lin
   now.clamped += shown.clamped;
   if (now == noted_mishaps_ || now_ns - noted_mishaps_ns_ < kSecond) return;
   noted_mishaps_ns_ = now_ns;
+  const std::uint64_t lost = now.removed - noted_mishaps_.removed;
+  const std::string who = lost > 0 ? lost_after(lost, now_ns) : std::string();
   noted_mishaps_ = now;
   const std::string& last = mirror_.last_removed();
   const std::string told = last.empty() ? last : "; the last that clients cannot be told of: " + last;
   lines.push_back(
-      fmt::format("bodies of the simulation are not sound: {} removed and {} slowed down since its start{}",
-                  now.removed, now.clamped, told));
+      fmt::format("bodies of the simulation are not sound: {} removed and {} slowed down since its start{}{}",
+                  now.removed, now.clamped, who, told));
+}
+
+std::string LiveSource::lost_after(std::uint64_t lost, std::int64_t now_ns) {
+  const std::string names = senders_.names(now_ns);
+  return fmt::format("; {} of them since the last such line, up to frame {}; {}", lost, frame_,
+                     names.empty() ? "no client sent an input in the 10 s before"
+                                   : "inputs of the 10 s before came from " + names);
 }
 
 void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {

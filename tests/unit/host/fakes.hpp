@@ -40,6 +40,7 @@ class FakeSimulation final : public engine::Simulation {
     } else if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kPush) &&
                input.values.size() == 7) {
       effect.effect = Effect::kImmediate;
+      effect.cost = std::abs(input.values[4]);
     }
     return effect;
   }
@@ -64,6 +65,7 @@ class FakeSimulation final : public engine::Simulation {
   }
   [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
+  [[nodiscard]] engine::InputBudget input_budget() const override { return budget; }
   [[nodiscard]] engine::Mishaps mishaps() const override { return mishaps_so_far; }
   void save(std::vector<std::byte>& out) const override { out.clear(); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override { return bytes.empty(); }
@@ -83,6 +85,7 @@ class FakeSimulation final : public engine::Simulation {
   std::vector<engine::Event> events_now;
   engine::Vec3 gravity_in_force{};
   engine::Mishaps mishaps_so_far;
+  engine::InputBudget budget;
   std::function<void(std::uint64_t step)> on_step;
   std::uint64_t steps = 0;
   std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in
