@@ -301,7 +301,7 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
   Reason reason = Reason::kNone;
   Account* const account = roster.find(input.message.client, input.from, reason);
   if (account != nullptr) {
-    inputs.handle(*account, input.message, now_ns);
+    inputs.handle(*account, roster.peer(*account), input.message, now_ns);
     return;
   }
   ++totals.refused_messages;

@@ -48,6 +48,11 @@ SignalWatch::SignalWatch(std::string program, Limits limits) : program_(std::mov
   sigemptyset(&signals_);
   sigaddset(&signals_, SIGINT);
   sigaddset(&signals_, SIGTERM);
+  // nohup(1) has it ignored; blocked, it would be taken all the same.
+  struct sigaction hangup {};
+  sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) sigaddset(&signals_, SIGHUP);
+  std::signal(SIGXFSZ, SIG_IGN);
   pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // inherited by all threads started from here on
   thread_ = std::thread([this] { run(); });
 }

@@ -1,5 +1,6 @@
 #pragma once
-// Turns SIGINT and SIGTERM into a flag, and ends the process in time even if a library waits for ever.
+// Turns SIGINT, SIGTERM and SIGHUP into a flag, and ends the process in time even if a library waits for
+// ever.
 
 #include <atomic>
 #include <chrono>
@@ -11,7 +12,8 @@
 namespace tandem {
 
 /// A thread waits for the signals, so no handler and no global is needed. Make this object before other
-/// threads are started, because they inherit its mask.
+/// threads are started, because they inherit its mask. SIGHUP counts unless the parent has it ignored, as
+/// nohup(1) does. A file at its size limit (SIGXFSZ) is an error of the write, and does not end the process.
 ///
 /// The same thread is the guard of the end. Cyclone DDS, when it stops, waits for a packet to itself, which
 /// never comes once the network interface is gone. So from the first signal, or from finish() if that is

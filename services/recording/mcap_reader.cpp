@@ -76,68 +76,95 @@ void McapReader::FreeContext::operator()(ZSTD_DCtx_s* context) const { ZSTD_free
 McapReader::McapReader(McapReader&&) noexcept = default;
 McapReader::~McapReader() = default;
 
-Result<McapReader> McapReader::open(std::span<const std::byte> file) {
+Result<McapReader> McapReader::open(InputFile file) {
   constexpr std::size_t kVersionAt = 5;
-  const auto begin = file.first(std::min(file.size(), kMagic.size()));
-  if (!is_magic(begin)) {
-    const bool other_version = begin.size() == kMagic.size() &&
-                               std::memcmp(begin.data(), kMagic.data(), kVersionAt) == 0 &&
-                               std::memcmp(&begin[kVersionAt + 1], &kMagic[kVersionAt + 1], 2) == 0;
+  McapReader reader(std::move(file));
+  const auto begin =
+      reader.file_.read(0, std::min<std::uint64_t>(reader.file_.size_bytes(), kMagic.size()), reader.buffer_);
+  if (!begin) return tl::unexpected(begin.error());
+  if (!is_magic(*begin)) {
+    const bool other_version = begin->size() == kMagic.size() &&
+                               std::memcmp(begin->data(), kMagic.data(), kVersionAt) == 0 &&
+                               std::memcmp(&(*begin)[kVersionAt + 1], &kMagic[kVersionAt + 1], 2) == 0;
     if (other_version)
       return fail(ErrorCode::kUnsupported, "MCAP of another version than 0, which is the one that is read");
     return fail(ErrorCode::kMalformed, "not an MCAP file: its first eight bytes are others");
   }
-  McapReader reader(file);
   reader.data_at_ = reader.at_ = kMagic.size();
-  reader.survey();
+  if (auto surveyed = reader.survey(); !surveyed) return tl::unexpected(surveyed.error());
   return reader;
 }
 
-std::optional<McapReader::Record> McapReader::record_at(std::span<const std::byte> bytes, std::uint64_t& at) {
-  if (bytes.size() - at < kRecordHead) return std::nullopt;
-  Fields head(bytes.subspan(at, kRecordHead));
-  Record record{.opcode = head.get<std::uint8_t>(), .content = {}};
-  const auto size = head.get<std::uint64_t>();
-  if (size > bytes.size() - at - kRecordHead) return std::nullopt;
-  record.content = bytes.subspan(at + kRecordHead, size);
-  at += kRecordHead + size;
-  return record;
+Result<std::optional<McapReader::Head>> McapReader::head_at(std::uint64_t at) {
+  const std::uint64_t rest = file_.size_bytes() - at;
+  if (rest < kRecordHead) return std::nullopt;
+  const auto bytes = file_.read(at, kRecordHead, buffer_);
+  if (!bytes) return tl::unexpected(bytes.error());
+  Fields fields(*bytes);
+  Head head;
+  head.opcode = fields.get<std::uint8_t>();
+  head.size_bytes = fields.get<std::uint64_t>();
+  head.content_at = at + kRecordHead;
+  if (head.size_bytes > rest - kRecordHead) return std::nullopt;
+  return head;
 }
 
-// Finds the end, the chunks and what their indexes say; errors are told where the records are read.
-void McapReader::survey() {
+// Finds the end, the chunks and what their indexes say; errors in records are told where the records are
+// read.
+Result<void> McapReader::survey() {
   end_ = data_at_;
   bool ended = false;
   while (!ended) {
-    const std::uint64_t begin = end_;
-    const auto record = record_at(file_, end_);
-    if (!record) break;
-    if (record->opcode == kChunk) note_chunk(begin, record->content);
-    if (record->opcode == kMessageIndex && !chunks_.empty()) {
-      Fields fields(record->content);
-      const auto channel = fields.get<std::uint16_t>();
-      if (fields.get<std::uint32_t>() > 0)
-        indexes_.emplace_back(static_cast<std::uint32_t>(chunks_.size() - 1), channel);
-    }
-    // Learns the channels of the summary, so that a channel is known before its chunk is read.
-    if (record->opcode == kChannel) static_cast<void>(learn(*record));
-    ended = record->opcode == kFooter;
+    const auto head = head_at(end_);
+    if (!head) return tl::unexpected(head.error());
+    if (!*head) break;
+    if (auto noted = note(**head, end_); !noted) return noted;
+    end_ = (*head)->end();
+    ended = (*head)->opcode == kFooter;
   }
-  if (!ended || !is_magic(file_.subspan(end_))) torn_at_ = end_;
+  const std::uint64_t rest = file_.size_bytes() - end_;
+  if (!ended || rest != kMagic.size()) {
+    torn_at_ = end_;
+  } else {
+    const auto magic = file_.read(end_, kMagic.size(), buffer_);
+    if (!magic) return tl::unexpected(magic.error());
+    if (!is_magic(*magic)) torn_at_ = end_;
+  }
   if (channels_.empty() && !chunks_.empty()) {  // without a summary: those that the first chunk names
     McapMessage first;
     static_cast<void>(next(first));
     rewind();
   }
+  return {};
 }
 
-void McapReader::note_chunk(std::uint64_t at, std::span<const std::byte> content) {
-  const ChunkHead head = read_head(content);
-  if (head.last_ns != 0) {  // else it holds no message
-    first_ns_ = last_ns_ == 0 ? head.first_ns : std::min(first_ns_, head.first_ns);
-    last_ns_ = std::max(last_ns_, head.last_ns);
+Result<void> McapReader::note(const Head& head, std::uint64_t at) {
+  constexpr std::uint64_t kTimes = 8 + 8, kIndexHead = 2 + 4;
+  const bool whole = head.opcode == kChannel && head.size_bytes <= kMostRecordBytes;
+  const std::uint64_t wanted = head.opcode == kChunk          ? kTimes
+                               : head.opcode == kMessageIndex ? kIndexHead
+                               : whole                        ? head.size_bytes
+                                                              : 0;
+  const auto begin = file_.read(head.content_at, std::min(head.size_bytes, wanted), buffer_);
+  if (!begin) return tl::unexpected(begin.error());
+  Fields fields(*begin);
+  if (head.opcode == kChunk) {
+    const auto first_ns = fields.get<std::uint64_t>();
+    const auto last_ns = fields.get<std::uint64_t>();
+    if (last_ns != 0) {  // else it holds no message
+      first_ns_ = last_ns_ == 0 ? first_ns : std::min(first_ns_, first_ns);
+      last_ns_ = std::max(last_ns_, last_ns);
+    }
+    chunks_.push_back({at, first_ns});
   }
-  chunks_.push_back({at, head.first_ns});
+  if (head.opcode == kMessageIndex && !chunks_.empty()) {
+    const auto channel = fields.get<std::uint16_t>();
+    if (fields.get<std::uint32_t>() > 0)
+      indexes_.emplace_back(static_cast<std::uint32_t>(chunks_.size() - 1), channel);
+  }
+  // Learns the channels of the summary, so that a channel is known before its chunk is read.
+  if (whole) static_cast<void>(learn({.opcode = head.opcode, .content = *begin}));
+  return {};
 }
 
 std::vector<McapReader::Place> McapReader::chunks_with(std::string_view topic) const {
@@ -162,14 +189,43 @@ tl::unexpected<Error> McapReader::malformed(const std::string& what) const {
   return fail(ErrorCode::kMalformed, "at byte " + std::to_string(record_at_) + ": " + what);
 }
 
+Result<McapReader::Record> McapReader::next_in_file() {
+  record_at_ = at_;
+  chunk_ = {};  // its bytes may be overwritten
+  chunk_at_ = 0;
+  const auto head = head_at(at_);
+  if (!head) return tl::unexpected(head.error());
+  if (!*head) return malformed("a record that is longer than the file");
+  Record record{.opcode = (*head)->opcode, .content = {}};
+  at_ = (*head)->end();
+  if (record.opcode != kMessage && record.opcode != kChannel && record.opcode != kChunk) return record;
+  if ((*head)->size_bytes > kMostRecordBytes)
+    return malformed("a record of " + std::to_string((*head)->size_bytes) + " bytes, at most " +
+                     std::to_string(kMostRecordBytes) + " are read");
+  const auto content = file_.read((*head)->content_at, (*head)->size_bytes, buffer_);
+  if (!content) return tl::unexpected(content.error());
+  record.content = *content;
+  return record;
+}
+
+Result<McapReader::Record> McapReader::next_in_chunk() {
+  const auto too_long = [this] { return malformed("a record that is longer than its chunk"); };
+  if (chunk_.size() - chunk_at_ < kRecordHead) return too_long();
+  Fields head(chunk_.subspan(chunk_at_, kRecordHead));
+  Record record{.opcode = head.get<std::uint8_t>(), .content = {}};
+  const auto size = head.get<std::uint64_t>();
+  if (size > chunk_.size() - chunk_at_ - kRecordHead) return too_long();
+  record.content = chunk_.subspan(chunk_at_ + kRecordHead, size);
+  chunk_at_ += kRecordHead + size;
+  return record;
+}
+
 Result<bool> McapReader::next(McapMessage& out) {
   for (;;) {
     const bool in_chunk = chunk_at_ < chunk_.size();
-    std::uint64_t& at = in_chunk ? chunk_at_ : at_;
-    if (!in_chunk) record_at_ = at_;
     if (!in_chunk && at_ >= end_) return false;
-    const auto record = record_at(in_chunk ? chunk_ : file_, at);
-    if (!record) return malformed("a record that is longer than its chunk");
+    const auto record = in_chunk ? next_in_chunk() : next_in_file();
+    if (!record) return tl::unexpected(record.error());
     if (record->opcode == kMessage) {
       return read_message(record->content, out).transform([] { return true; });
     }
@@ -206,15 +262,12 @@ Result<void> McapReader::open_chunk(std::span<const std::byte> content) {
   if (head.compression.empty()) {
     chunk_ = head.stored;
   } else if (head.compression == "zstd") {
-    if (unpacked_bytes_ < head.size_bytes) {
-      unpacked_ = std::make_unique_for_overwrite<std::byte[]>(head.size_bytes);
-      unpacked_bytes_ = head.size_bytes;
-    }
+    const std::span<std::byte> unpacked = unpacked_.of(head.size_bytes);
     if (!zstd_) zstd_.reset(ZSTD_createDCtx());
-    const std::size_t size = ZSTD_decompressDCtx(zstd_.get(), unpacked_.get(), head.size_bytes,
+    const std::size_t size = ZSTD_decompressDCtx(zstd_.get(), unpacked.data(), unpacked.size(),
                                                  head.stored.data(), head.stored.size());
     if (ZSTD_isError(size) != 0) return malformed(std::string("a damaged chunk: ") + ZSTD_getErrorName(size));
-    chunk_ = {unpacked_.get(), size};
+    chunk_ = unpacked.first(size);
   } else {
     return fail(ErrorCode::kUnsupported,
                 "chunks compressed by '" + std::string(head.compression) + "'; zstd and none are read");

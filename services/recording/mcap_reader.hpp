@@ -9,8 +9,10 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "services/recording/input_file.hpp"
 #include "tandem/result.hpp"
 
 struct ZSTD_DCtx_s;
@@ -29,10 +31,14 @@ struct McapMessage {
 class McapReader {
  public:
   static constexpr std::uint64_t kMostChunkBytes = 128U << 20U;
+  /// Of a chunk as it is stored, with its head: what no compressor makes smaller grows a little.
+  static constexpr std::uint64_t kMostRecordBytes = kMostChunkBytes + (1U << 20U);
 
-  /// `file` must outlive the reader. Looks at the head of every record. Errors: kMalformed (not MCAP),
-  /// kUnsupported (another version of it).
-  static Result<McapReader> open(std::span<const std::byte> file);
+  /// Looks at the head of every record. Errors: kMalformed (not MCAP), kUnsupported (another version of it),
+  /// kIo.
+  static Result<McapReader> open(InputFile file);
+  /// Opens bytes, which must outlive the reader.
+  static Result<McapReader> open(std::span<const std::byte> file) { return open(InputFile(file)); }
   McapReader(McapReader&&) noexcept;
   McapReader& operator=(McapReader&&) = delete;
   McapReader(const McapReader&) = delete;
@@ -40,7 +46,7 @@ class McapReader {
   ~McapReader();
 
   /// The next message; false at the end of the data. Errors: kMalformed (a record's fields, a checksum),
-  /// kUnsupported (compression); nothing can be read behind one.
+  /// kUnsupported (compression), kIo; nothing can be read behind one.
   [[nodiscard]] Result<bool> next(McapMessage& out);
 
   /// A place to read from.
@@ -67,20 +73,31 @@ class McapReader {
     std::uint8_t opcode = 0;
     std::span<const std::byte> content;
   };
+  /// Of a record in the file: its content stands at `content_at`.
+  struct Head {
+    std::uint8_t opcode = 0;
+    std::uint64_t content_at = 0, size_bytes = 0;
+    [[nodiscard]] std::uint64_t end() const { return content_at + size_bytes; }
+  };
   struct FreeContext {
     void operator()(ZSTD_DCtx_s* context) const;
   };
 
-  explicit McapReader(std::span<const std::byte> file) : file_(file) {}
-  [[nodiscard]] static std::optional<Record> record_at(std::span<const std::byte> bytes, std::uint64_t& at);
-  void survey();
-  void note_chunk(std::uint64_t at, std::span<const std::byte> content);
+  explicit McapReader(InputFile file) : file_(std::move(file)) {}
+  /// Empty where the file ends before the record does.
+  [[nodiscard]] Result<std::optional<Head>> head_at(std::uint64_t at);
+  [[nodiscard]] Result<void> survey();
+  [[nodiscard]] Result<void> note(const Head& head, std::uint64_t at);
+  /// The record at at_, with its content if next() looks at it.
+  [[nodiscard]] Result<Record> next_in_file();
+  [[nodiscard]] Result<Record> next_in_chunk();
   [[nodiscard]] Result<void> learn(const Record& record);
   [[nodiscard]] Result<void> open_chunk(std::span<const std::byte> content);
   [[nodiscard]] Result<void> read_message(std::span<const std::byte> content, McapMessage& out) const;
   [[nodiscard]] tl::unexpected<Error> malformed(const std::string& what) const;
 
-  std::span<const std::byte> file_;
+  InputFile file_;
+  ReadBuffer buffer_;            // of the last record in the file
   std::uint64_t data_at_ = 0;    // behind the magic
   std::uint64_t end_ = 0;        // of the whole records
   std::uint64_t at_ = 0;         // of the next record in the file
@@ -91,10 +108,9 @@ class McapReader {
   std::uint64_t first_ns_ = 0, last_ns_ = 0;
   std::optional<std::uint64_t> torn_at_;
 
-  std::span<const std::byte> chunk_;  // being read: in the file, or in unpacked_
+  std::span<const std::byte> chunk_;  // being read: in buffer_, or in unpacked_
   std::uint64_t chunk_at_ = 0;
-  std::unique_ptr<std::byte[]> unpacked_;
-  std::size_t unpacked_bytes_ = 0;
+  ReadBuffer unpacked_;
   std::unique_ptr<ZSTD_DCtx_s, FreeContext> zstd_;
 };
 

@@ -1,10 +1,18 @@
 #include "services/recording/output_file.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -23,6 +31,78 @@ fs::path follow_links(fs::path path) {
     path = path.parent_path() / target;
   }
   return path;
+}
+
+struct Closer {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, Closer>;
+
+bool same_file(int descriptor, const std::string& path) {
+  struct stat held {};
+  struct stat named {};
+  return ::fstat(descriptor, &held) == 0 && ::lstat(path.c_str(), &named) == 0 &&
+         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+}
+
+/// False if another holds a lock that excludes this one. A file system without locks excludes nobody.
+bool lock(int descriptor, int kind) {
+  return ::flock(descriptor, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+}
+
+/// Who holds the lock of an open file, in words. A process of another container is not told.
+std::string holder_of(int descriptor) {
+  struct stat about {};
+  if (::fstat(descriptor, &about) != 0) return "another process";
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    // "1: FLOCK ADVISORY WRITE 4711 fd:00:1234 0 EOF", the inode in decimal
+    std::istringstream fields(line);
+    std::string number, type, mode, access, pid, place;
+    fields >> number >> type >> mode >> access >> pid >> place;
+    const std::size_t inode = place.rfind(':') + 1;
+    if (type == "FLOCK" && access == "WRITE" && place.substr(inode) == std::to_string(about.st_ino) &&
+        std::strtol(pid.c_str(), nullptr, 10) > 0)
+      return "process " + pid;
+  }
+  return "another process";
+}
+
+/// Tells who writes the file `path`, if somebody does.
+std::optional<std::string> writer_of(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  if (descriptor < 0) return std::nullopt;
+  std::optional<std::string> holder;
+  if (!lock(descriptor, LOCK_SH)) holder = holder_of(descriptor);
+  ::close(descriptor);
+  return holder;
+}
+
+Error written_by(const std::string& holder) {
+  return {ErrorCode::kConflict, "cannot create: " + holder + " is writing it"};
+}
+
+Error told_by_system() { return {ErrorCode::kIo, std::string("cannot create: ") + std::strerror(errno)}; }
+
+/// A new file `path`, locked. A file that is there and that nobody writes is what a killed run left: it is
+/// removed, and not written to, because it may have another name too.
+Result<File> create_locked(const std::string& path) {
+  constexpr int kMostRetries = 100;  // each one only if another process creates or removes the file meanwhile
+  for (int i = 0; i < kMostRetries; ++i) {
+    const int descriptor =
+        ::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+    if (descriptor < 0) return tl::unexpected(told_by_system());
+    File file(::fdopen(descriptor, "r+b"));
+    struct stat about {};
+    if (file == nullptr || ::fstat(descriptor, &about) != 0) return tl::unexpected(told_by_system());
+    if (!S_ISREG(about.st_mode))
+      return fail(ErrorCode::kIo, "cannot create: " + path + " exists and is no regular file");
+    if (!lock(descriptor, LOCK_EX)) return tl::unexpected(written_by(holder_of(descriptor)));
+    if (!same_file(descriptor, path)) continue;  // who had the lock has renamed or removed it
+    if (about.st_size == 0 && about.st_nlink == 1) return file;
+    ::unlink(path.c_str());
+  }
+  return tl::unexpected(written_by("another process"));
 }
 
 }  // namespace
@@ -49,17 +129,26 @@ Result<OutputFile> OutputFile::create(const std::string& path) {
     if (::access(path.c_str(), W_OK) != 0) return refuse(std::strerror(errno));
   }
   std::string target = follow_links(path).string();
-  const std::string part = target + ".part";
-  ::unlink(part.c_str());  // of a run that was killed
-  std::FILE* file = std::fopen(part.c_str(), "wbx");
-  if (file == nullptr) return refuse(std::strerror(errno));
-  return OutputFile(std::move(target), file);
+  auto file = create_locked(target + ".part");
+  if (!file) return fail(file.error().code, path + ": " + file.error().message);
+  OutputFile made(std::move(target), file->release());
+  // Whoever writes under the name held this .part before, so that nobody gets there from now on.
+  if (const auto holder = writer_of(made.path_)) {
+    const Error written = written_by(*holder);
+    return fail(written.code, path + ": " + written.message);
+  }
+  return made;
 }
 
-OutputFile::~OutputFile() {
+OutputFile::~OutputFile() { discard(); }
+
+bool OutputFile::has_part() const { return file_ != nullptr && same_file(::fileno(file_.get()), part()); }
+
+void OutputFile::discard() {
   if (!unnamed_) return;
+  unnamed_ = false;
+  if (has_part()) ::unlink(part().c_str());
   file_.reset();
-  std::remove(part().c_str());
 }
 
 tl::unexpected<Error> OutputFile::failure(const char* what) const {
@@ -81,21 +170,34 @@ Result<void> OutputFile::rewrite_start(std::span<const std::byte> bytes) {
 
 Result<void> OutputFile::take_name() {
   if (!unnamed_) return {};
+  if (!has_part())
+    return fail(ErrorCode::kIo, path_ + ": cannot rename: " + part() + " is another file by now, or is gone");
+  if (const auto holder = writer_of(path_))
+    return fail(ErrorCode::kConflict, path_ + ": cannot rename: " + *holder + " is writing it");
   if (std::rename(part().c_str(), path_.c_str()) != 0) return failure("cannot rename");
   unnamed_ = false;
   return {};
 }
 
-Result<void> OutputFile::close() {
-  if (file_ == nullptr) return {};
+Result<void> OutputFile::sync() {
   // A full disk may show only here.
   if (std::fflush(file_.get()) != 0 || ::fsync(::fileno(file_.get())) != 0) return failure("cannot write");
+  struct stat about {};
+  if (::fstat(::fileno(file_.get()), &about) == 0 && about.st_nlink == 0)
+    return fail(ErrorCode::kIo, path_ + ": was removed while it was written");
+  return {};
+}
+
+Result<void> OutputFile::close() {
+  if (file_ == nullptr) return {};
+  if (auto synced = sync(); !synced) return synced;
   if (std::fclose(file_.release()) != 0) return failure("cannot write");
   return {};
 }
 
 Result<void> OutputFile::commit() {
-  return close().and_then([this] { return take_name(); });
+  if (file_ == nullptr) return {};
+  return sync().and_then([this] { return take_name(); }).and_then([this] { return close(); });
 }
 
 Result<void> check_distinct(const std::string& input, const std::string& output) {

@@ -12,13 +12,18 @@
 
 namespace tandem::recording {
 
-/// Writes to `path`.part, a new file, and renames it. A process that has an older file of that name open or
-/// mapped keeps it as it was. An object that is destroyed before the renaming leaves nothing behind. A
-/// process that is killed leaves the .part, which the next run replaces. Not thread-safe.
+/// Writes to `path`.part, a new file, and renames it. A process that has an older file of that name open
+/// keeps it as it was. An object that is destroyed before the renaming leaves nothing behind. A process that
+/// is killed leaves the .part, which the next run replaces. Not thread-safe.
+///
+/// The file that is written is locked (flock), under both of its names and for as long as it is open, so that
+/// of several writers one writes. The lock belongs to the file and not to its name, so that a path in another
+/// spelling finds it. On a file system without locks only the comparison before the renaming is left.
 class OutputFile {
  public:
   /// Follows symbolic links, so that they stay. Errors: kIo, naming the file and the reason: also where
-  /// `path` exists and may not be written or is no regular file.
+  /// `path` exists and may not be written or is no regular file. kConflict: another writes it; the message
+  /// names the process, where the system tells.
   static Result<OutputFile> create(const std::string& path);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
@@ -30,12 +35,17 @@ class OutputFile {
   Result<void> write(std::span<const std::byte> bytes);
   /// Overwrites bytes at the start, as for a header that is known only afterwards.
   Result<void> rewrite_start(std::span<const std::byte> bytes);
-  /// Takes its name; more may follow. No effect where it has it.
+  /// Takes its name; more may follow. No effect where it has it. Errors: kIo, also where the .part is another
+  /// file by now; kConflict where another writes a file of its name.
   Result<void> take_name();
+  /// Closes and removes a file that has no name.
+  void discard();
   [[nodiscard]] bool has_name() const { return !unnamed_; }
-  /// Everything is on the disk, under whichever name.
+  /// Everything is on the disk, under whichever name. Errors: kIo, also where the file was removed.
+  Result<void> sync();
+  /// sync(); nothing may be written afterwards.
   Result<void> close();
-  /// close(), then take_name().
+  /// sync(), take_name(), close(): nobody else has the name in between.
   Result<void> commit();
   [[nodiscard]] const std::string& path() const { return path_; }
   /// The bytes that write() handed over, including the part of a failed write that the system took.
@@ -48,6 +58,7 @@ class OutputFile {
   OutputFile(std::string path, std::FILE* file);
   [[nodiscard]] tl::unexpected<Error> failure(const char* what) const;
   [[nodiscard]] std::string part() const { return path_ + ".part"; }
+  [[nodiscard]] bool has_part() const;
 
   std::string path_;
   bool unnamed_ = true;  // the .part is there and ours to remove

@@ -43,25 +43,21 @@ Playback::Run::Run(transport::SessionMessage announced, client::Playable playabl
       snapshots(session.streams[stream].max_snapshot_bytes) {}
 
 Result<std::unique_ptr<Playback>> Playback::open(const std::string& path) {
-  auto mapped = MappedFile::open(path);
-  if (!mapped) return tl::unexpected(mapped.error());
-  const auto bytes = mapped->bytes();
-  auto opened = open(std::move(*mapped), bytes);
+  auto file = InputFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  auto opened = open(std::move(*file));
   if (!opened) return fail(opened.error().code, path + ": " + opened.error().message);
   return opened;
 }
 
 Result<std::unique_ptr<Playback>> Playback::open(std::span<const std::byte> file) {
-  return open(std::nullopt, file);
+  return open(InputFile(file));
 }
 
-Result<std::unique_ptr<Playback>> Playback::open(std::optional<MappedFile> mapped,
-                                                 std::span<const std::byte> file) {
-  auto reader = McapReader::open(file);
-  if (!reader) return tl::unexpected(reader.error());
-  std::unique_ptr<Playback> made(new Playback(std::move(*reader)));
-  if (mapped) made->mapped_.emplace(std::move(*mapped));
-  return made;
+Result<std::unique_ptr<Playback>> Playback::open(InputFile file) {
+  return McapReader::open(std::move(file)).map([](McapReader&& reader) {
+    return std::unique_ptr<Playback>(new Playback(std::move(reader)));
+  });
 }
 
 double Playback::seconds_since_first(std::uint64_t ns) const {

@@ -12,7 +12,7 @@
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/client/following/snapshot_assembly.hpp"
 #include "sdk/client/session/session_check.hpp"
-#include "services/recording/mapped_file.hpp"
+#include "services/recording/input_file.hpp"
 #include "services/recording/mcap_reader.hpp"
 
 namespace tandem::recording {
@@ -32,7 +32,8 @@ class Playback {
     kFrame,    ///< one more frame is applied
     kEnd,      ///< of the file, or of what is left of it
   };
-  /// Errors: kMalformed, kUnsupported, kMismatch (a frame's hash); nothing can be read behind one.
+  /// Errors: kMalformed, kUnsupported, kMismatch (a frame's hash), kIo (also: the file became shorter);
+  /// nothing can be read behind one.
   [[nodiscard]] Result<Step> next();
   /// To the last snapshot that has one, so that next() begins a run no later than `from_s` where the file
   /// permits; from there on call next() until time_s() is late enough.
@@ -78,8 +79,7 @@ class Playback {
   };
 
   explicit Playback(McapReader reader) : reader_(std::move(reader)) {}
-  static Result<std::unique_ptr<Playback>> open(std::optional<MappedFile> mapped,
-                                                std::span<const std::byte> file);
+  static Result<std::unique_ptr<Playback>> open(InputFile file);
   [[nodiscard]] double seconds_since_first(std::uint64_t ns) const;
   void rewind();
   // The places where next() can begin a run.
@@ -91,7 +91,6 @@ class Playback {
   [[nodiscard]] Result<std::optional<Step>> take(transport::SnapshotMessage message);
   [[nodiscard]] Result<std::optional<Step>> apply_next();
 
-  std::optional<MappedFile> mapped_;
   McapReader reader_;
   std::uint64_t time_ns_ = 0;
   std::unique_ptr<Run> run_;

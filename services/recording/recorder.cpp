@@ -60,21 +60,21 @@ void Recorder::add(const transport::SessionMessage& session, std::int64_t wall_n
   add_plain(session, wall_ns, wall_ns);
 }
 
-void Recorder::add(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns) {
+void Recorder::add(const transport::SnapshotMessage& snapshot, client::Now now) {
   stream_ = snapshot.stream;
-  start(snapshot, wall_ns);
+  start(snapshot, now);
 }
 
 // All that a reader needs to begin here stands in one chunk.
-void Recorder::start(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns) {
+void Recorder::start(const transport::SnapshotMessage& snapshot, client::Now now) {
   end_chunk();
   const std::uint64_t before = writer_->size_bytes();
-  if (session_) write(*session_, wall_ns, wall_ns);
-  write(snapshot, wall_ns, wall_ns);
-  for (const auto& [number, input] : unpromised_) write(input, wall_ns, wall_ns);
+  if (session_) write(*session_, now.wall_ns, now.wall_ns);
+  write(snapshot, now.wall_ns, now.wall_ns);
+  for (const auto& [number, input] : unpromised_) write(input, now.wall_ns, now.wall_ns);
   writer_->end_chunk();
   counted_.start_bytes += writer_->size_bytes() - before;
-  started_ns_ = wall_ns;
+  started_ns_ = now.steady_ns;
   if (good()) named_ = file_->take_name();
   settle();
 }
@@ -109,11 +109,11 @@ void Recorder::add(const transport::ClientStatusMessage& status, std::int64_t wa
   add_plain(status, wall_ns, wall_ns);
 }
 
-bool Recorder::snapshot_due(std::int64_t wall_ns) const {
-  return started_ns_ && wall_ns - *started_ns_ >= kSnapshotNs;
+bool Recorder::snapshot_due(std::int64_t steady_ns) const {
+  return started_ns_ && steady_ns - *started_ns_ >= kSnapshotNs;
 }
 
-void Recorder::cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns) {
+void Recorder::cut_snapshot(const ClientTimeline& timeline, client::Now now) {
   timeline.snapshot(snapshot_);
   transport::SnapshotMessage message;
   message.epoch = session_->epoch;
@@ -123,7 +123,7 @@ void Recorder::cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns
   message.bytes = snapshot_;
   end_chunk();
   ++counted_.snapshots_cut;
-  start(message, wall_ns);
+  start(message, now);
 }
 
 Result<void> Recorder::finish() {
@@ -133,9 +133,11 @@ Result<void> Recorder::finish() {
   totals_.fixed_bytes += writer_->size_bytes() - before;
   totals_.file_bytes = file_->written_bytes();
   if (!file_->has_name()) totals_ = {};  // there will be no file
+  // Now, and not with this object: DDS, which ends before it, may keep the process until it is broken off.
+  file_->discard();
   if (!named_) return named_;
   if (!finished) return finished;
-  return file_->has_name() ? file_->close() : Result<void>();
+  return file_->close();
 }
 
 }  // namespace tandem::recording

@@ -16,7 +16,8 @@ namespace tandem::recording {
 
 /// Writes messages in the order in which the client took them in. The file is a new one, and has its name
 /// from the first snapshot on: without one, an older file of that name stays. From then on it is readable up
-/// to the last chunk however the process ends. Times are wall clock in ns. Not thread-safe.
+/// to the last chunk however the process ends. Times in the file are wall clock in ns. The wall clock may
+/// jump; when a snapshot is due is counted by the steady one. Not thread-safe.
 class Recorder {
  public:
   /// Between the snapshots that a recorder cuts itself: how much a replay computes at most to get anywhere.
@@ -27,7 +28,7 @@ class Recorder {
 
   void add(const transport::SessionMessage& session, std::int64_t wall_ns);
   /// Adds the snapshot from which the client started or restarted.
-  void add(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns);
+  void add(const transport::SnapshotMessage& snapshot, client::Now now);
   void add(const transport::ScheduledInputMessage& input, std::int64_t wall_ns);
   /// Adds a delta of the previous snapshot's stream, as one part, however many parts it came in.
   void add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns);
@@ -39,13 +40,13 @@ class Recorder {
   void add(const transport::ClientStatusMessage& status, std::int64_t wall_ns);
 
   /// kSnapshotNs have passed since the last snapshot in the file.
-  [[nodiscard]] bool snapshot_due(std::int64_t wall_ns) const;
+  [[nodiscard]] bool snapshot_due(std::int64_t steady_ns) const;
   /// Writes the agreed state of a timeline whose last delta was added.
-  void cut_snapshot(const ClientTimeline& timeline, std::int64_t wall_ns);
+  void cut_snapshot(const ClientTimeline& timeline, client::Now now);
 
   /// Returns false after an error; nothing more is written then.
   [[nodiscard]] bool good() const { return named_ && writer_->written(); }
-  /// Ends the file, or drops it where no snapshot came. Errors: kIo, also of anything written before.
+  /// Ends the file, or removes it where no snapshot came. Errors: kIo, also of anything written before.
   [[nodiscard]] Result<void> finish();
 
   /// For each topic: number of messages, and their bytes before compression.
@@ -71,7 +72,7 @@ class Recorder {
   void add_plain(const M& message, std::int64_t wall_ns, std::int64_t publish_ns);
   void settle();
   void end_chunk();
-  void start(const transport::SnapshotMessage& snapshot, std::int64_t wall_ns);
+  void start(const transport::SnapshotMessage& snapshot, client::Now now);
 
   std::unique_ptr<OutputFile> file_;  // stays where it is: the writer's sink
   Result<void> named_;
@@ -81,7 +82,7 @@ class Recorder {
   /// Inputs that no delta in the file has counted yet; a reader that starts from a snapshot needs them after
   /// it.
   std::map<std::uint64_t, transport::ScheduledInputMessage> unpromised_;
-  std::optional<std::int64_t> started_ns_;  // the last snapshot
+  std::optional<std::int64_t> started_ns_;  // the last snapshot, steady
   Totals counted_;                          // with the open chunk
   Totals totals_;                           // up to the last chunk that is in the file
   std::uint64_t settled_bytes_ = 0;         // of the file then

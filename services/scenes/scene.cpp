@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "services/engine/bullet/bullet.hpp"
+#include "services/engine/common/check.hpp"
 #include "services/engine/particles/particles.hpp"
 #include "services/scenes/convert.hpp"
 #include "services/scenes/directory.hpp"
@@ -120,6 +121,8 @@ void read_world(const idl::Scene& file, Scene& scene) {
   const double gravity = std::sqrt(dot(scene.gravity, scene.gravity));
   world.max_gravity = file.max_gravity() > 0 ? file.max_gravity() : 10 * std::max(gravity, 1.0);
   world.max_push = file.max_push() > 0 ? file.max_push() : 100 * scene.smallest_radius_m;
+  world.push_budget =
+      file.push_budget() > 0 ? file.push_budget() : engine::kDefaultPushBudget * world.max_push;
   for (const idl::Vec3& corner : {file.bounds().low(), file.bounds().high()}) {
     for (const double v : to_vec3(corner)) scene.extent_m = std::max(scene.extent_m, std::fabs(v));
   }

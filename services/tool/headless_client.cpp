@@ -37,14 +37,15 @@ Result<void> HeadlessClient::open() {
     // rate is known.
     if (auto loaded = load_script(1.0 / 30); !loaded) return loaded;
   }
-  if (!options_.hash_log.empty()) {
-    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
-    if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
-  }
   if (!options_.capture.empty()) {
     auto recorder = recording::Recorder::create(options_.capture, options_.compression);
     if (!recorder) return tl::unexpected<Error>(recorder.error());
     recorder_ = std::make_unique<recording::Recorder>(std::move(*recorder));
+  }
+  // After the recording, so that one that is refused leaves the log of who writes it.
+  if (!options_.hash_log.empty()) {
+    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
+    if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
   }
   client::CoreOptions core;
   core.session = options_.session;
@@ -143,15 +144,14 @@ void HeadlessClient::on_names(const transport::SessionMessage& /*session*/) {
   if (recorder_ && core_->stream() != nullptr) record_session(*core_->stream());
 }
 
-// Whatever is told of a stream begins with where it is held.
 void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
   if (!recorder_) return;
   record_session(stream);
-  if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), transport::wall_ns());
+  if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), client::now());
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  if (recorder_) recorder_->add(snapshot, transport::wall_ns());
+  if (recorder_) recorder_->add(snapshot, client::now());
 }
 
 void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
@@ -171,8 +171,8 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
 
 void HeadlessClient::record(client::Now now) {
   if (!recorder_) return;
-  if (core_->timeline() != nullptr && recorder_->snapshot_due(now.wall_ns))
-    recorder_->cut_snapshot(*core_->timeline(), now.wall_ns);
+  if (core_->timeline() != nullptr && recorder_->snapshot_due(now.steady_ns))
+    recorder_->cut_snapshot(*core_->timeline(), now);
 }
 
 void HeadlessClient::send_script(client::Now now) {

@@ -105,7 +105,7 @@ EDGES = {
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
     "services/lab/framerate": OF_LAB + ["services/lab/measures"],
-    "services/lab/commands": OF_LAB + LAB,
+    "services/lab/commands": OF_LAB + LAB + ["services/process"],
     "tests": ["*"],
 }
 

@@ -7,6 +7,7 @@
 #include "services/engine/bullet/check.hpp"
 #include "services/engine/bullet/columns.hpp"
 #include "services/engine/bullet/physics.hpp"
+#include "services/engine/common/check.hpp"
 
 namespace tandem::engine {
 namespace {
@@ -22,8 +23,11 @@ class Rigid final : public Simulation {
     return static_cast<double>(rigid_.world.damping_per_s);
   }
   [[nodiscard]] Classification classify(const Input& input) const override {
-    return classify_input(input, rigid_);
+    Classification result = classify_input(input, rigid_);
+    if (result.effect == Classification::Effect::kImmediate) result.cost = push_cost(input, bodies());
+    return result;
   }
+  [[nodiscard]] InputBudget input_budget() const override { return engine::input_budget(rigid_.world); }
   void apply(const Input& input) override;
   void step() override;
   [[nodiscard]] Bodies bodies() const override;

@@ -1,5 +1,6 @@
 #include "services/engine/common/check.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -71,6 +72,7 @@ std::string fault(const World& world) {
       return "an emitter must lie within the bounds, with a known type and a rate of 0 to 1e6 a second";
     }
   }
+  if (!(world.push_budget >= 0)) return "the budget of pushes must not be negative";
   for (const Region& region : world.regions) {
     if (!ordered(region.low, region.high) || !sane(region.offset) || region.type >= types)
       return "a region needs a known type";
@@ -126,6 +128,33 @@ Classification classify_input(const Input& input, const World& world) {
       return refuse("this engine takes no application input");
   }
   return refuse("unknown kind of input");
+}
+
+InputBudget input_budget(const World& world) {
+  if (!(world.push_budget > 0)) return {};
+  return {.per_second = world.push_budget, .most = std::max(world.max_push, world.push_budget)};
+}
+
+double push_cost(const Input& input, const Bodies& bodies) {
+  if (input.kind != static_cast<std::uint32_t>(InputKind::kPush)) return 0;
+  const std::size_t capacity = bodies.alive.size();
+  const std::size_t stride = 1 + (capacity - std::min<std::size_t>(capacity, 1)) / kCountedBodies;
+  std::size_t alive = 0, reached = 0;
+  for (std::size_t slot = 0; slot < capacity; slot += stride) {
+    if (bodies.alive[slot] == 0) continue;
+    ++alive;
+    double squared = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double d = static_cast<double>(bodies.position[i][slot]) - input.values[i];
+      squared += d * d;
+    }
+    reached += squared <= input.values[3] * input.values[3] ? 1U : 0U;
+  }
+  const double share =
+      static_cast<double>(reached) / static_cast<double>(std::max<std::size_t>(alive, kFewBodies));
+  double change = 0;
+  for (std::size_t i = 4; i < 7; ++i) change += input.values[i] * input.values[i];
+  return std::sqrt(change) * std::max(share, kLeastShare);
 }
 
 }  // namespace tandem::engine

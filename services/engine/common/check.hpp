@@ -18,4 +18,20 @@ namespace tandem::engine {
 
 [[nodiscard]] Classification classify_input(const Input& input, const World& world);
 
+/// The budget of pushes of one participant.
+[[nodiscard]] InputBudget input_budget(const World& world);
+/// What a push takes of it: its velocity change, times the share of the bodies that it reaches. A scene of
+/// few bodies counts as one of kFewBodies, and a push that reaches few as one that reaches kLeastShare:
+/// thousands of pushes at single bodies would cost nothing otherwise. Up to kCountedBodies are looked at,
+/// evenly among the slots. 0 for other inputs.
+[[nodiscard]] double push_cost(const Input& input, const Bodies& bodies);
+
+inline constexpr std::uint32_t kFewBodies = 64;
+/// With the budget of a scene that names none (kDefaultPushBudget), five pushes a second of half the largest
+/// strength are always possible at up to this share of the bodies.
+inline constexpr double kLeastShare = 1.0 / 20;
+/// Of a scene's max_push. Above the strength of its gravity, one participant could lift all bodies for ever.
+inline constexpr double kDefaultPushBudget = 1.0 / 8;
+inline constexpr std::size_t kCountedBodies = 4096;
+
 }  // namespace tandem::engine

@@ -51,13 +51,17 @@ class Particles final : public Simulation {
   [[nodiscard]] Vec3 gravity() const override { return columns_.gravity; }
   [[nodiscard]] double damping_per_s() const override { return static_cast<double>(world_.damping_per_s); }
   [[nodiscard]] Classification classify(const Input& input) const override {
-    return classify_input(input, world_);
+    Classification result = classify_input(input, world_);
+    if (result.effect == Classification::Effect::kImmediate) result.cost = push_cost(input, bodies());
+    return result;
   }
+  [[nodiscard]] InputBudget input_budget() const override { return engine::input_budget(world_); }
   void apply(const Input& input) override;
   void step() override;
   [[nodiscard]] Bodies bodies() const override;
   [[nodiscard]] std::span<const Event> events() const override { return events_; }
   [[nodiscard]] std::uint32_t colliding() const override { return colliding_; }
+  [[nodiscard]] Mishaps mishaps() const override { return {.removed = lost_, .clamped = 0}; }
   void save(std::vector<std::byte>& out) const override { save_columns(columns_, fingerprint_, out); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override;
 
@@ -88,6 +92,7 @@ class Particles final : public Simulation {
   std::vector<Event> events_;
   std::uint32_t free_from_ = 0;  // no slot below is free
   std::uint32_t colliding_ = 0;
+  std::uint64_t lost_ = 0;  // since this object was made
 };
 
 Particles::Particles(const World& world, std::uint32_t threads)
@@ -194,7 +199,9 @@ void Particles::despawn(std::uint32_t slot) {
 
 void Particles::remove_outside() {
   for (std::uint32_t slot = 0; slot < world_.capacity; ++slot) {
-    if (columns_.alive[slot] != 0 && !inside(position(slot), world_.low, world_.high)) despawn(slot);
+    if (columns_.alive[slot] == 0 || inside(position(slot), world_.low, world_.high)) continue;
+    despawn(slot);
+    if (world_.emitters.empty()) ++lost_;  // nothing brings another: it was not meant to leave
   }
 }
 

@@ -24,7 +24,8 @@ bool may_play(const Account& account) {
 
 }  // namespace
 
-Reason InputDesk::handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns) {
+Reason InputDesk::handle(Account& account, Peer& peer, const transport::InputMessage& input,
+                         std::int64_t now_ns) {
   account.reply.schedule.on_outcome();
   if (input.epoch != epoch_) {
     // Its number belongs to another epoch's count, so it must not enter this one's outcomes.
@@ -40,7 +41,7 @@ Reason InputDesk::handle(Account& account, const transport::InputMessage& input,
     if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
     return Reason::kDuplicate;
   }
-  InputVerdict verdict = decide(account, input, now_ns);
+  InputVerdict verdict = decide(account, peer, input, now_ns);
   if (verdict.reason != Reason::kNone) ++refused_;
   entry.frame = verdict.acts_on;
   entry.code = static_cast<std::uint32_t>(verdict.reason);
@@ -49,14 +50,15 @@ Reason InputDesk::handle(Account& account, const transport::InputMessage& input,
   return verdict.reason;
 }
 
-InputVerdict InputDesk::decide(Account& account, const transport::InputMessage& input, std::int64_t now_ns) {
+InputVerdict InputDesk::decide(Account& account, Peer& peer, const transport::InputMessage& input,
+                               std::int64_t now_ns) {
   if (!account.inputs.rate.take(now_ns)) return {Reason::kRateLimited};
   if (!may_play(account)) return {Reason::kNotPlaying};
   if (account.demoted) return {Reason::kDemoted};
   if (account.role() == transport::Role::kObserver) return {Reason::kObserver};
   if (!well_formed(input)) return {Reason::kInvalid};
   return source_->accept({.kind = input.kind, .values = input.values, .bytes = input.bytes},
-                         {input.client, input.number}, *outbox_);
+                         {input.client, input.number, now_ns, &peer.inputs}, *outbox_);
 }
 
 }  // namespace tandem::host

@@ -16,12 +16,14 @@ class InputDesk {
   InputDesk(Epoch epoch, FrameSource& source, Outbox& outbox)
       : epoch_(epoch), source_(&source), outbox_(&outbox) {}
 
-  /// Decides one input of a known client. Returns the outcome and records it in the account.
-  transport::Reason handle(Account& account, const transport::InputMessage& input, std::int64_t now_ns);
+  /// Decides one input of a known client, whose DDS participant is `peer`. Returns the outcome and records it
+  /// in the account.
+  transport::Reason handle(Account& account, Peer& peer, const transport::InputMessage& input,
+                           std::int64_t now_ns);
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
  private:
-  [[nodiscard]] InputVerdict decide(Account& account, const transport::InputMessage& input,
+  [[nodiscard]] InputVerdict decide(Account& account, Peer& peer, const transport::InputMessage& input,
                                     std::int64_t now_ns);
 
   Epoch epoch_;

@@ -11,6 +11,7 @@
 
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/port.hpp"
+#include "services/accounts/budget.hpp"
 #include "services/accounts/limits.hpp"
 #include "services/accounts/outcomes.hpp"
 #include "services/accounts/reply_schedule.hpp"
@@ -73,6 +74,7 @@ struct Account {
 /// Limits of one DDS participant, for all its clients together; otherwise more ids would mean more cost.
 struct Peer {
   StallMeter stalls;
+  accounts::Budget inputs;                                            ///< see engine::InputBudget
   accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;  ///< snapshots after the first one of
                                                                       ///< each account
 };

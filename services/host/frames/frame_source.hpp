@@ -10,6 +10,7 @@
 #include "sdk/core/layout/parameters.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/messages.hpp"
+#include "services/accounts/budget.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "tandem/result.hpp"
@@ -17,10 +18,12 @@
 
 namespace tandem::host {
 
-/// The client and number of an input; 0, 0 for an input of the server itself.
+/// The client and number of an input, and when it came; 0, 0 for an input of the server itself.
 struct InputOrigin {
   transport::ClientId client = 0;
   std::uint64_t number = 0;
+  std::int64_t now_ns = 0;
+  accounts::Budget* budget = nullptr;  ///< of the client's DDS participant; null: no limit
 };
 
 /// What became of an input.

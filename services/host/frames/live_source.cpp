@@ -174,18 +174,38 @@ bool LiveSource::refresh_names() {
 
 InputVerdict LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) {
   const engine::Classification effect = simulation_->classify(input);
+  InputVerdict verdict;
   switch (effect.effect) {
     case engine::Classification::Effect::kScheduled:
-      return schedule(input, effect, origin, outbox);
+      verdict = schedule(input, effect, origin, outbox);
+      break;
     case engine::Classification::Effect::kImmediate:
       if (immediate_.size() >= kMostImmediate) return {Reason::kRateLimited};
+      if (too_dear(effect.cost, origin)) return {Reason::kRateLimited, 0, "the budget of pushes is used up"};
       immediate_.push_back(input);
-      return {Reason::kNone, next_frame()};
+      verdict = {Reason::kNone, next_frame()};
+      break;
     case engine::Classification::Effect::kRefused:
       note_refusal(origin, effect.reason);
+      verdict = {Reason::kInvalid, 0, transport::plain_text(effect.reason, transport::kMaxReplyTextBytes)};
       break;
   }
-  return {Reason::kInvalid, 0, transport::plain_text(effect.reason, transport::kMaxReplyTextBytes)};
+  if (verdict.reason == Reason::kNone && origin.client != 0) senders_.sent(origin.client, origin.now_ns);
+  return verdict;
+}
+
+bool LiveSource::too_dear(double cost, const InputOrigin& origin) {
+  constexpr std::int64_t kTellNs = 10 * kSecond;
+  if (origin.budget == nullptr) return false;
+  const engine::InputBudget rule = simulation_->input_budget();
+  if (origin.budget->take(cost, {rule.per_second, rule.most}, origin.now_ns)) return false;
+  if (origin.now_ns - told_budget_ns_ >= kTellNs) {
+    told_budget_ns_ = origin.now_ns;
+    refusals_.push_back(fmt::format(
+        "client {:016x} has used up its budget of pushes (push_budget), so its next pushes are refused",
+        origin.client));
+  }
+  return true;
 }
 
 InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
@@ -257,12 +277,21 @@ void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lin
   now.clamped += shown.clamped;
   if (now == noted_mishaps_ || now_ns - noted_mishaps_ns_ < kSecond) return;
   noted_mishaps_ns_ = now_ns;
+  const std::uint64_t lost = now.removed - noted_mishaps_.removed;
+  const std::string who = lost > 0 ? lost_after(lost, now_ns) : std::string();
   noted_mishaps_ = now;
   const std::string& last = mirror_.last_removed();
   const std::string told = last.empty() ? last : "; the last one that could not be sent: " + last;
   lines.push_back(
-      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}",
-                  now.removed, now.clamped, told));
+      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}{}",
+                  now.removed, now.clamped, who, told));
+}
+
+std::string LiveSource::lost_after(std::uint64_t lost, std::int64_t now_ns) {
+  const std::string names = senders_.names(now_ns);
+  return fmt::format("; {} of them since the last such line, up to frame {}; {}", lost, frame_,
+                     names.empty() ? "no client sent an input in the 10 s before"
+                                   : "inputs of the 10 s before came from " + names);
 }
 
 void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {

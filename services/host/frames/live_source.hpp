@@ -9,6 +9,7 @@
 
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
+#include "services/host/frames/recent_senders.hpp"
 #include "services/host/streams/stream.hpp"
 #include "services/workers/workers.hpp"
 #include "tandem/result.hpp"
@@ -68,8 +69,12 @@ class LiveSource final : public FrameSource {
   /// Hands the simulation all inputs that act on frame s, the one that is about to be stepped.
   void apply(Frame s);
   void make_deltas();
+  /// True if the sender's budget is used up for an input of that cost.
+  [[nodiscard]] bool too_dear(double cost, const InputOrigin& origin);
   void note_refusal(const InputOrigin& origin, const std::string& reason);
   void note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines);
+  /// How many bodies were lost, and whose inputs came before.
+  [[nodiscard]] std::string lost_after(std::uint64_t lost, std::int64_t now_ns);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
   [[nodiscard]] Frame next_frame() const { return frame_ + 1; }
   [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
@@ -92,6 +97,8 @@ class LiveSource final : public FrameSource {
   std::uint32_t scheduled_now_ = 0;                // for scheduling_frame_
   static constexpr std::size_t kMostRefusals = 4;  // told of a frame
   std::vector<std::string> refusals_;              // not told yet
+  std::int64_t told_budget_ns_ = INT64_MIN / 2;
+  RecentSenders senders_;
   std::int64_t noted_mishaps_ns_ = -kSecond;
   engine::Mishaps noted_mishaps_;
   bool names_are_old_ = true;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
 #include <filesystem>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "services/lab/measures/scene_source.hpp"
 #include "services/lab/trajectories/export_recording.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
+#include "services/process/signal_watch.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tool/progress.hpp"
 
@@ -23,7 +25,7 @@ struct ExportOptions {
   std::uint32_t every = 1;
 };
 
-Result<void> export_trajectory(const ExportOptions& options) {
+Result<void> export_trajectory(const ExportOptions& options, const std::atomic<bool>& stop) {
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return tl::unexpected(scene.error());
   auto source = make_source(*scene, options.run);
@@ -53,6 +55,7 @@ Result<void> export_trajectory(const ExportOptions& options) {
   tool::Progress progress(fmt::format("{}, {} bodies: frame", scene->name, options.run.bodies),
                           options.run.frames);
   for (Frame frame = 0;; ++frame) {
+    if (stop) return stopped();
     info.gravity.push_back(replay->simulation().gravity());
     const engine::Bodies bodies = replay->simulation().bodies();
     if (auto appended = writer->append(bodies); !appended) return appended;
@@ -67,10 +70,10 @@ Result<void> export_trajectory(const ExportOptions& options) {
   return writer->finish(info);
 }
 
-Result<void> export_chosen(const ExportOptions& options) {
-  if (options.recording.empty()) return export_trajectory(options);
-  if (options.points.empty()) return export_states(options.recording, options.out);
-  return export_points(options.recording, options.points, options.every);
+Result<void> export_chosen(const ExportOptions& options, const std::atomic<bool>& stop) {
+  if (options.recording.empty()) return export_trajectory(options, stop);
+  if (options.points.empty()) return export_states(options.recording, options.out, stop);
+  return export_points(options.recording, options.points, options.every, stop);
 }
 
 }  // namespace
@@ -129,8 +132,9 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
     if (options->out.empty() && options->points.empty())
       commandline::refuse("--out", "expected the .npy file to write");
     run = [options] {
-      const auto exported = export_chosen(*options);
-      return exported ? 0 : report("export", exported.error());
+      SignalWatch signals("tandem export");
+      const auto exported = export_chosen(*options, signals.stop());
+      return signals.finish(exported ? 0 : report("export", exported.error()));
     };
   });
 }

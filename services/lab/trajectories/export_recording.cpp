@@ -91,7 +91,8 @@ std::vector<engine::Shape> shapes_of(const transport::SessionMessage& session) {
 
 }  // namespace
 
-Result<void> export_states(const std::string& recording, const std::string& npy) {
+Result<void> export_states(const std::string& recording, const std::string& npy,
+                           const std::atomic<bool>& stop) {
   const auto sidecar = sidecar_path(npy);
   if (!sidecar) return tl::unexpected(sidecar.error());
   for (const std::string& output : {npy, *sidecar}) {
@@ -124,6 +125,7 @@ Result<void> export_states(const std::string& recording, const std::string& npy)
 
   Step step = Step::kStarted;
   do {
+    if (stop) return stopped();
     info.gravity.push_back(recorded.gravity(reader->timeline().drive()));
     const engine::Bodies bodies = recorded.of(reader->state());
     // The last that lived in a slot.
@@ -147,7 +149,8 @@ Result<void> export_states(const std::string& recording, const std::string& npy)
   return writer->finish(info);
 }
 
-Result<void> export_points(const std::string& recording, const std::string& mcap, std::uint32_t every) {
+Result<void> export_points(const std::string& recording, const std::string& mcap, std::uint32_t every,
+                           const std::atomic<bool>& stop) {
   if (auto distinct = recording::check_distinct(recording, mcap); !distinct) return distinct;
   auto reader = Reader::open(recording);
   if (!reader) return tl::unexpected(reader.error());
@@ -158,6 +161,7 @@ Result<void> export_points(const std::string& recording, const std::string& mcap
                                recording::Compression::kZstd);
   writer.declare(point_cloud_kind(kTopic));
   for (Step step = Step::kStarted; step != Step::kEnd;) {
+    if (stop) return stopped();
     if (step == Step::kStarted || reader->timeline().applied() % every == 0) {
       const transport::SessionMessage& session = reader->playback().session();
       const std::uint64_t time_ns = reader->playback().time_ns();

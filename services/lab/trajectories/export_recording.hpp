@@ -1,6 +1,7 @@
 #pragma once
 // Exports a recording of a session for other tools, as a trajectory or as point clouds.
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 
@@ -25,15 +26,24 @@ inline constexpr const char* kRecordingFormat =
     "times\n"
     "it was recorded: for each body, by slot, x, y, z, radius, red, green, blue, alpha, type.";
 
+/// For an export that nobody breaks off.
+inline const std::atomic<bool> kNoStop{false};
+
+/// What an export says that was told to stop. It leaves no file behind.
+[[nodiscard]] inline tl::unexpected<Error> stopped() {
+  return fail(ErrorCode::kIo, "stopped by a signal before its end; no file was written");
+}
+
 /// The agreed states of the recording's first run as a pair X.npy and X.json: a row for the start and one for
 /// each frame. Where the recorded scene can be loaded, it becomes X.scene.textproto, and X.json names it.
 /// Says on stderr where more follows, and where the file is cut short. Errors: kInvalidArgument (`npy` does
-/// not end in .npy), kIo, kMalformed, kUnsupported, kMismatch.
-[[nodiscard]] Result<void> export_states(const std::string& recording, const std::string& npy);
+/// not end in .npy), kIo (also: `stop` was set), kConflict, kMalformed, kUnsupported, kMismatch.
+[[nodiscard]] Result<void> export_states(const std::string& recording, const std::string& npy,
+                                         const std::atomic<bool>& stop = kNoStop);
 
 /// All runs as messages foxglove.PointCloud (point_cloud.hpp) of topic /bodies in an MCAP file: of the first
 /// frame of a run, and of each that `every` divides. Log times are those of the recording. Errors: as above.
 [[nodiscard]] Result<void> export_points(const std::string& recording, const std::string& mcap,
-                                         std::uint32_t every);
+                                         std::uint32_t every, const std::atomic<bool>& stop = kNoStop);
 
 }  // namespace tandem::lab

@@ -289,7 +289,7 @@ Result<void> TrajectoryWriter::finish(const TrajectoryInfo& info) {
   json["gravity"] = info.gravity;
   return npy_.rewrite_start(bytes_of(header(rows_, bodies_, channels_)))
       .and_then([&] { return sidecar_.write(bytes_of(json.dump() + '\n')); })
-      .and_then([&] { return npy_.close(); })
+      .and_then([&] { return npy_.sync(); })
       .and_then([&] { return sidecar_.commit(); })
       .and_then([&] { return npy_.commit(); });
 }

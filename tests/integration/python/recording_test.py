@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """tandem.Recording on what `tandem record` wrote. Environment: as stage.py; PYTHONPATH names the package."""
 
+import os
 import pathlib
 import tempfile
 import unittest
@@ -118,6 +119,28 @@ class Recorded(unittest.TestCase):
             tandem.Recording(self.folder / "none.mcap")
         self.assertEqual(raised.exception.code, Result.IO)
         self.assertIn("No such file", str(raised.exception))
+
+    def test_a_file_that_shrinks_is_an_error(self):
+        shrinking = self.folder / "shrinking.mcap"
+        shrinking.write_bytes(self.file.read_bytes())
+        with tandem.Recording(shrinking) as recording:
+            first = recording.read()
+            os.truncate(shrinking, 1000)
+            with self.assertRaises(tandem.Error) as raised:
+                while recording.read():
+                    pass
+            self.assertIsNotNone(first)
+        self.assertEqual(raised.exception.code, Result.IO)
+        self.assertIn("shrinking.mcap: it became shorter while it was read", str(raised.exception))
+
+    def test_what_is_no_regular_file_is_refused(self):
+        fifo = self.folder / "fifo"
+        os.mkfifo(fifo)
+        for path, kind in ((fifo, "a FIFO"), (self.folder, "a directory"), ("/dev/zero", "a device")):
+            with self.assertRaises(tandem.Error) as raised:
+                tandem.Recording(path)
+            self.assertEqual(raised.exception.code, Result.IO)
+            self.assertIn(f"it is {kind}, and no regular file", str(raised.exception))
 
     def test_closed_twice_and_used_after(self):
         recording = tandem.Recording(self.file)

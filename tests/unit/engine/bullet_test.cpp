@@ -1,4 +1,5 @@
 #include "services/engine/bullet/bullet.hpp"
+#include "services/engine/common/check.hpp"
 
 #include <gmock/gmock.h>
 
@@ -192,6 +193,21 @@ TEST(Bullet, APushOffTheMiddleTurnsABody) {
   EXPECT_NEAR(angular_velocity(*s, 0)[0], 0.2 * 2 / (0.16 / 6), 0.2);
   EXPECT_EQ(velocity(*s, 1), (Vec3{0, 0, 0})) << "out of the radius";
   EXPECT_EQ(angular_velocity(*s, 1), (Vec3{0, 0, 0}));
+}
+
+TEST(Bullet, APushCostsItsSpeedTimesTheShareOfTheBodiesThatItReaches) {
+  RigidWorld world = heap_world(200);
+  world.world.push_budget = 3;
+  world.world.max_push = 30;
+  const auto s = make(world);
+  EXPECT_EQ(s->input_budget().per_second, 3);
+  EXPECT_EQ(s->input_budget().most, 30) << "one push of all bodies";
+  const auto cost = [&](double radius, Vec3 change) {
+    return s->classify(push_input({0, 0, 0}, radius, change)).cost;
+  };
+  EXPECT_DOUBLE_EQ(cost(1000, {0, 30, 0}), 30);
+  EXPECT_DOUBLE_EQ(cost(1000, {3, 0, 4}), 5);
+  EXPECT_DOUBLE_EQ(cost(0.01, {0, 30, 0}), 30 * kLeastShare);
 }
 
 TEST(Bullet, APushWakesWhatSleeps) {

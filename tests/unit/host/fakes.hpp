@@ -40,6 +40,7 @@ class FakeSimulation final : public engine::Simulation {
     } else if (input.kind == static_cast<std::uint32_t>(engine::InputKind::kPush) &&
                input.values.size() == 7) {
       effect.effect = Effect::kImmediate;
+      effect.cost = std::abs(input.values[4]);
     }
     return effect;
   }
@@ -64,6 +65,7 @@ class FakeSimulation final : public engine::Simulation {
   }
   [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
+  [[nodiscard]] engine::InputBudget input_budget() const override { return budget; }
   [[nodiscard]] engine::Mishaps mishaps() const override { return mishaps_so_far; }
   [[nodiscard]] std::vector<engine::BodyName> names() const override {
     ++asked_for_names;
@@ -91,6 +93,7 @@ class FakeSimulation final : public engine::Simulation {
   std::vector<engine::BodyName> body_names;
   std::uint64_t names_version_now = 0;
   mutable int asked_for_names = 0;
+  engine::InputBudget budget;
   std::function<void(std::uint64_t step)> on_step;
   std::uint64_t steps = 0;
   std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in

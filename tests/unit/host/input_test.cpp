@@ -52,6 +52,59 @@ TEST_F(InputTest, AScheduledInputActsOnFrameSPlusLead) {
   EXPECT_EQ(scheduled.values, (std::vector<std::int32_t>{0, 0, drive.gravity[2], 0}));
 }
 
+TEST_F(InputTest, TheClientsOfADdsParticipantHaveOneBudgetOfImmediateInputs) {
+  constexpr transport::ClientId kSibling = 257;  // of client 1's DDS participant
+  bench.enter(2);
+  bench.enter(kSibling);
+  bench.on_ms = [this] {
+    for (const transport::ClientId client : {transport::ClientId{1}, transport::ClientId{2}, kSibling})
+      bench.playing(client, bench.host->frame());
+  };
+  bench.simulation.budget = {.per_second = 1, .most = 3};
+  const auto reason = [&](transport::ClientId client, std::uint64_t number, double cost) {
+    auto push = bench.push(client, number);
+    push.values[4] = cost;
+    bench.send(push);
+    bench.run_ms(300);
+    return bench.refusal(client, number);
+  };
+  static_cast<void>(bench.host->take_notices());
+  EXPECT_EQ(reason(1, 1, 2.5), Reason::kNone);
+  EXPECT_EQ(reason(1, 2, 1.5), Reason::kRateLimited);
+  EXPECT_EQ(reason(kSibling, 1, 1.6), Reason::kRateLimited) << "another id is no other participant";
+  EXPECT_EQ(reason(1, 3, 0), Reason::kNone) << "what costs nothing is not held up";
+  EXPECT_EQ(reason(2, 1, 2.5), Reason::kNone);
+  bench.run_ms(1500);
+  EXPECT_EQ(reason(1, 4, 2.5), Reason::kNone) << "it has come back";
+  EXPECT_EQ(bench.simulation.applied.size(), 4U);
+  const auto lines = bench.host->take_notices();
+  EXPECT_EQ(std::ranges::count_if(
+                lines, [](const auto& line) { return line.find("its budget of pushes") != line.npos; }),
+            1)
+      << "once in ten seconds";
+}
+
+TEST_F(InputTest, BodiesThatAreLostAreToldWithThoseWhoSentInputsBefore) {
+  static_cast<void>(bench.host->take_notices());
+  const auto lose = [&](std::uint64_t bodies) {
+    bench.simulation.mishaps_so_far.removed += bodies;
+    bench.run_ms(1100);
+    for (const std::string& line : bench.host->take_notices())
+      if (line.find("not sound") != line.npos) return line;
+    return std::string();
+  };
+  EXPECT_THAT(lose(2), testing::HasSubstr("; 2 of them since the last such line, up to frame"));
+  EXPECT_THAT(lose(1), testing::HasSubstr("no client sent an input in the 10 s before"));
+  bench.send(bench.push(1, 1));
+  bench.run_ms(200);
+  EXPECT_THAT(
+      lose(5),
+      testing::AllOf(testing::HasSubstr("8 removed"), testing::HasSubstr("; 5 of them"),
+                     testing::HasSubstr("inputs of the 10 s before came from client 0000000000000001 (")));
+  bench.run_ms(10'000);
+  EXPECT_THAT(lose(1), testing::HasSubstr("no client sent an input"));
+}
+
 TEST_F(InputTest, TheSimulationGetsAScheduledInputInTheStepThatProducesItsFrame) {
   const Frame s = bench.host->frame() + 1;
   bench.send(bench.gravity(1, 1));

@@ -1,11 +1,13 @@
 // The small parts by themselves.
 #include <gtest/gtest.h>
 
+#include "services/accounts/budget.hpp"
 #include "services/accounts/token_bucket.hpp"
 #include "services/host/clients/notices.hpp"
 #include "services/host/clients/pacing.hpp"
 #include "services/host/clients/stall_meter.hpp"
 #include "services/host/clients/window.hpp"
+#include "services/host/frames/recent_senders.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "tests/unit/host/fakes.hpp"
 
@@ -35,6 +37,32 @@ TEST(TokenBucket, GivesABurstAndThenARate) {
   int taken = 0;
   for (std::int64_t ms = 0; ms <= 10'000; ++ms) taken += bucket.take(kSecond + ms * kMillisecond) ? 1 : 0;
   EXPECT_NEAR(taken, 3 + 20, 1);
+}
+
+TEST(Budget, GivesItsReserveAndThenWhatComesBack) {
+  const accounts::Budget::Rule rule{.per_second = 2, .most = 10};
+  accounts::Budget budget;
+  EXPECT_TRUE(budget.take(9, rule, kSecond));
+  EXPECT_FALSE(budget.take(2, rule, kSecond)) << "1 is left, and a refusal takes nothing";
+  EXPECT_TRUE(budget.take(1, rule, kSecond));
+  EXPECT_FALSE(budget.take(3, rule, 2 * kSecond));
+  EXPECT_TRUE(budget.take(2, rule, 2 * kSecond));
+  EXPECT_TRUE(budget.take(1000, rule, 100 * kSecond)) << "more than the reserve costs all of it";
+  EXPECT_FALSE(budget.take(1, rule, 100 * kSecond));
+  EXPECT_TRUE(budget.take(1000, {}, 100 * kSecond)) << "no limit";
+}
+
+TEST(RecentSenders, NamesTheLatestOfTheLastTenSeconds) {
+  RecentSenders senders;
+  EXPECT_EQ(senders.names(kSecond), "");
+  senders.sent(1, kSecond);
+  senders.sent(2, 2 * kSecond);
+  senders.sent(1, 3 * kSecond);
+  EXPECT_EQ(senders.names(4 * kSecond), "client 0000000000000001 (1.0 s), client 0000000000000002 (2.0 s)");
+  EXPECT_EQ(senders.names(13 * kSecond), "client 0000000000000001 (10.0 s)");
+  EXPECT_EQ(senders.names(14 * kSecond), "");
+  for (transport::ClientId client = 10; client < 200; ++client) senders.sent(client, 20 * kSecond);
+  EXPECT_TRUE(senders.names(20 * kSecond).ends_with(" and 56 more")) << senders.names(20 * kSecond);
 }
 
 TEST(Notices, OfOneClientAndOfAllAreBoundedAndSayWhatIsLeftOut) {

@@ -38,7 +38,7 @@ class ExportRecording : public ::testing::Test {
     auto recorder = recording::Recorder::create(path("x.mcap"), recording::Compression::kZstd);
     ASSERT_TRUE(recorder);
     recorder->add(server.session, wall_ns_);
-    recorder->add(server.snapshot(), wall_ns_);
+    recorder->add(server.snapshot(), {wall_ns_, wall_ns_});
     record_frames(server, *recorder, frames);
     ASSERT_TRUE(recorder->finish());
     fixed_bytes_ = recorder->totals().fixed_bytes;
@@ -162,10 +162,10 @@ TEST_F(ExportRecording, TheStatesEndAtTheFirstGapAndThatIsTold) {
   auto recorder = recording::Recorder::create(path("x.mcap"), recording::Compression::kNone);
   ASSERT_TRUE(recorder);
   recorder->add(server.session, wall_ns_);
-  recorder->add(server.snapshot(), wall_ns_);
+  recorder->add(server.snapshot(), {wall_ns_, wall_ns_});
   record_frames(server, *recorder, 2);
   server.advance();
-  recorder->add(server.snapshot(), wall_ns_);
+  recorder->add(server.snapshot(), {wall_ns_, wall_ns_});
   record_frames(server, *recorder, 5);
   ASSERT_TRUE(recorder->finish());
   ::testing::internal::CaptureStderr();

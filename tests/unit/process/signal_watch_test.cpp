@@ -57,6 +57,38 @@ TEST(SignalWatch, ASignalIsSeenAsAFlag) {
   while (!watch.stop()) usleep(1000);
 }
 
+/// The exit code of a child that watches, gets SIGHUP and exits: 7 if it is a stop, else 1.
+int after_hangup(bool ignored) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (ignored) std::signal(SIGHUP, SIG_IGN);
+    const SignalWatch watch("test");
+    kill(getpid(), SIGHUP);
+    usleep(100'000);
+    _exit(watch.stop() ? 7 : 1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(SignalWatch, AHangupIsAStopUnlessItIsIgnored) {
+  EXPECT_EQ(after_hangup(false), 7);
+  EXPECT_EQ(after_hangup(true), 1);
+}
+
+TEST(SignalWatch, AFileAtItsSizeLimitDoesNotEndTheProcess) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const SignalWatch watch("test");
+    raise(SIGXFSZ);
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status));
+}
+
 TEST(SignalWatch, GoingOnAfterAStopIsNoSignal) {
   const pid_t child = fork();
   if (child == 0) {

@@ -93,5 +93,73 @@ TEST_F(OutputFileTest, WhatIsNoRegularFileIsRefusedAndStays) {
   EXPECT_EQ(files(), 4U);
 }
 
+TEST_F(OutputFileTest, OneWritesAFileAndAnotherIsToldWhoDoes) {
+  fs::create_directory(folder / "there");
+  fs::create_directory_symlink("there", path("way"));
+  fs::create_symlink("there/x", path("link"));
+  const std::string holder = "process " + std::to_string(::getpid()) + " is writing it";
+  auto first = OutputFile::create(path("there/x"));
+  ASSERT_TRUE(first) << first.error().message;
+  ASSERT_TRUE(write(*first, "first"));
+  for (const bool named : {false, true}) {
+    if (named) {
+      ASSERT_TRUE(first->take_name());
+    }
+    for (const char* spelling : {"there/x", "./there/../there//x", "way/x", "link"}) {
+      const auto second = OutputFile::create(path(spelling));
+      ASSERT_FALSE(second) << spelling << (named ? " with its name" : " as .part");
+      EXPECT_EQ(second.error().code, ErrorCode::kConflict);
+      EXPECT_NE(second.error().message.find(holder), std::string::npos) << second.error().message;
+    }
+  }
+  EXPECT_FALSE(fs::exists(path("there/x.part")));
+  ASSERT_TRUE(write(*first, " goes on") && first->commit());
+  EXPECT_EQ(content("there/x"), "first goes on");
+  auto later = OutputFile::create(path("link"));
+  EXPECT_TRUE(later) << later.error().message;
+}
+
+TEST_F(OutputFileTest, WhatAKilledRunLeftIsReplacedAndNotWrittenTo) {
+  put("x.part", "left");
+  fs::create_hard_link(path("x.part"), path("kept"));
+  auto file = OutputFile::create(path("x"));
+  ASSERT_TRUE(file && write(*file, "new") && file->commit());
+  EXPECT_EQ(content("x"), "new");
+  EXPECT_EQ(content("kept"), "left");
+  EXPECT_EQ(files(), 2U);
+}
+
+TEST_F(OutputFileTest, ThePartOfAnotherIsNeitherRenamedNorRemoved) {
+  {
+    auto file = OutputFile::create(path("x"));
+    ASSERT_TRUE(file && write(*file, "mine"));
+    fs::remove(path("x.part"));
+    put("x.part", "another's");
+    const auto named = file->take_name();
+    ASSERT_FALSE(named);
+    EXPECT_NE(named.error().message.find("x.part is another file by now"), std::string::npos)
+        << named.error().message;
+  }
+  EXPECT_EQ(content("x.part"), "another's");
+  EXPECT_FALSE(fs::exists(path("x")));
+}
+
+TEST_F(OutputFileTest, AFileThatWasRemovedWhileItWasWrittenIsAnError) {
+  auto file = OutputFile::create(path("x"));
+  ASSERT_TRUE(file && file->take_name() && write(*file, "gone"));
+  fs::remove(path("x"));
+  const auto closed = file->close();
+  ASSERT_FALSE(closed);
+  EXPECT_NE(closed.error().message.find("was removed while it was written"), std::string::npos);
+}
+
+TEST_F(OutputFileTest, AFileThatWasMovedAwayIsComplete) {
+  auto file = OutputFile::create(path("x"));
+  ASSERT_TRUE(file && file->take_name());
+  fs::rename(path("x"), path("y"));
+  ASSERT_TRUE(write(*file, "all") && file->close());
+  EXPECT_EQ(content("y"), "all");
+}
+
 }  // namespace
 }  // namespace tandem::recording

@@ -1,6 +1,7 @@
 #include "services/recording/playback.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -39,7 +40,8 @@ class PlaybackTest : public ::testing::Test {
       ASSERT_TRUE(client->apply(delta.frame, delta.last_input, delta.hash, delta.payload));
       recorder->add(server.session.epoch, delta, wall_ns);
       wall_ns += kSecond;
-      if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, wall_ns);
+      steady_ns += kSecond;
+      if (recorder->snapshot_due(steady_ns)) recorder->cut_snapshot(*client, {steady_ns, wall_ns});
     }
   }
   void schedule(std::int32_t gravity_y) {
@@ -49,7 +51,7 @@ class PlaybackTest : public ::testing::Test {
   void join() {
     const auto snapshot = server.snapshot();
     ASSERT_TRUE(client->load(snapshot.bytes, server.session.epoch));
-    recorder->add(snapshot, wall_ns);
+    recorder->add(snapshot, {steady_ns, wall_ns});
   }
   void begin() {
     recorder.emplace(std::move(*Recorder::create(path, Compression::kZstd)));
@@ -75,6 +77,7 @@ class PlaybackTest : public ::testing::Test {
   std::optional<ClientTimeline> client;
   std::optional<Recorder> recorder;
   std::int64_t wall_ns = 1'700'000'000 * kSecond;
+  std::int64_t steady_ns = 5 * kSecond;
 };
 
 TEST_F(PlaybackTest, PlaysEveryFrameWithTheServersHash) {
@@ -114,6 +117,25 @@ TEST_F(PlaybackTest, ARecordingOfAnotherVersionIsRefusedByThatVersion) {
   ASSERT_FALSE(step);
   EXPECT_EQ(step.error().code, ErrorCode::kUnsupported);
   EXPECT_NE(step.error().message.find("protocol version 1"), std::string::npos) << step.error().message;
+}
+
+TEST_F(PlaybackTest, AWallClockThatJumpsAnHourChangesNoSnapshot) {
+  begin();
+  frames(70);
+  wall_ns -= 3600 * kSecond;
+  frames(80);
+  wall_ns += 2 * 3600 * kSecond;
+  frames(50);
+  ASSERT_TRUE(recorder->finish());
+  EXPECT_EQ(recorder->totals().snapshots_cut, 3U) << "of frames 60, 120 and 180";
+  const auto playback = Playback::open(path);
+  ASSERT_TRUE(playback) << playback.error().message;
+  EXPECT_EQ(play(**playback), "S" + std::string(200, '.'));
+  for (const Frame frame : {59U, 119U, 179U, 199U}) {
+    ASSERT_TRUE((*playback)->seek(server.session.epoch, frame));
+    ASSERT_EQ((*playback)->next(), Step::kStarted);
+    EXPECT_EQ((*playback)->timeline().applied(), frame / 60 * 60);
+  }
 }
 
 TEST_F(PlaybackTest, AFrameBringsTheInputsThatItIsTheFirstToPromise) {
@@ -181,8 +203,9 @@ TEST_F(PlaybackTest, AnInputOnItsWayWhenASnapshotIsCutIsThereBehindIt) {
   recorder->add(server.session.epoch, delta, wall_ns);
   schedule(-60);
   wall_ns += kSecond;
-  ASSERT_TRUE(recorder->snapshot_due(wall_ns));
-  recorder->cut_snapshot(*client, wall_ns);
+  steady_ns += kSecond;
+  ASSERT_TRUE(recorder->snapshot_due(steady_ns));
+  recorder->cut_snapshot(*client, {steady_ns, wall_ns});
   frames(10);
   ASSERT_TRUE(recorder->finish());
   auto playback = Playback::open(path);
@@ -249,6 +272,41 @@ TEST_F(PlaybackTest, WhatCannotBeReadIsToldWithTheFilesName) {
   std::ofstream(path) << "not a recording";
   EXPECT_EQ(Playback::open(path).error().message,
             path + ": not an MCAP file: its first eight bytes are others");
+}
+
+TEST_F(PlaybackTest, AFileThatBecomesShorterWhileItIsReadIsAnError) {
+  begin();
+  frames(150);
+  const std::uint64_t middle = std::filesystem::file_size(path);
+  frames(150);
+  ASSERT_TRUE(recorder->finish());
+  auto playback = Playback::open(path);
+  ASSERT_TRUE(playback);
+  ASSERT_EQ((*playback)->next(), Step::kStarted);
+  std::filesystem::resize_file(path, middle);
+  auto step = (*playback)->next();
+  std::size_t played = 0;
+  for (; step == Step::kFrame; step = (*playback)->next()) ++played;
+  ASSERT_FALSE(step);
+  EXPECT_EQ(step.error().code, ErrorCode::kIo);
+  EXPECT_EQ(step.error().message, "it became shorter while it was read");
+  EXPECT_GT(played, 140U) << "what is still there is read";
+  const auto sought = (*playback)->seek(server.session.epoch, 290);
+  ASSERT_FALSE(sought);
+  EXPECT_EQ(sought.error().message, "it became shorter while it was read");
+}
+
+TEST_F(PlaybackTest, WhatIsNoRegularFileIsRefused) {
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  for (const auto& [what, named] : {std::pair{path.c_str(), "a FIFO"},
+                                    {"/tmp", "a directory"},
+                                    {"/dev/zero", "a device"},
+                                    {"/dev/tty", "a device"}}) {
+    const auto playback = Playback::open(what);
+    ASSERT_FALSE(playback) << what;
+    EXPECT_EQ(playback.error().message,
+              std::string(what) + ": cannot read: it is " + named + ", and no regular file");
+  }
 }
 
 TEST_F(PlaybackTest, AFrameOfAnotherHashIsAnError) {

@@ -47,7 +47,7 @@ class RecorderTest : public ::testing::Test {
   Recorder create() const { return std::move(*Recorder::create(path, Compression::kNone)); }
   void join(Recorder& recorder) {
     recorder.add(server.session, wall_ns);
-    recorder.add(server.snapshot(), wall_ns);
+    recorder.add(server.snapshot(), {wall_ns, wall_ns});
   }
   void frames(Recorder& recorder, int count) {
     for (int i = 0; i < count; ++i) {

@@ -1,3 +1,4 @@
+#include "services/accounts/budget.hpp"
 #include "services/scenes/scene.hpp"
 
 #include <gmock/gmock.h>
@@ -242,6 +243,43 @@ TEST_P(RigidScene, StaysWholeUnderItsScriptAndTurns) {
   }
   EXPECT_EQ(simulation.mishaps(), engine::Mishaps{});
   EXPECT_GT(simulation.colliding(), kBodies / 2);
+}
+
+/// Bodies that are left of `rubble` after a participant tried to push all of them up as hard as the scene
+/// permits, 60 times a second; and how many pushes it had.
+std::pair<std::uint32_t, int> left_of_rubble(bool limited, int tries) {
+  constexpr std::uint32_t kBodies = 300;
+  auto simulation = *make_simulation(*load_scene("rubble"), kBodies, 7, 1);
+  const engine::InputBudget limit = simulation->input_budget();
+  EXPECT_EQ(limit.per_second, 3.75);
+  EXPECT_EQ(limit.most, 30);
+  accounts::Budget budget;
+  const engine::Input push{.kind = 2, .values = {0, 0, 0, 1000, 0, 30, 0}};
+  int taken = 0;
+  std::int64_t now_ns = 0;
+  const auto step = [&] {
+    simulation->step();
+    now_ns += 1'000'000'000 / 60;
+  };
+  for (int i = 0; i < 120; ++i) step();
+  for (int i = 0; i < tries; ++i, step()) {
+    const auto classified = simulation->classify(push);
+    EXPECT_EQ(classified.effect, engine::Classification::Effect::kImmediate);
+    if (limited && !budget.take(classified.cost, {limit.per_second, limit.most}, now_ns)) continue;
+    simulation->apply(push);
+    ++taken;
+  }
+  for (int i = 0; i < 600; ++i) step();
+  const auto alive = simulation->bodies().alive;
+  return {static_cast<std::uint32_t>(std::count(alive.begin(), alive.end(), std::uint8_t{1})), taken};
+}
+
+TEST(RubbleScene, OneParticipantCannotPushItEmpty) {
+  if (!engine::bullet_is_built()) GTEST_SKIP();
+  EXPECT_EQ(left_of_rubble(false, 400).first, 0U) << "as it would be without a budget";
+  const auto [left, pushes] = left_of_rubble(true, 900);
+  EXPECT_EQ(left, 300U);
+  EXPECT_EQ(pushes, 1 + 15 / 8);
 }
 
 // Bullet's heaps of boxes tremble: now and then one of them is kicked, which keeps all that touch awake.

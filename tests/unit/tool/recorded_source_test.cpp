@@ -30,7 +30,7 @@ class RecordedSourceTest : public ::testing::Test {
     const auto snapshot = server.snapshot();
     EXPECT_TRUE(client->load(snapshot.bytes, server.session.epoch));
     recorder->add(server.session, wall_ns);
-    recorder->add(snapshot, wall_ns);
+    recorder->add(snapshot, {wall_ns, wall_ns});
     for (Frame frame = 1; frame <= kFrames; ++frame) {
       if (frame == 5) {
         const auto input = server.schedule(-4000);
@@ -47,7 +47,7 @@ class RecordedSourceTest : public ::testing::Test {
                      .payload = delta.payload},
                     wall_ns);
       wall_ns += kSecond;
-      if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, wall_ns);
+      if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, {wall_ns, wall_ns});
     }
     EXPECT_TRUE(recorder->finish());
     fixed_bytes = recorder->totals().fixed_bytes;

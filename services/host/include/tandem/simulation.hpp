@@ -38,6 +38,14 @@ struct Classification {
   std::string reason = {};   ///< kRefused: the reason, one line
   Vec3 gravity{};            ///< kScheduled: scene units / s^2, in force from the frame the input acts on
   double damping_per_s = 0;  ///< kScheduled
+  double cost = 0;           ///< kImmediate: what the input takes of its sender's InputBudget, >= 0
+};
+
+/// What the immediate inputs of one participant may cost, in a unit that the simulation chooses. The server
+/// refuses an input that costs more than is left.
+struct InputBudget {
+  double per_second = 0;  ///< comes back
+  double most = 0;        ///< maximum that is saved up, and what a participant begins with; 0: no limit
 };
 
 /// The bodies after a step, in slot order, as columns of `capacity` elements. Units: scene units, seconds.
@@ -101,6 +109,8 @@ class Simulation {
   [[nodiscard]] virtual Classification classify(const Input& /*input*/) const {
     return {.reason = "this simulation takes no input"};
   }
+  /// The limit of what Classification::cost counts. It does not change.
+  [[nodiscard]] virtual InputBudget input_budget() const { return {}; }
   /// Hands over an input that classify() did not refuse. It takes effect in the next step(). The last gravity
   /// wins.
   virtual void apply(const Input& /*input*/) {}

@@ -1,0 +1,33 @@
+#pragma once
+// How much may happen, where it happens in amounts.
+
+#include <algorithm>
+#include <cstdint>
+
+namespace tandem::accounts {
+
+/// What is taken comes back at a constant rate, up to a reserve. Starts full. Time never goes back.
+class Budget {
+ public:
+  struct Rule {
+    double per_second = 0;
+    double most = 0;  ///< the reserve; 0: everything may be taken
+  };
+
+  /// Takes `amount`, if it is there. More than the whole reserve is taken as the whole.
+  bool take(double amount, const Rule& rule, std::int64_t now_ns) {
+    if (!(rule.most > 0)) return true;
+    spent_ = std::max(spent_ - static_cast<double>(now_ns - at_ns_) * 1e-9 * rule.per_second, 0.0);
+    at_ns_ = now_ns;
+    const double wanted = std::min(amount, rule.most);
+    if (!(spent_ + wanted <= rule.most)) return false;
+    spent_ += wanted;
+    return true;
+  }
+
+ private:
+  double spent_ = 0;  // as of at_ns_
+  std::int64_t at_ns_ = 0;
+};
+
+}  // namespace tandem::accounts
