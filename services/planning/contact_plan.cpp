@@ -68,13 +68,13 @@ std::string fault(const World& world) {
 
 }  // namespace
 
-Result<void> set_contact(const World& world, const host::Lattice& lattice, const PredictorTraits& predictor,
-                         Layout& layout) {
+Result<void> set_contact(const World& world, const PredictorTraits& predictor, host::StreamConfig& stream) {
   const auto wrong = [&predictor](const std::string& what) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("predictor '{}': {}", predictor.name, what));
   };
   if (const std::string what = fault(world); !what.empty()) return wrong(what);
   const Scenery& scenery = *world.scenery;
+  const host::Lattice& lattice = stream.lattice;
   const double scale = lattice.position_scale();
   const double one = ContactConstants::kOne;
   const double mass = world.types.front().mass;
@@ -98,9 +98,10 @@ Result<void> set_contact(const World& world, const host::Lattice& lattice, const
     return fail(ErrorCode::kCapacity,
                 fmt::format("predictor '{}': the world does not fit the lattice", predictor.name));
   }
-  const bool is_merged = predictor.one_step && constants.substeps > 1;
-  layout.predictor = predictor.one_step && !is_merged ? "contact" : predictor.name;
-  layout.predictor_constants = write_contact_constants(is_merged ? in_one_step(constants) : constants);
+  if (predictor.one_step && constants.substeps == 1) stream.local.encodes_as = "contact";
+  stream.layout.predictor = predictor.name;
+  stream.layout.predictor_constants =
+      write_contact_constants(predictor.one_step ? in_one_step(constants) : constants);
   return {};
 }
 

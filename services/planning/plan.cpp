@@ -66,7 +66,7 @@ bool suits(const PredictorTraits& predictor, const World& world, const CodecTrai
 }
 
 Result<void> set_predictor(const World& world, const PredictorTraits& predictor, host::StreamConfig& stream) {
-  if (predictor.reads_world) return set_contact(world, stream.lattice, predictor, stream.layout);
+  if (predictor.reads_world) return set_contact(world, predictor, stream);
   stream.layout.predictor = predictor.name;
   return {};
 }

@@ -10,7 +10,8 @@ namespace tandem {
 Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local,
                                  std::unique_ptr<Predictor> predictor) {
   if (auto good = check_layout(layout); !good) return tl::unexpected<Error>(good.error());
-  const auto traits = find_predictor(layout.predictor);  // empty for a caller's own predictor
+  // Empty for a caller's own predictor.
+  const auto traits = find_predictor(local.encodes_as.empty() ? layout.predictor : local.encodes_as);
   auto codec = make_codec({.name = layout.codec,
                            .capacity = layout.capacity,
                            .tables = layout.codec_tables,

@@ -163,7 +163,8 @@ Result<void> check_stream_names(std::span<const StreamConfig> streams) {
 }
 
 Result<void> choose_gains(StreamConfig& config) {
-  const auto traits = find_predictor(config.layout.predictor);
+  const std::string_view name = config.local.encodes_as;
+  const auto traits = find_predictor(name.empty() ? config.layout.predictor : name);
   if (!traits) return tl::unexpected(traits.error());
   set_first_gains(**traits, config.layout.parameters);
   config.gains = usual_gain_goal(**traits);

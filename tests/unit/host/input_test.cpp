@@ -90,7 +90,7 @@ TEST_F(InputTest, BodiesThatAreLostAreToldWithThoseWhoSentInputsBefore) {
     bench.simulation.mishaps_so_far.removed += bodies;
     bench.run_ms(1100);
     for (const std::string& line : bench.host->take_notices())
-      if (line.find("not sound") != line.npos) return line;
+      if (line.find("faulty bodies") != line.npos) return line;
     return std::string();
   };
   EXPECT_THAT(lose(2), testing::HasSubstr("; 2 of them since the last such line, up to frame"));

@@ -88,7 +88,7 @@ TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
   };
   using W = Wishes;
   using S = ServiceWishes;
-  EXPECT_EQ(with([](W& w, S&) { w.budget_bytes = 1; }), "budget: at least 64 bytes");
+  EXPECT_EQ(with([](W& w, S&) { w.budget_bytes = 1; }), "budget: must be at least 64 bytes");
   EXPECT_NE(with([](W& w, S&) { w.codec = "entropy", w.budget_bytes = 500; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.codec = "none", w.automatic = true; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.max_error_m = 1; }), "accepted");

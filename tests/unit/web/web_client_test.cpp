@@ -151,7 +151,7 @@ TEST_F(WebClientTest, InputsLeaveAndTheirOutcomesAreTold) {
   give(reply);
   poll();
   EXPECT_THAT(viewer.take_events(),
-              HasSubstr(R"("kind":"refused","frame":0,"reason":"input refused: too many)"));
+              HasSubstr(R"("kind":"refused","frame":0,"reason":"input refused: there were too many)"));
 }
 
 TEST_F(WebClientTest, LagIsByTheServersClock) {
