@@ -72,20 +72,21 @@ def orientation():
     q, w, most = worlds.some_quaternion(worlds.random_numbers(22)), (1000, -2**28, 77), turn.MOST_W
     turned = writer.orientation(q, w)
     edge = writer.orientation((0, one, 0, 0), (0, 0, -most))
+    near = writer.orientation((0, one, 0, 0), (0, 600000, 1000 - most))
     vector.predict(3)
     for why, records in (
         ("despawn of 2", [writer.record(2, 0)]),
         ("spawn in 2", [writer.record(2, 1, b"\1\1", place, turned)]),
         ("a teleport of the orientation of 0, which wakes it; c of 0 becomes 0", [writer.record(0, 2, b"\2", turned)]),
         ("of the position of 5", [writer.record(5, 2, b"\1", place)]),
-        ("of both of 6, at the limit of w", [writer.record(6, 2, b"\3", place, edge)]),
+        ("of both of 6, near the limit of w", [writer.record(6, 2, b"\3", place, near)]),
         ("type change of 1, which wakes nobody", [writer.record(1, 3, b"\1")]),
-        ("despawn and spawn of 5", [writer.record(5, 0), writer.record(0, 1, b"\0\1", place, edge)]),
+        ("despawn and spawn of 5, at the limit of w", [writer.record(5, 0), writer.record(0, 1, b"\0\1", place, edge)]),
     ):
         vector.say(why)
         vector.delta(writer.section(0x81, b"".join(records)))
         vector.predict()
-    vector.say("all is rounded; the w of 6, at its limit, would leave its range and stays")
+    vector.say("all is rounded; the w of 6 would leave its range and stays")
     vector.delta(writer.section(0x87, bytes([5, 5, 5, 12, 20])))
     vector.predict(10)
     vector.input(1, line.frame + 1, Drive((0, -2999, 5), 100))
@@ -125,6 +126,7 @@ def orientation_snapshot():
     state = line.world.state
     state.rest[1], state.c[1, 1], state.w[:, 1] = 1, 3000, 0
     state.q[:, 2], state.w[:, 2] = (0, 0, 0, -turn.ONE), (0, turn.MOST_W, 0)
+    state.q[:, 4] = [*[math.isqrt((2**60 + 2**50) // 3)] * 3, 0]  # x, y and z alone are too long for a w
     start = writer.snapshot(line)
     broken = []
     for why, rows, values in (

@@ -1,9 +1,11 @@
 """The vectors of the codec `tracker`, and of rounding."""
 
+import math
 from dataclasses import replace
 
 import worlds
 import writer
+from tandem_reference import turn
 from tandem_reference.predict import Drive
 from tandem_reference.tracker import Correction
 from vector_text import Vector, scattered
@@ -20,6 +22,8 @@ def vectors():
         "tracker_turns": turns(),
         "tracker_turns_refused": refused_of_turns(),
         "tracker_turns_snapshot": middle_of_turns(),
+        "tracker_turns_rounded": rounded_turns(),
+        "tracker_field": field(),
         "tracker_refused": refused(),
         "rounding": rounding(),
     }
@@ -78,7 +82,7 @@ def learn_anything(models, following):
         if models.weight[model]:
             models.p[model] = 32768 + following(32000)
         if following(100) > 70:
-            models.weight[model], models.p[model] = 1, 32 if model % 2 else 65504
+            models.weight[model], models.p[model] = (1, 255, 6)[model % 3], 32 if model % 2 else 65504
 
 
 # Where classes of frames begin.
@@ -138,6 +142,7 @@ def middle_of_turns():
     state.rest[5::9] = 1
     state.c[:, 5::9] = [[0], [3000], [0]]
     state.w[:, 5::9] = 0
+    state.w[:, 2] = turn.MOST_W, 0, 0
     learn_anything(line.world.models, following)
     about = "codec tracker: orientations from the middle, with columns and models of every kind"
     vector = Vector(about, line, writer.snapshot(line))
@@ -155,6 +160,8 @@ def middle_of_turns():
         corrections = some_corrections(range(54), following, (2, 2, 3))
         if frame in changes:
             vector.say(changes[frame][1])
+            if frame == 2:
+                corrections |= turns_of_2_rad()
             vector.track(corrections, writer.section(0x82, writer.parameters(changes[frame][0])))
         elif frame == 3:
             vector.say("slot 7 turned, 9 moved, 8 of another type, all corrected")
@@ -167,6 +174,81 @@ def middle_of_turns():
             vector.delta(writer.section(0x81, writer.record(3, 2, b"\2", content)))
         else:
             vector.track(corrections)
+    return vector
+
+
+def turns_of_2_rad():
+    """Steps of 2 rad: at the limit of one turn (the first, which has the maximum w), and beyond it, also by the length alone."""
+    steps = [1, 0, 0], [0, -1, 0], [1, 1, 0], [2, 0, 0], [-1, 0, -1], [0, 3, 0], [1, -1, 1], [-5, 1, 0]
+    return {slot: Correction(0, None, turn_by) for slot, turn_by in zip((2, 6, 10, 11, 15, 18, 19, 22), steps)}
+
+
+def rounded_turns():
+    """Roundings of orientations, of bodies at rest next to each other too, and snapshots before and after."""
+    slots = [slot for slot in range(28) if slot != 7]
+    line = scattered("tracker", "ballistic", slots, 28, b"", 51, turns=True)
+    following = worlds.random_numbers(52)
+    state = line.world.state
+    resting = [*range(8, 13), *range(15, 22)]
+    state.rest[resting] = 1
+    state.v[:, resting], state.c[:, resting] = 0, [[0], [3000], [0]]
+    state.w[:, [slot for slot in resting if slot % 3]] = 0
+    for slot in resting:
+        # Neighbours lie alike; every other one has the other sign.
+        alike = state.q[:, slot - slot % 5 if slot < 15 else 15] + [following(2**12) for _ in range(4)]
+        state.q[:, slot] = alike * (-1) ** (slot // 2)
+    one, long = turn.ONE, math.isqrt(2**58 + 2**48)
+    for slot, q in enumerate(([long, -long, long, -long], [0, -one, 0, -100], [one, 0, 0, 100], [-one, 0, 0, 0],
+                              [0, 0, 0, -one], [long, long, -long, long])):  # fmt: skip
+        state.q[:, slot] = q
+    for slot, w in ((1, (-(2**29), 0, 0)), (24, (2**29 - 1, 30000, 0)), (25, (-2, 30000, 5 - 2**29)), (26, (2**29 - 1, 12345, 0)), (4, (0, 2**29, 0)),
+                    (5, (3, -3, 2**20 + 1)), (6, (2**23, -(2**23), 3 * 2**23))):  # fmt: skip
+        state.w[:, slot] = w
+    for slot in slots:
+        for group in (0, 5):
+            age = (5, 5, 0, 0, 5, 9, 0, 9, 9)[(slot + group) % 9]
+            interval = (255, 0, 255, 3, 3, 0, 200)[(slot + group) % 7]
+            state.codec[group : group + 5, slot] = [age, interval, *([1, 1, -1] if slot % 3 else [0, 1, -1])]
+    about = "codec tracker: rounded orientations; bodies at rest that lie alike, some of which turn; 0 and 5 as long as q may be"
+    vector = Vector(about, line, writer.snapshot(line))
+    vector.say("halves; 9 and 16 are woken, 17 is turned where it rests, 23 put to rest")
+    corrections = {
+        2: Correction(0, [1, 0, 0], [0, 1, -1], 0), 3: Correction(0, None, [1, -1, 0]), 9: Correction(0, [0, 1, 0]),
+        16: Correction(0, None, [1, 2, -3]), 17: Correction(1, None, [0, 0, 1]), 23: Correction(1, [1, 1, 1], [2, 0, 0], 1),
+    }  # fmt: skip
+    vector.track(corrections, rounding=writer.section(0x87, bytes([1, 1, 1, 1, 1])))
+    vector.say("q rounded by no bits, so that its sign stays")
+    vector.delta(writer.section(0x87, bytes([0, 0, 0, 0, 15])))
+    vector.say("0 and 5, turned, would leave their range and stay, but for the sign; w of 1 is rounded to 0; 6, 13, 14, turned, are corrected")
+    places = {0: (long, -long, long, -long), 1: (0, -one, 0, -100), 5: (long, long, -long, long)}
+    places |= {slot: worlds.some_quaternion(following) for slot in (6, 13, 14)}
+    born = [writer.record(gap, 2, b"\2", writer.orientation(q, (5, -6, 7))) for gap, q in zip((0, 1, 4, 1, 7, 1), places.values())]
+    turned = {slot: Correction(0, None, [9, -4, slot]) for slot in (6, 13, 14)}
+    vector.track(turned, writer.section(0x81, b"".join(born)), places, rounding=writer.section(0x87, bytes([0, 0, 0, 18, 0])))
+    vector.predict()
+    vector.say("all, by the maximum")
+    vector.track(corrections, rounding=writer.section(0x87, bytes([4, 5, 6, 18, 24])))
+    vector.predict()
+    vector.say("4 and 5 leave; q rounded, corrected and rounded again; a snapshot of this frame has short columns")
+    gone = writer.section(0x81, writer.record(4, 0) + writer.record(1, 0))
+    corrections = {slot: how for slot, how in corrections.items() if slot > 9}
+    vector.track(corrections, gone, rounding=writer.section(0x87, bytes([4, 5, 6, 17, 20])))
+    vector.snapshot(writer.snapshot(vector.line))
+    vector.say("the same with other numbers of ones")
+    for more in (-3, 1, 40000):
+        vector.snapshot(writer.snapshot(vector.line, more_ones=more))
+    return vector
+
+
+def field():
+    """`field` with several sub-steps a frame, which mean what they mean for `contact`; gains too."""
+    line = scattered("tracker", "field", range(12), 12, b"", 61)
+    line.stream = worlds.stream("tracker", "field", 12, constants=worlds.CONTACT)
+    vector = Vector("codec tracker with field of two sub-steps a frame", line)
+    following = worlds.random_numbers(62)
+    for _ in range(4):
+        vector.predict()
+        vector.track(some_steps(range(12), following, (1, 2, 3)))
     return vector
 
 

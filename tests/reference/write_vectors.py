@@ -159,6 +159,7 @@ def snapshots():
     vector.input(7, 44, Drive((0, 0, 0), 0))
     vector.predict(4)
     vector.refuse_snapshot(start[:4] + b"\3" + start[5:], "an unknown version")
+    vector.refuse_snapshot(start[:4] + b"\1" + start[5:], "the version before")
     vector.refuse_snapshot(start[:59] + b"\1" + start[60:], "another capacity")
     vector.refuse_snapshot(start[:51] + bytes(8) + start[59:], "another state hash")
     vector.refuse_snapshot(start[:-1], "cut short")

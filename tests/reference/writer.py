@@ -231,20 +231,20 @@ def same_column(numbers, values, at_rest):
         before[rest] = x
 
 
-def models_of(numbers, models):
-    """The models of the codec `tracker`."""
+def models_of(numbers, models, more_ones):
+    """The models of the codec `tracker`; `more_ones` are told than those that explain P best."""
     weights, ones, rest = NumberModels(), [NumberModels() for _ in range(8)], NumberModels()
     starts = tracker.Models(len(models.p) > tracker.Models(False).p.size).p.tolist()
     for weight, p, start in zip(models.weight.tolist(), models.p.tolist(), starts):
         numbers.number(weights, -weight % 256)
         if weight:
-            seen = ((weight + 1) * p - start + 2**15) >> 16
+            seen = (((weight + 1) * p - start + 2**15) >> 16) + more_ones
             numbers.number(ones[weight.bit_length() - 1], seen)
             guess = (start + 65536 * seen) // (weight + 1)
             numbers.number(rest, p - min(max(guess, 32), 65504))
 
 
-def region(world):
+def region(world, more_ones=0):
     """The body of a region's section."""
     state, numbers = world.state, NumberEncoder()
     living, before = [Model(), Model()], 0
@@ -272,11 +272,11 @@ def region(world):
         else:
             column(numbers, values, reference.ZERO, at_rest)
     if world.models:
-        models_of(numbers, world.models)
+        models_of(numbers, world.models, more_ones)
     return leb128(0) + struct.pack("<Q", state.region_hash()) + numbers.finish()
 
 
-def snapshot(timeline, epoch=1, stream=0, generation=0):
+def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
     """The snapshot of a timeline's frame."""
     world, state, drive = timeline.world, timeline.world.state, timeline.drive
     waiting = [
@@ -291,7 +291,7 @@ def snapshot(timeline, epoch=1, stream=0, generation=0):
             struct.pack("<QI", state.hash(), state.capacity),
             section(0x82, parameters(world.parameters)),
             section(0x84, b"".join(waiting)) if waiting else b"",
-            section(0x85, region(world)),
+            section(0x85, region(world, more_ones)),
         ]
     )
 

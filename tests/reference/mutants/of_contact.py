@@ -20,14 +20,13 @@ MUTANTS = [
     ("contact", "the sub-step's part is rounded down",
      "(2**15 + self.substeps // 2) // self.substeps", "2**15 // self.substeps"),
     # Field.
-    ("stream", "`field` is `contact`", "self.world = self.world.as_field()", "pass"),
-    ("contact", "the spring of `field` has no limit", "min(substeps * self.spring, 10240)", "substeps * self.spring"),
-    ("contact", "the normal damping of `field` has no limit", "min(total - shear, 2**13)", "total - shear"),
-    ("contact", "the shear damping of `field` may exceed all'",
-     "min(substeps * self.shear, total, 2**13)", "min(substeps * self.shear, 2**13)"),
-    ("contact", "the dampings of `field` are rounded up",
-     "total = 5 * substeps * (self.normal + self.shear) // 8",
-     "total = -(-5 * substeps * (self.normal + self.shear) // 8)"),
+    ("stream", "`field` makes one sub-step, whatever it announces",
+     "            self.world = contact.read_world(self.predictor_constants)\n",
+     "            self.world = contact.read_world(self.predictor_constants)\n"
+     '            object.__setattr__(self.world, "substeps", 1 if self.predictor == "field" else self.world.substeps)\n'),
+    ("predict", "bodies do not feel each other with `field`",
+     'if stream.predictor == "ballistic":', 'if stream.predictor != "contact":'),
+    ("tracker", "now = 1 divides by 2 with `field`", 'stream.predictor == "ballistic"', 'stream.predictor != "contact"'),
     # The force of a contact.
     ("contact", "the approach is damped by normal_damping",
      "(kind.shear * approach) >> 11", "(kind.normal * approach) >> 11"),

@@ -135,6 +135,9 @@ MUTANTS = [
 
 # The same, and why no agreed state depends on it.
 EQUIVALENT = [
+    ("snapshot", "w of q may be beyond 1 in its column",
+     'require(-most <= value <= most, "snapshot", f"a value of {value}")', "pass",
+     "what is beyond 1 is no quaternion, and refused as such"),
     ("turn", "the squares of the norm are added before they are shifted",
      "    norm = ((r * r) >> 2).sum(axis=0)\n    return",
      "    norm = (r * r).sum(axis=0) >> 2\n    return",
