@@ -20,11 +20,12 @@ class ColumnCoder {
   template <class Coder>
   [[gnu::always_inline]] std::int64_t code(Coder& coder, bool at_rest, std::int64_t x, std::int64_t norm) {
     Kind& kind = kinds_[at_rest ? 1 : 0];
-    if (guess_ == Guess::kSame)
-      return kind.guess = kind.exchanged(code_number(coder, kind.models, kind.exchanged(x)));
     if (guess_ == Guess::kNorm) kind.guess = norm;
-    x = kind.guess + code_number(coder, kind.models, x - kind.guess);
-    if (guess_ == Guess::kBefore || (at_rest && (guess_ == Guess::kHalf || guess_ == Guess::kRest)))
+    const bool is_same = guess_ == Guess::kSame;
+    const std::int64_t number = code_number(coder, kind.models, is_same ? kind.exchanged(x) : x - kind.guess);
+    x = is_same ? kind.exchanged(number) : kind.guess + number;
+    if (is_same || guess_ == Guess::kBefore ||
+        (at_rest && (guess_ == Guess::kHalf || guess_ == Guess::kRest)))
       kind.guess = x;
     if (guess_ == Guess::kHalf && !at_rest) kind.guess = (kind.guess + x) >> 1;
     return x;
@@ -60,6 +61,7 @@ class MissingComponent {
 
 // Numbers that are all multiples of 2^n are written without their n lowest bits.
 constexpr unsigned kShiftBits = 5;
+constexpr std::int64_t kBeyond = std::int64_t{1} << 33;  // of all columns
 constexpr std::size_t kMostRegionNumberBytes = 4;
 
 class RegionWriter {
@@ -71,29 +73,39 @@ class RegionWriter {
       before = coder_.decide(state.alive()[slot] != 0, models[before ? 1 : 0]);
       if (before) bodies_.push_back(slot);
     }
+    values_.resize(bodies_.size());
   }
   template <class T>
   void column(std::span<const T> column, Guess guess, std::int64_t /*least*/, std::int64_t /*most*/,
               const MissingComponent* missing = nullptr) {
-    std::uint32_t used = 0;
-    for (const Slot slot : bodies_) used |= static_cast<std::uint32_t>(column[slot]);
-    const auto shift = static_cast<unsigned>(used == 0 ? 0 : std::countr_zero(used));
-    coder_.even(shift, kShiftBits);
-    ColumnCoder numbers(guess);
-    NumberEncoder coder = coder_;  // a copy, so that it stays in registers while bytes are written
-    for (const Slot slot : bodies_)
-      numbers.code(coder, !rest_.empty() && rest_[slot] != 0, std::int64_t{column[slot]} >> shift,
-                   missing == nullptr ? 0 : missing->of(slot) >> shift);
-    coder_ = coder;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) values_[i] = column[bodies_[i]];
+    write_values(guess, missing);
   }
   /// From the next column on, bodies at rest have their own models.
   void know_rest(std::span<const std::uint8_t> rest) { rest_ = rest; }
   NumberEncoder& coder() { return coder_; }
 
  private:
+  // One copy for columns of all types: it is most of the code.
+  void write_values(Guess guess, const MissingComponent* missing) {
+    std::uint64_t used = 0;
+    for (const std::int64_t value : values_) used |= static_cast<std::uint64_t>(value);
+    const auto shift = static_cast<unsigned>(used == 0 ? 0 : std::countr_zero(used));
+    coder_.even(shift, kShiftBits);
+    ColumnCoder numbers(guess);
+    NumberEncoder coder = coder_;  // a copy, so that it stays in registers while bytes are written
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Slot slot = bodies_[i];
+      numbers.code(coder, !rest_.empty() && rest_[slot] != 0, values_[i] >> shift,
+                   missing == nullptr ? 0 : missing->of(slot) >> shift);
+    }
+    coder_ = coder;
+  }
+
   NumberEncoder coder_;
   std::span<const std::uint8_t> rest_;
   std::vector<Slot> bodies_;
+  std::vector<std::int64_t> values_;  // of one column, by body
 };
 
 class RegionReader {
@@ -107,32 +119,42 @@ class RegionReader {
       state.alive()[slot] = 1;
       bodies_.push_back(slot);
     }
+    values_.resize(bodies_.size());
   }
   template <class T>
   void column(std::span<T> column, Guess guess, std::int64_t least, std::int64_t most,
               const MissingComponent* missing = nullptr) {
-    const unsigned shift = coder_.even(0, kShiftBits);
-    ColumnCoder numbers(guess);
-    NumberDecoder coder = coder_;
-    for (const Slot slot : bodies_) {
-      if (!good_) break;
-      const std::int64_t x = numbers.code(coder, !rest_.empty() && rest_[slot] != 0, 0,
-                                          missing == nullptr ? 0 : missing->of(slot) >> shift);
-      // Within 2^33 before the shift, so it fits.
-      const std::int64_t value = x * (std::int64_t{1} << shift);
-      good_ = value >= least && value <= most;
-      if (good_) column[slot] = static_cast<T>(value);
+    if (good_) read_values(guess, missing);
+    for (std::size_t i = 0; i < bodies_.size() && good_; ++i) {
+      good_ = values_[i] >= least && values_[i] <= most;
+      if (good_) column[bodies_[i]] = static_cast<T>(values_[i]);
     }
-    coder_ = coder;
   }
   void know_rest(std::span<const std::uint8_t> rest) { rest_ = rest; }
   [[nodiscard]] bool good() const { return good_; }
   NumberDecoder& coder() { return coder_; }
 
  private:
+  void read_values(Guess guess, const MissingComponent* missing) {
+    const unsigned shift = coder_.even(0, kShiftBits);
+    ColumnCoder numbers(guess);
+    NumberDecoder coder = coder_;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Slot slot = bodies_[i];
+      const std::int64_t x = numbers.code(coder, !rest_.empty() && rest_[slot] != 0, 0,
+                                          missing == nullptr ? 0 : missing->of(slot) >> shift);
+      // A number has at most 32 bits, and valid guesses have too.
+      good_ = x > -kBeyond && x < kBeyond;
+      if (!good_) break;
+      values_[i] = x * (std::int64_t{1} << shift);
+    }
+    coder_ = coder;
+  }
+
   NumberDecoder coder_;
   std::span<const std::uint8_t> rest_;
   std::vector<Slot> bodies_;
+  std::vector<std::int64_t> values_;  // of one column, by body
   bool good_ = true;
 };
 

@@ -16,24 +16,31 @@ class ModelsCoder {
   /// `start`: P of a model that has learned nothing. Returns false if a decoder read an invalid model.
   template <class Coder>
   bool code(Coder& coder, std::uint16_t start, std::uint8_t& weight, std::uint16_t& p1) {
-    const std::int64_t lacks = code_number(coder, weights_, static_cast<std::uint8_t>(0U - weight));
+    const std::int64_t lacks = number(coder, kinds_[kWeights], static_cast<std::uint8_t>(0U - weight));
     if (lacks < 0 || lacks > UINT8_MAX) return false;
     weight = static_cast<std::uint8_t>(-lacks);
     if (weight == 0) return true;
     // A model that has seen `ones` among `weight` decisions has about this P.
     const std::int64_t count = weight + 1;
     const std::int64_t seen = (count * p1 - start + (1 << 15)) >> 16;
-    const std::int64_t ones = code_number(coder, ones_[std::bit_width(unsigned{weight}) - 1], seen);
+    const std::int64_t ones = number(coder, kinds_[kOnes + std::bit_width(unsigned{weight}) - 1], seen);
     const std::int64_t guess =
         std::clamp<std::int64_t>((start + ones * 65536) / count, TrackerModels::kLeast, TrackerModels::kMost);
-    const std::int64_t p = guess + code_number(coder, rounding_, p1 - guess);
+    const std::int64_t p = guess + number(coder, kinds_[kRounding], p1 - guess);
     p1 = static_cast<std::uint16_t>(p);
     return p >= TrackerModels::kLeast && p <= TrackerModels::kMost;
   }
 
  private:
-  NumberModels weights_, rounding_;
-  std::array<NumberModels, 8> ones_;  // by the number of bits of the weight
+  // Not inline: three copies would make the WebAssembly module larger, and there are few models.
+  template <class Coder>
+  [[gnu::noinline]] static std::int64_t number(Coder& coder, NumberModels& models, std::int64_t x) {
+    return code_number(coder, models, x);
+  }
+
+  enum : std::size_t { kWeights, kRounding, kOnes, kKinds = kOnes + 8 };  // ones by the bits of the weight
+  // In a vector, because compilers unroll the start values of an array into 20 kB of code.
+  std::vector<NumberModels> kinds_ = std::vector<NumberModels>(kKinds);
 };
 
 }  // namespace
