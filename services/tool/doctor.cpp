@@ -16,6 +16,7 @@
 #include <fstream>
 #include <memory>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "services/json/json.hpp"
 #include "services/tool/commands.hpp"
 
@@ -170,20 +171,11 @@ Check judge_buffer(const char* name, const char* setting, std::int64_t bytes) {
 }
 
 Check judge_configuration(const MachineFacts& facts) {
-  if (facts.cyclonedds_uri.empty())
-    return {"CYCLONEDDS_URI", Verdict::kGood, "unset: Cyclone DDS picks the interface", ""};
-  if (!facts.cyclonedds_uri_readable) {
-    return {"CYCLONEDDS_URI", Verdict::kFailure, facts.cyclonedds_uri, "the file it names cannot be read"};
-  }
-  return {"CYCLONEDDS_URI", Verdict::kGood, facts.cyclonedds_uri, ""};
-}
-
-/// A configuration is XML text or names of files, with or without file://, separated by commas.
-bool configuration_readable(const std::string& uri) {
-  if (uri.empty() || uri.front() == '<') return true;
-  const std::string first = uri.substr(0, uri.find(','));
-  const std::string scheme = "file://";
-  return std::ifstream(first.rfind(scheme, 0) == 0 ? first.substr(scheme.size()) : first).good();
+  const std::string what =
+      facts.cyclonedds_uri.empty() ? "unset: Cyclone DDS picks the interface" : facts.cyclonedds_uri;
+  if (facts.domain_fault.empty()) return {"CYCLONEDDS_URI", Verdict::kGood, what, ""};
+  return {"CYCLONEDDS_URI", Verdict::kFailure, fmt::format("{}: {}", what, facts.domain_fault),
+          "correct what Cyclone DDS names on stderr: the file, the XML element or the interface"};
 }
 
 const char* word(Verdict verdict) {
@@ -221,7 +213,7 @@ int print(const std::vector<Check>& checks, bool json) {
 
 }  // namespace
 
-MachineFacts machine_facts() {
+MachineFacts machine_facts(std::uint32_t domain) {
   MachineFacts facts;
   facts.interfaces = interfaces();
   for (const Interface& interface : facts.interfaces) {
@@ -232,7 +224,7 @@ MachineFacts machine_facts() {
   rlimit files{};
   if (::getrlimit(RLIMIT_NOFILE, &files) == 0) facts.open_files_limit = files.rlim_cur;
   if (const char* uri = std::getenv("CYCLONEDDS_URI")) facts.cyclonedds_uri = uri;
-  facts.cyclonedds_uri_readable = configuration_readable(facts.cyclonedds_uri);
+  if (auto opened = transport::check_dds_domain(domain); !opened) facts.domain_fault = opened.error().message;
   return facts;
 }
 
@@ -254,9 +246,12 @@ void add_doctor(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "doctor", "Checks interfaces, multicast, socket buffers and limits, and suggests changes.");
   const auto json = std::make_shared<bool>(false);
+  const auto domain = std::make_shared<std::uint32_t>(0);
+  command.add_option("--domain", *domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
   command.add_flag("--json", *json, "Print one JSON object: ok, checks[name, verdict, detail, advice]");
   command.footer("Exits with 1 if sessions cannot work at all, and with 0 if there are only warnings.");
-  command.on_chosen([json, &run] { run = [json] { return print(judge(machine_facts()), *json); }; });
+  command.on_chosen(
+      [json, domain, &run] { run = [json, domain] { return print(judge(machine_facts(*domain)), *json); }; });
 }
 
 }  // namespace tandem::tool

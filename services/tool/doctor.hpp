@@ -31,15 +31,15 @@ struct MachineFacts {
   std::int64_t receive_buffer_max_bytes = 0,
                send_buffer_max_bytes = 0;  ///< net.core.{r,w}mem_max; -1 unknown
   std::uint64_t open_files_limit = 0;
-  std::string cyclonedds_uri;           ///< empty: unset
-  bool cyclonedds_uri_readable = true;  ///< false: it names a file that cannot be read
+  std::string cyclonedds_uri;  ///< empty: unset
+  std::string domain_fault;    ///< why the DDS domain cannot be opened; empty: it can
 };
 
-/// Looks at this machine. Sends one datagram per interface to a multicast group with a time to live of 0, so
-/// that it never leaves the host. Takes at most a second.
-[[nodiscard]] MachineFacts machine_facts();
+/// Looks at this machine, and opens the DDS domain. Sends one datagram per interface to a multicast group
+/// with a time to live of 0, so that it never leaves the host. Takes at most a second.
+[[nodiscard]] MachineFacts machine_facts(std::uint32_t domain);
 
-/// Judges the facts. One check each for interfaces, multicast, buffers, limits and configuration.
+/// Judges the facts. One check each for interfaces, multicast, buffers, limits and the DDS configuration.
 [[nodiscard]] std::vector<Check> judge(const MachineFacts& facts);
 
 }  // namespace tandem::tool

@@ -56,6 +56,10 @@ class Monitor {
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
 };
 
+/// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
+/// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr.
+[[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain);
+
 /// Joins the domain as "tandem monitor"; only `options.domain` is used. Errors: as above.
 [[nodiscard]] Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options);
 

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 
 namespace tandem::transport::dds {
@@ -87,3 +88,11 @@ DomainUse::~DomainUse() {
 }
 
 }  // namespace tandem::transport::dds
+
+namespace tandem::transport {
+
+Result<void> check_dds_domain(std::uint32_t domain) {
+  return dds::DomainUse::acquire(domain, dds::Repeat::kSeldom).map([](const dds::DomainUse&) {});
+}
+
+}  // namespace tandem::transport

@@ -308,10 +308,20 @@ class CommandLine(unittest.TestCase):
                 self.assertEqual(done.returncode, 1, command)
                 self.assertIn(b"stdout", done.stderr, command)
 
-    def test_doctor_fails_on_a_configuration_file_that_is_not_there(self):
-        done = run("doctor", "--json", CYCLONEDDS_URI="file:///nowhere/cyclonedds.xml")
-        self.assertEqual(done.returncode, 1)
-        self.assertFalse(json.loads(done.stdout)["ok"])
+    def test_doctor_fails_on_a_configuration_that_cyclone_dds_refuses(self):
+        def general(content):
+            return f'<CycloneDDS><Domain id="any"><General>{content}</General></Domain></CycloneDDS>'
+
+        for uri in (
+            "file:///nowhere/cyclonedds.xml",
+            "<CycloneDDS><Domain",
+            general("<Interfcs/>"),
+            general('<Interfaces><NetworkInterface name="nosuch0"/></Interfaces>'),
+        ):
+            done = run("doctor", "--json", CYCLONEDDS_URI=uri)
+            self.assertEqual(done.returncode, 1, uri)
+            checks = {check["name"]: check for check in json.loads(done.stdout)["checks"]}
+            self.assertEqual(checks["CYCLONEDDS_URI"]["verdict"], "failure", uri)
 
 
 if __name__ == "__main__":

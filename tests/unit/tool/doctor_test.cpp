@@ -65,15 +65,15 @@ TEST(Doctor, warns_of_a_low_open_files_limit) {
   EXPECT_EQ(check(facts, "open files").verdict, Verdict::kWarning);
 }
 
-TEST(Doctor, fails_on_a_configuration_file_that_is_not_there) {
+TEST(Doctor, fails_where_the_domain_cannot_be_opened) {
   MachineFacts facts = good_machine();
   facts.cyclonedds_uri = "file:///nowhere.xml";
-  facts.cyclonedds_uri_readable = false;
+  facts.domain_fault = "DDS domain 0 cannot be opened";
   EXPECT_EQ(check(facts, "CYCLONEDDS_URI").verdict, Verdict::kFailure);
 }
 
 TEST(Doctor, can_look_at_this_machine) {
-  const MachineFacts facts = machine_facts();
+  const MachineFacts facts = machine_facts(0);
   EXPECT_GT(facts.open_files_limit, 0U);
   EXPECT_EQ(judge(facts).size(), 6U);
 }
