@@ -68,7 +68,7 @@ struct BodyName {
 /// The axis of the scene that points up.
 enum class UpAxis : std::uint32_t { kX = 0, kY = 1, kZ = 2 };
 
-/// What a server does in its session.
+/// The role of a server in its session.
 enum class ServerRole : std::uint32_t {
   kLive = 0,
   kStandby = 1,  ///< it follows the live server and can take over; clients do not join it

@@ -6,7 +6,8 @@
 
 namespace tandem::accounts {
 
-/// What is taken comes back at a constant rate, up to a reserve. Starts full. Time never goes back.
+/// A reserve from which amounts are taken, and which fills again at a constant rate. It starts full. Time
+/// never goes back.
 class Budget {
  public:
   struct Rule {

@@ -31,7 +31,7 @@ struct StreamWishes {
   std::vector<std::pair<std::string, std::string>> settings = {};
 };
 
-/// What an operator wishes for a world's streams.
+/// The wishes of an operator for a world's streams.
 struct Wishes {
   std::string codec = "tracker";
   std::string predictor{kAutomaticPredictor};

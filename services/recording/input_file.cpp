@@ -40,7 +40,7 @@ Result<InputFile> InputFile::open(const std::string& path) {
   struct stat about {};
   if (::stat(path.c_str(), &about) != 0) return refuse(std::strerror(errno));
   if (!S_ISREG(about.st_mode)) return refuse_kind(about.st_mode);
-  // Another file may have its name by now: opening it does not block, and it is asked again.
+  // Another file may have its name by now. So the opening must not block, and its kind is checked again.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (descriptor < 0) return refuse(std::strerror(errno));
   InputFile file(descriptor, 0);

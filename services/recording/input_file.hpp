@@ -21,8 +21,8 @@ class ReadBuffer {
   std::size_t size_bytes_ = 0;
 };
 
-/// Reads a file by system calls and not by a mapping: a mapped file that another program cuts shorter would
-/// end the process with SIGBUS. The length is the one that the file has when it is opened. Not thread-safe.
+/// Reads a file by system calls and not by a mapping: if another program cut a mapped file shorter, SIGBUS
+/// would end the process. The length is the one that the file has when it is opened. Not thread-safe.
 class InputFile {
  public:
   /// Opens a regular file. It refuses everything else without opening it, because a FIFO would block and a
@@ -39,7 +39,7 @@ class InputFile {
   [[nodiscard]] std::uint64_t size_bytes() const { return size_bytes_; }
   /// Returns `count` bytes from `at` on, all within size_bytes(). They stand in `buffer` or in memory that
   /// outlives the file, and are valid until the buffer's next use. Errors: kIo, without the file's name; also
-  /// where the file became shorter.
+  /// if the file became shorter.
   [[nodiscard]] Result<std::span<const std::byte>> read(std::uint64_t at, std::size_t count,
                                                         ReadBuffer& buffer) const;
 

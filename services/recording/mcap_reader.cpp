@@ -109,8 +109,7 @@ Result<std::optional<McapReader::Head>> McapReader::head_at(std::uint64_t at) {
   return head;
 }
 
-// Finds the end, the chunks and what their indexes say; errors in records are told where the records are
-// read.
+// Finds the end, the chunks and their indexes. Errors within records are reported when the records are read.
 Result<void> McapReader::survey() {
   end_ = data_at_;
   bool ended = false;

@@ -25,13 +25,13 @@ struct McapMessage {
   std::span<const std::byte> content;  ///< until the next call
 };
 
-/// Reads chunks without compression and with zstd; what stands outside of chunks too. Bytes are untrusted:
+/// Reads chunks without compression and with zstd, and messages outside of chunks. Bytes are untrusted:
 /// memory is bounded by kMostChunkBytes, the names of channels, and a small share of the file. Not
 /// thread-safe.
 class McapReader {
  public:
   static constexpr std::uint64_t kMostChunkBytes = 128U << 20U;
-  /// Of a chunk as it is stored, with its head: what no compressor makes smaller grows a little.
+  /// Maximum size of a chunk as it is stored, with its head. Data that cannot be compressed grows a little.
   static constexpr std::uint64_t kMostRecordBytes = kMostChunkBytes + (1U << 20U);
 
   /// Looks at the head of every record. Errors: kMalformed (not MCAP), kUnsupported (another version of it),
@@ -45,8 +45,8 @@ class McapReader {
   McapReader& operator=(const McapReader&) = delete;
   ~McapReader();
 
-  /// The next message; false at the end of the data. Errors: kMalformed (a record's fields, a checksum),
-  /// kUnsupported (compression), kIo; nothing can be read behind one.
+  /// Reads the next message; false at the end of the data. Errors: kMalformed (a record's fields, a
+  /// checksum), kUnsupported (compression), kIo. After an error nothing more can be read.
   [[nodiscard]] Result<bool> next(McapMessage& out);
 
   /// A place to read from.
@@ -73,7 +73,7 @@ class McapReader {
     std::uint8_t opcode = 0;
     std::span<const std::byte> content;
   };
-  /// Of a record in the file: its content stands at `content_at`.
+  /// A record in the file. Its content stands at `content_at`.
   struct Head {
     std::uint8_t opcode = 0;
     std::uint64_t content_at = 0, size_bytes = 0;
@@ -84,7 +84,7 @@ class McapReader {
   };
 
   explicit McapReader(InputFile file) : file_(std::move(file)) {}
-  /// Empty where the file ends before the record does.
+  /// Returns nothing if the file ends before the record does.
   [[nodiscard]] Result<std::optional<Head>> head_at(std::uint64_t at);
   [[nodiscard]] Result<void> survey();
   [[nodiscard]] Result<void> note(const Head& head, std::uint64_t at);

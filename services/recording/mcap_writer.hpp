@@ -1,6 +1,6 @@
 #pragma once
-// Messages into a file: MCAP (mcap.dev). A channel is a topic, its schema a text that describes its type.
-// idl/PROTOCOL.md, "Recordings".
+// Writes messages to an MCAP file (mcap.dev). A channel is a topic, its schema a text that describes its
+// type. idl/PROTOCOL.md, "Recordings".
 
 #include <cstdint>
 #include <functional>
@@ -29,7 +29,8 @@ enum class Compression : std::uint8_t { kNone, kZstd };
 class McapWriter {
  public:
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
-  /// A chunk is closed with the message that reaches one of these: what a file that is cut short may lack.
+  /// A chunk is closed with the message that reaches one of these. A file that is cut short lacks at most
+  /// that.
   static constexpr std::size_t kChunkBytes = 1U << 20U;
   static constexpr std::uint64_t kChunkNs = 2'000'000'000;  ///< by log time
 
@@ -46,7 +47,7 @@ class McapWriter {
     std::string schema_name, schema_encoding;
     std::string_view schema;  ///< outlives the writer
   };
-  /// Makes a channel before its first message. No effect where the topic has one.
+  /// Makes a channel before its first message. No effect if the topic has one.
   void declare(const Kind& kind);
   /// The kind for a topic of Tandem: CDR, described by the IDL.
   template <class M>
@@ -56,8 +57,8 @@ class McapWriter {
   /// Appends a message of a topic that was declared. Times are wall clock, ns since 1970.
   void add(std::string_view topic, std::span<const std::byte> content, std::int64_t log_time_ns,
            std::int64_t publish_time_ns);
-  /// Appends one of Tandem's: when it was taken in, and when it was published, where that is known. Returns
-  /// its size.
+  /// Appends a message of Tandem with the time when it was taken in and, if known, when it was published.
+  /// Returns its size.
   template <class M>
   std::size_t add(const M& message, std::int64_t log_time_ns, std::int64_t publish_time_ns) {
     cdr_.clear();

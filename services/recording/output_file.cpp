@@ -50,7 +50,7 @@ bool lock(int descriptor, int kind) {
   return ::flock(descriptor, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;
 }
 
-/// Who holds the lock of an open file, in words. A process of another container is not told.
+/// Names the process that holds the lock of an open file. The system does not name one of another container.
 std::string holder_of(int descriptor) {
   struct stat about {};
   if (::fstat(descriptor, &about) != 0) return "another process";
@@ -68,7 +68,7 @@ std::string holder_of(int descriptor) {
   return "another process";
 }
 
-/// Tells who writes the file `path`, if somebody does.
+/// Names the process that writes the file `path`, if there is one.
 std::optional<std::string> writer_of(const std::string& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (descriptor < 0) return std::nullopt;
@@ -84,7 +84,7 @@ Error written_by(const std::string& holder) {
 
 Error told_by_system() { return {ErrorCode::kIo, std::string("cannot create: ") + std::strerror(errno)}; }
 
-/// A new file `path`, locked. A file that is there and that nobody writes is what a killed run left: it is
+/// Makes the new file `path` and locks it. If there is a file that nobody writes, a killed run left it: it is
 /// removed, and not written to, because it may have another name too.
 Result<File> create_locked(const std::string& path) {
   constexpr int kMostRetries = 100;  // each one only if another process creates or removes the file meanwhile
@@ -98,7 +98,7 @@ Result<File> create_locked(const std::string& path) {
     if (!S_ISREG(about.st_mode))
       return fail(ErrorCode::kIo, "cannot create: " + path + " exists and is no regular file");
     if (!lock(descriptor, LOCK_EX)) return tl::unexpected(written_by(holder_of(descriptor)));
-    if (!same_file(descriptor, path)) continue;  // who had the lock has renamed or removed it
+    if (!same_file(descriptor, path)) continue;  // its writer has renamed or removed it meanwhile
     if (about.st_size == 0 && about.st_nlink == 1) return file;
     ::unlink(path.c_str());
   }
@@ -132,7 +132,7 @@ Result<OutputFile> OutputFile::create(const std::string& path) {
   auto file = create_locked(target + ".part");
   if (!file) return fail(file.error().code, path + ": " + file.error().message);
   OutputFile made(std::move(target), file->release());
-  // Whoever writes under the name held this .part before, so that nobody gets there from now on.
+  // A process that writes under the name has held this .part before, so from now on no other gets there.
   if (const auto holder = writer_of(made.path_)) {
     const Error written = written_by(*holder);
     return fail(written.code, path + ": " + written.message);
@@ -202,7 +202,7 @@ Result<void> OutputFile::commit() {
 
 Result<void> check_distinct(const std::string& input, const std::string& output) {
   for (const std::string& written : {output, output + ".part"}) {
-    std::error_code error;  // one that is not there is another
+    std::error_code error;  // a file that is missing is another one
     if (fs::equivalent(input, written, error))
       return fail(ErrorCode::kInvalidArgument, written + ": is the recording that is read");
   }

@@ -16,14 +16,15 @@ namespace tandem::recording {
 /// keeps it as it was. An object that is destroyed before the renaming leaves nothing behind. A process that
 /// is killed leaves the .part, which the next run replaces. Not thread-safe.
 ///
-/// The file that is written is locked (flock), under both of its names and for as long as it is open, so that
-/// of several writers one writes. The lock belongs to the file and not to its name, so that a path in another
-/// spelling finds it. On a file system without locks only the comparison before the renaming is left.
+/// The file is locked (flock) under both of its names for as long as it is open, so that only one of several
+/// writers writes. The lock belongs to the file and not to its name, so that a path in another
+/// spelling finds it. On a file system without locks, only the comparison before the renaming protects the
+/// file.
 class OutputFile {
  public:
-  /// Follows symbolic links, so that they stay. Errors: kIo, naming the file and the reason: also where
-  /// `path` exists and may not be written or is no regular file. kConflict: another writes it; the message
-  /// names the process, where the system tells.
+  /// Follows symbolic links, so that they stay. Errors: kIo, naming the file and the reason; also if `path`
+  /// exists and may not be written, or is no regular file. kConflict: another process writes it; the message
+  /// names that process if the system does.
   static Result<OutputFile> create(const std::string& path);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
@@ -35,13 +36,13 @@ class OutputFile {
   Result<void> write(std::span<const std::byte> bytes);
   /// Overwrites bytes at the start, as for a header that is known only afterwards.
   Result<void> rewrite_start(std::span<const std::byte> bytes);
-  /// Takes its name; more may follow. No effect where it has it. Errors: kIo, also where the .part is another
-  /// file by now; kConflict where another writes a file of its name.
+  /// Takes its name; more may be written afterwards. No effect if it has it. Errors: kIo, also if the .part
+  /// is another file by now; kConflict if another process writes a file of its name.
   Result<void> take_name();
   /// Closes and removes a file that has no name.
   void discard();
   [[nodiscard]] bool has_name() const { return !unnamed_; }
-  /// Everything is on the disk, under whichever name. Errors: kIo, also where the file was removed.
+  /// Brings everything to the disk, under whichever name. Errors: kIo, also if the file was removed.
   Result<void> sync();
   /// sync(); nothing may be written afterwards.
   Result<void> close();
@@ -66,8 +67,8 @@ class OutputFile {
   std::unique_ptr<std::FILE, Closer> file_;
 };
 
-/// Refuses to write what is being read. Errors: kInvalidArgument where `output`, or the .part that becomes
-/// it, is the file `input`.
+/// Refuses to write a file that is being read. Errors: kInvalidArgument if `output`, or the .part that
+/// becomes it, is the file `input`.
 [[nodiscard]] Result<void> check_distinct(const std::string& input, const std::string& output);
 
 }  // namespace tandem::recording

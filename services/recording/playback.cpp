@@ -23,7 +23,7 @@ Result<M> read(const McapMessage& message) {
   return read;
 }
 
-// The rest of an announcement may be laid out otherwise in another version.
+// In another version the rest of an announcement may have another layout.
 Result<void> check_version(const McapMessage& session) {
   const auto version = transport::session_version(session.content);
   if (!version || *version == transport::kProtocolVersion) return {};
@@ -97,7 +97,7 @@ Result<void> Playback::seek(Epoch epoch, Frame frame) {
     reader_.go_to(all[middle]);
     const auto step = next();
     if (!step) return tl::unexpected(step.error());
-    // Without a frame behind it the start is cut short: nothing from there on.
+    // A start without a frame behind it was cut short: there is nothing from there on.
     const bool behind = *step == Step::kEnd || session().epoch > epoch ||
                         (session().epoch == epoch && timeline().applied() > frame);
     (behind ? to : from) = behind ? middle : middle + 1;
@@ -156,7 +156,7 @@ Result<std::optional<Playback::Step>> Playback::take(const McapMessage& message)
   return kNothing;
 }
 
-// Announced again, in front of a snapshot or with other names, a session goes on.
+// A session that is announced again, in front of a snapshot or with other names, goes on.
 Result<void> Playback::take(transport::SessionMessage message) {
   transport::complete_layouts(message);
   if (run_ && message.epoch == run_->session.epoch && message.streams == run_->session.streams) {
@@ -186,7 +186,7 @@ Result<std::optional<Playback::Step>> Playback::take(transport::SnapshotMessage 
   if (run.snapshots.add(std::move(message)) == client::SnapshotAssembly::Outcome::kRefused)
     return fail(ErrorCode::kMalformed, "a snapshot that breaks a rule of the format");
   const auto whole = run.snapshots.take();
-  // A snapshot that the recorder cut contains only what is held anyway.
+  // A snapshot that the recorder cut contains only a state that is held already.
   if (!whole || (run.timeline.playing() && whole->frame <= run.timeline.applied())) return std::nullopt;
   const auto loaded = run.timeline.load(whole->bytes, run.session.epoch, stream().id);
   if (!loaded) return tl::unexpected(loaded.error());

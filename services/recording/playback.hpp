@@ -1,5 +1,5 @@
 #pragma once
-// A recording, frame by frame: what a client of the recorded session would hold.
+// Follows a recording frame by frame, and holds the states that a client of the recorded session would hold.
 
 #include <cstdint>
 #include <map>
@@ -19,7 +19,7 @@ namespace tandem::recording {
 
 /// Follows the messages of a file as a client does, and checks every hash. A *run* is a snapshot and the
 /// frames that follow it without a gap; a file has several where the recorder had to join again, or where the
-/// server was restarted. What is in a file is untrusted. Not thread-safe.
+/// server was restarted. The contents of a file are untrusted. Not thread-safe.
 class Playback {
  public:
   /// Errors, naming the file: kIo, kMalformed, kUnsupported.
@@ -30,16 +30,16 @@ class Playback {
   enum class Step : std::uint8_t {
     kStarted,  ///< a run begins: the state of its snapshot is held
     kFrame,    ///< one more frame is applied
-    kEnd,      ///< of the file, or of what is left of it
+    kEnd,      ///< the file ends, or is cut short, here
   };
-  /// Errors: kMalformed, kUnsupported, kMismatch (a frame's hash), kIo (also: the file became shorter);
-  /// nothing can be read behind one.
+  /// Errors: kMalformed, kUnsupported, kMismatch (a frame's hash), kIo (also: the file became shorter). After
+  /// an error nothing more can be read.
   [[nodiscard]] Result<Step> next();
-  /// To the last snapshot that has one, so that next() begins a run no later than `from_s` where the file
-  /// permits; from there on call next() until time_s() is late enough.
+  /// Goes to the last snapshot with which next() begins a run no later than `from_s`, if the file has one;
+  /// from there on call next() until time_s() is late enough.
   void seek(double from_s);
-  /// To the last snapshot of an epoch that is not behind `frame`, or the file's begin where there is none;
-  /// from there on call next() until the frame is there. Errors: as next().
+  /// Goes to the last snapshot of an epoch that is not later than `frame`, or to the file's begin if there is
+  /// none; from there on call next() until the frame is there. Errors: as next().
   [[nodiscard]] Result<void> seek(Epoch epoch, Frame frame);
 
   /// When the current message was recorded, wall clock, ns since 1970.

@@ -133,7 +133,7 @@ Result<void> Recorder::finish() {
   totals_.fixed_bytes += writer_->size_bytes() - before;
   totals_.file_bytes = file_->written_bytes();
   if (!file_->has_name()) totals_ = {};  // there will be no file
-  // Now, and not with this object: DDS, which ends before it, may keep the process until it is broken off.
+  // Done now, and not with this object: DDS ends before it, and may hang until the process is ended.
   file_->discard();
   if (!named_) return named_;
   if (!finished) return finished;

@@ -1,6 +1,6 @@
 #pragma once
-// `tandem record` and `tandem join --capture`: what a client received, applied and sent, in an MCAP file
-// (idl/PROTOCOL.md, "Recordings").
+// `tandem record` and `tandem join --capture`: writes the messages that a client received, applied and sent
+// to an MCAP file (idl/PROTOCOL.md, "Recordings").
 
 #include <cstdint>
 #include <map>
@@ -17,10 +17,11 @@ namespace tandem::recording {
 /// Writes messages in the order in which the client took them in. The file is a new one, and has its name
 /// from the first snapshot on: without one, an older file of that name stays. From then on it is readable up
 /// to the last chunk however the process ends. Times in the file are wall clock in ns. The wall clock may
-/// jump; when a snapshot is due is counted by the steady one. Not thread-safe.
+/// jump, so the steady clock decides when a snapshot is due. Not thread-safe.
 class Recorder {
  public:
-  /// Between the snapshots that a recorder cuts itself: how much a replay computes at most to get anywhere.
+  /// Time between the snapshots that a recorder cuts itself: the maximum that a replay computes to get
+  /// anywhere.
   static constexpr std::int64_t kSnapshotNs = 60'000'000'000;
 
   /// Errors: kIo, as OutputFile::create().
@@ -46,7 +47,7 @@ class Recorder {
 
   /// Returns false after an error; nothing more is written then.
   [[nodiscard]] bool good() const { return named_ && writer_->written(); }
-  /// Ends the file, or removes it where no snapshot came. Errors: kIo, also of anything written before.
+  /// Ends the file, or removes it if no snapshot came. Errors: kIo, also of anything written before.
   [[nodiscard]] Result<void> finish();
 
   /// For each topic: number of messages, and their bytes before compression.
@@ -61,7 +62,7 @@ class Recorder {
     std::uint64_t fixed_bytes = 0;  ///< of these, what a file without messages has
     std::map<std::string, Share> topics;
   };
-  /// Valid after finish(): of what is in the file, so not of a chunk that could not be written.
+  /// Counts the file's contents, so not a chunk that could not be written. Valid after finish().
   [[nodiscard]] const Totals& totals() const { return totals_; }
 
  private:

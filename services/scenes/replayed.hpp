@@ -1,5 +1,5 @@
 #pragma once
-// What the announcement of a replayed session contains besides its scene.
+// The part of a replayed session's announcement besides its scene.
 
 #include <cstdint>
 #include <string>
@@ -14,8 +14,8 @@ struct Recording {
   double frame_rate_hz = 0;  ///< > 0
 };
 
-/// Puts `recording` into a scene's text. If the text has no dt_s, adds that of the recorded frame rate, so that
-/// another rate of the replay changes no velocity. Other text stays unchanged.
+/// Puts `recording` into a scene's text. If the text has no dt_s, adds that of the recorded frame rate, so
+/// that another rate of the replay changes no velocity. Other text stays unchanged.
 [[nodiscard]] std::string replayed(const std::string& text, const Recording& recording);
 
 }  // namespace tandem::scenes

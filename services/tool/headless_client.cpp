@@ -42,7 +42,7 @@ Result<void> HeadlessClient::open() {
     if (!recorder) return tl::unexpected<Error>(recorder.error());
     recorder_ = std::make_unique<recording::Recorder>(std::move(*recorder));
   }
-  // After the recording, so that one that is refused leaves the log of who writes it.
+  // After the recording: if that is refused, another process may be writing this log, too, and it must stay.
   if (!options_.hash_log.empty()) {
     hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
     if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);

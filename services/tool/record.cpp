@@ -23,7 +23,7 @@ struct RecordOptions {
 Json report(const HeadlessClient& client) {
   const recording::Recorder::Totals& totals = client.recorder()->totals();
   Json out = client.report();
-  // The rest of the file: what it adds to payloads, and messages other than deltas.
+  // Sizes of the whole file and of its parts besides payloads.
   out["file_bytes"] = totals.file_bytes;
   out["frames_recorded"] = totals.frames;
   out["payload_recorded_bytes"] = totals.payload_bytes;

@@ -35,7 +35,7 @@ def shell(*words):
 
 
 def enter_namespace():
-    """A network of our own, gone with this process. As root directly, otherwise through a user namespace."""
+    """Enter a network of our own, which ends with this process: as root directly, otherwise through a user namespace."""
     if LIBC.unshare(CLONE_NEWNET) != 0:
         if os.environ.get("TANDEM_STAGE_INNER"):
             return False
@@ -65,7 +65,7 @@ class Namespace:
 
     @contextlib.contextmanager
     def entered(self):
-        """Sockets and programs that this thread opens or starts meanwhile are in that namespace."""
+        """Within this context, sockets and programs of this thread are opened and started in that namespace."""
         outside = os.open("/proc/thread-self/ns/net", os.O_RDONLY)
         try:
             if self.descriptor is None:
@@ -85,7 +85,7 @@ class Namespace:
 
 
 def link(kbit):
-    """The rate of everything that goes through loopback from now on."""
+    """Limit the rate of everything that goes through loopback from now on."""
     burst = max(4000, kbit * 1000 // 8 // 100)
     shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", f"{kbit}kbit", "burst", str(burst),
           "latency", f"{QUEUE_MS}ms")  # fmt: skip
@@ -96,7 +96,7 @@ def fast_link():
 
 
 def cut_link():
-    """Every packet is larger than the bucket, and so dropped."""
+    """Drop every packet, because each is larger than the bucket."""
     shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", "8kbit", "burst", "20", "limit", "20")
 
 
@@ -117,7 +117,7 @@ class Process:
             self.lines.append((time.monotonic(), line.rstrip()))
 
     def first(self, text, after=0.0):
-        """When a line with that text came, or None."""
+        """Return when the first line with that text came, or None."""
         return next((at for at, line in list(self.lines) if at >= after and text in line), None)
 
     def wait_for(self, text, seconds, after=0.0):
@@ -132,25 +132,25 @@ class Process:
         raise Failed(f"waited {seconds:.0f} s for '{text}'; it said last:\n{tail}")
 
     def cpu_seconds(self):
-        """Processor time of all its threads, which what else runs here hardly changes."""
+        """Return the processor time of all its threads. Other programs hardly change it."""
         fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def resident_kb(self):
-        """The part of its memory that is in RAM."""
+        """Return the part of its memory that is in RAM."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text()
         return int(re.search(r"VmRSS:\s*(\d+)", status)[1])
 
     def log_bytes(self):
-        """Its lines for people, without live lines."""
+        """Return the size of its lines for people, without live lines."""
         return sum(len(line) + 1 for _, line in list(self.lines) if not line.startswith("{"))
 
     def live(self):
-        """The live lines of a client, with the time of each."""
+        """Return the live lines of a client, with the time of each."""
         return [(at, json.loads(line)) for at, line in list(self.lines) if line.startswith("{")]
 
     def output(self, seconds):
-        """Waits until it ends by itself. Returns the JSON object that it printed, or {}."""
+        """Wait until it ends by itself. Return the JSON object that it printed, or {}."""
         try:
             out = self.process.stdout.read()
             self.process.wait(seconds)

@@ -31,7 +31,7 @@ struct Session {
   [[nodiscard]] State state(Random& random) const {
     return synthetic::random_state(random, capacity, dead_one_in, groups);
   }
-  /// What a correction is due to, and the larger one goes first.
+  /// The error that makes a correction due; the larger one goes first.
   [[nodiscard]] std::uint64_t error(const State& state, const State& target, Slot slot) const {
     if (!groups.orientation) return error_squared(state, target, slot);
     if (state.alive()[slot] == 0) return 0;
@@ -123,7 +123,7 @@ void corrects_what_is_beyond_the_threshold_and_nothing_else(const Session& sessi
       continue;
     }
     if (session.codec == "tracker") {
-      // Free to send early, and where it sends to leave any error up to the threshold.
+      // It may send a body early, and may leave any error up to the threshold where it sends.
       RC_ASSERT(error_squared(agreed, target, slot) <= std::max<std::uint64_t>(limit, 3));
       continue;
     }

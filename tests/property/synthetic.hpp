@@ -17,7 +17,7 @@ namespace tandem::synthetic {
 inline constexpr TypeId kTypes = 3;
 
 inline constexpr Groups kTurning{.orientation = true};
-/// Of a stream with orientations, by type.
+/// The radii of a stream with orientations, by type.
 inline constexpr std::array<std::int32_t, kTypes> kRadii{1, 3000, 40'000'000};
 
 inline BodyState random_body(Random& random, const Groups& groups = {}) {
@@ -47,7 +47,8 @@ inline State random_state(Random& random, std::uint32_t capacity, std::uint64_t 
   return state;
 }
 
-/// `state` with one alive body in `moved_one_in` moved (0: none), mostly a little, sometimes to anywhere.
+/// Returns `state` with one of `moved_one_in` alive bodies moved (0: none), mostly a little, sometimes to
+/// anywhere.
 inline State random_target(Random& random, const State& state, std::uint64_t moved_one_in) {
   State target = state;
   for (Slot slot = 0; slot < state.capacity(); ++slot) {

@@ -1,4 +1,4 @@
-"""The paper's codecs."""
+"""Tests the thesis's codecs."""
 
 import struct
 import unittest

@@ -166,6 +166,7 @@ class Sections(RefusalCase):
             ("order", correct + bytes.fromhex("82020400")),
             ("order", correct + correct),
             ("corrections", bytes.fromhex("8308 01 02 010000 000000")),
+            ("parameters", bytes.fromhex("8200")),
             ("length", bytes.fromhex("0103 0000")),
             ("length", bytes.fromhex("01")),
             ("leb128", bytes.fromhex("01 ffffffff 0f")),

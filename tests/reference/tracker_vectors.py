@@ -369,7 +369,7 @@ def correction_of(rest, steps, turn_by, fine):
 
 
 def turned_content(following):
-    """What a record says of an orientation."""
+    """Return the bytes of a record's orientation."""
     return writer.orientation(worlds.some_quaternion(following), worlds.some_spin(following))
 
 

@@ -7,7 +7,7 @@ from tandem_reference import payload, snapshot, xxh3
 from tandem_reference.errors import Refused
 
 NOTE = "# Written by tests/reference from PROTOCOL.md alone; tests/golden checks that ours agrees."
-# Of the group orientation, which was written with the C++ in view.
+# Texts of the group orientation, whose decoder was written with the C++ in view.
 TURN_NOTE = "# Written by tests/reference; tests/golden checks that ours agrees."
 
 

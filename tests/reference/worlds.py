@@ -13,7 +13,7 @@ from tandem_reference.stream import Stream
 from tandem_reference.timeline import Timeline
 
 PARAMETERS = {1: 100, 2: 3, 3: 5, 4: 800, 5: 26214, 6: 9830}
-# Beside them, of the paper's codecs with residuals where bodies turn.
+# Further parameters, for the thesis's codecs with residuals where bodies turn.
 TURN_PARAMETERS = {7: 2**20, 8: 3 * 2**14}
 ONE = 2**30
 # Two sub-steps, two types, a plane, a box and a ball.
@@ -21,7 +21,7 @@ CONTACT = [
     2, 1820, 205, 205, 1820, 205, 205, 2, 1, 1, 1, 20000, 65536, 10000, 131072, 0, ONE, 0, 0,
     200000, 0, 0, 50000, 50000, 50000, ONE, 0, 0, 0, ONE, 0, 0, 0, ONE, -200000, 0, 0, 60000,
 ]  # fmt: skip
-# The same in one step a frame.
+# The same with one sub-step a frame.
 FIELD = [1, 3640, 102, 410, 3640, 102, 410, *CONTACT[7:]]
 FALL = Drive((0, -3000, 0), 200)
 

@@ -132,6 +132,7 @@ def sections():
     vector.refuse(bytes.fromhex("8204 04000202"), "parameters that do not ascend")
     vector.refuse(bytes.fromhex("8202 0702"), "an unknown parameter")
     vector.refuse(bytes.fromhex("8202 0100"), "a threshold of 0")
+    vector.refuse(bytes.fromhex("8200"), "no parameter")
     vector.refuse(bytes.fromhex("8203 048000"), "a value that is not in the shortest form")
     vector.refuse(bytes.fromhex("8203 0400"), "a section longer than the payload")
     return vector

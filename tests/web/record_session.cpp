@@ -1,5 +1,5 @@
-// What a gateway would send one viewer, from a session on a simulated network, and what a native client made
-// of it.
+// Writes the messages that a gateway would send one viewer, from a session on a simulated network, and the
+// states of a native client.
 //
 //   record_session --scene NAME --bodies N --frames N [--epoch N] [--codec NAME] [--predictor NAME] OUT
 //
@@ -69,7 +69,7 @@ class Recorder final : public client::CoreListener {
         Json::array({delta.frame, to_hex(timeline.hash()), timeline.corrected().size()}));
   }
 
-  /// Of the last frame; false where the file cannot be written.
+  /// Adds the last frame and writes both files. Returns false if one cannot be written.
   [[nodiscard]] bool finish() {
     const ClientTimeline& timeline = *core->timeline();
     const State& state = timeline.state(timeline.applied());

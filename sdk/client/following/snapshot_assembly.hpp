@@ -33,7 +33,7 @@ class SnapshotAssembly {
   /// Drops the snapshot, which cannot be used; later parts of its frame are ignored.
   void reject();
 
-  /// What an acknowledgement says about the snapshot that is coming in.
+  /// The progress of the snapshot that is coming in, for the acknowledgement.
   [[nodiscard]] Frame frame() const { return head_.frame; }
   [[nodiscard]] std::uint32_t parts() const { return static_cast<std::uint32_t>(held_.size()); }
   /// Pairs of first part and count, ascending; at most kMaxMissingRuns of them.

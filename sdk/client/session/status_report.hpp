@@ -1,5 +1,5 @@
 #pragma once
-// The figures that a client publishes once a second for those who watch the session.
+// The figures that a client publishes once a second for monitors of the session.
 
 #include <cstdint>
 

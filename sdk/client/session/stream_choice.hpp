@@ -15,7 +15,7 @@
 
 namespace tandem::client {
 
-/// What matters most to an application when a stream is chosen.
+/// The preference of an application when a stream is chosen.
 struct StreamPreference {
   enum class Kind : std::uint8_t {
     kAutomatic,  ///< the fewest bits, if the step takes a small part of a frame

@@ -1,5 +1,5 @@
 #pragma once
-// What an encoder tells an observer that measures or steers it.
+// The interface of an observer that measures or steers an encoder.
 
 #include <array>
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace tandem {
 
-/// What corrections say about a filter's gains: sums of cosines in 1/kCosineOne. A positive sum asks for more
-/// gain.
+/// Evidence of corrections about a filter's gains: sums of cosines in 1/kCosineOne. A positive sum asks for
+/// more gain.
 struct GainEvidence {
   static constexpr std::int64_t kCosineOne = std::int64_t{1} << 30;
   std::int64_t agreement = 0;    ///< of corrections with the previous one; for the gain of v

@@ -10,7 +10,7 @@ namespace tandem {
 
 // sdk/package/figures.py reads the structs: each figure is one line, followed by its text.
 
-/// Figures that a client also publishes once a second for those who watch its session: TandemClientStatus.
+/// Figures that a client also publishes once a second for monitors of its session: TandemClientStatus.
 struct ReportedFigures {
   double client_ms_p50 = 0;           ///< decode, apply and simulate one frame
   double mbit_per_s = 0;              ///< payload rate since the first frame; 1 Mbit = 2^20 bits

@@ -73,7 +73,7 @@ class Shape(enum.IntEnum):
 
 
 class _FromNative:
-    """Of a dict with the names of the fields; numbers become members of the field's enum where it has one."""
+    """Make one from a dict with the names of the fields; numbers become members of the field's enum, if it has one."""
 
     @classmethod
     def _of(cls, values: dict[str, Any]) -> Any:

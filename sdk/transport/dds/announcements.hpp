@@ -48,7 +48,7 @@ class Announcements {
   }
 
   [[nodiscard]] SessionBook& book() { return book_; }
-  /// The newest status samples that were not taken from here yet.
+  /// The newest status samples that the caller has not taken yet.
   [[nodiscard]] std::vector<Received<ServerStatusMessage>>& statuses() { return statuses_; }
 
  private:

@@ -146,7 +146,7 @@ class DdsClientPort final : public ClientPort {
       deltas.set_limits(limits);
     }
   };
-  /// What all streams of an epoch share.
+  /// The endpoints that all streams of an epoch share.
   struct Common {
     Reader<ScheduledInputMessage> scheduled;
     Reader<ReplyMessage> reply;

@@ -277,7 +277,7 @@ class SimulatedClientPort final : public ClientPort {
     std::optional<Fabric::Index> snapshots;
     Limits limits;
   };
-  /// What all streams of an epoch share.
+  /// The endpoints that all streams of an epoch share.
   struct Common {
     Epoch epoch = 0;
     Fabric::Index scheduled = 0, reply = 0;

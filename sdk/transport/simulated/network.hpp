@@ -45,7 +45,7 @@ struct NetworkOptions {
   std::int64_t lease_ns = 1'000'000'000;
 };
 
-/// What happened to samples on the way, so that tests can check that they tested anything.
+/// Counts of what happened to samples on the way, by which tests check that they tested anything.
 struct NetworkCounts {
   std::uint64_t delivered = 0;
   std::uint64_t repaired = 0;

@@ -66,7 +66,7 @@ std::array<double, 3> gravity(const client::ClientCore& core) {
   return result;
 }
 
-/// A member for each figure that a list names.
+/// Makes a member for each figure of a list.
 struct WriteFigure {
   JsonWriter& json;
   template <class T>

@@ -46,7 +46,7 @@ class WebClient final : private client::CoreListener {
   Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
                              client::Now now);
 
-  /// What happened since the last call, oldest first, as a JSON list of objects:
+  /// Returns the events since the last call, oldest first, as a JSON list of objects:
   /// {"type": "session", "epoch": N}, {"type": "applied", "epoch": N, "frame": N, "hash": "16 hex digits",
   /// "bytes": N, "corrected": N}, {"type": "outcome", "number": N, "kind": "acted" | "refused" | "unknown",
   /// "frame": N, "reason": "text", "latencyMs": X}. Empty when nothing did.

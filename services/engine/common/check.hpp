@@ -20,17 +20,18 @@ namespace tandem::engine {
 
 /// The budget of pushes of one participant.
 [[nodiscard]] InputBudget input_budget(const World& world);
-/// What a push takes of it: its velocity change, times the share of the bodies that it reaches. A scene of
-/// few bodies counts as one of kFewBodies, and a push that reaches few as one that reaches kLeastShare:
-/// thousands of pushes at single bodies would cost nothing otherwise. Up to kCountedBodies are looked at,
-/// evenly among the slots. 0 for other inputs.
+/// The cost of a push: its velocity change times the share of the bodies that it reaches; 0 for other inputs.
+/// A scene counts as at least kFewBodies bodies, and the share as at least kLeastShare: otherwise thousands
+/// of pushes at single bodies would cost nothing. Looks at up to kCountedBodies bodies, evenly among the
+/// slots.
 [[nodiscard]] double push_cost(const Input& input, const Bodies& bodies);
 
 inline constexpr std::uint32_t kFewBodies = 64;
 /// With the budget of a scene that names none (kDefaultPushBudget), five pushes a second of half the largest
 /// strength are always possible at up to this share of the bodies.
 inline constexpr double kLeastShare = 1.0 / 20;
-/// Of a scene's max_push. Above the strength of its gravity, one participant could lift all bodies for ever.
+/// The budget as a share of the scene's max_push. If it were above the strength of gravity, one participant
+/// could lift all bodies for ever.
 inline constexpr double kDefaultPushBudget = 1.0 / 8;
 inline constexpr std::size_t kCountedBodies = 4096;
 

@@ -92,8 +92,8 @@ struct World {
   std::vector<Region> regions;
   double max_gravity = 1000;  ///< inputs beyond are refused; scene units / s^2
   double max_push = 1000;     ///< inputs beyond are refused; scene units / s
-  /// What the pushes of one participant may change the velocity of all bodies by, on average, in a second;
-  /// scene units / s. Up to one push of max_push at all bodies is saved up. 0: no limit.
+  /// Maximum by which the pushes of one participant may change the mean velocity of all bodies in a second,
+  /// scene units / s. A participant can save up one push of max_push at all bodies. 0: no limit.
   double push_budget = 0;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a gateway needs from the session of which it is a client.
+// The interface of a gateway to the session of which it is a client.
 
 #include <cstdint>
 #include <optional>

@@ -7,8 +7,8 @@
 
 namespace tandem::host {
 
-/// What a client must know about the session before it plays any stream. The message lists no stream yet, and
-/// neither gravity nor names, which the simulation knows.
+/// Everything that a client must know about the session before it plays any stream. The message lists no
+/// stream yet, and neither gravity nor names, which the simulation knows.
 [[nodiscard]] transport::SessionMessage session_message(const HostConfig& config);
 
 /// Adds a stream to the message: what a client must know before it reads a byte of it. Measures a client's

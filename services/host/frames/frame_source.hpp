@@ -26,7 +26,7 @@ struct InputOrigin {
   accounts::Budget* budget = nullptr;  ///< of the client's DDS participant; null: no limit
 };
 
-/// What became of an input.
+/// The outcome of an input.
 struct InputVerdict {
   transport::Reason reason = transport::Reason::kNone;  ///< kNone: it acts
   Frame acts_on = 0;                                    ///< the frame that it acts on

@@ -1,5 +1,5 @@
 #pragma once
-// Whose inputs were taken lately, for a log.
+// Remembers the clients whose inputs were taken lately, for a log.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// What a host tells its operator about its work.
+// The figures of a host for its operator.
 
 #include <cstddef>
 #include <cstdint>

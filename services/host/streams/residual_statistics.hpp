@@ -1,5 +1,5 @@
 #pragma once
-// What the thesis's codecs learn from corrections: quantisation ranges and Huffman code lengths.
+// Learns from corrections for the thesis's codecs: quantisation ranges and Huffman code lengths.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// What `tandem bench bandwidth` measures: several codecs over the same trajectory, without a network.
+// The measurement of `tandem bench bandwidth`: several codecs over the same trajectory, without a network.
 
 #include <cstdint>
 #include <functional>

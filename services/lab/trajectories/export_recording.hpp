@@ -29,7 +29,7 @@ inline constexpr const char* kRecordingFormat =
 /// For an export that nobody breaks off.
 inline const std::atomic<bool> kNoStop{false};
 
-/// What an export says that was told to stop. It leaves no file behind.
+/// The message of an export that was told to stop. It leaves no file behind.
 [[nodiscard]] inline tl::unexpected<Error> stopped() {
   return fail(ErrorCode::kIo, "stopped by a signal before its end; no file was written");
 }

@@ -89,8 +89,8 @@ class Reader {
     playback_ = std::move(*opened);
   }
 
-  /// To the next state; None at the end. Otherwise: whether it starts a run, epoch, frame, hash, seconds
-  /// since the first message, slots, whether it has orientations.
+  /// Goes to the next state. Returns None at the end, otherwise: whether the state starts a run, epoch,
+  /// frame, hash, seconds since the first message, slots, whether it has orientations.
   [[nodiscard]] py::object next() {
     struct Place {
       bool starts;
@@ -117,7 +117,7 @@ class Reader {
     return py::make_tuple(s.starts, s.epoch, s.frame, s.hash, s.time_s, s.capacity, s.turning);
   }
 
-  /// To where next() leads to a frame of an epoch soonest.
+  /// Goes to the place from which next() reaches a frame of an epoch soonest.
   void seek(Epoch epoch, Frame frame) {
     const auto done = locked([&] {
       holds_ = false;
@@ -126,8 +126,8 @@ class Reader {
     if (!done) refuse(done.error());
   }
 
-  /// Writes the current state. `arrays`: the columns in the order of tandem_columns, None for what is not
-  /// wanted; the last, the changes, is not looked at.
+  /// Writes the current state. `arrays`: the columns in the order of tandem_columns, None for those that are
+  /// not wanted; the last one, the changes, is ignored.
   void write(const py::tuple& arrays) {
     Columns to;
     to.positions = column_of<float>(arrays[0], "positions", 3);

@@ -77,7 +77,7 @@ void sample(benchmark::State& state, SampleMode mode) {
 BENCHMARK_CAPTURE(sample, interpolate, SampleMode::kInterpolate)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(sample, extrapolate, SampleMode::kExtrapolate)->Unit(benchmark::kMicrosecond);
 
-// The same of bodies with orientations, all of which turn and are corrected a little in every frame.
+// The same with orientations. All bodies turn, and are corrected a little in every frame.
 void sample_turning(benchmark::State& state, SampleMode mode) {
   const std::vector<std::uint8_t> jumps(kBodies);
   Accelerations steady;

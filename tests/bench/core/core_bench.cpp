@@ -155,7 +155,8 @@ void client_frame(benchmark::State& bench, std::string_view codec) {
   bench.counters["apply_us"] = median_us(apply);
 }
 
-// Blocks side by side: wall time of encode(), decode() and the state hash at 65,536 bodies in four blocks.
+// Works on blocks side by side: wall time of encode(), decode() and the state hash at 65,536 bodies in four
+// blocks.
 void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   constexpr std::uint32_t kMany = 4 * kBlockSlots;
   constexpr StreamParameters kParameters{{4096, 256, 1024}};

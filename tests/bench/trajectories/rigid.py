@@ -99,7 +99,7 @@ WORLDS = {world.__name__: world for world in (pile, mixed, towers, dominoes, res
 
 
 def plan(world, bodies, frames, seed):
-    """What a recorder reads, and X.json, for `frames` frames of 1/60 s."""
+    """Return the input of a recorder, for `frames` frames of 1/60 s, and the contents of X.json."""
     planned = WORLDS[world](random.Random(seed), bodies)
     aside = GRAVITY * math.sqrt(0.5)
     turned = None if planned["turn_s"] is None else round(planned["turn_s"] / DT_S)
@@ -124,14 +124,14 @@ def plan(world, bodies, frames, seed):
 
 
 def halved(rows, bodies, info):
-    """Every second row of a recording at 60 Hz, and its X.json at 30 Hz."""
+    """Return every second row of a recording at 60 Hz, and the contents of its X.json at 30 Hz."""
     size = bodies * 13 * 4
     kept = b"".join(rows[i : i + size] for i in range(0, len(rows), 2 * size))
     return kept, {**info, "dt_s": 2 * info["dt_s"], "gravity": info["gravity"][::2]}
 
 
 def positions(rows):
-    """The first six columns of thirteen."""
+    """Return the first six of thirteen columns."""
     values, kept = array.array("f", rows), array.array("f", bytes(len(rows) // 13 * 6))
     for column in range(6):
         kept[column::6] = values[column::13]
@@ -139,7 +139,7 @@ def positions(rows):
 
 
 def scene(world, dt_s):
-    """What `field` is told: the planes, and springs of half of what would turn a body round in one frame."""
+    """Return the scene for `field`: the planes, and springs of half the strength that would turn a body round in one frame."""
     planes = [(normal.index(sum(normal)), sum(normal), offset * sum(normal))
               for *normal, offset in WORLDS[world](random.Random(0), 1)["planes"]]  # fmt: skip
     return recording.scene_text(dt_s, EDGE / 2, (-60, -10, -60), (60, 60, 60), planes, 0.5 / dt_s**2, 0.1 / dt_s, 0.01 / dt_s)

@@ -1,4 +1,4 @@
-"""Measures the recordings of rigid bodies; what RESULTS.md says of them. Python alone."""
+"""Measures the recordings of rigid bodies, and writes their part of RESULTS.md. Python alone."""
 
 import statistics
 
@@ -10,15 +10,16 @@ ENGINES = {"bullet": "Bullet", "ode": "ODE"}
 RATES = (60, 30)
 RECORDINGS = {f"{engine}-{world}": (engine, world) for engine in ENGINES for world in rigid.WORLDS}
 PREDICTORS = ("ballistic", "field")
-# Times `entropy`: in the geometric mean, of every recording. By error in percent of a body.
+# How many times the bytes of `tracker` those of `entropy` must be at least, by error in percent of a body: in the geometric mean, and
+# for every recording.
 FLOORS = {1: (4, 3), 5: (6.5, 5), 10: (8, 6.5)}
 MOST_RMS = 0.75  # of the threshold
 FLAT = "positions"
 
 
 def measure_all(tool, folder, name):
-    """Rows by (Hz, percent, what): what is `entropy`, a predictor of `tracker`, or the same behind FLAT for positions alone;
-    peers and what `auto` takes stand at 5 percent."""
+    """Return rows by (Hz, percent, what). `what` is `entropy`, a predictor of `tracker`, or FLAT for positions alone. The peers
+    are in the rows at 5 percent; [Hz, "auto"] is the predictor that `auto` takes."""
     found = {}
     for hz in RATES:
         npy, flat = folder / f"{name}-{hz}.npy", folder / f"{name}-{hz}-{FLAT}.npy"
@@ -34,29 +35,29 @@ def measure_all(tool, folder, name):
 
 
 def surface(row, which):
-    """Largest or RMS error of the surface as a share of the threshold."""
+    """Return the maximum or RMS error of the surface as a share of the threshold."""
     return row[f"{which}_surface_error"] / row["threshold"]
 
 
 def largest(row):
-    """Bold where it is beyond the threshold."""
+    """Format the maximum surface error, bold if it is above the threshold."""
     most = surface(row, "max")
     return f"{most:.2f}" if most < 1.005 else f"**{most:.2f}**"
 
 
 def gains(measured, percent, predictor):
-    """Of `tracker` over `entropy`, by recording."""
+    """Return how many times the bytes of `tracker` those of `entropy` are, by recording."""
     return {f"{name}-{hz}": own[hz, percent, "entropy"]["bytes"] / own[hz, percent, predictor]["bytes"]
             for name, own in measured.items() for hz in RATES}  # fmt: skip
 
 
 def without_dominoes(found):
-    """All of them where there are no others."""
+    """Return the values without those of dominoes; if there are no others, all."""
     return {name: value for name, value in found.items() if "dominoes" not in name} or found
 
 
 def at_least(value, floor):
-    """Bold where it is below."""
+    """Format a value, bold if it is below the floor."""
     return f"{value:.2f}" if value >= floor else f"**{value:.2f}**"
 
 

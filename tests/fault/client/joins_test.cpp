@@ -36,7 +36,7 @@ constexpr std::int64_t kWallNs = 1'700'000'000'000'000'000;
 constexpr double kThreshold = 0.05;
 const LinkModel kGood{.delay_ns = 1'000'000, .jitter_ns = 1'000'000};
 constexpr double kBitsPerBody = 45;  // a second, of deltas: a link has four times as much at least
-constexpr int kPatience = 5;         // of somebody who is late, to say how late: so many bounds
+constexpr int kPatience = 5;         // in bounds: how long a late client is watched, to say how late it is
 
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
   const char* text = std::getenv(name);

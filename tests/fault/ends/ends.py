@@ -25,7 +25,7 @@ MCAP_END = b"\x89MCAP0\r\n"
 
 
 def plug_in(stage):
-    """From now on programs start on an interface of their own."""
+    """Let all further programs start on an interface of their own."""
     try:
         shell("ip", "link", "add", INTERFACE, "type", "veth", "peer", "name", FAR_END)
     except subprocess.CalledProcessError as error:
@@ -42,7 +42,7 @@ def pull_out():
 
 
 def start_all(stage):
-    """Every program of ours that speaks DDS, at work; by name."""
+    """Start every program of ours that speaks DDS. Return them by name."""
     folder, options = pathlib.Path(stage.folder), stage.options
     started = {"tandemd": stage.server(200, "--hash-log", folder / "server")}
     recorder = stage.start(options.tandem, "record", folder / "first.mcap", "--seconds", 1, "--json")
@@ -62,7 +62,7 @@ def start_all(stage):
 
 
 def send(programs, number):
-    """Returns when."""
+    """Send a signal to all programs. Return the time."""
     sent = time.monotonic()
     for program in programs:
         program.process.send_signal(number)
@@ -70,7 +70,7 @@ def send(programs, number):
 
 
 def wait_all(programs, since, limit_s):
-    """Seconds after `since` at which each of them ended; fails where one had not after `limit_s`."""
+    """Return how many seconds after `since` each of them ended. Fail if one had not ended after `limit_s`."""
     ended = {}
     while len(ended) < len(programs):
         took = time.monotonic() - since
@@ -85,7 +85,7 @@ def wait_all(programs, since, limit_s):
 
 
 def left(program):
-    """What it says that it left; None where it does not."""
+    """Return what the program says that it left; None if it says nothing."""
     time.sleep(0.1)  # until its lines are read
     return next((line for _, line in program.lines if LEFT in line), None)
 

@@ -48,7 +48,7 @@ def honest(stage, seconds):
 
 
 def frames_between(client, begin, end):
-    """Frames a second by the live lines of that time."""
+    """Return the frames a second by the live lines of that time."""
     lines = [line for at, line in client.live() if begin <= at <= end]
     if len(lines) < 3:
         raise Failed("a client fell silent")
@@ -88,7 +88,7 @@ def random_inputs(stage, count):
 
 
 def short_observers(stage, count):
-    """They come, watch a moment and go; one group in four is killed instead."""
+    """Clients come, watch a moment and go; one group in four is killed instead."""
     for group in range(count // GROUP):
         observers = stage.start(
             stage.options.tandem, "join", "--observe", "--count", GROUP, "--seconds", 0.5, "--timeout", 30, "--json"
@@ -103,7 +103,7 @@ def short_observers(stage, count):
 
 
 def forgotten(stage, crowd, count):
-    """What a crowd costs is given back: memory of the server, and of clients that stay."""
+    """The server, and clients that stay, give back the memory that a crowd cost."""
     server = stage.server(BODIES)
     clients = [stage.client(), stage.client("--observe")]
     for client in clients:

@@ -23,7 +23,7 @@ from stage import NOT_RUN, Failed, arguments, run  # noqa: E402
 
 BODIES = 10_000
 SNAPSHOT_BYTES = 80_000  # with headers
-SETTLE_S = 3.0  # after those of Stage.server: who joins first does so 5 s into the session
+SETTLE_S = 3.0  # on top of those of Stage.server: the first client joins 5 s into the session
 AT_ONCE = 20
 BLOCKED_S = 3.0  # maximum delay of others by a client that never answers
 
@@ -33,7 +33,7 @@ def link(delay_ms, jitter_ms=0, loss=0, **more):
 
 
 def bound_s(way):
-    """One second, ten round trips, three times what the snapshot takes at the link's rate."""
+    """Return the bound: a second, ten round trips, and three times what the snapshot takes at the link's rate."""
     sending = SNAPSHOT_BYTES * 8 / (way["rate_kbit"] * 1000) if way["rate_kbit"] else 0
     return 1 + 10 * 2 * (way["delay_ms"] + way["jitter_ms"]) / 1000 + 3 * sending
 
@@ -44,7 +44,7 @@ def seeds(stage, share=1):
 
 
 def percentile(values, share):
-    """By nearest rank, so that of 20 the 95th is the last but one."""
+    """Return the percentile by nearest rank: of 20 values, the 95th is the last but one."""
     ordered = sorted(values)
     return ordered[max(0, -int(-share * len(ordered) // 1) - 1)]
 
@@ -65,7 +65,7 @@ def relay_said(network):
 
 
 def row(stage, way, floor_s, aim_s):
-    """One after the other joins over this link. Without a link, over loopback."""
+    """Clients join over this link, one after the other. Without a link they join over loopback."""
     with Network("client") if way else contextlib.nullcontext() as network:
         server = stage.server(BODIES, namespace=network and network.server)
         time.sleep(SETTLE_S)
@@ -126,8 +126,8 @@ def crowd(stage, way, floor_s, aim_s):
 
 
 def playing(stage, way, floor_ms, aim_ms):
-    """How late frames are, once somebody plays: joined over a good link, or what came meanwhile would count as late.
-    Server and client read the same clock."""
+    """Measure how late frames are for a client that plays. It joins over a good link, because frames that came while it joined
+    would count as late. Server and client read the same clock."""
     with Network("client") as network:
         stage.server(BODIES, "--predictor", "ballistic", namespace=network.server)
         time.sleep(SETTLE_S)
@@ -164,11 +164,11 @@ class Witness:
         print(f"  somebody else plays, {self.frames_per_s(begin, time.monotonic()):.1f} frames in the slowest second", flush=True)
 
     def frames_per_s(self, begin, end):
-        """In the slowest second of which a part is between these times."""
+        """Return the frames of the slowest second that overlaps these times."""
         return min((line["frames_per_s"] for at, line in self.client.live() if begin < at < end + 1), default=30.0)
 
     def watch(self, begin):
-        """From then until now."""
+        """Count the frames from `begin` until now."""
         end = time.monotonic()
         time.sleep(1.1)
         self.slowest = min(self.slowest, self.frames_per_s(begin, end))
@@ -181,7 +181,7 @@ class Witness:
 
 
 def until_carried(network, name, count):
-    """Waits until so many bytes more are on their way to a client."""
+    """Wait until so many more bytes have been sent to a client."""
     def carried():
         return network.carried()["links"][name]["down"]["octets"]
 
@@ -193,7 +193,7 @@ def until_carried(network, name, count):
 
 
 def begin_join(stage, network, name, seed):
-    """A participant that has a part of the snapshot when this returns. The seed decides which part."""
+    """Start a participant. It has a part of the snapshot when this returns; the seed decides which part."""
     client = stage.client("--timeout", 90, namespace=network.clients[name])
     client.wait_for("found session", 20)
     until_carried(network, name, random.Random(seed).uniform(0.1, 0.6) * SNAPSHOT_BYTES)

@@ -118,7 +118,7 @@ def lost(stage, seconds, limit, *more):
 
 
 def duplex_link(kbit):
-    """That rate each way between the first participant of the domain, the server, and the second. Multicast goes by."""
+    """Limit the rate each way between the server, the first DDS participant of the domain, and the second. Multicast is not limited."""
     fast = ("rate", "10gbit", "quantum", "60000")
     shell("tc", "qdisc", "del", "dev", "lo", "root")
     shell("tc", "qdisc", "add", "dev", "lo", "root", "handle", "1:", "htb", "default", "1")
@@ -156,7 +156,7 @@ def choice(stage, kbit, expected, joins_at=None):
 
 
 class Sniffer:
-    """Bytes on loopback since it was made, headers and all: of datagrams with a delta, and of all others."""
+    """Counts the bytes on loopback, with all headers: those of datagrams with a delta, and those of all others."""
 
     ETHERTYPE_ALL, OUTGOING, ETHERNET_BYTES, IP_BYTES, UDP_BYTES = 3, 4, 14, 20, 8
 
@@ -183,7 +183,7 @@ class Sniffer:
                 self.others += len(frame) - self.ETHERNET_BYTES
 
     def is_delta(self, frame):
-        """A user's writer without a key (entity kind 0x03) sends DATA: deltas, scheduled inputs, snapshots."""
+        """True for DATA of a user's writer without a key (entity kind 0x03): deltas, scheduled inputs, snapshots."""
         rtps = frame[self.ETHERNET_BYTES + self.IP_BYTES + self.UDP_BYTES :]
         if rtps[:4] != b"RTPS":
             return False
@@ -204,7 +204,7 @@ class Sniffer:
 
 
 def traffic(stage, role, count, limit, script=None):
-    """What clients cost besides deltas, on loopback counters, per client."""
+    """Measure the traffic per client besides deltas, by the counters of loopback."""
     stage.server(1_000)
     more = ["--observe"] if role == "observer" else []
     if script:
@@ -222,7 +222,7 @@ def traffic(stage, role, count, limit, script=None):
 
 
 def busy(stage):
-    """20 inputs a second in all, by ten participants."""
+    """Ten participants send 20 inputs a second in all."""
     path = pathlib.Path(stage.folder) / "script.textproto"
     with open(path, "w", encoding="ascii") as out:
         for i in range(80):
@@ -279,7 +279,7 @@ CASES = {
     "lost_0.5_s": lambda stage: lost(stage, 0.5, 1),
     "lost_5_s": lambda stage: lost(stage, 5, 2),
     "lost_20_s": lambda stage: lost(stage, 20, 4),
-    # Of users who send far more inputs than a late joiner is handed.
+    # These users send far more inputs than a late joiner is handed.
     "lost_20_s_with_inputs": lambda stage: lost(stage, 20, 4, "--scripted", "--users", 256),
     "traffic_observers": lambda stage: traffic(stage, "observer", 10, 5),
     "traffic_participants": lambda stage: traffic(stage, "participant", 10, 20),

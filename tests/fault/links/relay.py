@@ -65,7 +65,7 @@ class Direction:
         self.dead = link["dead"]
 
     def offer(self, now, size):
-        """When a packet arrives at the other end: no time at all, one, or two."""
+        """Return the times at which a packet arrives at the other end: none, one, or two."""
         draw = self.draw
         self.packets += 1
         leaves = now
@@ -109,7 +109,7 @@ class Relay:
         heapq.heappush(self.travelling, (due, self.pushed, to, source, frame))
 
     def enter(self, now, source, frame):
-        """A frame leaves a namespace."""
+        """Take a frame that leaves a namespace."""
         if frame[12:14] == ARP:  # is repeated once a second only, and the links meant here have none
             for number in range(len(self.taps)):
                 if number != source:
@@ -121,7 +121,7 @@ class Relay:
                 self.push(due, self.HUB, source, frame)
 
     def spread(self, now, source, frame):
-        """A frame is where the links meet, at the server."""
+        """Pass on a frame that is where the links meet, at the server."""
         if not frame[0] & 1:
             to = frame[5]
             if to == 0:
@@ -152,7 +152,7 @@ class Relay:
                     raise
 
     def obey(self, command):
-        """A line of JSON: seed and links by number, or a question about what was carried."""
+        """Obey a command, which is a line of JSON: seed and links by number, or a question for the counts."""
         if "seed" in command:
             for number in range(len(self.taps)):
                 self.up[number].restart(f"{command['seed']} up {number}")
@@ -174,7 +174,7 @@ class Relay:
             self.lateness.clear()
 
     def run(self):
-        """Until standard input ends."""
+        """Carry frames until standard input ends."""
         watched, told = [0, *self.taps], b""
         while True:
             wait = max(0.0, self.travelling[0][0] - time.monotonic()) if self.travelling else 1.0
@@ -232,7 +232,7 @@ class Network:
         self.process.stdin.flush()
 
     def restart(self, seed):
-        """All that is random from now on follows from this seed."""
+        """Start all random numbers anew from this seed."""
         self.tell(seed=seed)
 
     def set(self, name, *ways, **changes):
@@ -249,7 +249,7 @@ class Network:
             self.set(name, **changes)
 
     def carried(self):
-        """Frames and how late the relay itself was, since last asked; packets of all links since the beginning."""
+        """Return the frames, and how late the relay itself was, since the last call; and the packets of all links since the start."""
         self.tell(question=True)
         answer = json.loads(self.process.stdout.readline())
         answer["links"] = dict(zip(["server", *self.numbers], answer["links"]))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What recordings meet with in operation: two writers, signals, a full disk, files that shrink or are none.
+"""Faults that recordings meet with in operation: two writers, signals, a full disk, files that shrink or are not regular.
 
 faults_test.py --tandemd PATH --tandem PATH
 
@@ -158,7 +158,7 @@ def check_full_disk(programs):
 
 
 def check_no_files(programs):
-    """What is no regular file is refused at once, and not waited for."""
+    """A file that is not a regular one is refused at once, and not waited for."""
     fifo, bound = programs.folder / "fifo", programs.folder / "socket"
     os.mkfifo(fifo)
     listener = socket.socket(socket.AF_UNIX)

@@ -221,7 +221,7 @@ def check_refusals(programs, file):
         _, errors = finish(programs.start(programs.tandem, "replay", bad), "replay", 1)
         lines = [line for line in errors.splitlines() if "cut short" not in line]
         assert len(lines) == 1 and said in lines[0], errors
-    # Of a program that spoke version 1 of the protocol.
+    # This file is from a program that spoke version 1 of the protocol.
     old = pathlib.Path(__file__).parent / "version1.mcap"
     npy = programs.folder / "old.npy"
     for command in (("replay", old), ("export", "--from", old, "--out", npy), ("export", "--from", old, "--points", npy)):

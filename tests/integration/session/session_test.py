@@ -307,7 +307,7 @@ def rigid(stage):
 
 
 def rigid_codecs(stage):
-    """Bodies of Bullet that turn, by the paper's codecs and with automatic quality; the reference decoder reproduces all."""
+    """The reference decoder reproduces bodies of Bullet that turn, by the thesis's codecs and with automatic quality."""
     auto = ("--threshold", "auto", "--target-bandwidth", 0.1)
     rows = [("dominoes", codec, ()) for codec in ("entropy", "limited")]
     rows += [("rubble", codec, auto) for codec in ("tracker", "quantized")]

@@ -18,7 +18,7 @@ inline constexpr const char* kLoopback =
     "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/>"
     "</Interfaces></General></Domain></CycloneDDS>";
 
-/// A domain of this process' own; runs that share one by chance still differ in their session names.
+/// A domain for this process. Runs that share one by chance still have different session names.
 inline DdsOptions loopback() {
   static int count = 0;
   setenv("CYCLONEDDS_URI", kLoopback, 1);

@@ -38,7 +38,8 @@ std::map<Frame, std::string> hashes(const std::filesystem::path& path) {
   return read;
 }
 
-/// Of one participant: acknowledgements in the session's partition, deltas and snapshots from the stream's.
+/// A participant of stream kRich: acknowledges in the session's partition, reads deltas and snapshots from
+/// theirs.
 class StreamReader {
  public:
   explicit StreamReader(const DdsOptions& options)

@@ -28,6 +28,8 @@ MUTANTS = [
      "            rows[:, slot] = 0\n",
      "            rows[:, slot] = 0\n"
      "        self.q[3:, slot] = turn.ONE\n"),
+    ("payload", "a parameters section may name none",
+     '            require(parsed.parameters, "parameters", "a section that names none")\n', ""),
     # Lifecycle.
     ("payload", "a gap counts the slots between",
      "        slot += key // 4\n", "        slot += key // 4 + bool(records)\n"),

@@ -1,4 +1,4 @@
-"""What a capture file holds, sorted into the streams of its sessions."""
+"""Reads a capture file and sorts its messages into the streams of its sessions."""
 
 from . import cdr, mcap, stream
 from .errors import Refused, require

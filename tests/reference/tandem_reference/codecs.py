@@ -1,4 +1,4 @@
-"""Corrections of the paper's codecs: none, selective, quantized, entropy and limited."""
+"""Corrections of the thesis's codecs: none, selective, quantized, entropy and limited."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ LIST, MASK, ALL = range(3)
 
 
 def bits_of(data, count, rule, what):
-    """The first `count` bits of some bytes, the lowest of each byte first; the others must be zero."""
+    """Return the first `count` bits of some bytes, the lowest of each byte first; the others must be zero."""
     bits = np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little")
     require(not bits[count:].any(), rule, f"{what}: unused bits that are not zero")
     return bits[:count].astype(bool)
@@ -51,7 +51,7 @@ def apply_corrections(world, stream, corrections):
 
 
 def set_values(state, slots, body):
-    """p, v, q and w as they stand in the section; c becomes 0."""
+    """Set p, v, q and w to the values in the section; c becomes 0."""
     numbers = 13 if state.orientation else 6
     values = np.frombuffer(body.take(4 * numbers * len(slots)), "<i4").astype(np.int64).reshape(-1, numbers).T
     p, v, q, w = np.split(values, (3, 6, 10)) if state.orientation else (values[:3], values[3:], None, None)
@@ -73,7 +73,7 @@ def residuals(stream, body, bodies):
 
 
 def add_residuals(state, slots, steps, values):
-    """p, v, q and w change by steps of the sizes in force."""
+    """Change p, v, q and w by steps of the sizes in force."""
     state.p[:, slots] = clamp(state.p[:, slots] + steps[:3] * values["position_step"], MOST_P)
     state.v[:, slots] = clamp(state.v[:, slots] + steps[3:6] * values["velocity_step"], MOST_V)
     if state.orientation:

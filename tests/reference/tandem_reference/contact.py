@@ -12,7 +12,7 @@ from .state import MOST_C, MOST_P, MOST_V
 
 @dataclass(frozen=True)
 class Kind:
-    """Of a kind of contact: spring in 2^-14, dampings in 2^-13."""
+    """The constants of one kind of contact: spring in 2^-14, dampings in 2^-13."""
 
     spring: int
     normal: int
@@ -73,14 +73,14 @@ def read_world(constants):
 
 
 def contact_force(kind, depth, n, relative):
-    """What a contact adds to F, on each axis; n points from the body towards the other."""
+    """Return the force that a contact adds to F, on each axis; n points from the body towards the other."""
     approach = (relative * n).sum(axis=0) >> 11
     push = clamp(((kind.spring * depth) >> 11) + ((kind.shear * approach) >> 11), 2**15 - 1)
     return (((kind.normal + kind.shear) * relative) >> 9) - ((push * n) >> 11)
 
 
 def pair_forces(world, p, velocity, radius, couples):
-    """The forces of touching pairs: (first bodies, second bodies, force on the first)."""
+    """Return the forces of touching pairs: (first bodies, second bodies, force on the first)."""
     a, b = couples
     apart = pairs.short_difference(p[:, a] >> world.shift, p[:, b] >> world.shift)
     square = (apart * apart).sum(axis=0)
@@ -96,7 +96,7 @@ def pair_forces(world, p, velocity, radius, couples):
 
 
 def total_force(world, p, v, radius, couples):
-    """F of every body, from the state before a sub-step."""
+    """Return F of every body, from the state before a sub-step."""
     velocity = clamp(v >> (world.shift + 6), 2**14 - 1)
     force = np.zeros_like(p)
     a, b, of_pairs = pair_forces(world, p, velocity, radius, couples)
@@ -109,7 +109,7 @@ def total_force(world, p, v, radius, couples):
 
 
 def step(state, world, moving, gravity, decay, damping):
-    """One frame: pairs once, then all sub-steps. Only the slots `moving` change."""
+    """Make one frame: find pairs once, then make all sub-steps. Only the slots `moving` change."""
     alive = np.flatnonzero(state.alive)
     p, v, c = state.p[:, alive], state.v[:, alive], state.c[:, alive]
     kind = np.minimum(state.type[alive], len(world.radius) - 1)

@@ -8,14 +8,14 @@ UP = np.array([[0], [2**14], [0]], np.int64)
 
 
 def plane(p, r, shape):
-    """Height, and `out` in 2^-14, of every body and one plane."""
+    """Return `height`, and `out` in 2^-14, of every body at one plane."""
     normal, offset = np.array(shape[:3], np.int64).reshape(3, 1), shape[3]
     height = r - (((normal * p).sum(axis=0) >> 30) - offset)
     return height, np.broadcast_to(normal >> 16, p.shape)
 
 
 def ball(p, r, shape):
-    """The same of a ball; height 0 where a body is out of reach on an axis."""
+    """Return the same at a ball; the height is 0 where a body is out of reach on an axis."""
     away = p - np.array(shape[:3], np.int64).reshape(3, 1)
     most = shape[3] + r
     near = np.all(np.abs(away) < most, axis=0)
@@ -26,7 +26,7 @@ def ball(p, r, shape):
 
 
 def box(p, r, shape):
-    """The same of a box."""
+    """Return the same at a box."""
     numbers = np.array(shape, np.int64)
     centre, half, axes = numbers[:3].reshape(3, 1), numbers[3:6].reshape(3, 1), numbers[6:].reshape(3, 3)
     away = p - centre
@@ -52,7 +52,7 @@ def box(p, r, shape):
 
 
 def contacts(world, p, radius):
-    """Of every shape that touches bodies: those bodies, the depths, the directions in 2^-12."""
+    """Yield for every shape that touches bodies: those bodies, the depths, the directions in 2^-12."""
     for measure, shapes in ((plane, world.planes), (box, world.boxes), (ball, world.balls)):
         for shape in shapes:
             height, out = measure(p, radius, shape)

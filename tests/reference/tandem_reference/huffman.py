@@ -25,7 +25,7 @@ class Table:
 
 
 def tables(data, count):
-    """So many tables of 256 bytes: of the residuals of p and of v, with orientations also of the turn and of w."""
+    """Return `count` tables of 256 bytes: for residuals of p and of v, with orientations also of the turn and of w."""
     require(len(data) == 256 * count, "session", f"codec tables of {len(data)} bytes instead of {256 * count}")
     return [Table(data[at : at + 256]) for at in range(0, len(data), 256)]
 
@@ -59,7 +59,7 @@ class Bits:
 
 
 def decode(data, of_vectors, bodies):
-    """Three residuals of each table for each body, to the end of the data."""
+    """Decode three residuals of each table for each body, to the end of the data."""
     bits = Bits(data, "corrections")
     result = []
     for _ in range(bodies):

@@ -6,13 +6,13 @@ SHORT = 8  # bits of a number whose sign and leading bits have models
 
 
 class Model:
-    """The probability of a 1, in 1/65536, and how many decisions it has seen, and one, up to 127."""
+    """The probability of a 1, in 1/65536, and `seen`: 1 more than the decisions so far, up to 127."""
 
     def __init__(self):
         self.p, self.seen = 32768, 1
 
     def learn(self, one):
-        """What a decision teaches."""
+        """Learn from a decision."""
         rate = self.seen.bit_length()
         self.p = self.p + ((65536 - self.p) >> rate) if one else self.p - (self.p >> rate)
         self.seen = min(self.seen + 1, 127)
@@ -41,7 +41,7 @@ class NumberDecoder(RangeDecoder):
         return one
 
     def number(self, models):
-        """A number of a kind."""
+        """Decode a number of a kind."""
         if not self.decide(models.some):
             return 0
         node = 1

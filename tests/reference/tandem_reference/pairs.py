@@ -1,4 +1,4 @@
-"""Which bodies may touch each other within a frame."""
+"""Finds the pairs of bodies that may touch each other within a frame."""
 
 import numpy as np
 

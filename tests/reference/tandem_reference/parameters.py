@@ -31,7 +31,7 @@ def check(identity, value, known):
 
 
 def read(reader, known):
-    """What the rest of a section of a stream that lists the ids `known` names: {id: value}."""
+    """Read the rest of a section: {id: value}. `known` has the ids that the stream lists."""
     found, before = {}, 0
     while reader.left():
         identity = reader.u8()
@@ -44,7 +44,7 @@ def read(reader, known):
 
 
 def complete(pairs, known):
-    """All that a stream lists from (id, value) pairs in ascending order, as a session names them."""
+    """Return {id: value} from the (id, value) pairs of a session, which must name all that the stream lists, ascending."""
     for identity, value in pairs:
         check(identity, value, known)
     require([identity for identity, _ in pairs] == list(known), "parameters", "not each that the stream has, ascending")

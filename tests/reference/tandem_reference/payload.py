@@ -81,6 +81,7 @@ def parse(data, world):
             parsed.records = read_records(body, state.orientation)
         elif kind == PARAMETERS:
             parsed.parameters = parameters.read(body, world.parameters)
+            require(parsed.parameters, "parameters", "a section that names none")
         elif kind == ROUNDING:
             parsed.rounding = read_rounding(body, state.orientation)
         else:
@@ -108,13 +109,13 @@ def rounded(columns, bits):
 
 
 def rounded_in_range(vectors, bits, is_in_range):
-    """The same of vectors, each of which stays as it is where the result would be out of range."""
+    """Round vectors; one whose result would be out of range stays as it is."""
     result = rounded(vectors, bits)
     return np.where(is_in_range(result), result, vectors)
 
 
 def round_orientations(state, bits):
-    """q of every body, with a w that is not negative."""
+    """Round q of every body, and negate it where its w is below 0 then."""
     if state.orientation and bits:
         alive = state.alive == 1
         q = rounded_in_range(state.q[:, alive], bits, turn.is_quaternion)
@@ -168,7 +169,7 @@ def read_records(body, orientation):
 
 
 def apply_records(state, records, types):
-    """Spawn, despawn and so on; which bodies were renewed."""
+    """Apply the records. Return which bodies were renewed."""
     renewed = np.zeros(state.capacity, bool)
     for record in records:
         slot = record.slot

@@ -1,4 +1,4 @@
-"""The binary range decoder: of the codec `tracker`, with models that stay as they are, and of snapshots."""
+"""The binary range decoder, for the codec `tracker`, whose models stay as they are in a delta, and for snapshots."""
 
 from .errors import require
 
@@ -49,7 +49,7 @@ class RangeDecoder:
 
 
 class CountingDecoder(RangeDecoder):
-    """Decodes decisions of models that learn after the delta: counts them."""
+    """Decodes decisions of models that learn after the delta, and counts them."""
 
     def __init__(self, data, probabilities, zeros, ones):
         require(len(data) > 0, "stream", "an empty code stream")

@@ -63,7 +63,7 @@ def read_inputs(body, frame, last_input):
 
 
 class Guess:
-    """What the next number of a column is expected to be: 0, the one before (at rest), or half way to it."""
+    """The guess of a column's next number: 0, the number before, or half way to it; by whether bodies are at rest."""
 
     def __init__(self, how):
         self.how = how
@@ -78,7 +78,7 @@ class Guess:
 
 
 def read_column(numbers, guess, at_rest, most):
-    """A column over bodies, of which some are at rest; `most`: least and largest value allowed."""
+    """Read a column over bodies, of which some are at rest. `most`: minimum and maximum allowed."""
     shift = numbers.even_bits(5)
     kinds = [NumberModels(), NumberModels()]
     values = []
@@ -92,7 +92,7 @@ def read_column(numbers, guess, at_rest, most):
 
 
 def read_norm(numbers, at_rest, others, most):
-    """A column of w, guessed as what gives a norm of 1 with x, y and z (`others`)."""
+    """Read the column qw. The guess gives a length of 1 with qx, qy and qz (`others`)."""
     shift = numbers.even_bits(5)
     kinds = [NumberModels(), NumberModels()]
     values = []
@@ -105,7 +105,7 @@ def read_norm(numbers, at_rest, others, most):
 
 
 def read_same(numbers, at_rest):
-    """A column of bytes in which 0 and the value of the body before change places."""
+    """Read a column of bytes in which 0 and the value of the body before change places."""
     shift = numbers.even_bits(5)
     kinds, before = [NumberModels(), NumberModels()], [0, 0]
     values = []

@@ -40,7 +40,7 @@ class State:
         return twin
 
     def clear(self, slot):
-        """What a despawn does: every column of the slot is zero."""
+        """Despawn: set every column of the slot to zero."""
         for column in (self.alive, self.reuse, self.type, self.rest):
             column[slot] = 0
         for rows in (self.p, self.v, self.c, self.q, self.w, self.codec):
@@ -55,7 +55,7 @@ class State:
         return block * BLOCK, min((block + 1) * BLOCK, self.capacity)
 
     def leaves(self, block):
-        """The hashes of a block: of what every slot has, then of each group."""
+        """Return the hashes of a block: leaf 0 with the columns outside of groups, then one of each group."""
         first, end = self.block_slots(block)
         common = [
             self.alive[first:end].astype("u1"),

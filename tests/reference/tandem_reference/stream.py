@@ -1,4 +1,4 @@
-"""What is fixed in a stream: capacity, types, codec, predictor; and the hash of its layout."""
+"""The fixed part of a stream: capacity, types, codec, predictor; and the hash of its layout."""
 
 import struct
 from dataclasses import dataclass, field
@@ -77,7 +77,7 @@ class Stream:
         return "".join(one + "\n" for one in lines)
 
     def layout_hash(self):
-        """What the session must announce."""
+        """Return the layout hash that the session must announce."""
         return xxh3.xxh3_64(self.layout_text().encode())
 
 

@@ -36,7 +36,7 @@ class Models:
         return twin
 
     def learn(self, zeros, ones):
-        """What the decisions of a delta teach: how many of each model were 0 and 1."""
+        """Learn from the decisions of a delta: how many of each model were 0 and 1."""
         made = zeros + ones > 0
         seen = self.weight + 1 + zeros + ones
         learnt = np.clip(((self.weight + 1) * self.p + 65536 * ones) // seen, 32, 65504)
@@ -119,7 +119,7 @@ class Contexts:
 
 @dataclass
 class Correction:
-    """What a delta says of a corrected body; steps are None where a group is not corrected."""
+    """The correction of a body; steps are None where a group is not corrected."""
 
     rest: int
     steps: list = None
@@ -129,7 +129,7 @@ class Correction:
 
 @dataclass
 class Setting:
-    """What corrections depend on beside stream and parameters: rounding of p in bits, gravity of the frame."""
+    """The input of corrections besides stream and parameters: rounding of p in bits, gravity of the frame."""
 
     rounding: int
     gravity: tuple
@@ -230,7 +230,7 @@ class Group:
 
     @classmethod
     def of(cls, corrected, what, columns):
-        """Of {slot: Correction} those where `what` is corrected; None if there is none."""
+        """Choose from {slot: Correction} those where `what` is corrected; None if there is none."""
         slots = [slot for slot, correction in corrected.items() if getattr(correction, what)]
         if not slots:
             return None
@@ -245,7 +245,7 @@ class Group:
         return np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
 
     def growth(self, one, gain_of):
-        """What a step adds to v, c or w, in 1/64 of its unit; `gain_of` by the time since the last correction."""
+        """Return what a step adds to v, c or w, in 1/64 of its unit; `gain_of` is called with `now`."""
         last, kept = self.columns[LAST, self.slots], clamp(self.steps, 127)
         before = last * by_axes(last, 243, 235, 176, 151)
         after = kept * by_axes(kept, 243, 235, 176, 151)
@@ -254,7 +254,7 @@ class Group:
         return np.minimum(2**29, (((one * gain_of(now) + 2**15) >> 16) * trust + 128) >> 8)
 
     def remember(self):
-        """These corrections, as the last ones."""
+        """Store these corrections as the last ones."""
         self.columns[INTERVAL, self.slots] = self.columns[AGE, self.slots] + 1
         self.columns[AGE, self.slots] = 0
         self.columns[LAST, self.slots] = clamp(self.steps, 127)

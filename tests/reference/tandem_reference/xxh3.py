@@ -118,7 +118,7 @@ LOW_HALF, SHIFT_32, SHIFT_47, PRIME = np.uint64(0xFFFFFFFF), np.uint64(32), np.u
 
 
 def stripe_sums(words, keys):
-    """What stripes (..., stripes, 8 words) add to the eight lanes."""
+    """Return what stripes (..., stripes, 8 words) add to the eight lanes."""
     keyed = words ^ keys
     return ((keyed & LOW_HALF) * (keyed >> SHIFT_32) + words[..., NEIGHBOUR]).sum(axis=-2, dtype=np.uint64)
 

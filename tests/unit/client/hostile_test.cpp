@@ -114,7 +114,8 @@ TEST_F(HostileTest, AnyMutatedDeltaIsCaughtBeforeItCounts) {
   EXPECT_EQ(figures().resyncs, figures().hash_mismatches + figures().refused_messages);
 }
 
-// What the state hash does not cover (the drive, say) shows in the hash of the next delta at the latest.
+// A value that the state hash does not cover (the drive, say) shows in the hash of the next delta at the
+// latest.
 TEST_F(HostileTest, AnyMutatedSnapshotIsRefusedOrFoundOutByTheNextDeltas) {
   constexpr std::uint64_t kSeed = 20'240'602;
   RecordProperty("seed", std::to_string(kSeed));

@@ -56,7 +56,7 @@ TEST_F(SampleColumnsTest, ColumnsThatAreTooShortAreLeftAsTheyAre) {
 }
 
 TEST_F(SampleColumnsTest, AnArrayOfTheAppsOwnStructsIsFilledAsPackedColumnsAre) {
-  // Of an odd size, so that nothing in it is aligned.
+  // The struct has an odd size, so that nothing in it is aligned.
   constexpr std::size_t kStruct = 41;
   std::vector<std::byte> bodies(40 * kStruct, std::byte{0xEE});
   join();

@@ -1,4 +1,4 @@
-// What is drawn while the network is cut, and when it is back.
+// Tests the picture while the network is cut, and when it is back.
 
 #include <algorithm>
 #include <cmath>
@@ -59,7 +59,7 @@ class TroubleTest : public ::testing::Test {
     before_last = std::exchange(last, sample.positions);
   }
   void cut(bool on) { network.set_cut(server_port->self(), client_port->self(), on); }
-  /// Between what is drawn of a body and where the server has it now.
+  /// The distance between a body as it is drawn and as the server has it now.
   [[nodiscard]] double off(Slot slot) const {
     double squared = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -109,7 +109,7 @@ TEST_F(TroubleTest, AfterAThirdOfASecondBodiesStandAndThenComeBackWithoutAJump) 
   cut(false);
   go_on(1);
   EXPECT_LT(off(3), 0.2);
-  // What is far off comes back over several samples: none takes a third of the way at once.
+  // A body that is far off comes back over several samples: none takes a third of the way at once.
   EXPECT_LT(bend, 0.35 * behind);
 }
 

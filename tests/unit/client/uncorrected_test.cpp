@@ -9,7 +9,7 @@ namespace {
 
 class UncorrectedTest : public ClientTest {
  protected:
-  /// What is drawn once time stands at the last frame applied.
+  /// Returns the picture once time stands at the last frame applied.
   const Sample& settled() {
     core->start_sampling();
     poll(500 * kMs);
@@ -101,7 +101,7 @@ TEST_F(UncorrectedTest, WantedBeforeTheFirstSnapshotItBeginsThere) {
   ASSERT_TRUE(core->drift());
   frame();
   EXPECT_EQ(core->drift()->frames, 1U);
-  // Of another run of the server nothing of it is left.
+  // After the server was started anew nothing of it is left.
   server = FakeServer(2000);
   port.sessions.push_back(from_server(server.session));
   poll();

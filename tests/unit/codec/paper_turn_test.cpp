@@ -1,4 +1,4 @@
-// The paper's codecs on bodies that turn.
+// Tests the thesis's codecs on bodies that turn.
 
 #include <gtest/gtest.h>
 

@@ -172,7 +172,7 @@ TEST_P(ContactTiers, AMixedRunKeepsItsHash) {
   EXPECT_EQ(to_hex(hasher.hash(state, {})), GetParam() == "field" ? "af8e47babf2ececf" : "34c4d42564047433");
 }
 
-// What the kernels leave: the pairs of a heap in a grid of 8 cells a side, and the forces between them.
+// The results of the kernels: the pairs of a heap in a grid of 8 cells a side, and the forces between them.
 struct KernelResult {
   std::vector<std::uint32_t> first, second;
   std::vector<std::int32_t> forces;

@@ -56,7 +56,7 @@ State random_state(std::mt19937_64& random, std::uint32_t capacity) {
   return s;
 }
 
-// Of some bodies c is made to hold them up under the drive: those at rest stay there.
+// Some bodies get a c that holds them up under the drive: those of them that are at rest stay there.
 void hold_up_some(std::mt19937_64& random, const Drive& drive, State& s) {
   for (Slot slot = 0; slot < s.capacity(); ++slot) {
     if (s.alive()[slot] == 0 || random() % 2 == 0) continue;

@@ -39,7 +39,7 @@ Real4 product(const Real4& a, const Real4& b) {
 
 double norm(const Real4& q) { return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]); }
 
-// Of the turn that leads from one to the other.
+// The angle of the turn that leads from one to the other.
 double angle_rad(const Real4& a, const Real4& b) {
   const Real4 between = product(a, {-b[0], -b[1], -b[2], b[3]});
   return 2 * std::atan2(std::hypot(between[0], between[1], between[2]), std::abs(between[3]));
@@ -191,7 +191,7 @@ State turning_state(Random& random, std::uint32_t capacity) {
   return state;
 }
 
-// Some rest; of one of them c does not hold it up, so that it wakes in the step.
+// Puts some bodies to rest. The c of one of them does not hold it up, so that it wakes in the step.
 void put_to_rest(State& state, const Drive& drive) {
   for (Slot slot = 0; slot < state.capacity(); ++slot) {
     if (state.alive()[slot] == 0 || slot % 3 != 0) continue;

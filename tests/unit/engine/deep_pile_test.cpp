@@ -1,4 +1,4 @@
-// What counts for stability is the deepest pile: contacts at the bottom are many and strong.
+// The deepest pile decides about stability: contacts at its bottom are many and strong.
 #include "tests/unit/engine/worlds.hpp"
 
 namespace tandem::engine {

@@ -108,7 +108,7 @@ class GatewayTest : public ::testing::Test {
     message.values = std::move(values);
     return message;
   }
-  /// All that a viewer who reads gets now.
+  /// All messages that a viewer gets now if it reads.
   std::vector<transport::GatewayMessage> read(ViewerId id) {
     std::vector<transport::GatewayMessage> messages;
     for (auto next = gateway.next(id, now_ns); next.message; next = gateway.next(id, now_ns)) {

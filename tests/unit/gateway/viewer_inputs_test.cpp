@@ -1,4 +1,4 @@
-// What viewers send, good and bad.
+// Tests messages of viewers, good and bad.
 #include "fake_world.hpp"
 
 namespace tandem::gateway {

@@ -99,7 +99,7 @@ class FakeSimulation final : public engine::Simulation {
   std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in
 };
 
-/// What the test puts in is taken; what the host's outbox held is kept by kind and in order.
+/// A port from which the host takes the test's messages, and which keeps the host's own by kind and in order.
 class FakePort final : public transport::ServerPort {
  public:
   explicit FakePort(transport::ParticipantId self) : self_(self) {}

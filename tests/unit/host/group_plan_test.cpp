@@ -1,4 +1,4 @@
-// Which sessions have orientations.
+// Tests which sessions have orientations.
 #include "sdk/core/tables/codec_table.hpp"
 #include "services/host/streams/groups.hpp"
 

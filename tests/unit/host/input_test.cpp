@@ -1,4 +1,4 @@
-// What becomes of an input.
+// Tests the outcome of inputs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

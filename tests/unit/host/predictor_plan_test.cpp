@@ -1,4 +1,4 @@
-// Which predictor a session has that leaves it to us.
+// Tests which predictor a session gets that names none.
 #include <gtest/gtest.h>
 
 #include "services/sessions/session_plan.hpp"

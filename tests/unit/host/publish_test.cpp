@@ -1,4 +1,4 @@
-// What leaves the host, and what happens when it can not.
+// Tests the messages that leave the host, and what happens when they cannot.
 #include <gtest/gtest.h>
 
 #include <algorithm>

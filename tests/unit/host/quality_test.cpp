@@ -29,7 +29,7 @@ void correct(QualityControl& control, std::int32_t position, std::int32_t veloci
   control.observe(predicted, target, {.threshold = 1});
 }
 
-/// `seconds` of frames of `bytes` each; the parameters in force at the end.
+/// Runs frames of `bytes` each for `seconds`. Returns the parameters in force at the end.
 CodecParameters run(QualityControl& control, int seconds, std::size_t bytes, CodecParameters parameters) {
   for (int frame = 0; frame < 30 * seconds; ++frame) control.after_frame(bytes, 10, parameters);
   return parameters;

@@ -1,4 +1,5 @@
-// tandem::Server over DDS: what who brings a simulation of their own may do wrong, and what they see of it.
+// tandem::Server over DDS: mistakes that the author of a simulation may make, and how the server reports
+// them.
 #include "tandem/host.hpp"
 
 #include <gtest/gtest.h>

@@ -25,8 +25,8 @@ std::vector<std::byte> content(std::size_t size) {
   return bytes;
 }
 
-/// One way to a receiver as reliable DDS makes it: in order; what is lost holds up all behind it for a round
-/// trip.
+/// One direction to a receiver over reliable DDS: samples arrive in order, and a lost one holds up all behind
+/// it for a round trip.
 struct Link {
   double bytes_per_s = 1e9;
   std::int64_t delay_ns = 10 * kMillisecond;

@@ -1,4 +1,4 @@
-// Which client delays the others, for how long, and with what consequences.
+// Tests which client delays the others, for how long, and with what consequences.
 #include <gtest/gtest.h>
 
 #include <set>

@@ -61,7 +61,7 @@ class StreamsTest : public ::testing::Test {
     return static_cast<std::size_t>(std::ranges::count(
         bench.port.snapshots, stream, [](const auto& snapshot) { return snapshot.stream.id; }));
   }
-  /// What a client of `stream` makes of its last snapshot and of all that was published.
+  /// Returns the state that a client of `stream` computes from its last snapshot and all that was published.
   ClientTimeline follow(std::uint32_t stream) const {
     const auto& session = bench.host->session();
     ClientTimeline client = std::move(*ClientTimeline::create(session.streams[stream].layout));
@@ -374,7 +374,7 @@ TEST_F(StreamsTest, ThatTheConfigurationGetsWrongAreRefusedByName) {
             std::string::npos);
 }
 
-// Of the bodies' turns one tells nothing.
+// One of two streams lists positions alone.
 TEST(StreamsThatTurn, ShareSlotsWithOneThatHasPositionsAlone) {
   HostConfig config = turning_config();
   config.streams.push_back(config.streams[0]);

@@ -33,7 +33,7 @@ class ExportRecording : public ::testing::Test {
 
   [[nodiscard]] std::string path(const char* name) const { return folder_ / name; }
 
-  /// What a client records of `frames` frames; gravity changes on the way.
+  /// Makes the recording of a client over `frames` frames; gravity changes on the way.
   void record(FakeServer& server, int frames = kFrames) {
     auto recorder = recording::Recorder::create(path("x.mcap"), recording::Compression::kZstd);
     ASSERT_TRUE(recorder);

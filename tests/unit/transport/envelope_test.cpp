@@ -12,7 +12,8 @@ namespace {
 template <class M>
 constexpr bool kFromViewer = std::is_constructible_v<ViewerMessage, M>;
 
-/// Of random content, with what random numbers would hardly ever have within the limits.
+/// Makes a message of random content. Fields that random numbers would hardly ever put within the limits are
+/// set.
 template <class M>
 M lawful(std::uint64_t seed) {
   auto message = RandomMessages(seed).make<M>();

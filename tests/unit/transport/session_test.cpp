@@ -9,7 +9,7 @@
 namespace tandem::transport {
 namespace {
 
-// Of one participant every ten epochs.
+// An announcement of an epoch. Ten epochs in a row are of one participant.
 Received<SessionMessage> announcement(Epoch epoch) {
   Received<SessionMessage> received;
   received.message.epoch = epoch;

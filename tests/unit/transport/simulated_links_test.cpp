@@ -1,4 +1,4 @@
-// What a link of the simulated network does to what travels on it.
+// Tests what a link of the simulated network does to samples.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -68,7 +68,7 @@ TEST(Workers, OneThreadWorksOnTheCallersWithoutCutting) {
   EXPECT_EQ(calls, 1);
 }
 
-// What one run writes the next one reads, on whichever thread: a run's end orders the two.
+// A run reads what the run before it wrote, on whichever thread: the end of a run orders the two.
 TEST(Workers, ARunSeesWhatTheRunBeforeItWrote) {
   constexpr std::uint32_t kCount = 512;
   Workers workers(4);

@@ -1,5 +1,5 @@
-// The tier `ballistic`: equation 3.1 of the thesis (semi-implicit Euler, gravity and damping) on the lattice,
-// plus the learned acceleration c:
+// The predictor `ballistic`: equation 3.1 of the thesis (semi-implicit Euler, gravity and damping) on the
+// lattice, plus the learned acceleration c:
 //   v += g + c;  c -= (c*E + 2^15) >> 16;  v -= (v*D + 2^15) >> 16;  clamp v, c to +-2^28;
 //   p += (v + 32) >> 6;  clamp p to +-2^30
 #include "sdk/core/predict/ballistic/ballistic.hpp"

@@ -4,8 +4,8 @@
 
 namespace tandem {
 
-/// The tier `ballistic`: gravity, damping and the learned acceleration c. Bodies do not interact. O(capacity)
-/// per step, no scratch memory.
+/// The predictor `ballistic`: gravity, damping and the learned acceleration c. Bodies do not interact.
+/// O(capacity) per step, no scratch memory.
 class Ballistic final : public Predictor {
  public:
   void step(const State& from, State& to, const StepInput& input) override;

@@ -1,5 +1,5 @@
 #pragma once
-// What the predictors `contact` and `field` know about the world, and its form in the session.
+// The constants of the predictors `contact` and `field`, and their form in the session.
 
 #include <array>
 #include <cstdint>

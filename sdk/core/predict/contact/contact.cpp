@@ -1,5 +1,5 @@
-// The tiers `contact` and `field`: v += g + c + contact forces, then as `ballistic`. Forces are computed from
-// the state at the start of a sub-step, after S. Green, "Particle Simulation using CUDA" (2008):
+// The predictors `contact` and `field`: v += g + c + contact forces, then as `ballistic`. Forces are computed
+// from the state at the start of a sub-step, after S. Green, "Particle Simulation using CUDA" (2008):
 //   (damping + shear) * u - (spring * overlap + shear * (u.n)) * n
 #include "sdk/core/predict/contact/contact.hpp"
 

@@ -1,5 +1,5 @@
 #pragma once
-// Moves bodies in a sub-step of the tier `contact`.
+// Moves bodies in a sub-step of the predictors `contact` and `field`.
 
 #include <cstdint>
 #include <span>

@@ -1,6 +1,6 @@
 #pragma once
-// Pairs of the tier `contact`: finds the bodies that are near each other at the start of a frame, and adds
-// the forces between them.
+// Pairs of the predictors `contact` and `field`: finds the bodies that are near each other at the start of a
+// frame, and adds the forces between them.
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// Contacts of bodies with the static geometry of the tier `contact`.
+// Contacts of bodies with the static geometry, for the predictors `contact` and `field`.
 
 #include <cstdint>
 #include <span>

@@ -1,4 +1,4 @@
-// What tests/web/record_session wrote.
+// Reads the files that tests/web/record_session wrote.
 
 import { readFileSync } from 'node:fs';
 
