@@ -20,7 +20,11 @@ constexpr std::int64_t kSlowNs = 10'000'000'000;
 }  // namespace
 
 Writer::Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)())
-    : folder_(&folder), interval_ns_(interval_ns), clock_ns_(clock_ns), began_ns_(clock_ns()) {
+    : folder_(&folder),
+      interval_ns_(interval_ns),
+      clock_ns_(clock_ns),
+      began_ns_(clock_ns()),
+      asked_ns_(began_ns_) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -38,8 +42,13 @@ bool Writer::idle() const {
   return !busy_;
 }
 
-bool Writer::due(std::int64_t now_ns) const {
-  return (!taken_ns_ || now_ns - *taken_ns_ >= interval_ns_) && idle();
+bool Writer::due(std::int64_t now_ns) {
+  const std::int64_t frame_ns = now_ns - std::exchange(asked_ns_, now_ns);
+  const std::lock_guard lock(mutex_);
+  if (busy_ || !taken_ns_) return !busy_;
+  // A disk that needs half of the interval is slow, and asking more of it would make it slower.
+  const std::int64_t ahead_ns = std::clamp<std::int64_t>(frame_ns + write_ns_, 0, interval_ns_ / 2);
+  return now_ns - *taken_ns_ >= interval_ns_ - ahead_ns;
 }
 
 void Writer::take(std::int64_t now_ns, const std::function<void(Checkpoint&)>& fill) {
@@ -72,6 +81,7 @@ void Writer::run() {
     const std::int64_t took_ns = clock_ns_() - start_ns;
     lock.lock();
     figures_.write_ms_max = std::max(figures_.write_ms_max, ms(took_ns));
+    write_ns_ = took_ns;
     if (stored) {
       ++figures_.written;
       figures_.frame = checkpoint_.frame;

@@ -38,9 +38,10 @@ class Writer {
   Writer(Writer&&) = delete;
   Writer& operator=(Writer&&) = delete;
 
-  /// True if the interval has passed and the checkpoint before is written. A slow disk makes checkpoints
-  /// rare; it delays no frame.
-  [[nodiscard]] bool due(std::int64_t now_ns) const;
+  /// Call after every frame. True if the checkpoint before is written, and a copy made after the next frame
+  /// might not be on the disk when the interval is over. So no more than the interval can be lost; a slow
+  /// disk makes checkpoints rarer, and delays no frame.
+  [[nodiscard]] bool due(std::int64_t now_ns);
   /// Has `fill` copy the world, and returns. Precondition: no write is under way.
   void take(std::int64_t now_ns, const std::function<void(Checkpoint&)>& fill);
   /// True if no write is under way.
@@ -60,6 +61,7 @@ class Writer {
   std::int64_t (*clock_ns_)();
   std::int64_t began_ns_;
   std::optional<std::int64_t> taken_ns_;
+  std::int64_t asked_ns_;  // in due()
   std::int64_t told_ns_ = INT64_MIN;
   bool told_trouble_ = false;
 
@@ -71,7 +73,8 @@ class Writer {
   bool busy_ = false, stop_ = false;
   Figures figures_;
   std::int64_t newest_ns_ = 0;
-  std::string trouble_;  // of the last write; empty: it was good
+  std::int64_t write_ns_ = 0;  // of the last write
+  std::string trouble_;        // of the last write; empty: it was good
   std::thread thread_;
 };
 

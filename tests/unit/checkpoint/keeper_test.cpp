@@ -194,7 +194,7 @@ TEST_F(KeeperTest, AFrameIsNotKeptWaitingWhileACheckpointIsUnderWay) {
   for (std::int64_t now = 0; now < 10'000'000'000; now += 33'333'333)
     (*keeper)->after_frame(now, [&](Checkpoint& out) { out = sample(1000, static_cast<Frame>(++copies)); });
   EXPECT_GE(copies, 1);
-  EXPECT_LE(copies, 10) << "one a second";
+  EXPECT_LE(copies, 20) << "two a second, if the disk is slow";
 }
 
 TEST_F(KeeperTest, SettingsOutOfRangeAreRefused) {
