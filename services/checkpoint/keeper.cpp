@@ -14,12 +14,6 @@ constexpr Epoch kLastEpoch = Epoch{1}
 
 tl::unexpected<Error> refuse(std::string why) { return fail(ErrorCode::kInvalidArgument, std::move(why)); }
 
-bool can_save(const engine::Simulation& simulation) {
-  std::vector<std::byte> state;
-  simulation.save(state);
-  return !state.empty();
-}
-
 std::string told_of(const Checkpoint& checkpoint, const std::string& file) {
   return fmt::format("goes on from {}: frame {} of epoch {}, {} bodies", file, checkpoint.frame,
                      checkpoint.epoch, checkpoint.bodies);
@@ -58,7 +52,9 @@ Keeper::Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_
 
 Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) {
   Start start;
-  if (!can_save(simulation)) {
+  std::vector<std::byte> state;
+  simulation.save(state);
+  if (state.empty()) {
     constexpr const char* kWhy = "this simulation cannot be saved (it has no save() and load())";
     if (settings_.required)
       return fail(ErrorCode::kUnsupported, fmt::format("{}, but a checkpoint is required", kWhy));
@@ -87,7 +83,8 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
     }
     start.told = none + "; starts afresh";
   }
-  writer_.emplace(folder_, static_cast<std::int64_t>(settings_.interval_s * 1e9), clock_ns_);
+  writer_.emplace(folder_, static_cast<std::int64_t>(settings_.interval_s * 1e9), clock_ns_,
+                  std::move(state));
   return start;
 }
 

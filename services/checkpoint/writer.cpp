@@ -19,12 +19,14 @@ constexpr std::int64_t kSlowNs = 10'000'000'000;
 
 }  // namespace
 
-Writer::Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)())
+Writer::Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(),
+               std::vector<std::byte> memory)
     : folder_(&folder),
       interval_ns_(interval_ns),
       clock_ns_(clock_ns),
       began_ns_(clock_ns()),
       asked_ns_(began_ns_) {
+  checkpoint_.engine_state = std::move(memory);
   thread_ = std::thread([this] { run(); });
 }
 

@@ -31,7 +31,9 @@ class Writer {
   static constexpr std::int64_t kTellNs = 10'000'000'000;  ///< between two lines about the same trouble
 
   /// `folder` is used by the writer's thread from now on, and must outlive it. `clock_ns`: a steady clock.
-  Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)());
+  /// `memory`: for the engine's part. The first copy takes several times as long into memory that the system
+  /// has not handed out yet.
+  Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(), std::vector<std::byte> memory);
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;

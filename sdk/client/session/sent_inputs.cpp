@@ -42,7 +42,8 @@ void SentInputs::resolve(const transport::ReplyMessage& reply, std::vector<Input
 
 void SentInputs::resolve(const Doubt& doubt, const transport::ReplyMessage& reply,
                          std::vector<InputOutcome>& outcomes) {
-  const auto entry = std::ranges::find(reply.entries, doubt.number, &transport::ReplyEntry::number);
+  const auto entry = std::find_if(reply.entries.begin(), reply.entries.end(),
+                                  [&](const transport::ReplyEntry& e) { return e.number == doubt.number; });
   const bool listed = entry != reply.entries.end();
   // If the server has handled an input of this epoch already, only the list tells about earlier ones.
   const bool decided = listed || (doubt.number <= reply.highest_input && reply.highest_input < first_number_);
