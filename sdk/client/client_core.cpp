@@ -159,7 +159,12 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   join_attempts_ = join_attempt();
   epoch_.reset();
   pictures_.clear();
-  sent_.clear(outcomes_);
+  const bool continues = session_ && announcement.message.continues_epoch == session_->epoch;
+  if (continues) {
+    sent_.carry_over(announcement.message.continues_frame);
+  } else {
+    sent_.clear(outcomes_);
+  }
   session_ = announcement.message;
   session_from_ = announcement.from;
   refusal_.clear();
@@ -226,6 +231,7 @@ void ClientCore::report_outcomes() {
         ++statistics_.inputs_refused;
         break;
       case InputOutcome::Kind::kUnknown:
+      case InputOutcome::Kind::kLost:
         ++statistics_.inputs_unknown;
         break;
     }

@@ -17,6 +17,12 @@ bool Outcomes::has(std::uint64_t number) const {
                              [number](const Outcome& outcome) { return outcome.entry.number == number; });
 }
 
+std::vector<transport::ReplyEntry> Outcomes::entries() const {
+  std::vector<transport::ReplyEntry> entries;
+  for (const Outcome& outcome : outcomes_) entries.push_back(outcome.entry);
+  return entries;
+}
+
 void Outcomes::tell(transport::ReplyMessage& reply, std::int64_t now_ns) const {
   reply.entries.clear();
   reply.texts.clear();

@@ -20,6 +20,8 @@ class Outcomes {
   /// `text`: the words of the simulation that refused the input; empty if there are none.
   void add(const transport::ReplyEntry& entry, std::int64_t now_ns, std::string text = {});
   [[nodiscard]] bool has(std::uint64_t number) const;
+  /// All that are kept, oldest first.
+  [[nodiscard]] std::vector<transport::ReplyEntry> entries() const;
   /// Fills in the entries and texts of a reply that is made now. Of more than kMaxReplyTexts texts the newest
   /// are told.
   void tell(transport::ReplyMessage& reply, std::int64_t now_ns) const;

@@ -499,10 +499,21 @@ void Host::Impl::plan_wake() {
 
 Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation& simulation,
                                            transport::ServerPort& port) {
+  const auto before = std::exchange(config.goes_on_from, nullptr);
+  if (before) {
+    if (before->epoch >= config.epoch) return refuse("the epoch must be above the one that it continues");
+    if (before->capacity() != simulation.capacity()) return refuse("the checkpoint has another capacity");
+    config.start_frame = config.continues_frame = before->frame;
+    config.continues_epoch = before->epoch;
+    config.wait_for = 0;
+    config.goes_on_from = before;
+  }
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
   auto source = LiveSource::create(config, simulation);
   if (!source) return tl::unexpected(source.error());
-  return Impl::create(std::move(config), std::move(*source), port);
+  auto host = Impl::create(std::move(config), std::move(*source), port);
+  if (host && before) (*host)->impl_->roster.remember(before->clients);
+  return host;
 }
 
 Result<std::unique_ptr<Host>> Host::create(ServiceConfig config, std::unique_ptr<FrameSource> source,
@@ -540,6 +551,11 @@ Result<void> Host::set_parameters(const StreamParameters& parameters, std::uint3
 }
 const StreamParameters& Host::parameters(std::uint32_t stream) const {
   return impl_->source->parameters(stream);
+}
+void Host::capture(checkpoint::Checkpoint& out) const {
+  out.wall_ms = impl_->wall_ns / kMillisecond;
+  impl_->source->capture(out);
+  impl_->roster.capture(out.clients);
 }
 double Host::threshold_m(std::uint32_t stream) const { return impl_->threshold_m(stream); }
 std::uint32_t Host::first_made() const { return impl_->first_made(); }

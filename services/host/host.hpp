@@ -64,6 +64,10 @@ class Host {
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity, kUnsupported (no simulation).
   Result<Frame> inject(const engine::Input& input);
 
+  /// Copies all that a server needs to go on from frame(), for a checkpoint: HostConfig::goes_on_from. Call
+  /// it right after a poll() that returned true. Keeps the memory that `out` has. Only for a simulation.
+  void capture(checkpoint::Checkpoint& out) const;
+
   /// Sets what decoder and predicted step read (threshold, quantisation steps, gains, decay): see
   /// Stream::set_parameters(). Errors: also kUnsupported without a simulation and kOutOfOrder while the
   /// stream is not made.

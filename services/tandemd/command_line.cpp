@@ -140,6 +140,15 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
       "--scripted", [&config] { config.set_scripted(true); },
       "Run the scene's script in the server, which then sends the inputs of simulated users");
   flags.add("--users", &Config::set_users, "Number of users in that script [the scene's]");
+  flags.add("--checkpoint-dir", &Config::mutable_checkpoint_dir,
+            "Folder for checkpoints of this session. The server goes on from the newest when it starts again "
+            "[no checkpoints]");
+  flags.add("--checkpoint-interval", &Config::set_checkpoint_interval,
+            fmt::format("Seconds between two checkpoints [{}]", defaults.checkpoint.interval_s));
+  flags.add(
+      "--checkpoint", &Config::mutable_checkpoint,
+      "auto: start afresh where there is no good checkpoint; require: do not start then; off: neither read "
+      "nor write any [auto]");
   flags.add("--hash-log", &Config::mutable_hash_log, "File for a line `epoch,frame,hash` of every frame");
 }
 

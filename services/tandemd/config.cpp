@@ -74,6 +74,23 @@ Result<void> check_numbers(const Options& options) {
   return {};
 }
 
+Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
+  checkpoint::Settings& settings = options.checkpoint;
+  const std::string& wanted = config.checkpoint();
+  if (config.has_checkpoint() && wanted != "auto" && wanted != "require" && wanted != "off")
+    return refuse("checkpoint", fmt::format("must be auto, require or off, not '{}'", wanted));
+  settings.required = wanted == "require";
+  if (settings.required && config.checkpoint_dir().empty())
+    return refuse("checkpoint", "require needs --checkpoint-dir");
+  if (wanted != "off") settings.folder = config.checkpoint_dir();
+  if (config.has_checkpoint_interval()) settings.interval_s = config.checkpoint_interval();
+  if (!within(settings.interval_s, checkpoint::kLeastIntervalS, checkpoint::kMostIntervalS)) {
+    return refuse("checkpoint-interval", fmt::format("must be {} to {} seconds", checkpoint::kLeastIntervalS,
+                                                     checkpoint::kMostIntervalS));
+  }
+  return {};
+}
+
 /// Checks which of threshold, automatic quality and budget can be combined.
 Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
   if (choice.threshold_m && config.has_threshold_scale())
@@ -240,6 +257,7 @@ Result<Options> check_config(const ServerConfig& config) {
     return refuse("session", named.error().message);
   return read_service(config, options)
       .and_then([&] { return check_numbers(options); })
+      .and_then([&] { return read_checkpoint(config, options); })
       .and_then([&] { return check_quality(config, options.choice); })
       .and_then([&] { return check_streams(config, options.choice); })
       .map([&] { return options; });

@@ -44,6 +44,12 @@ std::string streams_text(const host::HostTotals& totals) {
   return text;
 }
 
+std::string age_text(const std::optional<checkpoint::Figures>& checkpoints) {
+  if (!checkpoints) return {};
+  return checkpoints->age_s ? fmt::format("  checkpoint {:.1f} s old", *checkpoints->age_s)
+                            : std::string("  no checkpoint yet");
+}
+
 }  // namespace
 
 Console::Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
@@ -54,7 +60,8 @@ void Console::clear_line() {
   line_shown_ = false;
 }
 
-void Console::show(host::Host& host, std::int64_t now_ns) {
+void Console::show(host::Host& host, const std::optional<checkpoint::Figures>& checkpoints,
+                   std::int64_t now_ns) {
   for (const std::string& notice : host.take_notices()) {
     clear_line();
     spdlog::info(notice);
@@ -72,7 +79,7 @@ void Console::show(host::Host& host, std::int64_t now_ns) {
       host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s, frames > 0 ? corrected / frames : 0,
       host.report().frame_ms, host.participants(), host.observers(), host.window(),
       host.threshold_m(host.first_made()), gains_text(host.parameters(host.first_made())));
-  std::fputs((line + streams_text(totals)).c_str(), stderr);
+  std::fputs((line + streams_text(totals) + age_text(checkpoints)).c_str(), stderr);
   std::fflush(stderr);
   line_shown_ = true;
   last_ = totals;

@@ -2,8 +2,10 @@
 // The output of tandemd while it runs: log lines, and on a terminal one live line.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "services/checkpoint/writer.hpp"
 #include "services/host/host.hpp"
 
 namespace tandem::daemon {
@@ -23,8 +25,9 @@ class Console {
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
-  /// Logs the host's notices and, once a second on a terminal, rewrites the live line.
-  void show(host::Host& host, std::int64_t now_ns);
+  /// Logs the host's notices and, once a second on a terminal, rewrites the live line. `checkpoints`: empty
+  /// if there are none.
+  void show(host::Host& host, const std::optional<checkpoint::Figures>& checkpoints, std::int64_t now_ns);
 
  private:
   void clear_line();

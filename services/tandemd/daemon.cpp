@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -14,6 +15,8 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/checkpoint/keeper.hpp"
+#include "services/host/frames/going_on.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/json/json.hpp"
@@ -80,6 +83,11 @@ class ScriptSender {
     if (options.scripted) script_.emplace(scene, options.seed, options.users);
   }
 
+  /// Leaves out what a checkpoint of that frame holds already: it was sent before the frame was made.
+  void skip_to(Frame frame) {
+    if (script_) static_cast<void>(script_->until(frame + lead_));
+  }
+
   void send_due(host::Host& host) {
     if (!script_) return;
     for (const scenes::ScriptedInput& scripted : script_->until(host.frame() + 1 + lead_)) {
@@ -125,10 +133,54 @@ class FailureLog {
   std::int64_t next_ns_ = 0;
 };
 
+/// Finds the checkpoint to go on from, has the simulation and the session begin there, and says so.
+Result<std::unique_ptr<checkpoint::Keeper>> begin(const Options& options, engine::Simulation& simulation,
+                                                  host::HostConfig& config) {
+  auto keeper = checkpoint::Keeper::open(options.checkpoint, &steady_ns);
+  if (!keeper) return keeper;
+  const auto start = (*keeper)->start(host::checkpoint_world(config), simulation);
+  if (!start) return tl::unexpected(start.error());
+  for (const std::string& warning : start->warnings) spdlog::warn("checkpoint: {}", warning);
+  spdlog::info("checkpoint: {}", start->told);
+  host::begin_from(*start, config);
+  return keeper;
+}
+
+/// A keeper, if there is one, at work for a host.
+class Keeping {
+ public:
+  Keeping(checkpoint::Keeper* keeper, const host::Host& host) : keeper_(keeper) {
+    capture_ = [&host](checkpoint::Checkpoint& out) { host.capture(out); };
+  }
+  void after_frame(std::int64_t now_ns) {
+    ran_ = true;
+    if (keeper_ != nullptr) keeper_->after_frame(now_ns, capture_);
+  }
+  void show(std::int64_t now_ns) {
+    if (keeper_ == nullptr) return;
+    for (const std::string& line : keeper_->take_notices(now_ns)) spdlog::warn("checkpoint: {}", line);
+  }
+  void end() {
+    if (keeper_ == nullptr || !ran_) return;
+    keeper_->end(steady_ns(), capture_);
+    show(steady_ns());
+  }
+  /// Empty without a keeper.
+  [[nodiscard]] std::optional<checkpoint::Figures> figures() const {
+    return keeper_ == nullptr ? std::nullopt : std::optional(keeper_->figures(steady_ns()));
+  }
+
+ private:
+  checkpoint::Keeper* keeper_;
+  std::function<void(checkpoint::Checkpoint&)> capture_;
+  bool ran_ = false;
+};
+
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
-             const host::Publisher& publisher, const Options& options, const std::atomic<bool>& stop) {
+             Keeping& keeping, const host::Publisher& publisher, const Options& options,
+             const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
@@ -141,6 +193,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     if (host.poll(now_ns, wall_ns())) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
+      keeping.after_frame(now_ns);
     }
     if (host.error()) return Ending::kRefused;
     if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
@@ -148,8 +201,9 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;
       script.send_due(host);
     }
-    console.show(host, now_ns);
+    console.show(host, keeping.figures(), now_ns);
     failures.show(now_ns);
+    keeping.show(now_ns);
     if (publisher.gave_up()) return Ending::kCannotWrite;
     if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
     const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
@@ -158,7 +212,19 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   return Ending::kDone;
 }
 
-[[nodiscard]] Result<void> print_report(const host::HostTotals& totals, double frame_rate_hz, bool json) {
+Json json_of(const checkpoint::Figures& figures) {
+  return {{"written", figures.written},
+          {"failed", figures.failed},
+          {"frame", figures.frame},
+          {"bytes", figures.bytes},
+          {"age_s", figures.age_s ? Json(*figures.age_s) : Json()},
+          {"copy_ms_max", figures.copy_ms_max},
+          {"write_ms_max", figures.write_ms_max}};
+}
+
+[[nodiscard]] Result<void> print_report(const host::HostTotals& totals,
+                                        const std::optional<checkpoint::Figures>& checkpoints,
+                                        double frame_rate_hz, bool json) {
   const double per_frame = totals.frames == 0 ? 0 : 1 / static_cast<double>(totals.frames);
   const double mbit_per_s =
       static_cast<double>(totals.payload_bytes) * 8 / kBitsPerMbit * per_frame * frame_rate_hz;
@@ -167,6 +233,12 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       "({} ms), {} inputs refused",
       totals.frames, mbit_per_s, totals.frame_ms_p50, totals.frame_ms_p99, totals.clients_seen, totals.stalls,
       totals.suspended_ms, totals.refused_inputs);
+  if (checkpoints) {
+    spdlog::info(
+        "{} checkpoints, {} failed, the last of frame {} with {} bytes; a frame was delayed by {:.2f} ms at most",
+        checkpoints->written, checkpoints->failed, checkpoints->frame, checkpoints->bytes,
+        checkpoints->copy_ms_max);
+  }
   if (!json) return {};
   Json streams = Json::array();
   for (const host::StreamTotals& stream : totals.streams) {
@@ -185,6 +257,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   each_server_count([&object](const char* name, std::uint64_t count) { object[name] = count; }, totals);
   object["demotions"] = totals.demotions;
   object["streams"] = std::move(streams);
+  if (checkpoints) object["checkpoint"] = json_of(*checkpoints);
   const std::string line = object.dump() + '\n';
   if (std::fputs(line.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     return fail(ErrorCode::kIo, "the report could not be written to stdout");
@@ -197,7 +270,7 @@ bool is_alone(const std::vector<host::StreamConfig>& streams) {
 }
 
 /// Finishes the hash log, reports the result, and returns the exit code.
-int tell_end(const host::Host& host, Ending ending, HashLog& hashes,
+int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const Keeping& keeping,
              const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options) {
   const auto closed = hashes.close();
   if (!closed) spdlog::error(closed.error().message);
@@ -208,7 +281,7 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes,
     if (const std::string gains = gains_text(host.parameters(id)); !gains.empty())
       spdlog::info("at the end{}: {}", which, gains);
   }
-  const auto printed = print_report(host.totals(), frame_rate_hz, options.json);
+  const auto printed = print_report(host.totals(), keeping.figures(), frame_rate_hz, options.json);
   if (!printed) spdlog::error(printed.error().message);
   if (ending == Ending::kCannotWrite) {
     return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
@@ -232,6 +305,14 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   auto simulation =
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
   if (!simulation) return report_error(simulation.error(), 2);
+  config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
+  std::unique_ptr<checkpoint::Keeper> keeper;
+  if (!options.checkpoint.folder.empty()) {
+    auto begun = begin(options, **simulation, *config);
+    if (!begun) return report_error(begun.error(), 1);
+    keeper = std::move(*begun);
+  }
+  const bool goes_on = config->goes_on_from != nullptr;
   HashLog hashes;
   if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
     return report_error(opened.error(), 1);
@@ -252,9 +333,13 @@ int run_daemon(const Options& options, SignalWatch& signals) {
 
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
-  const Ending ending = serve(**host, **port, script, hashes, publisher, options, signals.stop());
+  if (goes_on) script.skip_to((*host)->frame());
+  Keeping keeping(keeper.get(), **host);
+  const Ending ending = serve(**host, **port, script, hashes, keeping, publisher, options, signals.stop());
+  if (ending != Ending::kRefused) keeping.end();
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
-  const int exit_code = signals.finish(tell_end(**host, ending, hashes, streams, frame_rate_hz, options));
+  const int exit_code =
+      signals.finish(tell_end(**host, ending, hashes, keeping, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "services/checkpoint/keeper.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
@@ -18,6 +19,8 @@ struct Options : planning::ServiceWishes {
 
   std::uint32_t domain = 0;
   std::optional<double> duration_s;  ///< empty: until stopped
+
+  checkpoint::Settings checkpoint;
 
   std::string hash_log;  ///< path; empty: none
   bool json = false;     ///< a report on stdout at the end

@@ -16,6 +16,7 @@ using Run = std::function<int()>;
 void add_join(commandline::Command app, Run& run);
 void add_record(commandline::Command app, Run& run);
 void add_replay(commandline::Command app, Run& run);
+void add_checkpoint(commandline::Command app, Run& run);
 /// Subcommands for evaluation; services/lab defines them if it is part of the build.
 void add_bench(commandline::Command app, Run& run);
 void add_export(commandline::Command app, Run& run);

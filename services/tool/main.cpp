@@ -1,5 +1,5 @@
-// The command line tool: join, record, replay, bench, export, top, doctor. Exit 0 done, 1 failed, 2 wrong
-// usage.
+// The command line tool: join, record, replay, checkpoint, bench, export, top, doctor. Exit 0 done, 1 failed,
+// 2 wrong usage.
 
 #include <cstdio>
 #include <exception>
@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   tandem::tool::add_join(app, run);
   tandem::tool::add_record(app, run);
   tandem::tool::add_replay(app, run);
+  tandem::tool::add_checkpoint(app, run);
 #ifdef TANDEM_LAB
   tandem::tool::add_bench(app, run);
   tandem::tool::add_export(app, run);

@@ -29,7 +29,7 @@ HOST = ["services/host", "services/host/clients", "services/host/frames", "servi
 LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
-OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/workers"]
+OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/checkpoint", "services/workers"]
 OF_LAB = (
     SIMULATION
     + TIMELINE
@@ -68,6 +68,7 @@ EDGES = {
     "services/json": [],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
+    "services/checkpoint": LAYOUT + ["sdk/transport"] + SIMULATION,
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
     "services/planning": OF_HOST
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
@@ -76,7 +77,7 @@ EDGES = {
     "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],
     "services/host/clients": OF_HOST + ["services/host/frames", "services/host/outgoing"],
     "services/host": OF_HOST + HOST,
-    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/planning"] + HOST,
+    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
@@ -89,7 +90,7 @@ EDGES = {
     "services/tandemd": SIMULATION
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
-    + ["services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
+    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
     "services/gateway": OF_CLIENT
@@ -99,7 +100,7 @@ EDGES = {
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/process", "services/recording", "services/scenes"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],

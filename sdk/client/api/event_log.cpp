@@ -59,6 +59,9 @@ void EventLog::on_outcome(const client::InputOutcome& outcome) {
     case client::InputOutcome::Kind::kUnknown:
       event.kind = TANDEM_EVENT_INPUT_UNKNOWN;
       break;
+    case client::InputOutcome::Kind::kLost:
+      event.kind = TANDEM_EVENT_INPUT_LOST;
+      break;
   }
   event.number = outcome.number;
   add(std::move(event));

@@ -11,7 +11,57 @@ void SentInputs::on_sent(std::int64_t now_ns, std::vector<InputOutcome>& outcome
   pending_.pop_front();
 }
 
+void SentInputs::carry_over(Frame frame) {
+  SentInputs next;
+  next.last_number_ = last_number_;
+  next.first_number_ = last_number_ + 1;
+  next.doubts_ = std::move(doubts_);
+  for (const Acted& acted : acted_)
+    if (acted.frame > frame) next.doubts_.push_back({acted.number, 0, true});
+  for (const Pending& input : pending_) {
+    if (input.frame != 0 && input.frame <= frame) {
+      next.pending_.push_back(input);  // it acted; this client has yet to see it
+    } else {
+      next.doubts_.push_back({input.number, input.sent_ns, false});
+    }
+  }
+  constexpr std::size_t kMostDoubts = kMaxPending + kMaxActed;
+  if (next.doubts_.size() > kMostDoubts)
+    next.doubts_.erase(next.doubts_.begin(), next.doubts_.end() - kMostDoubts);
+  *this = std::move(next);
+}
+
+// A reply without an account says nothing of inputs; its reason is another.
+void SentInputs::resolve(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes) {
+  if (doubts_.empty()) return;
+  const auto reason = static_cast<transport::Reason>(reply.reason);
+  if (reason != transport::Reason::kNone && reason != transport::Reason::kDemoted) return;
+  for (const Doubt& doubt : doubts_) resolve(doubt, reply, outcomes);
+  doubts_.clear();
+}
+
+void SentInputs::resolve(const Doubt& doubt, const transport::ReplyMessage& reply,
+                         std::vector<InputOutcome>& outcomes) {
+  const auto entry = std::find_if(reply.entries.begin(), reply.entries.end(),
+                                  [&](const transport::ReplyEntry& e) { return e.number == doubt.number; });
+  const bool listed = entry != reply.entries.end();
+  // If the server has handled an input of this epoch already, only the list tells about earlier ones.
+  const bool decided = listed || (doubt.number <= reply.highest_input && reply.highest_input < first_number_);
+  if (!decided) {
+    outcomes.push_back({InputOutcome::Kind::kLost, doubt.number, 0, 0, 0});
+  } else if (doubt.told) {
+    return;
+  } else if (!listed) {
+    outcomes.push_back({InputOutcome::Kind::kUnknown, doubt.number, 0, 0, 0});
+  } else if (entry->code != static_cast<std::uint32_t>(transport::Reason::kNone)) {
+    outcomes.push_back({InputOutcome::Kind::kRefused, doubt.number, 0, entry->code, 0});
+  } else {
+    pending_.push_back({doubt.number, doubt.sent_ns, std::max<Frame>(1, entry->frame)});
+  }
+}
+
 void SentInputs::on_reply(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes) {
+  resolve(reply, outcomes);
   std::erase_if(pending_, [&](Pending& input) {
     if (input.frame != 0 || input.number > reply.highest_input) return false;
     const auto entry = std::find_if(reply.entries.begin(), reply.entries.end(),
@@ -47,6 +97,8 @@ void SentInputs::settle(std::vector<InputOutcome>& outcomes) {
     const std::int64_t at_ns = exact.frame == input.frame ? exact.at_ns : last_applied_.at_ns;
     outcomes.push_back({InputOutcome::Kind::kActed, input.number, input.frame, 0,
                         std::max<std::int64_t>(0, at_ns - input.sent_ns)});
+    acted_.push_back({input.number, input.frame});
+    if (acted_.size() > kMaxActed) acted_.pop_front();
     return true;
   });
 }
@@ -55,9 +107,13 @@ void SentInputs::clear(std::vector<InputOutcome>& outcomes) {
   for (const Pending& input : pending_) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});
   }
+  for (const Doubt& doubt : doubts_) {
+    if (!doubt.told) outcomes.push_back({InputOutcome::Kind::kUnknown, doubt.number, 0, 0, 0});
+  }
   const std::uint64_t last_number = last_number_;
   *this = SentInputs();
   last_number_ = last_number;
+  first_number_ = last_number + 1;
 }
 
 }  // namespace tandem::client

@@ -19,6 +19,7 @@ struct InputOutcome {
     kActed,    ///< acted on `frame`, which this client has applied
     kRefused,  ///< the server refused it for `reason`
     kUnknown,  ///< it was lost, or 32 later answers overwrote its answer
+    kLost,     ///< it did not act: the server went back to a frame before it. May follow kActed
   };
   Kind kind = Kind::kActed;
   std::uint64_t number = 0;
@@ -33,11 +34,16 @@ class SentInputs {
  public:
   /// Maximum number of unanswered inputs held; beyond it the oldest counts as unknown.
   static constexpr std::size_t kMaxPending = 256;
+  /// Maximum number of inputs that acted and that a server which goes back can still take back.
+  static constexpr std::size_t kMaxActed = 1024;
 
   std::uint64_t next_number() const { return last_number_ + 1; }
   void on_sent(std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
   void on_reply(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
   void on_applied(Frame frame, std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
+  /// An epoch begins that continues the one before from `frame`. What acted later, or was not answered, is in
+  /// doubt until the first reply that comes from an account: it says what the server had decided by then.
+  void carry_over(Frame frame);
   /// A new epoch begins: unanswered inputs count as unknown. The numbers continue, because an earlier server
   /// that comes back remembers the outcomes of the numbers it knows.
   void clear(std::vector<InputOutcome>& outcomes);
@@ -53,10 +59,24 @@ class SentInputs {
     Frame frame = 0;
     std::int64_t at_ns = 0;
   };
+  struct Doubt {
+    std::uint64_t number = 0;
+    std::int64_t sent_ns = 0;
+    bool told = false;  // as kActed
+  };
+  struct Acted {
+    std::uint64_t number = 0;
+    Frame frame = 0;
+  };
   void settle(std::vector<InputOutcome>& outcomes);
+  void resolve(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
+  void resolve(const Doubt& doubt, const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
 
   std::uint64_t last_number_ = 0;
+  std::uint64_t first_number_ = 1;  // of this epoch
   std::deque<Pending> pending_;
+  std::deque<Acted> acted_;  // the latest
+  std::vector<Doubt> doubts_;
   // When the last frames were applied, indexed by frame modulo the array's size: a reply may come after the
   // frame that it names.
   std::array<Applied, 256> applied_at_{};

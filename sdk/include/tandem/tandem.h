@@ -370,7 +370,10 @@ enum {
   TANDEM_EVENT_INPUT_UNKNOWN = 9,  /**< the outcome of input `number` will never be known */
   TANDEM_EVENT_SESSION_ENDED = 10, /**< the server is gone; the last state stays */
   TANDEM_EVENT_NEW_EPOCH = 11,     /**< another run of a server: `epoch`. The old epoch's state is void */
-  TANDEM_EVENT_SESSION_BACK = 12   /**< the server that was gone is back, in the same epoch */
+  TANDEM_EVENT_SESSION_BACK = 12,  /**< the server that was gone is back, in the same epoch */
+  /** Input `number` did not act: the server went on from a frame before it (tandem_scene::continues_frame).
+   * Comes once, after TANDEM_EVENT_NEW_EPOCH, also where TANDEM_EVENT_INPUT_ACTED came in the epoch before. */
+  TANDEM_EVENT_INPUT_LOST = 13
 };
 
 /** One event. Fields that its kind does not mention are 0. */

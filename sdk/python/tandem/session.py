@@ -58,6 +58,7 @@ class EventKind(enum.IntEnum):
     SESSION_ENDED = 10  #: the server is gone; the last state stays
     NEW_EPOCH = 11  #: another run of a server: `epoch`. Nothing of the old one counts
     SESSION_BACK = 12  #: the server that was gone is there again, in the same epoch
+    INPUT_LOST = 13  #: input `number` did not act: the server went on from a frame before it. Once, after NEW_EPOCH
 
 
 class Shape(enum.IntEnum):

@@ -44,6 +44,8 @@ const char* name_of(client::InputOutcome::Kind kind) {
       return "refused";
     case client::InputOutcome::Kind::kUnknown:
       return "unknown";
+    case client::InputOutcome::Kind::kLost:
+      return "lost";
   }
   return "";
 }

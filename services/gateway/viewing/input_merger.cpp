@@ -52,7 +52,7 @@ void InputMerger::on_outcome(const client::InputOutcome& outcome, std::vector<Ve
       outcome.kind == Kind::kRefused ? static_cast<Reason>(outcome.reason) : transport::Reason::kNone;
   for (const Claim& claim : claims.mapped()) {
     out.push_back({.claim = claim,
-                   .known = outcome.kind != Kind::kUnknown,
+                   .known = outcome.kind == Kind::kActed || outcome.kind == Kind::kRefused,
                    .reason = reason,
                    .frame = outcome.frame,
                    .text = outcome.text});

@@ -55,6 +55,14 @@ Account* Roster::admit(const transport::AckMessage& ack, const transport::Partic
   account.from = from;
   account.heard_ns = now_ns;
   account.attempt = ack.join_attempt;
+  if (const auto known = remembered_.find(ack.client);
+      known != remembered_.end() && known->second.from == from) {
+    account.inputs.highest = known->second.highest;
+    // Told again from now on: the client may have missed the last replies of the epoch before.
+    for (const transport::ReplyEntry& entry : known->second.outcomes)
+      account.inputs.outcomes.add(entry, now_ns);
+    remembered_.erase(known);
+  }
   ++seen_;
   peers_.try_emplace(from);
   return &accounts_.emplace(ack.client, account).first->second;
@@ -156,7 +164,21 @@ Account* Roster::find(transport::ClientId id, const transport::ParticipantId& fr
   return &known->second;
 }
 
+void Roster::remember(const std::vector<checkpoint::ClientState>& clients) {
+  for (const checkpoint::ClientState& client : clients) remembered_.emplace(client.id, client);
+}
+
+void Roster::capture(std::vector<checkpoint::ClientState>& out) const {
+  out.clear();
+  for (const auto& [id, account] : accounts_)
+    out.push_back({id, account.from, account.inputs.highest, account.inputs.outcomes.entries()});
+  for (const auto& [id, client] : remembered_)
+    if (!accounts_.contains(id)) out.push_back(client);
+}
+
 void Roster::look_for_dead(transport::ServerPort& port, const Now& now) {
+  if (!remembered_ns_) remembered_ns_ = now.ns;
+  if (now.ns - *remembered_ns_ > kForgetNs) remembered_.clear();
   for (auto it = accounts_.begin(); it != accounts_.end();) {
     Account& account = it->second;
     const std::int64_t silence_ns = now.ns - account.heard_ns;

@@ -16,6 +16,7 @@
 #include "services/accounts/outcomes.hpp"
 #include "services/accounts/reply_schedule.hpp"
 #include "services/accounts/token_bucket.hpp"
+#include "services/checkpoint/checkpoint.hpp"
 #include "services/host/clients/notices.hpp"
 #include "services/host/clients/stall_meter.hpp"
 #include "services/host/clients/window.hpp"
@@ -132,6 +133,12 @@ class Roster {
   /// kNotPlaying.
   Account* find(transport::ClientId id, const transport::ParticipantId& from, transport::Reason& reason);
 
+  /// Remembers what clients were told of their inputs in the epoch that this one continues. An account that
+  /// such a client opens here, from the same DDS participant, goes on from there.
+  void remember(const std::vector<checkpoint::ClientState>& clients);
+  /// Copies what clients were told of their inputs, including those that have not come back yet.
+  void capture(std::vector<checkpoint::ClientState>& out) const;
+
   /// Forgets clients whose participant is gone. Call it now and then, and while suspended.
   void look_for_dead(transport::ServerPort& port, const Now& now);
   /// True if a client keeps the server from starting frame s = now.frame + 1.
@@ -197,6 +204,9 @@ class Roster {
   std::map<transport::ClientId, Account>
       accounts_;  // ordered, so that rules apply in the same order everywhere
   std::map<transport::ParticipantId, Peer> peers_;  // participants that have an account
+  // Clients of the epoch before that have not come back, for as long as an account is kept.
+  std::map<transport::ClientId, checkpoint::ClientState> remembered_;
+  std::optional<std::int64_t> remembered_ns_;  // since when
   std::uint64_t seen_ = 0, demotions_ = 0;
   Notices notices_;
   std::vector<transport::ClientId> forgotten_;

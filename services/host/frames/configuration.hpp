@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/checkpoint/checkpoint.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/streams/stream.hpp"
 
@@ -48,9 +50,13 @@ struct HostConfig : ServiceConfig {
 
   std::string scene;
   std::string scene_description;
+  std::string engine;  ///< name of the simulation's engine, for checkpoints
   transport::UpAxis up_axis = transport::UpAxis::kY;
   Epoch continues_epoch = 0;  ///< the epoch that this one continues; 0: none
   Frame continues_frame = 0;  ///< the frame of that epoch from which this one continues
+  /// The checkpoint from which the simulation was loaded; the session continues its world. It decides
+  /// start_frame, continues_epoch and continues_frame, and frame 1 is not waited for. Null: a new world.
+  std::shared_ptr<const checkpoint::Checkpoint> goes_on_from;
   /// What clients draw for each type; layout.type_count elements.
   std::vector<transport::BodyType> types{{.name = "body", .radius = 0, .colour_rgba = 0xFFFFFFFF}};
 };

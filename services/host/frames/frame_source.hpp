@@ -11,6 +11,7 @@
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/messages.hpp"
 #include "services/accounts/budget.hpp"
+#include "services/checkpoint/checkpoint.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "tandem/result.hpp"
@@ -80,6 +81,9 @@ class FrameSource {
   virtual Result<void> set_parameters(std::uint32_t /*stream*/, const StreamParameters& /*parameters*/) {
     return unsupported();
   }
+  /// Copies all that a checkpoint holds of the frames, right after one was made; the clients are the host's.
+  /// Keeps the memory that `out` has.
+  virtual void capture(checkpoint::Checkpoint& /*out*/) const {}
   /// Lines for a log since the last call.
   [[nodiscard]] virtual std::vector<std::string> take_notices(std::int64_t /*now_ns*/) { return {}; }
   /// The error that ended the frames; empty if they did not end by an error.

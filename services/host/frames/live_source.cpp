@@ -46,6 +46,7 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       frame_rate_hz_(config.frame_rate_hz),
       clock_ns_(config.clock_ns),
       frame_(config.start_frame),
+      engine_(config.engine),
       drive_(drive) {
   session_.gravity = simulation.gravity();
   for (const StreamConfig& stream : config.streams) lanes_.push_back({stream, {}});
@@ -58,7 +59,11 @@ Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
   if (!drive) return tl::unexpected(drive.error());
   auto mirror = make_mirror(config.streams, simulation.bodies(), config.extent);
   if (!mirror) return tl::unexpected(mirror.error());
+  if (config.goes_on_from) mirror->restore(config.goes_on_from->next_reuse, config.goes_on_from->withheld);
   std::unique_ptr<LiveSource> source(new LiveSource(config, simulation, std::move(*mirror), *drive));
+  if (config.goes_on_from) {
+    if (auto good = source->go_on_from(*config.goes_on_from); !good) return tl::unexpected(good.error());
+  }
   for (std::uint32_t id = 0; id < source->lanes_.size(); ++id) {
     auto stream = source->begin(id);
     const std::string& name = config.streams[id].name;
@@ -67,6 +72,7 @@ Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
     list_stream(*stream, source->session_);
     if (id == 0) source->lanes_[id].stream.emplace(std::move(*stream));
   }
+  if (config.goes_on_from) source->remember_parameters(*config.goes_on_from);
   source->refresh_names();
   return source;
 }
@@ -87,6 +93,16 @@ Result<Stream> LiveSource::begin(std::uint32_t id) const {
   return stream;
 }
 
+Result<void> LiveSource::make(std::uint32_t id) {
+  auto stream = begin(id);
+  if (!stream) return tl::unexpected(stream.error());
+  Lane& lane = lanes_[id];
+  lane.stream.emplace(std::move(*stream));
+  // A stream that is begun anew later in the epoch starts with its first parameters, as always.
+  if (const auto learned = std::exchange(lane.learned, std::nullopt)) lane.stream->resume(*learned);
+  return {};
+}
+
 StreamSet LiveSource::active() const {
   StreamSet active;
   for (std::size_t id = 0; id < lanes_.size(); ++id) active[id] = lanes_[id].stream.has_value();
@@ -101,9 +117,8 @@ void LiveSource::set_active(StreamSet streams) {
       lane.told_out_of_reach = false;
     }
     if (!streams[id] || lane.stream) continue;
-    auto stream = begin(id);
-    TANDEM_ASSERT(stream.has_value());  // it was begun before, from the same configuration
-    lane.stream.emplace(std::move(*stream));
+    const auto made = make(id);
+    TANDEM_ASSERT(made.has_value());  // it was begun before, from the same configuration
   }
 }
 

@@ -46,6 +46,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
   Result<Frame> inject(const engine::Input& input, Outbox& outbox) override;
   Result<void> set_parameters(std::uint32_t id, const StreamParameters& parameters) override;
+  void capture(checkpoint::Checkpoint& out) const override;
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns) override;
   [[nodiscard]] std::optional<Error> error() const override { return error_; }
 
@@ -53,7 +54,8 @@ class LiveSource final : public FrameSource {
   struct Lane {
     StreamConfig config;
     std::optional<Stream> stream;
-    bool told_out_of_reach = false;  // it was told that the quality target is out of reach
+    bool told_out_of_reach = false;                // it was told that the quality target is out of reach
+    std::optional<StreamParameters> learned = {};  // in an earlier epoch; not taken over yet
   };
   struct Waiting {
     ScheduledDrive drive;
@@ -62,6 +64,12 @@ class LiveSource final : public FrameSource {
   LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror, const Drive& drive);
 
   [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
+  /// begin(), for a stream that is made from now on.
+  [[nodiscard]] Result<void> make(std::uint32_t id);
+  /// Takes over the inputs that wait to act, and remembers what the streams had learned. Errors: kMalformed,
+  /// if the simulation refuses such an input.
+  [[nodiscard]] Result<void> go_on_from(const checkpoint::Checkpoint& checkpoint);
+  void remember_parameters(const checkpoint::Checkpoint& checkpoint);
   [[nodiscard]] InputVerdict schedule(const engine::Input& input, const engine::Classification& effect,
                                       const InputOrigin& origin, Outbox& outbox);
   /// Notes whether a body appeared in the last step, so that names() has to be asked.
@@ -87,6 +95,7 @@ class LiveSource final : public FrameSource {
   double frame_rate_hz_;
   std::int64_t (*clock_ns_)();
   Frame frame_;
+  std::string engine_;
   bool under_way_ = false;                // the simulation has been stepped
   Drive drive_;                           // in force at frame_
   std::uint64_t last_input_ = 0;          // number

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 namespace {
 
@@ -150,6 +152,24 @@ void Mirror::start(const engine::Bodies& bodies) {
     generations_[s] = shown_[s];
   }
   clear_hidden();
+}
+
+void Mirror::save(std::vector<std::uint8_t>& next_reuse, std::vector<std::uint8_t>& withheld) const {
+  next_reuse = generations_;
+  withheld = expelled_;
+}
+
+void Mirror::restore(std::span<const std::uint8_t> next_reuse, std::span<const std::uint8_t> withheld) {
+  TANDEM_ASSERT(next_reuse.size() == shown_.size() && withheld.size() == shown_.size());
+  for (Slot s = 0; s < target_.capacity(); ++s) {
+    generations_[s] = next_reuse[s];
+    if (withheld[s] != 0 && shown_[s] != 0) {
+      shown_[s] = 0;
+      expelled_[s] = 1;
+      target_.despawn(s);
+    }
+    if (shown_[s] != 0) target_.reuse()[s] = static_cast<std::uint8_t>(next_reuse[s] - 1);
+  }
 }
 
 void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event> events) {

@@ -41,6 +41,12 @@ class Mirror {
   [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
   /// Sets the start state: everything shown is in generation 0, without records.
   void start(const engine::Bodies& bodies);
+  /// Writes what the bodies do not tell, by slot: the `reuse` of the next body, and 1 for a body that the
+  /// engine has and clients must not see. Replaces the content, and keeps the memory.
+  void save(std::vector<std::uint8_t>& next_reuse, std::vector<std::uint8_t>& withheld) const;
+  /// Call after start(), with what save() wrote when the engine had these bodies: slots keep their `reuse`.
+  /// Precondition: both have an element for each slot.
+  void restore(std::span<const std::uint8_t> next_reuse, std::span<const std::uint8_t> withheld);
   /// Call after a step, with bodies that check() accepts. `events` may be incomplete: births, deaths and
   /// types are read from the bodies themselves. Only teleports and the reuse of a slot within the step need
   /// their event. Events out of range are ignored.

@@ -266,6 +266,28 @@ Result<void> Stream::set_parameters(const StreamParameters& parameters) {
   return {};
 }
 
+void Stream::resume(const StreamParameters& learned) {
+  Impl& m = *impl_;
+  StreamParameters parameters = m.parameters;
+  if (m.quality) {
+    CodecParameters codec = learned.codec;
+    codec.threshold = std::clamp(codec.threshold, m.config.quality->smallest_threshold,
+                                 m.config.quality->largest_threshold);
+    codec.velocity_gain = parameters.codec.velocity_gain;
+    codec.acceleration_gain = parameters.codec.acceleration_gain;
+    if (has_turn_steps(codec) == has_turn_steps(parameters.codec)) parameters.codec = codec;
+  }
+  if (m.gains) {
+    parameters.step.decay = learned.step.decay;
+    parameters.codec.velocity_gain = learned.codec.velocity_gain;
+    parameters.codec.acceleration_gain = learned.codec.acceleration_gain;
+    m.gains.emplace(*m.config.gains, m.config.layout.capacity, parameters);
+  }
+  if (parameters == m.parameters) return;
+  m.parameters = parameters;
+  m.timeline.set_parameters(parameters);
+}
+
 void Stream::set_clock(std::int64_t (*now_ns)()) {
   impl_->clock = now_ns;
   impl_->timeline.set_clock(now_ns);

@@ -99,6 +99,9 @@ class Stream {
   /// Sets parameters from the next frame on; they travel in that frame's delta. With gain goals, gains stay
   /// so until the next decision. Errors: kInvalidArgument (out of range, or automatic quality decides).
   [[nodiscard]] Result<void> set_parameters(const StreamParameters& parameters);
+  /// Takes over what a stream of the same layout had learned, from the next frame on: threshold and steps
+  /// where automatic quality decides them, decay and gains where they follow the corrections.
+  void resume(const StreamParameters& learned);
   [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units
   /// True if automatic quality is above its target although the threshold is at the permitted maximum.

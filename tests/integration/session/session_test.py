@@ -280,6 +280,114 @@ def server_restart(stage):
             raise Failed(f"{name} applied {frames} frames of the new run")
 
 
+def killed_server_goes_on(stage):
+    """The server is killed and goes on from its checkpoint: at most 1 s of the world is lost, and all play within 3 s."""
+    folder = stage.folder / "checkpoints"
+    keeps = ("--checkpoint-dir", folder)
+    bodies = 10000
+    stage.server("first", *keeps, "--scripted", scene="half_pipe", bodies=bodies)
+    stage.client("participant", "--input-script", stage.script("script", 1, 200, 0.1))
+    stage.client("observer", "--observe")
+    everybody = ["participant", "observer"]
+    stage.wait_live(everybody, lambda live: live.get("frame", 0) > 150, "frame 150")
+    lives = ["first"]
+    for name in ("second", "third"):
+        stage.kill(lives[-1])
+        newest = sorted(folder.glob("*.checkpoint"))[-1]
+        if name == "third":  # a power failure on a disk that lies
+            os.truncate(newest, 1000)
+        began = time.monotonic()
+        stage.server(name, *keeps, "--checkpoint", "require", "--scripted", scene="half_pipe", bodies=bodies)
+        stage.wait(lambda: stage.hashes(name), "the first frame of the new epoch")  # noqa: B023
+        epoch, frame = next(iter(stage.hashes(name)))
+        before, last = max(stage.hashes(lives[-1]))
+        told = stage.folder / f"{name}.err"
+        stage.wait(lambda: told.read_text().count(" plays as ") == len(everybody), "all playing")  # noqa: B023
+        took_s = time.monotonic() - began
+        print(f"{name}: {last - frame} frames lost, all play after {took_s:.2f} s", flush=True)
+        if epoch <= before:
+            raise Failed(f"epoch {epoch} is not above {before}")
+        if not 0 <= last - frame <= (30 if name == "second" else 61):
+            raise Failed(f"frame {last} was published, and {name} goes on from frame {frame}")
+        if took_s > 3:
+            raise Failed(f"all play {took_s:.1f} s after the start of {name}")
+        said = told.read_text()
+        if "goes on from" not in said or (name == "third") != (f"{newest}: it says that it has" in said):
+            raise Failed(f"{name} does not say from which file it goes on, or which it cannot use: {said}")
+        lives.append(name)
+        stage.wait_live(everybody, lambda live: live.get("frame", 0) > frame + 90, "three more seconds")  # noqa: B023
+    reports = {name: stage.stop(name) for name in everybody}
+    report = stage.stop("third")["checkpoint"]
+    for name in everybody:
+        check_report(reports[name])
+        compare(stage, lives, name, 200, reports[name]["resyncs"])
+    if not report["written"] or report["failed"] or report["age_s"] > 1:
+        raise Failed(f"the figures of the last server are wrong: {report}")
+    kept = sorted(folder.iterdir())
+    if len(kept) > 4:  # three, and the one that was cut short
+        raise Failed(f"too many files are kept: {kept}")
+    print(f"  {report['bytes'] / bodies:.1f} bytes a body, {report}", flush=True)
+
+
+def checkpoint_refusals(stage):
+    """Two servers of one folder, no checkpoint where one is required, a folder that vanishes; what the tool says of files."""
+
+    def run(code, *command):
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, env=stage.environment,
+                              timeout=LIMIT_S, check=False)  # fmt: skip
+        if done.returncode != code:
+            raise Failed(f"{command} ended with {done.returncode}, not {code}: {done.stderr}")
+        return done
+
+    def server(code, folder, *arguments, bodies=50):
+        command = (stage.options.tandemd, "--scene", "half_pipe", "--bodies", bodies, "--duration", 0.5, *stage.common)
+        return run(code, *command, "--checkpoint-dir", folder, *arguments).stderr
+
+    parent = stage.folder / "parent"
+    parent.mkdir()
+    folder = parent / "checkpoints"
+    said = server(1, folder, "--checkpoint", "require")
+    if f"{folder}: no checkpoint to go on from" not in said:
+        raise Failed(f"require says: {said}")
+    if "starts afresh" not in server(0, folder):
+        raise Failed("auto does not say that it starts afresh")
+    file = sorted(folder.glob("*.checkpoint"))[-1]
+    shown = json.loads(run(0, stage.options.tandem, "checkpoint", "show", file, "--json").stdout)
+    if (shown["session"], shown["scene"], shown["engine"], shown["capacity"]) != ("default", "half_pipe", "particles", 50):
+        raise Failed(f"show says {shown}")
+    run(0, stage.options.tandem, "checkpoint", "verify", file)
+    torn = parent / "torn.checkpoint"
+    torn.write_bytes(file.read_bytes()[:-1])
+    if "torn.checkpoint: it says that it has" not in run(1, stage.options.tandem, "checkpoint", "verify", torn).stderr:
+        raise Failed("verify does not say why")
+    for other, bodies, reason in (
+        (("--session", "other"), 50, "it is of session 'default', not 'other'"),
+        ((), 60, "it has 50 slots, not 60"),
+        (("--seed", 2), 50, "the engine refuses its part"),
+    ):
+        said = server(1, folder, "--checkpoint", "require", *other, bodies=bodies)
+        if f"{file}: {reason}" not in said:
+            raise Failed(f"{other}: {said}")
+    run(2, stage.options.tandem, "checkpoint", "show")
+    run(2, stage.options.tandemd, "--scene", "cube", "--bodies", 5, "--checkpoint", "require")
+    run(2, stage.options.tandemd, "--scene", "cube", "--bodies", 5, "--checkpoint-dir", folder, "--checkpoint-interval", 0)
+    server(1, parent / "no" / "such")
+
+    stage.server("first", "--checkpoint-dir", folder, "--checkpoint-interval", 0.2)
+    stage.wait(lambda: len(stage.hashes("first")) > 20, "20 frames")
+    said = server(1, folder, "--session", "other")
+    if f"{folder}: process {stage.processes['first'].pid} keeps its checkpoints there" not in said:
+        raise Failed(f"the second server of a folder is told: {said}")
+    parent.rename(stage.folder / "elsewhere")
+    before = len(stage.hashes("first"))
+    stage.wait(lambda: len(stage.hashes("first")) > before + 60, "60 frames without the folder")
+    said = (stage.folder / "first.err").read_text()
+    if said.count("No such file or directory; the world goes on") != 1:
+        raise Failed(f"a folder that vanished is told: {said}")
+    if stage.stop("first")["checkpoint"]["failed"] == 0:
+        raise Failed("no checkpoint failed")
+
+
 def rigid(stage):
     """Bodies of Bullet that turn, poked and tilted: a late joiner, a server that is killed; the reference decoder follows."""
     script = stage.folder / "tilts.textproto"
@@ -428,7 +536,9 @@ def reference(stage):
 # 2,000 bodies reserves 5 MB.
 MEMORY_SLACK_KB = 4096
 SCENARIOS = {
-    f.__name__: f for f in (two_thousand_frames, server_restart, rigid, rigid_codecs, no_server, endings, emitter, reference)
+    f.__name__: f
+    for f in (two_thousand_frames, server_restart, killed_server_goes_on, checkpoint_refusals, rigid, rigid_codecs, no_server,
+              endings, emitter, reference)  # fmt: skip
 }
 
 

@@ -172,6 +172,94 @@ TEST_F(InputTest, RepliesToOthersAndOfOtherEpochsAreIgnored) {
   EXPECT_TRUE(recorder.outcomes.empty());
 }
 
+/// A second server that goes on from frame `from` of the first one.
+class ContinuedTest : public InputTest {
+ protected:
+  void go_on_from(Frame from) {
+    server = FakeServer(2000);
+    server.session.continues_epoch = 1000;
+    server.session.continues_frame = from;
+    join();
+  }
+  std::uint64_t send() {
+    return core->send(InputKind::kGravity, {0, -9, 0}, {}, {now_ns, wall_ns()}).value();
+  }
+  void answer(std::vector<transport::ReplyEntry> entries, std::uint64_t highest, std::uint32_t reason = 0) {
+    auto message = reply(std::move(entries), highest);
+    message.epoch = server.session.epoch;
+    message.reason = reason;
+    port.replies.push_back(from_server(message));
+    poll();
+  }
+  [[nodiscard]] std::vector<std::uint64_t> of_kind(InputOutcome::Kind kind) const {
+    std::vector<std::uint64_t> numbers;
+    for (const InputOutcome& outcome : recorder.outcomes)
+      if (outcome.kind == kind) numbers.push_back(outcome.number);
+    return numbers;
+  }
+  using Numbers = std::vector<std::uint64_t>;
+};
+
+TEST_F(ContinuedTest, AnInputThatActedAfterTheCheckpointIsLostAndThatIsToldOnce) {
+  join();
+  const Frame acts = server.frame() + 1;
+  for (int i = 0; i < 2; ++i) send();
+  answer({{1, acts, 0}, {2, acts + 1, 0}}, 2);
+  for (int i = 0; i < 3; ++i) frame();
+  ASSERT_EQ(of_kind(InputOutcome::Kind::kActed), (Numbers{1, 2}));
+  go_on_from(acts);
+  EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty()) << "the server has not said anything yet";
+  for (int i = 0; i < 2; ++i) answer({{1, acts, 0}}, 1);
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{2});
+  EXPECT_EQ(send(), 3U);
+}
+
+TEST_F(ContinuedTest, AnInputThatWaitedInTheCheckpointActsAndIsNotLost) {
+  join();
+  const Frame acts = server.frame() + 1;
+  send();
+  answer({{1, acts, 0}}, 1);
+  for (int i = 0; i < 3; ++i) frame();
+  go_on_from(acts - 1);
+  answer({{1, acts, 0}}, 1);
+  EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty());
+}
+
+TEST_F(ContinuedTest, AnUnansweredInputIsDecidedByTheFirstReplyOfAnAccount) {
+  join();
+  for (int i = 0; i < 4; ++i) send();
+  const Frame from = server.frame();
+  go_on_from(from);
+  answer({}, 0, static_cast<std::uint32_t>(transport::Reason::kNotPlaying));  // nobody's account yet
+  EXPECT_TRUE(recorder.outcomes.empty());
+  answer({{2, from, 0}, {3, 0, static_cast<std::uint32_t>(transport::Reason::kInvalid)}}, 3);
+  while (server.frame() <= from) frame();
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kUnknown), Numbers{1});
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kActed), Numbers{2});
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kRefused), Numbers{3});
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{4});
+}
+
+TEST_F(ContinuedTest, AnInputOfTheNewEpochDoesNotHideALostOne) {
+  join();
+  send();
+  go_on_from(server.frame());
+  EXPECT_EQ(send(), 2U);
+  answer({{2, server.frame(), 0}}, 2);
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{1});
+}
+
+TEST_F(ContinuedTest, AnEpochThatContinuesAnotherOneMakesUnansweredInputsUnknown) {
+  join();
+  send();
+  server = FakeServer(2000);
+  server.session.continues_epoch = 999;
+  join();
+  answer({}, 0);
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kUnknown), Numbers{1});
+  EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty());
+}
+
 TEST_F(InputTest, TheRoleAndTheReasonComeFromTheServer) {
   join();
   auto told = reply({}, 0);

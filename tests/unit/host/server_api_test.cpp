@@ -3,10 +3,13 @@
 #include "tandem/host.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <limits>
+#include <string>
 
 namespace tandem {
 namespace {
@@ -68,6 +71,49 @@ TEST_F(ServerApi, OptionsOutOfRangeAreRefused) {
             ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.target_mbit_per_s = kNan; }), ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.codec = "zip"; }), ErrorCode::kUnsupported);
+}
+
+/// Counts its steps, and can be saved.
+class Counting final : public Standing {
+ public:
+  void save(std::vector<std::byte>& out) const override { out.push_back(static_cast<std::byte>(steps)); }
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) override {
+    if (bytes.size() != 1) return false;
+    steps = std::to_integer<int>(bytes[0]);
+    return true;
+  }
+};
+
+TEST_F(ServerApi, AServerGoesOnFromTheCheckpointOfTheOneBefore) {
+  const std::string folder = ::testing::TempDir() + "tandem-server-api-" + std::to_string(::getpid());
+  std::string log;
+  options.checkpoint_dir = folder;
+  options.log = [&log](std::string_view line) { log += line; };
+  options.checkpoint_required = true;
+  EXPECT_EQ(refusal(), ErrorCode::kUnsupported) << "a simulation without save()";
+  Counting first;
+  EXPECT_EQ(Server::start(options, first).error().code, ErrorCode::kIo) << "nothing to go on from";
+  options.checkpoint_required = false;
+  std::uint64_t last = 0;
+  {
+    auto server = Server::start(options, first);
+    ASSERT_TRUE(server) << server.error().message;
+    EXPECT_NE(log.find("starts afresh"), std::string::npos) << log;
+    EXPECT_EQ(Server::start(options, standing).error().code, ErrorCode::kConflict)
+        << "two servers of a folder";
+    EXPECT_TRUE(server->run_for(1));
+    EXPECT_GT(server->status().checkpoints, 0U);
+    EXPECT_TRUE(server->status().checkpoint_age_s.has_value());
+    last = server->status().frame;
+  }
+  options.checkpoint_required = true;
+  Counting second;
+  const auto server = Server::start(options, second);
+  ASSERT_TRUE(server) << server.error().message;
+  EXPECT_EQ(server->status().continues_frame, last) << "an orderly end loses nothing";
+  EXPECT_EQ(server->status().frame, last);
+  EXPECT_EQ(second.steps, static_cast<int>(last));
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(ServerApi, WishesThatMakeNoStreamAreRefused) {

@@ -120,6 +120,32 @@ TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
             std::string::npos);
 }
 
+TEST(Options, CheckpointsHaveAFolderAnIntervalAndARule) {
+  EXPECT_TRUE(check_config(least())->checkpoint.folder.empty()) << "none by default";
+  Config config = least();
+  config.set_checkpoint_dir("/var/lib/world");
+  auto options = check_config(config);
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->checkpoint.folder, "/var/lib/world");
+  EXPECT_EQ(options->checkpoint.interval_s, 1);
+  EXPECT_FALSE(options->checkpoint.required);
+  config.set_checkpoint("require");
+  config.set_checkpoint_interval(0.5);
+  options = check_config(config);
+  ASSERT_TRUE(options);
+  EXPECT_TRUE(options->checkpoint.required);
+  EXPECT_EQ(options->checkpoint.interval_s, 0.5);
+  config.set_checkpoint("off");
+  EXPECT_TRUE(check_config(config)->checkpoint.folder.empty()) << "whatever else is said";
+  EXPECT_NE(refusal([](Config& s) { s.set_checkpoint("require"); }).find("--checkpoint-dir"),
+            std::string::npos);
+  EXPECT_NE(refusal([](Config& s) { s.set_checkpoint("maybe"); }).find("--checkpoint"), std::string::npos);
+  for (const double bad : {0.0, -1.0, 1e6, std::nan("")}) {
+    EXPECT_NE(refusal([bad](Config& s) { s.set_checkpoint_interval(bad); }).find("--checkpoint-interval"),
+              std::string::npos);
+  }
+}
+
 TEST(Options, OneWayToSetTheThresholdOnTheCommandLineDisplacesTheOtherInTheFile) {
   Config flags = least(), file;
   file.set_threshold(0.1);

@@ -90,6 +90,14 @@ struct ServerOptions {
   std::optional<double> stall_timeout_s = 0.5;
   double rate_hz = 0;      ///< frames a second, 1..1000; 0: the simulation's own, 1 / dt_s
   bool free_rate = false;  ///< ignores the rate and runs as fast as participants and network allow
+  /// A folder for checkpoints of this session alone; its parent must exist. Empty: no checkpoints. The server
+  /// writes one every `checkpoint_interval_s` and goes on from the newest when it is started again: start()
+  /// then calls Simulation::load() of the simulation that it is given. Without a good checkpoint it starts
+  /// afresh and says so in the log. The simulation needs save() and load(); a server of one without them has
+  /// no checkpoints, and says so.
+  std::string checkpoint_dir = "";
+  double checkpoint_interval_s = 1;  ///< 0.01..86400
+  bool checkpoint_required = false;  ///< start() fails where there is no good checkpoint
   /// Receives one line for a human, for example when a client joins, is demoted or is refused. Called by
   /// poll(). It must not call the server.
   std::function<void(std::string_view)> log = {};
@@ -103,6 +111,10 @@ struct ServerStatus : ServerCounts {
   std::uint64_t payload_bytes = 0, corrected = 0;
   double threshold = 0;                       ///< in force
   double frame_ms_p50 = 0, frame_ms_p99 = 0;  ///< step, predict, encode, apply
+  /// The epoch and the frame of it that this session continues from a checkpoint; 0, 0: it started afresh.
+  std::uint64_t continues_epoch = 0, continues_frame = 0;
+  std::uint64_t checkpoints = 0;           ///< written since the start
+  std::optional<double> checkpoint_age_s;  ///< since the frame of the last one; empty: none was written
 };
 
 /// One server of one session. It runs at the simulation's rate (1 / dt_s) or at the rate in the options.
@@ -111,8 +123,10 @@ struct ServerStatus : ServerCounts {
 class __attribute__((visibility("default"))) Server {
  public:
   /// Starts a server. `simulation` must outlive the server. It must not have been stepped; its bodies are the
-  /// start frame. Errors: kInvalidArgument (options, or body columns not `capacity` long), kUnsupported
-  /// (codec, predictor), kTransport (DDS could not start).
+  /// start frame, unless there is a checkpoint. Errors: kInvalidArgument (options, or body columns not
+  /// `capacity` long), kUnsupported (codec, predictor; a checkpoint is required, but the simulation has no
+  /// save()), kTransport (DDS could not start), kConflict (another server holds the folder of checkpoints),
+  /// kIo (that folder; no good checkpoint, but one is required).
   [[nodiscard]] static Result<Server> start(const ServerOptions& options, engine::Simulation& simulation);
   Server(Server&&) noexcept;
   Server& operator=(Server&&) noexcept;

@@ -1,0 +1,102 @@
+#include "services/checkpoint/folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
+#include <utility>
+
+#include "services/checkpoint/format.hpp"
+
+namespace tandem::checkpoint {
+namespace {
+
+constexpr std::string_view kEnding = ".checkpoint";
+constexpr std::string_view kUnfinished = ".checkpoint.part";
+constexpr std::size_t kDigits = 20;  // those of 2^64
+
+std::optional<std::uint64_t> number(std::string_view digits) {
+  std::uint64_t value = 0;
+  const char* const end = digits.data() + digits.size();
+  const auto [stopped, error] = std::from_chars(digits.data(), end, value);
+  return error == std::errc() && stopped == end ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+std::string file_name(const Moment& moment) {
+  return fmt::format("{:020}-{:020}{}", moment.epoch, moment.frame, kEnding);
+}
+
+std::optional<Moment> moment_of(const std::string& file_name) {
+  const std::string_view name = file_name;
+  if (name.size() != 2 * kDigits + 1 + kEnding.size() || !name.ends_with(kEnding) || name[kDigits] != '-')
+    return std::nullopt;
+  const auto epoch = number(name.substr(0, kDigits));
+  const auto frame = number(name.substr(kDigits + 1, kDigits));
+  if (!epoch || !frame) return std::nullopt;
+  return Moment{*epoch, *frame};
+}
+
+Result<Folder::Found> Folder::newest(const std::function<Result<void>(const Checkpoint&)>& accept) {
+  auto names = disk_->list();
+  if (!names) return fail(names.error().code, fmt::format("{}: {}", disk_->name(), names.error().message));
+  Found found;
+  std::vector<std::string> files;
+  for (const std::string& name : *names) {
+    if (name.ends_with(kUnfinished)) static_cast<void>(disk_->remove(name));  // a read-only folder keeps it
+    const auto moment = moment_of(name);
+    if (!moment) continue;
+    found.newest_epoch = std::max(found.newest_epoch, moment->epoch);
+    files.push_back(name);
+  }
+  std::ranges::sort(files);
+  for (; !files.empty() && !found.checkpoint; files.pop_back()) {
+    const std::string& file = files.back();
+    auto read = disk_->read(file, kMostFileBytes)
+                    .and_then([](const std::vector<std::byte>& bytes) { return decode(bytes); })
+                    .and_then([&](Checkpoint checkpoint) -> Result<Checkpoint> {
+                      if (file_name({checkpoint.epoch, checkpoint.frame}) != file)
+                        return fail(ErrorCode::kMalformed, "its name is that of another checkpoint");
+                      if (auto accepted = accept(checkpoint); !accepted)
+                        return tl::unexpected(accepted.error());
+                      return checkpoint;
+                    });
+    if (!read) {
+      found.refused.push_back(fmt::format("{}/{}: {}", disk_->name(), file, read.error().message));
+      continue;
+    }
+    found.checkpoint = std::move(*read);
+    found.file = file;
+    ours_ = files;
+  }
+  return found;
+}
+
+Result<void> Folder::write_whole(const std::string& file, std::span<const std::byte> bytes) {
+  const std::string unfinished = file + ".part";
+  const auto written = disk_->write(unfinished, bytes)
+                           .and_then([&] { return disk_->sync(unfinished); })
+                           .and_then([&] { return disk_->rename(unfinished, file); })
+                           .and_then([&] { return disk_->sync_folder(); });
+  if (!written) static_cast<void>(disk_->remove(unfinished));  // a full disk needs the room
+  return written;
+}
+
+Result<void> Folder::store(const Moment& moment, std::span<const std::byte> file) {
+  const std::string name = file_name(moment);
+  auto written = disk_->reopen().and_then([&] { return write_whole(name, file); });
+  if (!written) {
+    return fail(written.error().code, fmt::format("{}/{}: {}", disk_->name(), name, written.error().message));
+  }
+  std::erase(ours_, name);
+  ours_.push_back(name);
+  while (ours_.size() > kKept) {
+    static_cast<void>(disk_->remove(ours_.front()));  // one that is gone already is no loss
+    ours_.erase(ours_.begin());
+  }
+  return {};
+}
+
+}  // namespace tandem::checkpoint

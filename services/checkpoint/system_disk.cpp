@@ -1,0 +1,188 @@
+// A folder of a POSIX system.
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include "services/checkpoint/disk.hpp"
+
+namespace tandem::checkpoint {
+namespace {
+
+/// Closes a file descriptor.
+class Descriptor {
+ public:
+  explicit Descriptor(int number = -1) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  [[nodiscard]] int get() const { return number_; }
+  [[nodiscard]] bool open() const { return number_ >= 0; }
+  /// Reports what the system found out only now.
+  [[nodiscard]] bool close() { return ::close(std::exchange(number_, -1)) == 0; }
+
+ private:
+  int number_;
+};
+
+tl::unexpected<Error> told_by_system(const std::string& what) {
+  return fail(ErrorCode::kIo, what + ": " + std::strerror(errno));
+}
+
+/// The process that holds the lock of an open folder, in words. One in another container is not told.
+std::string holder_of(int descriptor) {
+  struct stat about {};
+  if (::fstat(descriptor, &about) != 0) return "another process";
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    // "1: FLOCK ADVISORY WRITE 4711 fd:00:1234 0 EOF", the inode in decimal
+    std::istringstream fields(line);
+    std::string number, type, mode, access, pid, place;
+    fields >> number >> type >> mode >> access >> pid >> place;
+    if (type == "FLOCK" && access == "WRITE" &&
+        place.substr(place.rfind(':') + 1) == std::to_string(about.st_ino) &&
+        std::strtol(pid.c_str(), nullptr, 10) > 0)
+      return "process " + pid;
+  }
+  return "another process";
+}
+
+Result<std::vector<std::byte>> read_at(int folder, const std::string& path, std::uint64_t most_bytes) {
+  // A FIFO in place of a file must not block.
+  const Descriptor file(::openat(folder, path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  if (!file.open()) return told_by_system("cannot be opened");
+  struct stat about {};
+  if (::fstat(file.get(), &about) != 0) return told_by_system("cannot be read");
+  if (!S_ISREG(about.st_mode)) return fail(ErrorCode::kIo, "is no regular file");
+  const auto size = static_cast<std::uint64_t>(about.st_size);
+  if (size > most_bytes) {
+    return fail(ErrorCode::kCapacity, "has " + std::to_string(size) + " bytes, more than the maximum of " +
+                                          std::to_string(most_bytes));
+  }
+  std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got = ::read(file.get(), bytes.data() + done, bytes.size() - done);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return told_by_system("cannot be read");
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  bytes.resize(done);  // it became shorter meanwhile
+  return bytes;
+}
+
+class SystemDisk final : public Disk {
+ public:
+  explicit SystemDisk(std::string path) : path_(std::move(path)) {}
+
+  Result<void> open() {
+    if (::mkdir(path_.c_str(), 0777) != 0 && errno != EEXIST) return told_by_system("cannot be made");
+    Descriptor folder(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!folder.open()) return told_by_system("cannot be opened");
+    // The folder itself is locked, so that a read-only one can be, too.
+    if (::flock(folder.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      return fail(ErrorCode::kConflict, holder_of(folder.get()) + " keeps its checkpoints there");
+    folder_ = std::move(folder);
+    return {};
+  }
+
+  [[nodiscard]] const std::string& name() const override { return path_; }
+
+  [[nodiscard]] Result<std::vector<std::string>> list() override {
+    // fdopendir() takes over the descriptor, and reads from where another one of it stopped.
+    const int again = ::openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR* const entries = again < 0 ? nullptr : ::fdopendir(again);
+    if (entries == nullptr) return told_by_system("cannot be listed");
+    std::vector<std::string> names;
+    while (const dirent* entry = ::readdir(entries)) names.emplace_back(entry->d_name);
+    ::closedir(entries);
+    return names;
+  }
+
+  [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& file,
+                                                    std::uint64_t most_bytes) override {
+    return read_at(folder_.get(), file, most_bytes);
+  }
+
+  [[nodiscard]] Result<void> write(const std::string& file, std::span<const std::byte> bytes) override {
+    // What a killed run left is removed, and not written to: it may have another name too.
+    ::unlinkat(folder_.get(), file.c_str(), 0);
+    Descriptor made(
+        ::openat(folder_.get(), file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+    if (!made.open()) return told_by_system("cannot be made");
+    while (!bytes.empty()) {
+      const ssize_t taken = ::write(made.get(), bytes.data(), bytes.size());
+      if (taken < 0 && errno == EINTR) continue;
+      if (taken < 0) return told_by_system("cannot be written");
+      bytes = bytes.subspan(static_cast<std::size_t>(taken));
+    }
+    if (!made.close()) return told_by_system("cannot be written");
+    return {};
+  }
+
+  [[nodiscard]] Result<void> sync(const std::string& file) override {
+    const Descriptor opened(::openat(folder_.get(), file.c_str(), O_RDONLY | O_CLOEXEC));
+    if (!opened.open() || ::fsync(opened.get()) != 0) return told_by_system("cannot be written to the disk");
+    return {};
+  }
+
+  [[nodiscard]] Result<void> rename(const std::string& from, const std::string& to) override {
+    if (::renameat(folder_.get(), from.c_str(), folder_.get(), to.c_str()) != 0)
+      return told_by_system("cannot be renamed");
+    return {};
+  }
+
+  [[nodiscard]] Result<void> remove(const std::string& file) override {
+    if (::unlinkat(folder_.get(), file.c_str(), 0) != 0) return told_by_system("cannot be removed");
+    return {};
+  }
+
+  [[nodiscard]] Result<void> sync_folder() override {
+    if (::fsync(folder_.get()) != 0) return told_by_system("cannot be written to the disk");
+    return {};
+  }
+
+  [[nodiscard]] Result<void> reopen() override {
+    struct stat held {};
+    struct stat named {};
+    const bool same = ::fstat(folder_.get(), &held) == 0 && ::stat(path_.c_str(), &named) == 0 &&
+                      held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+    return same ? Result<void>() : open();
+  }
+
+ private:
+  std::string path_;
+  Descriptor folder_;  // keeps the lock
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Disk>> open_folder(const std::string& path) {
+  auto disk = std::make_unique<SystemDisk>(path);
+  if (auto opened = disk->open(); !opened)
+    return fail(opened.error().code, path + ": " + opened.error().message);
+  return std::unique_ptr<Disk>(std::move(disk));
+}
+
+Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t most_bytes) {
+  return read_at(AT_FDCWD, path, most_bytes);
+}
+
+}  // namespace tandem::checkpoint

@@ -1,0 +1,15 @@
+#pragma once
+// How a session goes on from a checkpoint.
+
+#include "services/checkpoint/keeper.hpp"
+#include "services/host/frames/configuration.hpp"
+
+namespace tandem::host {
+
+/// What the checkpoints of a session are of.
+[[nodiscard]] checkpoint::World checkpoint_world(const HostConfig& config);
+
+/// Has the session begin as `start` says. Its epoch is above that of every checkpoint.
+void begin_from(const checkpoint::Start& start, HostConfig& config);
+
+}  // namespace tandem::host
