@@ -140,6 +140,9 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
       "--scripted", [&config] { config.set_scripted(true); },
       "Run the scene's script in the server, which then sends the inputs of simulated users");
   flags.add("--users", &Config::set_users, "Number of users in that script [the scene's]");
+  flags.add("--metrics", &Config::mutable_metrics,
+            "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and /healthz "
+            "and /readyz [none]");
   flags.add("--hash-log", &Config::mutable_hash_log, "File for a line `epoch,frame,hash` of every frame");
 }
 

@@ -21,6 +21,7 @@
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
+#include "services/tandemd/metrics.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -128,7 +129,8 @@ class FailureLog {
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
-             const host::Publisher& publisher, const Options& options, const std::atomic<bool>& stop) {
+             const host::Publisher& publisher, Metrics& metrics, const Options& options,
+             const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
@@ -138,7 +140,9 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   hashes.add(host.first_made(), host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
-    if (host.poll(now_ns, wall_ns())) {
+    const bool produced = host.poll(now_ns, wall_ns());
+    metrics.watch(host, publisher, produced, now_ns);
+    if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
     }
@@ -236,6 +240,12 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
     return report_error(opened.error(), 1);
 
+  Metrics metrics;
+  if (options.metrics) {
+    auto served =
+        metrics.serve(*options.metrics, facts_of(*config, options.session, scene->name, options.free_rate));
+    if (!served) return report_error(served.error(), 1);
+  }
   auto port = open_port(*config, options, signals.stop());
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
@@ -252,7 +262,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
 
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
-  const Ending ending = serve(**host, **port, script, hashes, publisher, options, signals.stop());
+  const Ending ending = serve(**host, **port, script, hashes, publisher, metrics, options, signals.stop());
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code = signals.finish(tell_end(**host, ending, hashes, streams, frame_rate_hz, options));
   publisher.flush();

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
@@ -21,6 +22,8 @@ struct Options : planning::ServiceWishes {
 
   std::string hash_log;  ///< path; empty: none
   bool json = false;     ///< a report on stdout at the end
+
+  std::optional<metrics::Address> metrics;  ///< empty: none are served
 };
 
 }  // namespace tandem::daemon
