@@ -82,7 +82,7 @@ class Host {
   [[nodiscard]] std::uint32_t participants() const;   ///< playing and waited for
   [[nodiscard]] std::uint32_t observers() const;      ///< playing and not waited for
   [[nodiscard]] HostTotals totals() const;
-  /// For a monitor, a few times a second at most: the cost is bounded, but it is not nothing.
+  /// For a monitor, about once a second: O(bodies), 1.5 us for each 1,000.
   [[nodiscard]] HostMoment present() const;
   /// Lines for a log (joined, demoted, refused ...), oldest first; forgets them. At most 2 a second on
   /// average, and one in 10 s about one client.

@@ -199,7 +199,10 @@ void Metrics::watch(const Host& host, const host::Publisher& publisher, bool pro
     figures_.epoch_ms = host.session().epoch;
     figures_.frame = host.frame();
     figures_.totals = host.totals();
-    figures_.moment = host.present();
+    if (now_ns >= next_moment_ns_) {
+      next_moment_ns_ = now_ns + kMomentNs;
+      figures_.moment = host.present();
+    }
     figures_.write_failures = publisher.failures();
     figures_.publish_took = publisher.durations();
     rate_.saw(figures_.totals.frames, now_ns);

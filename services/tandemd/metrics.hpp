@@ -55,11 +55,12 @@ class Metrics {
   [[nodiscard]] const char* obstacle(const host::Host& host, const host::Publisher& publisher) const;
 
   static constexpr std::int64_t kPeriodNs = kSecond / 4;
+  static constexpr std::int64_t kMomentNs = kSecond;  // it looks at all bodies
 
   SessionFacts facts_;
   FiguresNow figures_;  // of the polling thread
   metrics::RateWatch rate_;
-  std::int64_t next_ns_ = 0;
+  std::int64_t next_ns_ = 0, next_moment_ns_ = 0;
   metrics::Latest<FiguresNow> latest_;
   metrics::Health health_;
   std::unique_ptr<metrics::Endpoint> endpoint_;  // last: ends before what it reads

@@ -8,8 +8,8 @@
 
 namespace tandem::host {
 
-/// Looks at the clients, the queue and the bodies; the cost is bounded whatever their number: see
-/// position_error().
+/// Looks at the clients, the queue and the bodies. Counting bodies is O(n); errors are compared over a
+/// bounded number of them: position_error().
 [[nodiscard]] HostMoment host_moment(const Roster& roster, const FrameSource& source, const Outbox& outbox);
 
 }  // namespace tandem::host
