@@ -31,6 +31,7 @@ enum class Reason : std::uint32_t {
   kNoStream = 11,   ///< the named stream or generation is not played here
   kRecording = 12,  ///< the session is a recording: inputs cannot act on it
 };
+inline constexpr std::size_t kReasons = 13;
 
 // Declared after Reason; otherwise g++ 12 warns that its enumerator shadows this.
 inline constexpr std::uint32_t kProtocolVersion = 2;

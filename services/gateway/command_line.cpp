@@ -69,6 +69,14 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "--origin", options.origins,
       "Origin whose pages may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that this "
       "gateway served at an IP address may always connect");
+  std::string metrics;
+  app.add_option("--metrics", metrics,
+                 "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and "
+                 "/healthz and /readyz")
+      .check([](const std::string& text) {
+        const auto address = metrics::read_address(text);
+        return address ? std::string() : address.error().message;
+      });
   app.add_option("--max-viewers", options.limits.viewers, "Maximum number of viewers")
       .range(std::size_t{1}, kMostViewers)
       .show_default();
@@ -83,6 +91,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
     std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
     return {.options = std::nullopt, .exit_code = 2};
   }
+  if (!metrics.empty()) options.metrics = *metrics::read_address(metrics);
   // Each viewer has a second connection for files; the rest are for connections that will be refused.
   options.web.connections = 2 * options.limits.viewers + 64;
   return {.options = std::move(options), .exit_code = 0};

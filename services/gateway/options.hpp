@@ -2,11 +2,13 @@
 // The options of tandem-gateway, checked and complete.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/web_server.hpp"
+#include "services/metrics/address.hpp"
 
 namespace tandem::gateway {
 
@@ -19,6 +21,7 @@ struct Options {
   std::string viewer;      ///< folder of its files; empty: none
   std::string token_file;  ///< empty: no token
   std::vector<std::string> origins;
+  std::optional<metrics::Address> metrics;  ///< empty: none are served
 };
 
 }  // namespace tandem::gateway

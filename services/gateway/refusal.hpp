@@ -23,18 +23,19 @@ enum class Refusal : std::uint8_t {
 struct Closing {
   std::uint16_t code = 0;   ///< of the WebSocket close frame
   std::string_view reason;  ///< in it, for a human
+  std::string_view label;   ///< of its count in metrics
 };
 
 inline constexpr std::array<Closing, 9> kClosings{{
-    {4001, "token missing or wrong"},
-    {4002, "origin not allowed"},
-    {4003, "too many viewers"},
-    {4004, "malformed message"},
-    {4005, "another protocol version"},
-    {4006, "another client's id"},
-    {4007, "too many messages"},
-    {4008, "nothing was read for too long"},
-    {1009, "message too large"},
+    {4001, "token missing or wrong", "token"},
+    {4002, "origin not allowed", "origin"},
+    {4003, "too many viewers", "full"},
+    {4004, "malformed message", "malformed"},
+    {4005, "another protocol version", "protocol_version"},
+    {4006, "another client's id", "foreign_client"},
+    {4007, "too many messages", "too_many_messages"},
+    {4008, "nothing was read for too long", "not_reading"},
+    {1009, "message too large", "too_large"},
 }};
 
 [[nodiscard]] constexpr const Closing& closing(Refusal refusal) {

@@ -14,10 +14,14 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/gateway/admission.hpp"
+#include "services/gateway/metrics.hpp"
 #include "services/gateway/session_client.hpp"
 #include "services/gateway/site.hpp"
 #include "services/gateway/web_server.hpp"
 #include "services/json/json.hpp"
+#include "services/metrics/endpoint.hpp"
+#include "services/metrics/health.hpp"
+#include "services/metrics/latest.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -60,6 +64,7 @@ class Service final : public WebServer::Handler {
       {
         const std::lock_guard lock(mutex_);
         due_ns = client_.poll(gateway_, client::now());
+        watch();
         gateway_.list_ready(steady_ns(), ready_);
         ready = !ready_.empty();
       }
@@ -132,7 +137,32 @@ class Service final : public WebServer::Handler {
     return health.dump() + '\n';
   }
 
+  /// Errors: those of Endpoint::create().
+  [[nodiscard]] Result<void> serve_metrics(const metrics::Address& address, const std::string& session) {
+    auto endpoint = metrics::Endpoint::create(
+        address, health_, [this, session](metrics::Page& page) { describe(page, session, latest_.get()); });
+    if (!endpoint) return tl::unexpected(endpoint.error());
+    endpoint_ = std::move(*endpoint);
+    spdlog::info(endpoint_->notice());
+    return {};
+  }
+
  private:
+  /// Hands over figures a few times a second, because a scrape must not wait for the lock, nor hold it.
+  void watch() {
+    if (!endpoint_) return;
+    const std::int64_t now_ns = steady_ns();
+    if (now_ns >= next_figures_ns_) {
+      next_figures_ns_ = now_ns + kSecond / 4;
+      FiguresNow figures{.counts = gateway_.counts(), .viewers = gateway_.viewers(), .client = {}};
+      figures.client = {.status = client_.core().status(),
+                        .lag_s = client_.core().statistics().smoothed_latency_ns / 1e9};
+      client_watch_.saw(figures.client.status, now_ns);
+      latest_.offer(figures);
+    }
+    health_.beat(now_ns, client_watch_.obstacle());
+  }
+
   const Admission admission_;
   transport::ClientPort& port_;
   std::mutex mutex_;  // guards all below; port_.wait() and wake() need no guard
@@ -140,6 +170,12 @@ class Service final : public WebServer::Handler {
   Gateway gateway_;
   CountLog log_;
   std::vector<ViewerId> ready_;  // kept to reuse its memory
+  std::int64_t next_figures_ns_ = 0;
+  metrics::ClientWatch client_watch_;
+  // Not guarded by the lock.
+  metrics::Latest<FiguresNow> latest_;
+  metrics::Health health_;
+  std::unique_ptr<metrics::Endpoint> endpoint_;  // last: ends before what it reads
 };
 
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
@@ -183,6 +219,10 @@ int run(const Options& options, SignalWatch& signals) {
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
 
   Service service(options, Admission(std::move(token), options.origins), **port);
+  if (options.metrics) {
+    if (const auto served = service.serve_metrics(*options.metrics, options.session); !served)
+      return signals.finish(report_error(served.error(), 1));
+  }
   auto server = WebServer::create(options.web, site, service);
   if (!server) return signals.finish(report_error(server.error(), 1));
   const bool v6 = options.web.address.find(':') != std::string::npos;

@@ -15,6 +15,7 @@
 #include "services/host/clients/claim.hpp"
 #include "services/host/clients/inputs.hpp"
 #include "services/host/clients/joins.hpp"
+#include "services/host/clients/moment.hpp"
 #include "services/host/clients/pacing.hpp"
 #include "services/host/clients/replies.hpp"
 #include "services/host/clients/roster.hpp"
@@ -281,7 +282,7 @@ void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
     for (Lane& lane : lanes) lane.transfer.acknowledged(ack.message, now_ns);
     return;
   }
-  ++totals.refused_messages;
+  totals.messages_refused.add(reason);
   if (reason == Reason::kNoStream) refuse_stream(ack);
   if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
   if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
@@ -304,16 +305,16 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
     inputs.handle(*account, roster.peer(*account), input.message, now_ns);
     return;
   }
-  ++totals.refused_messages;
+  totals.messages_refused.add(reason);
   if (reason == Reason::kForeignClient) {
     // Not answered, because a reply is keyed by the client's id, and the rightful owner would take it as its
     // own.
     note_foreigner(input.message.client);
     return;
   }
-  ++totals.refused_inputs;
-  replies.refuse(input.message.client, input.message.epoch == config.epoch ? reason : Reason::kStaleEpoch,
-                 now_ns, wall_ns);
+  if (input.message.epoch != config.epoch) reason = Reason::kStaleEpoch;
+  totals.inputs_refused.add(reason);
+  replies.refuse(input.message.client, reason, now_ns, wall_ns);
 }
 
 void Host::Impl::note(std::string notice) { roster.notices().add(std::move(notice), now_ns); }
@@ -388,7 +389,8 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
   report.deltas.clear();
   for (const MadeDelta& made : frame->deltas) {
-    report.deltas.push_back({made.stream, made.hash, made.payload.size(), made.corrected});
+    report.deltas.push_back(
+        {made.stream, made.hash, made.payload.size(), made.corrected, made.predict_ns, made.encode_ns});
     StreamTotals& of_stream = lanes[made.stream].totals;
     ++of_stream.frames;
     of_stream.payload_bytes += made.payload.size();
@@ -431,6 +433,7 @@ HostTotals Host::Impl::totals_now() const {
   for (std::uint32_t id = 0; id < lanes.size(); ++id) {
     StreamTotals stream = lanes[id].totals;
     stream.made = active[id];
+    now.rejoins += lanes[id].joins.rejoins();
     stream.snapshot_bytes = lanes[id].transfer.bytes();
     stream.participants = roster.counted(id);
     stream.observers = roster.watching(id);
@@ -443,9 +446,12 @@ HostTotals Host::Impl::totals_now() const {
   now.reply_bytes = outbox.traffic().replies;
   now.input_bytes = outbox.traffic().scheduled_inputs;
   now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
-  now.refused_inputs += inputs.refused();
-  now.refused_messages += port->dropped();
+  for (std::size_t reason = 0; reason < transport::kReasons; ++reason)
+    now.inputs_refused.by_reason[reason] += inputs.refused().by_reason[reason];
+  now.refused_inputs = now.inputs_refused.total();
+  now.refused_messages = now.messages_refused.total() + port->dropped();
   now.demotions = roster.demotions();
+  now.repeated_demotions = roster.repeated_demotions();
   now.clients_seen = roster.seen();
   now.frame_ms_p50 = frame_durations.quantile_ms(0.5);
   now.frame_ms_p99 = frame_durations.quantile_ms(0.99);
@@ -568,6 +574,7 @@ std::uint32_t Host::participants() const { return impl_->roster.counted(); }
 std::uint32_t Host::observers() const { return impl_->roster.watching(); }
 
 HostTotals Host::totals() const { return impl_->totals_now(); }
+HostMoment Host::present() const { return host_moment(impl_->roster, *impl_->source, impl_->outbox); }
 
 std::vector<std::string> Host::take_notices() { return impl_->roster.notices().take(); }
 

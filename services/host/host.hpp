@@ -86,6 +86,8 @@ class Host {
   [[nodiscard]] std::uint32_t participants() const;   ///< playing and waited for
   [[nodiscard]] std::uint32_t observers() const;      ///< playing and not waited for
   [[nodiscard]] HostTotals totals() const;
+  /// For a monitor, about once a second: O(bodies), 1.5 us for each 1,000.
+  [[nodiscard]] HostMoment present() const;
   /// Lines for a log (joined, demoted, refused ...), oldest first; forgets them. At most 2 a second on
   /// average, and one in 10 s about one client.
   [[nodiscard]] std::vector<std::string> take_notices();

@@ -50,6 +50,16 @@ class Recorder {
   /// Ends the file, or removes it if no snapshot came. Errors: kIo, also of anything written before.
   [[nodiscard]] Result<void> finish();
 
+  /// What was added so far, and the bytes that the file got of it. Valid at any time.
+  struct Progress {
+    std::uint64_t frames = 0, snapshots_cut = 0, written_bytes = 0;
+  };
+  [[nodiscard]] Progress progress() const {
+    return {.frames = counted_.frames,
+            .snapshots_cut = counted_.snapshots_cut,
+            .written_bytes = file_->written_bytes()};
+  }
+
   /// For each topic: number of messages, and their bytes before compression.
   struct Share {
     std::uint64_t messages = 0, bytes = 0;

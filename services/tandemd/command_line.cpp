@@ -149,6 +149,9 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
       "--checkpoint", &Config::mutable_checkpoint,
       "auto: start afresh where there is no good checkpoint; require: do not start then; off: neither read "
       "nor write any [auto]");
+  flags.add("--metrics", &Config::mutable_metrics,
+            "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and /healthz "
+            "and /readyz [none]");
   flags.add("--hash-log", &Config::mutable_hash_log, "File for a line `epoch,frame,hash` of every frame");
 }
 

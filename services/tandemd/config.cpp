@@ -253,6 +253,11 @@ Result<Options> check_config(const ServerConfig& config) {
   options.wait_for = config.wait_for();
   if (config.has_duration() && config.duration() != 0) options.duration_s = config.duration();
   options.hash_log = config.hash_log();
+  if (config.has_metrics()) {
+    auto address = metrics::read_address(config.metrics());
+    if (!address) return refuse("metrics", address.error().message);
+    options.metrics = std::move(*address);
+  }
   if (const auto named = transport::check_session_name(options.session); !named)
     return refuse("session", named.error().message);
   return read_service(config, options)

@@ -24,6 +24,7 @@
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
+#include "services/tandemd/metrics.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -179,7 +180,7 @@ class Keeping {
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
-             Keeping& keeping, const host::Publisher& publisher, const Options& options,
+             Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, const Options& options,
              const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
@@ -190,7 +191,9 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   hashes.add(host.first_made(), host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
-    if (host.poll(now_ns, wall_ns())) {
+    const bool produced = host.poll(now_ns, wall_ns());
+    metrics.watch(host, publisher, produced, now_ns);
+    if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
       keeping.after_frame(now_ns);
@@ -317,6 +320,12 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
     return report_error(opened.error(), 1);
 
+  Metrics metrics;
+  if (options.metrics) {
+    auto served =
+        metrics.serve(*options.metrics, facts_of(*config, options.session, scene->name, options.free_rate));
+    if (!served) return report_error(served.error(), 1);
+  }
   auto port = open_port(*config, options, signals.stop());
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
@@ -335,7 +344,8 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   ScriptSender script(*scene, options);
   if (goes_on) script.skip_to((*host)->frame());
   Keeping keeping(keeper.get(), **host);
-  const Ending ending = serve(**host, **port, script, hashes, keeping, publisher, options, signals.stop());
+  const Ending ending =
+      serve(**host, **port, script, hashes, keeping, publisher, metrics, options, signals.stop());
   if (ending != Ending::kRefused) keeping.end();
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =

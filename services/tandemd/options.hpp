@@ -6,6 +6,7 @@
 #include <string>
 
 #include "services/checkpoint/keeper.hpp"
+#include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
@@ -24,6 +25,8 @@ struct Options : planning::ServiceWishes {
 
   std::string hash_log;  ///< path; empty: none
   bool json = false;     ///< a report on stdout at the end
+
+  std::optional<metrics::Address> metrics;  ///< empty: none are served
 };
 
 }  // namespace tandem::daemon

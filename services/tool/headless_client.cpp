@@ -81,7 +81,7 @@ Result<void> HeadlessClient::load_script(double dt_s) {
   return {};
 }
 
-void HeadlessClient::run(const std::atomic<bool>& stop) {
+void HeadlessClient::run(const std::atomic<bool>& stop, TurnListener* listener) {
   started_ns_ = transport::steady_ns();
   told_ns_ = live_ns_ = started_ns_;
   while (!stop) {
@@ -90,6 +90,7 @@ void HeadlessClient::run(const std::atomic<bool>& stop) {
     const client::Statistics& figures = core_->statistics();
     send_script(now);
     record(now);
+    if (listener != nullptr) listener->turned(*core_, recorder_.get(), now.steady_ns);
     if (recorder_ && !recorder_->good()) break;
     tell_waiting(now);
     tell_live(now);

@@ -33,6 +33,14 @@ struct HeadlessOptions {
   std::string name;             ///< in front of lines for humans; may be empty
 };
 
+/// Sees a client and its recorder, null without one, after every turn of the client's loop.
+class TurnListener {
+ public:
+  virtual ~TurnListener() = default;
+  virtual void turned(const client::ClientCore& core, const recording::Recorder* recorder,
+                      std::int64_t now_ns) = 0;
+};
+
 /// Runs in one thread of the caller.
 class HeadlessClient final : public client::CoreListener {
  public:
@@ -45,8 +53,8 @@ class HeadlessClient final : public client::CoreListener {
   HeadlessClient(HeadlessClient&&) = delete;
   HeadlessClient& operator=(HeadlessClient&&) = delete;
 
-  /// Plays until its time is over or `stop` is set.
-  void run(const std::atomic<bool>& stop);
+  /// Plays until its time is over or `stop` is set. `listener` may be null.
+  void run(const std::atomic<bool>& stop, TurnListener* listener = nullptr);
   /// True if it played without a hash mismatch and all files are written.
   [[nodiscard]] bool succeeded() const;
   /// The JSON object of the result, valid after run().

@@ -10,6 +10,7 @@
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
 #include "services/tool/print_error.hpp"
+#include "services/tool/record_metrics.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -18,6 +19,7 @@ struct RecordOptions {
   HeadlessOptions client;
   bool plain = false;
   bool json = false;
+  std::string metrics;  ///< empty: none are served
 };
 
 Json report(const HeadlessClient& client) {
@@ -43,12 +45,21 @@ int run_record(RecordOptions options) {
   options.client.lead = 0;  // nothing is drawn
   options.client.command = "record";
   if (!options.plain) options.client.compression = recording::Compression::kZstd;
+  RecordMetrics metrics;
+  if (!options.metrics.empty()) {
+    const auto served = metrics.serve(*metrics::read_address(options.metrics), options.client.session,
+                                      options.client.capture);
+    if (!served) {
+      print_error(fmt::format("tandem record: {}\n", served.error().message));
+      return 1;
+    }
+  }
   auto client = HeadlessClient::create(options.client);
   if (!client) {
     print_error(fmt::format("tandem record: {}\n", client.error().message));
     return 1;
   }
-  (*client)->run(signals.stop());
+  (*client)->run(signals.stop(), &metrics);
   if (options.json) {
     fmt::print("{}\n", report(**client).dump());
   } else {
@@ -79,6 +90,14 @@ void add_record(commandline::Command app, Run& run) {
   command.add_flag("--no-compression", options->plain, "Write chunks without compression by zstd");
   command.add_option("--hash-log", client.hash_log,
                      "Write a line `epoch,frame,hash` for every applied frame");
+  command
+      .add_option("--metrics", options->metrics,
+                  "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and "
+                  "/healthz and /readyz")
+      .check([](const std::string& text) {
+        const auto address = metrics::read_address(text);
+        return address ? std::string() : address.error().message;
+      });
   command.add_flag("--json", options->json, "Print the result as one JSON object");
   command.footer(
       "The file holds all that a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, "

@@ -66,6 +66,7 @@ EDGES = {
     "services/process": [],
     "services/commandline": [],
     "services/json": [],
+    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/checkpoint": LAYOUT + ["sdk/transport"] + SIMULATION,
@@ -89,19 +90,20 @@ EDGES = {
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd": SIMULATION
     + TABLES
-    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json"]
+    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/viewing"]
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json", "services/process"],
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
+    + ["services/metrics", "services/process"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/process", "services/recording", "services/scenes"],
+    + ["services/metrics", "services/process", "services/recording", "services/scenes"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
@@ -120,6 +122,7 @@ OWNERS = [
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
+    (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),

@@ -29,20 +29,20 @@ Reason InputDesk::handle(Account& account, Peer& peer, const transport::InputMes
   account.reply.schedule.on_outcome();
   if (input.epoch != epoch_) {
     // Its number belongs to another epoch's count, so it must not enter this one's outcomes.
-    ++refused_;
+    refused_.add(Reason::kStaleEpoch);
     account.reply.once = Reason::kStaleEpoch;
     return Reason::kStaleEpoch;
   }
   transport::ReplyEntry entry{.number = input.number, .frame = 0, .code = 0};
   if (input.number <= account.inputs.highest) {
     // The first outcome of a number counts; the reply repeats it.
-    ++refused_;
+    refused_.add(Reason::kDuplicate);
     entry.code = static_cast<std::uint32_t>(Reason::kDuplicate);
     if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
     return Reason::kDuplicate;
   }
   InputVerdict verdict = decide(account, peer, input, now_ns);
-  if (verdict.reason != Reason::kNone) ++refused_;
+  if (verdict.reason != Reason::kNone) refused_.add(verdict.reason);
   entry.frame = verdict.acts_on;
   entry.code = static_cast<std::uint32_t>(verdict.reason);
   account.inputs.highest = input.number;

@@ -7,6 +7,7 @@
 #include "services/host/clients/roster.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/outgoing/outbox.hpp"
+#include "services/host/outgoing/report.hpp"
 
 namespace tandem::host {
 
@@ -20,7 +21,7 @@ class InputDesk {
   /// in the account.
   transport::Reason handle(Account& account, Peer& peer, const transport::InputMessage& input,
                            std::int64_t now_ns);
-  [[nodiscard]] std::uint64_t refused() const { return refused_; }
+  [[nodiscard]] const Refusals& refused() const { return refused_; }
 
  private:
   [[nodiscard]] InputVerdict decide(Account& account, Peer& peer, const transport::InputMessage& input,
@@ -29,7 +30,7 @@ class InputDesk {
   Epoch epoch_;
   FrameSource* source_;
   Outbox* outbox_;
-  std::uint64_t refused_ = 0;
+  Refusals refused_;
 };
 
 }  // namespace tandem::host

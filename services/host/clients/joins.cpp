@@ -31,7 +31,10 @@ void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
   for (const transport::ClientId id : ready_) {
     const auto known = roster.accounts().find(id);
     if (known == roster.accounts().end()) continue;
-    if (known->second.join.served) roster.peer(known->second).snapshots_again.take(now_ns);
+    if (known->second.join.served) {
+      roster.peer(known->second).snapshots_again.take(now_ns);
+      if (known->second.phase == transport::Phase::kJoining) ++rejoins_;
+    }
     known->second.join = {.served = true, .served_attempt = known->second.attempt, .served_stream = stream_};
   }
   collecting_since_ns_.reset();

@@ -28,6 +28,8 @@ class JoinDesk {
   [[nodiscard]] std::span<const transport::ClientId> ready() const { return ready_; }
   /// Notes that a snapshot was made for the ready clients.
   void served(Roster& roster, std::int64_t now_ns);
+  /// Snapshots for clients that had got one before and did not play when they asked for this one.
+  [[nodiscard]] std::uint64_t rejoins() const { return rejoins_; }
   /// When the joiners that were collected so far get their snapshot.
   [[nodiscard]] std::optional<std::int64_t> due_ns(const SnapshotTransfer& transfer,
                                                    std::int64_t now_ns) const;
@@ -37,6 +39,7 @@ class JoinDesk {
   std::optional<std::int64_t> collecting_since_ns_;
   std::optional<std::int64_t> served_at_ns_;
   std::vector<transport::ClientId> ready_;
+  std::uint64_t rejoins_ = 0;
 };
 
 }  // namespace tandem::host

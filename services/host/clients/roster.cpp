@@ -13,6 +13,7 @@ using transport::Reason;
 using transport::Role;
 
 constexpr std::int64_t kReturnNs = 10'000'000'000;   // a demoted client must keep up this long
+constexpr std::int64_t kAgainNs = 300'000'000'000;   // another demotion within this time is a repeated one
 constexpr std::int64_t kSilenceNs = 30'000'000'000;  // a client without an acknowledgement for so long counts
                                                      // as gone
 constexpr std::int64_t kForgetNs = 60'000'000'000;   // its account is deleted after this time at the latest
@@ -213,6 +214,8 @@ void Roster::charge(std::int64_t duration_ns, const Now& now) {
     account.kept_up = false;
     account.reply.schedule.on_change();
     ++demotions_;
+    if (account.demoted_at_ns && now.ns - *account.demoted_at_ns <= kAgainNs) ++repeated_demotions_;
+    account.demoted_at_ns = now.ns;
     note(account, "delayed the others for too long; it is an observer until it has kept up for 10 s", now.ns);
   }
 }

@@ -57,6 +57,7 @@ struct Account {
   bool demoted = false;
   bool kept_up = false;  ///< while demoted: it has kept up since kept_up_since_ns
   std::int64_t kept_up_since_ns = 0;
+  std::optional<std::int64_t> demoted_at_ns;  ///< the last time
   Frame applied = 0;
   Frame timed_from = 0;  ///< round trips are measured on frames after this one
   std::uint32_t attempt = 0;
@@ -166,6 +167,11 @@ class Roster {
   [[nodiscard]] Peer& peer(const Account& account) { return peers_.at(account.from); }
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
+  /// Demotions of clients that had been demoted in the five minutes before.
+  [[nodiscard]] std::uint64_t repeated_demotions() const { return repeated_demotions_; }
+  [[nodiscard]] const std::map<transport::ClientId, Account>& accounts() const { return accounts_; }
+  /// DDS participants that have an account.
+  [[nodiscard]] std::size_t peers() const { return peers_.size(); }
   [[nodiscard]] Notices& notices() { return notices_; }
   /// Forgotten accounts that have writers of their own. The caller ends their writers and removes them here.
   [[nodiscard]] std::vector<transport::ClientId>& forgotten() { return forgotten_; }
@@ -207,7 +213,7 @@ class Roster {
   // Clients of the epoch before that have not come back, for as long as an account is kept.
   std::map<transport::ClientId, checkpoint::ClientState> remembered_;
   std::optional<std::int64_t> remembered_ns_;  // since when
-  std::uint64_t seen_ = 0, demotions_ = 0;
+  std::uint64_t seen_ = 0, demotions_ = 0, repeated_demotions_ = 0;
   Notices notices_;
   std::vector<transport::ClientId> forgotten_;
 };

@@ -14,6 +14,7 @@
 #include "services/checkpoint/checkpoint.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
+#include "services/host/streams/position_error.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 
@@ -57,6 +58,9 @@ class FrameSource {
   /// The parameters of the next frame. For a stream that is not made now: the parameters with which it
   /// begins.
   [[nodiscard]] virtual const StreamParameters& parameters(std::uint32_t stream) const = 0;
+
+  /// How far agreed() is from the bodies that it stands for, in scene units; 0 where that is not known.
+  [[nodiscard]] virtual PositionError error_of(std::uint32_t /*stream*/) const { return {}; }
 
   /// Makes the next frame; empty if there is none any more. `snapshots_follow`: the streams of which a
   /// snapshot is cut right after it. Queues the messages that have to leave before the deltas.

@@ -122,6 +122,13 @@ void LiveSource::set_active(StreamSet streams) {
   }
 }
 
+PositionError LiveSource::error_of(std::uint32_t id) const {
+  if (!lanes_[id].stream) return {};
+  const double unit_m = lanes_[id].config.lattice.unit;
+  const PositionError units = position_error(mirror_.target(), lanes_[id].stream->agreed(), frame_);
+  return {.rms = units.rms * unit_m, .largest = units.largest * unit_m};
+}
+
 const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
   const Lane& lane = lanes_[id];
   return lane.stream ? lane.stream->parameters() : lane.config.layout.parameters;
@@ -165,6 +172,8 @@ void LiveSource::make_deltas() {
       made.hash = frame.hash;
       made.payload = frame.payload;
       made.corrected = frame.corrected;
+      made.predict_ns = frame.predict_ns;
+      made.encode_ns = frame.encode_ns;
     }
   });
 }

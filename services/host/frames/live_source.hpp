@@ -38,6 +38,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] const State& agreed(std::uint32_t id) const override { return lanes_[id].stream->agreed(); }
   [[nodiscard]] std::uint64_t hash(std::uint32_t id) const override { return lanes_[id].stream->hash(); }
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t id) const override;
+  [[nodiscard]] PositionError error_of(std::uint32_t id) const override;
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
   InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;

@@ -1,6 +1,7 @@
 #include "services/host/outgoing/publisher.hpp"
 
 #include <chrono>
+#include <utility>
 
 namespace tandem::host {
 
@@ -26,14 +27,24 @@ void Publisher::stop() {
 }
 
 void Publisher::run(const std::stop_token& stop) {
+  using Clock = std::chrono::steady_clock;
+  std::chrono::nanoseconds frame_took{0};
   while (!stop.stop_requested() && !gave_up()) {
     const auto message = outbox_->pop(100ms);
     if (!message) continue;
+    if (std::holds_alternative<EndOfFrame>(*message)) {
+      durations_.add(std::exchange(frame_took, 0ns).count());
+      continue;
+    }
     // A delta or a scheduled input that is lost would send every client back to joining.
     const bool precious = std::holds_alternative<transport::DeltaMessage>(*message) ||
                           std::holds_alternative<transport::ScheduledInputMessage>(*message) ||
                           std::holds_alternative<transport::SessionMessage>(*message);
-    if (precious) {
+    if (std::holds_alternative<transport::DeltaMessage>(*message)) {
+      const auto began = Clock::now();
+      insist(*message, stop);
+      frame_took += Clock::now() - began;
+    } else if (precious) {
       insist(*message, stop);
     } else {
       write(*message);

@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "sdk/statistics/duration_buckets.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/outgoing/outbox.hpp"
 
@@ -34,6 +35,8 @@ class Publisher {
   [[nodiscard]] std::uint64_t failures() const { return failures_.load(std::memory_order_relaxed); }
   /// The last failure's text; empty if there was none. Thread-safe.
   [[nodiscard]] std::string last_failure() const;
+  /// How long the deltas of a frame took to be written, all streams together, with repetitions. Thread-safe.
+  [[nodiscard]] DurationBuckets::Counts durations() const { return durations_.counts(); }
   /// True once nothing more is written: the session cannot go on. Thread-safe.
   [[nodiscard]] bool gave_up() const { return gave_up_.load(std::memory_order_relaxed); }
 
@@ -50,6 +53,7 @@ class Publisher {
   std::chrono::nanoseconds patience_;
   std::atomic<std::uint64_t> failures_{0};
   std::atomic<bool> gave_up_{false};
+  DurationBuckets durations_;
   mutable std::mutex mutex_;
   std::string last_failure_;
   std::jthread thread_;

@@ -1,12 +1,14 @@
 #pragma once
 // The figures of a host for its operator.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "sdk/core/layout/layout.hpp"
+#include "sdk/transport/messages.hpp"
 #include "tandem/server_figures.hpp"
 
 namespace tandem::host {
@@ -17,6 +19,7 @@ struct DeltaReport {
   std::uint64_t hash = 0;
   std::size_t payload_bytes = 0;
   std::uint32_t corrected = 0;
+  std::int64_t predict_ns = 0, encode_ns = 0;  ///< durations; encoding includes applying; 0 without a clock
 };
 
 /// The frame that was produced last.
@@ -25,6 +28,18 @@ struct FrameReport {
   std::vector<DeltaReport> deltas;   ///< one for each stream that was made, ascending
   double frame_ms = 0, step_ms = 0;  ///< the whole frame (step, quantise, predict, encode, apply); the
                                      ///< engine's step alone
+};
+
+/// Counts of what was refused, by reason.
+struct Refusals {
+  std::array<std::uint64_t, transport::kReasons> by_reason{};
+
+  void add(transport::Reason reason) { ++by_reason[static_cast<std::size_t>(reason)]; }
+  [[nodiscard]] std::uint64_t total() const {
+    std::uint64_t total = 0;
+    for (const std::uint64_t count : by_reason) total += count;
+    return total;
+  }
 };
 
 /// Counts of one stream since the start.
@@ -41,8 +56,31 @@ struct HostTotals : ServerCounts {
   std::uint64_t frames = 0, corrected = 0;
   std::uint64_t payload_bytes = 0;  ///< of the deltas themselves
   std::uint64_t demotions = 0, clients_seen = 0;
+  std::uint64_t repeated_demotions = 0;       ///< of clients that had been demoted in the five minutes before
+  std::uint64_t rejoins = 0;                  ///< snapshots for clients that had played or joined before
+  Refusals inputs_refused, messages_refused;  ///< of refused_inputs and refused_messages, what has a reason
   double frame_ms_p50 = 0, frame_ms_p99 = 0;
   std::vector<StreamTotals> streams;  ///< in the order of their ids
+};
+
+/// The state of one stream at a moment.
+struct StreamMoment {
+  std::uint32_t at_rest = 0;                    ///< bodies; 0 while the stream is not made
+  std::uint32_t joining = 0;                    ///< clients that wait for a snapshot, or receive it
+  std::uint32_t longest_lag = 0;                ///< frames that the slowest client that plays is behind
+  double threshold_m = 0;                       ///< in force
+  double error_rms_m = 0, error_largest_m = 0;  ///< distance of agreed from real positions, over a part of
+                                                ///< the bodies; 0 while the stream is not made
+};
+
+/// The state of a host at a moment, besides its counts.
+struct HostMoment {
+  std::uint32_t bodies = 0, window = 0;
+  std::uint32_t dds_participants = 0;       ///< that have clients here
+  std::int64_t longest_round_trip_ns = 0;   ///< from a frame to its acknowledgement, of a participant
+  std::size_t queued = 0, queued_most = 0;  ///< messages that wait to be sent; the most there were
+  std::uint32_t queued_frames = 0;          ///< frames that wait to be sent
+  std::vector<StreamMoment> streams;        ///< in the order of their ids
 };
 
 }  // namespace tandem::host

@@ -76,6 +76,18 @@ TEST(Options, WordsAndNumbersAreBothUnderstood) {
   EXPECT_EQ(numbers->stall_timeout_s, 1.5);
 }
 
+TEST(Options, MetricsAreServedOnlyWhereAnAddressIsGiven) {
+  Config config = least();
+  EXPECT_FALSE(check_config(config)->metrics);
+  config.set_metrics("9730");
+  const auto options = check_config(config);
+  ASSERT_TRUE(options && options->metrics);
+  EXPECT_EQ(*options->metrics, (metrics::Address{"127.0.0.1", 9730}));
+  for (const char* bad : {"", "host:1", "127.0.0.1:65536", "::1:80"}) {
+    EXPECT_NE(refusal([bad](Config& s) { s.set_metrics(bad); }).find("--metrics"), std::string::npos) << bad;
+  }
+}
+
 TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
   EXPECT_NE(refusal([](Config& s) { s.clear_scene(); }).find("--scene"), std::string::npos);
   EXPECT_NE(refusal([](Config& s) { s.clear_bodies(); }).find("--bodies"), std::string::npos);

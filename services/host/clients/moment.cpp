@@ -1,0 +1,40 @@
+#include "services/host/clients/moment.hpp"
+
+#include <algorithm>
+
+namespace tandem::host {
+
+HostMoment host_moment(const Roster& roster, const FrameSource& source, const Outbox& outbox) {
+  HostMoment moment;
+  moment.window = roster.window();
+  moment.dds_participants = static_cast<std::uint32_t>(roster.peers());
+  moment.queued = outbox.size();
+  moment.queued_most = outbox.high_water();
+  moment.queued_frames = outbox.unwritten_frames();
+  const StreamSet active = source.active();
+  const transport::SessionMessage& session = source.session();
+  moment.streams.resize(session.streams.size());
+  for (std::uint32_t id = 0; id < moment.streams.size(); ++id) {
+    StreamMoment& stream = moment.streams[id];
+    stream.threshold_m = source.parameters(id).codec.threshold * session.lattice_unit;
+    if (!active[id]) continue;
+    moment.bodies = source.agreed(id).alive_count();
+    stream.at_rest = source.agreed(id).rest_count();
+    const PositionError error = source.error_of(id);
+    stream.error_rms_m = error.rms;
+    stream.error_largest_m = error.largest;
+  }
+  for (const auto& [id, account] : roster.accounts()) {
+    if (const auto joins = joined_stream(account); joins && *joins < moment.streams.size())
+      ++moment.streams[*joins].joining;
+    if (!account.plays() || account.stream >= moment.streams.size()) continue;
+    StreamMoment& stream = moment.streams[account.stream];
+    const Frame behind = source.frame() - std::min(account.applied, source.frame());
+    stream.longest_lag = std::max(stream.longest_lag, static_cast<std::uint32_t>(behind));
+    if (account.counted)
+      moment.longest_round_trip_ns = std::max(moment.longest_round_trip_ns, account.round_trip.high_ns());
+  }
+  return moment;
+}
+
+}  // namespace tandem::host

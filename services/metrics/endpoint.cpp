@@ -1,0 +1,297 @@
+#include "services/metrics/endpoint.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "services/metrics/process_series.hpp"
+#include "services/metrics/request.hpp"
+
+namespace tandem::metrics {
+namespace {
+
+using transport::steady_ns;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd = -1) : fd_(fd) {}
+  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+union SocketAddress {
+  sockaddr any;
+  sockaddr_in v4;
+  sockaddr_in6 v6;
+};
+
+tl::unexpected<Error> refuse(const Address& address, const char* what) {
+  return fail(ErrorCode::kIo,
+              fmt::format("metrics cannot be served at {}: {}: {}", to_text(address), what, strerror(errno)));
+}
+
+/// Listens, and sets the port that was taken.
+Result<Descriptor> listen_at(Address& address) {
+  SocketAddress at{};
+  socklen_t size = 0;
+  if (address.host.find(':') == std::string::npos) {
+    at.v4.sin_family = AF_INET;
+    at.v4.sin_port = htons(address.port);
+    inet_pton(AF_INET, address.host.c_str(), &at.v4.sin_addr);
+    size = sizeof(at.v4);
+  } else {
+    at.v6.sin6_family = AF_INET6;
+    at.v6.sin6_port = htons(address.port);
+    inet_pton(AF_INET6, address.host.c_str(), &at.v6.sin6_addr);
+    size = sizeof(at.v6);
+  }
+  Descriptor fd(socket(at.any.sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (fd.get() < 0) return refuse(address, "socket");
+  const int yes = 1;
+  setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  if (bind(fd.get(), &at.any, size) != 0) return refuse(address, "bind");
+  constexpr int kBacklog = 128;
+  if (listen(fd.get(), kBacklog) != 0) return refuse(address, "listen");
+  if (getsockname(fd.get(), &at.any, &size) == 0)
+    address.port = ntohs(at.any.sa_family == AF_INET ? at.v4.sin_port : at.v6.sin6_port);
+  return fd;
+}
+
+/// Grants `per_second` on average, and `burst` at once.
+class Pace {
+ public:
+  explicit Pace(const EndpointLimits& limits)
+      : each_ns_(kSecond / std::max<std::int64_t>(limits.per_second, 1)),
+        burst_ns_(each_ns_ * limits.burst) {}
+  /// The time of the next grant, which may be over.
+  [[nodiscard]] std::int64_t next_ns() const { return full_ns_ - burst_ns_; }
+  void take(std::int64_t now_ns) { full_ns_ = std::max(full_ns_, now_ns) + each_ns_; }
+  void pause(std::int64_t now_ns, std::int64_t duration_ns) { full_ns_ = now_ns + burst_ns_ + duration_ns; }
+
+ private:
+  std::int64_t each_ns_, burst_ns_;
+  std::int64_t full_ns_ = 0;  // when nothing of the burst is used up any more
+};
+
+struct Connection {
+  Descriptor fd;
+  std::int64_t end_ns = 0;
+  std::string received, answer = {};
+  std::size_t sent = 0;
+  bool over = false;
+
+  [[nodiscard]] bool answering() const { return !answer.empty(); }
+};
+
+}  // namespace
+
+struct Endpoint::Impl {
+  Impl(Address at, Descriptor listening, const Health& state, Describe program, const EndpointLimits& bounds)
+      : address(std::move(at)),
+        limits(bounds),
+        listener(std::move(listening)),
+        stop_event(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        health(&state),
+        describe(std::move(program)),
+        pace(bounds),
+        thread([this](const std::stop_token& stop) { run(stop); }) {}
+  ~Impl() {
+    thread.request_stop();
+    eventfd_write(stop_event.get(), 1);
+    thread.join();
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void run(const std::stop_token& stop) {
+    // Of this thread alone: a frame comes before a scrape. Without the right to do so, nothing is lost.
+    static_cast<void>(setpriority(PRIO_PROCESS, 0, kNice));
+    pthread_setname_np(pthread_self(), "metrics");
+    while (!stop.stop_requested()) {
+      wait();
+      for (Connection& connection : connections) serve(connection);
+      std::erase_if(connections, [](const Connection& connection) { return connection.over; });
+      accept_due();
+    }
+  }
+
+  /// Waits until a connection can go on, a new one may be accepted, or time is over for one.
+  void wait() {
+    const std::int64_t now_ns = steady_ns();
+    std::int64_t until_ns = now_ns + 60 * kSecond;
+    polled.assign(1, {.fd = stop_event.get(), .events = POLLIN, .revents = 0});
+    if (pace.next_ns() <= now_ns) {
+      polled.push_back({.fd = listener.get(), .events = POLLIN, .revents = 0});
+    } else {
+      until_ns = pace.next_ns();
+    }
+    for (const Connection& connection : connections) {
+      polled.push_back({.fd = connection.fd.get(),
+                        .events = static_cast<short>(connection.answering() ? POLLOUT : POLLIN),
+                        .revents = 0});
+      until_ns = std::min(until_ns, connection.end_ns);
+    }
+    const std::int64_t wait_ms =
+        (std::max<std::int64_t>(until_ns - now_ns, 0) + kMillisecond - 1) / kMillisecond;
+    poll(polled.data(), polled.size(), static_cast<int>(wait_ms));
+  }
+
+  void accept_due() {
+    while (pace.next_ns() <= steady_ns()) {
+      const int fd = accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+      const std::int64_t now_ns = steady_ns();
+      if (fd < 0) {
+        // No descriptors or no memory: waiting in poll() would not wait.
+        if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR) pace.pause(now_ns, kSecond / 10);
+        return;
+      }
+      pace.take(now_ns);
+      if (connections.size() >= limits.connections) connections.pop_front();
+      connections.push_back({.fd = Descriptor(fd), .end_ns = now_ns + limits.longest_ns, .received = {}});
+      serve(connections.back());  // a scraper's request mostly is there already
+      if (connections.back().over) connections.pop_back();
+    }
+  }
+
+  void serve(Connection& connection) {
+    if (!connection.answering()) receive(connection);
+    if (connection.answering()) send_more(connection);
+    if (steady_ns() >= connection.end_ns) connection.over = true;
+  }
+
+  void receive(Connection& connection) {
+    std::array<char, 2048> piece{};
+    while (!connection.over && !connection.answering()) {
+      const ssize_t got = recv(connection.fd.get(), piece.data(), piece.size(), 0);
+      if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
+      if (got <= 0) {
+        connection.over = true;
+        return;
+      }
+      connection.received.append(piece.data(), static_cast<std::size_t>(got));
+      const Reading reading = read_request(connection.received);
+      if (reading.complete) {
+        connection.answer = answer(reading.request);
+      } else if (connection.received.size() > kMostRequestBytes) {
+        connection.answer = response(431, kPlain, "the request is too large\n", false);
+      }
+    }
+  }
+
+  static void send_more(Connection& connection) {
+    while (connection.sent < connection.answer.size()) {
+      const ssize_t sent = send(connection.fd.get(), connection.answer.data() + connection.sent,
+                                connection.answer.size() - connection.sent, MSG_NOSIGNAL);
+      if (sent < 0 && (errno == EAGAIN || errno == EINTR)) return;
+      if (sent <= 0) break;
+      connection.sent += static_cast<std::size_t>(sent);
+    }
+    shutdown(connection.fd.get(), SHUT_WR);
+    connection.over = true;
+  }
+
+  std::string answer(const std::optional<Request>& request) {
+    if (!request) return response(400, kPlain, "this is not HTTP\n", false);
+    const bool head = request->method == Request::Method::kHead;
+    if (request->method == Request::Method::kOther)
+      return response(405, kPlain, "only GET and HEAD are served\n", false);
+    if (request->path == "/metrics")
+      return response(200, "text/plain; version=0.0.4; charset=utf-8", page(), head);
+    if (request->path == "/healthz") return answer(health->alive(), head);
+    if (request->path == "/readyz") return answer(health->ready(), head);
+    return response(404, kPlain, "/metrics, /healthz and /readyz are served\n", head);
+  }
+  static std::string answer(const Health::Answer& state, bool head) {
+    return response(state.good ? 200 : 503, kPlain, state.text, head);
+  }
+
+  /// Kept for a moment, so that many scrapes cost little more than one.
+  const std::string& page() {
+    const std::int64_t now_ns = steady_ns();
+    if (!text.empty() && now_ns - text_ns < limits.page_ns) return text;
+    Page made;
+    made.gauge("tandem_build_info", "The version of the program, as a label", 1,
+               {{"version", TANDEM_VERSION}});
+    made.gauge("tandem_alive", "1 if the program's work goes on: /healthz", health->alive().good ? 1 : 0);
+    made.gauge("tandem_ready", "1 if the program does what it is for: /readyz", health->ready().good ? 1 : 0);
+    describe(made);
+    describe_process(made);
+    made.gauge("tandem_scrape_duration_seconds", "Time to make the last page before this one", made_s);
+    text = to_text(made);
+    text_ns = now_ns;
+    made_s = static_cast<double>(steady_ns() - now_ns) / 1e9;
+    return text;
+  }
+
+  /// Lower than the priority of a frame. With 19, a scrape takes 60 ms and more while others use the
+  /// processor.
+  static constexpr int kNice = 5;
+  static constexpr std::string_view kPlain = "text/plain; charset=utf-8";
+
+  Address address;
+  EndpointLimits limits;
+  Descriptor listener, stop_event;
+  const Health* health;
+  Describe describe;
+  // Of the thread alone.
+  Pace pace;
+  std::deque<Connection> connections;  // oldest first
+  std::vector<pollfd> polled;
+  std::string text;
+  std::int64_t text_ns = 0;
+  double made_s = 0;
+  std::jthread thread;  // last: all above is there when it starts
+};
+
+Result<std::unique_ptr<Endpoint>> Endpoint::create(const Address& address, const Health& health,
+                                                   Describe describe, const EndpointLimits& limits) {
+  if (!has_text()) {
+    return fail(ErrorCode::kUnsupported,
+                "this build has no metrics: prometheus-cpp (prometheus-cpp-dev) was missing");
+  }
+  Address at = address;
+  auto listener = listen_at(at);
+  if (!listener) return tl::unexpected(listener.error());
+  return std::unique_ptr<Endpoint>(new Endpoint(
+      std::make_unique<Impl>(std::move(at), std::move(*listener), health, std::move(describe), limits)));
+}
+
+Endpoint::Endpoint(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Endpoint::~Endpoint() = default;
+
+const Address& Endpoint::address() const { return impl_->address; }
+
+std::string Endpoint::notice() const {
+  return fmt::format("metrics at http://{}/metrics{}", to_text(impl_->address),
+                     is_loopback(impl_->address) ? "" : ", for every host that can reach this address");
+}
+
+}  // namespace tandem::metrics

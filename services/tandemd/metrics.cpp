@@ -1,0 +1,215 @@
+#include "services/tandemd/metrics.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "services/metrics/figure_series.hpp"
+#include "services/metrics/reasons.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using host::Host;
+using metrics::Labels;
+using metrics::Page;
+
+// The server keeps its rate if it misses no more than this share of it, over three seconds.
+constexpr double kHeldShare = 0.9;
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
+
+void describe_session(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
+  page.gauge("tandem_session_info", "The session that this server publishes, as labels", 1,
+             {{"session", facts.session}, {"scene", facts.scene}});
+  page.gauge("tandem_epoch_timestamp_seconds", "Start of this epoch, since 1970",
+             static_cast<double>(figures.epoch_ms) / 1e3);
+  page.state("tandem_server_state",
+             "1 for the state of the server: it claims the session's name, waits for participants before "
+             "frame 1, runs, was refused by another server of this session, or has ended",
+             {"claiming", "waiting", "running", "refused", "ended"}, static_cast<std::size_t>(figures.state));
+  page.gauge("tandem_frame_rate_target_hertz", "Frames per second that are due; 0: as many as possible",
+             facts.frame_rate_hz);
+  page.gauge("tandem_frame_rate_hertz", "Frames per second, over the last three seconds",
+             figures.frame_rate_hz);
+  page.gauge("tandem_frame", "Number of the last frame", static_cast<double>(figures.frame));
+  page.count("tandem_frames_total", "Frames made", static_cast<double>(figures.totals.frames));
+  page.durations("tandem_frame_duration_seconds", "Time of a frame: step, predict, encode, apply",
+                 figures.frame_took);
+  page.durations("tandem_step_duration_seconds", "Time of the full simulation's step", figures.step_took);
+  page.durations("tandem_publish_duration_seconds",
+                 "Time in which DDS took the deltas of a frame, all streams together", figures.publish_took);
+  page.gauge("tandem_bodies", "Bodies alive", figures.moment.bodies);
+}
+
+void describe_stream(Page& page, const SessionFacts& facts, const FiguresNow& figures, std::size_t id) {
+  const std::string& name = facts.streams[id];
+  const host::StreamTotals& totals = figures.totals.streams[id];
+  const host::StreamMoment& moment = figures.moment.streams[id];
+  const Labels stream{{"stream", name}};
+  page.gauge("tandem_stream_info", "A stream, its codec and its predictor, as labels", 1,
+             {{"stream", name}, {"codec", facts.codecs[id]}, {"predictor", facts.predictors[id]}});
+  page.gauge("tandem_stream_made", "1 while the stream is computed, as somebody plays it",
+             totals.made ? 1 : 0, stream);
+  page.count("tandem_stream_frames_total", "Deltas of the stream", static_cast<double>(totals.frames),
+             stream);
+  page.count("tandem_payload_bytes_total", "Payload of the stream's deltas, counted once for all clients",
+             static_cast<double>(totals.payload_bytes), stream);
+  page.count("tandem_corrected_bodies_total", "Corrections of bodies in the stream's deltas",
+             static_cast<double>(totals.corrected), stream);
+  page.count("tandem_snapshots_total", "Snapshots made for joining clients",
+             static_cast<double>(totals.snapshots), stream);
+  page.count("tandem_snapshot_bytes_total", "Bytes of snapshots, with repetitions",
+             static_cast<double>(totals.snapshot_bytes), stream);
+  page.gauge("tandem_threshold_meters", "Error above which a body is corrected, in force", moment.threshold_m,
+             stream);
+  page.gauge("tandem_error_rms_meters", "Root of the mean square error of positions, of part of the bodies",
+             moment.error_rms_m, stream);
+  page.gauge("tandem_error_max_meters", "Largest error of a position, of part of the bodies",
+             moment.error_largest_m, stream);
+  page.gauge("tandem_bodies_at_rest", "Bodies at rest in the stream", moment.at_rest, stream);
+  const auto clients = [&](const char* role, double count) {
+    page.gauge("tandem_clients", "Clients by stream and role; those that join have none yet", count,
+               {{"stream", name}, {"role", role}});
+  };
+  clients("participant", totals.participants);
+  clients("observer", totals.observers);
+  clients("joining", moment.joining);
+  page.gauge("tandem_client_lag_frames", "Frames that the slowest client of the stream is behind",
+             moment.longest_lag, stream);
+  page.durations("tandem_predict_duration_seconds", "Time of the predicted step", figures.predict_took[id],
+                 stream);
+  page.durations("tandem_encode_duration_seconds", "Time to encode and apply", figures.encode_took[id],
+                 stream);
+}
+
+void describe_refusals(Page& page, const char* name, const char* help, const host::Refusals& refusals) {
+  for (std::size_t i = 1; i < transport::kReasons; ++i) {
+    const std::string_view reason = metrics::reason_label(static_cast<transport::Reason>(i));
+    page.count(name, help, static_cast<double>(refusals.by_reason[i]), {{"reason", std::string(reason)}});
+  }
+}
+
+void describe_clients(Page& page, const FiguresNow& figures) {
+  const host::HostTotals& totals = figures.totals;
+  page.count("tandem_clients_seen_total", "Clients that came", static_cast<double>(totals.clients_seen));
+  page.gauge("tandem_dds_participants", "DDS participants that have clients here",
+             figures.moment.dds_participants);
+  page.gauge("tandem_window_frames", "Frames that the server may be ahead of its slowest participant",
+             figures.moment.window);
+  page.gauge("tandem_round_trip_seconds",
+             "Longest time from a frame to its acknowledgement, of the participants",
+             seconds(figures.moment.longest_round_trip_ns));
+  page.count("tandem_demotions_total", "Participants that became observers because they delayed the others",
+             static_cast<double>(totals.demotions));
+  page.count("tandem_repeated_demotions_total",
+             "Demotions of clients that had been demoted in the five minutes before",
+             static_cast<double>(totals.repeated_demotions));
+  page.count("tandem_rejoins_total", "Snapshots for clients that had got one before and had lost the session",
+             static_cast<double>(totals.rejoins));
+  metrics::describe(page, static_cast<const ServerCounts&>(totals));
+  describe_refusals(page, "tandem_refused_inputs_total", "Inputs of clients that were refused",
+                    totals.inputs_refused);
+  describe_refusals(page, "tandem_refused_messages_total", "Messages that broke a rule of the protocol",
+                    totals.messages_refused);
+  page.count("tandem_refused_messages_total", "Messages that broke a rule of the protocol",
+             static_cast<double>(totals.refused_messages - totals.messages_refused.total()),
+             {{"reason", "unreadable"}});
+}
+
+void describe_queue(Page& page, const FiguresNow& figures) {
+  page.gauge("tandem_queue_messages", "Messages that wait to be sent",
+             static_cast<double>(figures.moment.queued));
+  page.gauge("tandem_queue_messages_high_water", "Maximum number of messages that waited at once",
+             static_cast<double>(figures.moment.queued_most));
+  page.gauge("tandem_queue_frames", "Frames that wait to be sent", figures.moment.queued_frames);
+  page.count("tandem_write_failures_total", "Writes that DDS refused, most of them repeated",
+             static_cast<double>(figures.write_failures));
+}
+
+}  // namespace
+
+SessionFacts facts_of(const host::HostConfig& config, const std::string& session, const std::string& scene,
+                      bool free_rate) {
+  SessionFacts facts{.session = session, .scene = scene, .streams = {}, .codecs = {}, .predictors = {}};
+  facts.frame_rate_hz = free_rate ? 0 : config.frame_rate_hz;
+  for (const host::StreamConfig& stream : config.streams) {
+    facts.streams.push_back(stream.name.empty() ? std::to_string(facts.streams.size()) : stream.name);
+    facts.codecs.push_back(stream.layout.codec);
+    facts.predictors.push_back(stream.layout.predictor);
+  }
+  return facts;
+}
+
+void describe(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
+  if (figures.totals.streams.size() != facts.streams.size()) return;  // it starts
+  describe_session(page, facts, figures);
+  for (std::size_t id = 0; id < facts.streams.size(); ++id) describe_stream(page, facts, figures, id);
+  describe_clients(page, figures);
+  describe_queue(page, figures);
+}
+
+Result<void> Metrics::serve(const metrics::Address& address, SessionFacts facts) {
+  facts_ = std::move(facts);
+  figures_.predict_took.resize(facts_.streams.size());
+  figures_.encode_took.resize(facts_.streams.size());
+  auto endpoint = metrics::Endpoint::create(address, health_,
+                                            [this](Page& page) { describe(page, facts_, latest_.get()); });
+  if (!endpoint) return tl::unexpected(endpoint.error());
+  endpoint_ = std::move(*endpoint);
+  spdlog::info(endpoint_->notice());
+  return {};
+}
+
+void Metrics::count_frame(const host::FrameReport& report) {
+  const auto ns = [](double ms) { return static_cast<std::int64_t>(ms * 1e6); };
+  figures_.frame_took.add(ns(report.frame_ms));
+  figures_.step_took.add(ns(report.step_ms));
+  for (const host::DeltaReport& delta : report.deltas) {
+    figures_.predict_took[delta.stream].add(delta.predict_ns);
+    figures_.encode_took[delta.stream].add(delta.encode_ns);
+  }
+}
+
+const char* Metrics::obstacle(const Host& host, const host::Publisher& publisher) const {
+  if (publisher.gave_up()) return "DDS takes no frames";
+  switch (host.state()) {
+    case Host::State::kClaiming:
+      return metrics::Health::kStarting;
+    case Host::State::kWaiting:
+      return "it waits for participants before frame 1 (--wait-for)";
+    case Host::State::kRunning:
+      break;
+    case Host::State::kRefused:
+      return "another server has the session";
+    case Host::State::kEnded:
+      return "there are no more frames";
+  }
+  const double due_hz = facts_.frame_rate_hz;
+  if (rate_.per_second() > 0 && rate_.per_second() >= kHeldShare * due_hz) return nullptr;
+  return "it publishes fewer frames than are due";
+}
+
+void Metrics::watch(const Host& host, const host::Publisher& publisher, bool produced, std::int64_t now_ns) {
+  if (!endpoint_) return;
+  if (produced) count_frame(host.report());
+  if (now_ns >= next_ns_) {
+    next_ns_ = now_ns + kPeriodNs;
+    figures_.state = host.state();
+    figures_.epoch_ms = host.session().epoch;
+    figures_.frame = host.frame();
+    figures_.totals = host.totals();
+    if (now_ns >= next_moment_ns_) {
+      next_moment_ns_ = now_ns + kMomentNs;
+      figures_.moment = host.present();
+    }
+    figures_.write_failures = publisher.failures();
+    figures_.publish_took = publisher.durations();
+    rate_.saw(figures_.totals.frames, now_ns);
+    figures_.frame_rate_hz = rate_.per_second();
+    latest_.offer(figures_);
+  }
+  health_.beat(now_ns, obstacle(host, publisher));
+}
+
+}  // namespace tandem::daemon

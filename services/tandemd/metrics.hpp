@@ -1,0 +1,69 @@
+#pragma once
+// The metrics and the health of tandemd: --metrics.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sdk/statistics/duration_buckets.hpp"
+#include "services/host/host.hpp"
+#include "services/host/outgoing/publisher.hpp"
+#include "services/metrics/endpoint.hpp"
+#include "services/metrics/health.hpp"
+#include "services/metrics/latest.hpp"
+#include "services/metrics/rate_watch.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::daemon {
+
+/// What a session is from its start to its end.
+struct SessionFacts {
+  std::string session, scene;
+  double frame_rate_hz = 0;  ///< 0: as fast as possible
+  /// One name for each stream; the number where it has none.
+  std::vector<std::string> streams, codecs, predictors;
+};
+[[nodiscard]] SessionFacts facts_of(const host::HostConfig& config, const std::string& session,
+                                    const std::string& scene, bool free_rate);
+
+/// Figures of a moment, as one thread hands them to the other.
+struct FiguresNow {
+  host::Host::State state = host::Host::State::kClaiming;
+  std::uint64_t epoch_ms = 0;
+  Frame frame = 0;
+  double frame_rate_hz = 0;  ///< as achieved over the last three seconds
+  host::HostTotals totals;
+  host::HostMoment moment;
+  std::uint64_t write_failures = 0;
+  DurationBuckets::Counts frame_took, step_took, publish_took;
+  std::vector<DurationBuckets::Counts> predict_took, encode_took;  ///< by stream
+};
+/// The page of such figures, apart from what metrics/ adds for every program.
+void describe(metrics::Page& page, const SessionFacts& facts, const FiguresNow& figures);
+
+/// Does nothing without an address. The thread that polls the host calls watch(); it never waits here.
+class Metrics {
+ public:
+  /// Starts to answer, if there is an address. Errors: those of Endpoint::create().
+  [[nodiscard]] Result<void> serve(const metrics::Address& address, SessionFacts facts);
+  /// Call after every poll.
+  void watch(const host::Host& host, const host::Publisher& publisher, bool produced, std::int64_t now_ns);
+
+ private:
+  void count_frame(const host::FrameReport& report);
+  [[nodiscard]] const char* obstacle(const host::Host& host, const host::Publisher& publisher) const;
+
+  static constexpr std::int64_t kPeriodNs = kSecond / 4;
+  static constexpr std::int64_t kMomentNs = kSecond;  // it looks at all bodies
+
+  SessionFacts facts_;
+  FiguresNow figures_;  // of the polling thread
+  metrics::RateWatch rate_;
+  std::int64_t next_ns_ = 0, next_moment_ns_ = 0;
+  metrics::Latest<FiguresNow> latest_;
+  metrics::Health health_;
+  std::unique_ptr<metrics::Endpoint> endpoint_;  // last: ends before what it reads
+};
+
+}  // namespace tandem::daemon

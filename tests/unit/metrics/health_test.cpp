@@ -1,0 +1,50 @@
+#include "services/metrics/health.hpp"
+
+#include <gtest/gtest.h>
+
+#include "services/metrics/rate_watch.hpp"
+
+namespace tandem::metrics {
+namespace {
+
+TEST(MetricsHealth, AProgramThatStartsIsAliveAndNotReady) {
+  const Health health;
+  EXPECT_TRUE(health.alive(kSecond).good);
+  EXPECT_FALSE(health.ready(kSecond).good);
+  EXPECT_EQ(health.ready(kSecond).text, "it starts\n");
+}
+
+TEST(MetricsHealth, AnObstacleIsNotReadyButAlive) {
+  Health health;
+  health.beat(kSecond, "it waits");
+  EXPECT_TRUE(health.alive(kSecond).good);
+  EXPECT_FALSE(health.ready(kSecond).good);
+  EXPECT_EQ(health.ready(kSecond).text, "it waits\n");
+  health.beat(kSecond, nullptr);
+  EXPECT_TRUE(health.ready(kSecond).good);
+}
+
+TEST(MetricsHealth, WorkThatStopsIsNeither) {
+  Health health;
+  health.beat(kSecond, nullptr);
+  EXPECT_TRUE(health.ready(kSecond + Health::kHangsNs).good);
+  const std::int64_t later_ns = kSecond + Health::kHangsNs + 1;
+  EXPECT_FALSE(health.alive(later_ns).good);
+  EXPECT_FALSE(health.ready(later_ns).good);
+  EXPECT_EQ(health.alive(later_ns).text, "its work has not gone on for 5 s\n");
+}
+
+TEST(MetricsRateWatch, SeesTheLastThreeSeconds) {
+  RateWatch watch;
+  EXPECT_EQ(watch.per_second(), 0);
+  for (int quarter = 0; quarter <= 40; ++quarter)
+    watch.saw(static_cast<std::uint64_t>(quarter) * 10, quarter * kSecond / 4);
+  EXPECT_DOUBLE_EQ(watch.per_second(), 40);
+  for (int quarter = 41; quarter <= 46; ++quarter) watch.saw(400, quarter * kSecond / 4);
+  EXPECT_DOUBLE_EQ(watch.per_second(), 20);
+  for (int quarter = 47; quarter <= 52; ++quarter) watch.saw(400, quarter * kSecond / 4);
+  EXPECT_DOUBLE_EQ(watch.per_second(), 0);
+}
+
+}  // namespace
+}  // namespace tandem::metrics
