@@ -18,6 +18,9 @@ enum class Refusal : std::uint8_t {
   kTooManyMessages,
   kNotReading,
   kTooLarge,
+  kSilent,
+  kAddressJoins,
+  kAddressBytes,
 };
 
 struct Closing {
@@ -25,7 +28,7 @@ struct Closing {
   std::string_view reason;  ///< in it, for a human
 };
 
-inline constexpr std::array<Closing, 9> kClosings{{
+inline constexpr std::array<Closing, 12> kClosings{{
     {4001, "token missing or wrong"},
     {4002, "origin not allowed"},
     {4003, "too many viewers"},
@@ -35,6 +38,9 @@ inline constexpr std::array<Closing, 9> kClosings{{
     {4007, "too many messages"},
     {4008, "nothing was read for too long"},
     {1009, "message too large"},
+    {4009, "nothing was acknowledged for too long"},
+    {4010, "too many connections or joins from this address"},
+    {4011, "too many bytes from this address"},
 }};
 
 [[nodiscard]] constexpr const Closing& closing(Refusal refusal) {
