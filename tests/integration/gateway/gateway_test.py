@@ -282,17 +282,17 @@ def doors(stage):
 
 
 def sleeper(stage):
-    """A viewer that reads nothing any more is let go after ten seconds, and nobody else notices."""
+    """A viewer that reads nothing any more is let go after half a minute, and nobody else notices."""
     stage.server("server", "--codec", "none", bodies=10_000)  # 55 Mbit/s fill every buffer at once
     stage.gateway("gateway")
     stage.viewer("awake", "--seconds", 45)
     stage.viewer("asleep", "--seconds", 60, "--sleep-after", 1, log=False)
     stage.wait(lambda: stage.health()["viewers"] == 2, "two viewers")
-    stage.wait(lambda: stage.health()["refused"]["nothing was acknowledged for too long"] == 1, "the sleeper to be let go")
+    stage.wait(lambda: stage.health()["refused"]["nothing was read for too long"] == 1, "the sleeper to be let go")
     played = len(stage.hashes("awake"))
     stage.wait(lambda: stage.health()["viewers"] == 1, "one viewer")
     print(f"  let go after {played} frames")
-    if not 200 < played < 600:
+    if played < 600:
         raise Failed(f"let go after {played} frames")
     report = stage.end("awake")
     stage.stop("server")
