@@ -23,6 +23,10 @@ class TokenBucket {
     at_ns_ = now_ns;
     return spent_ + 1 <= burst_;
   }
+  /// Takes so many after has(), also more than there are: what is missing has to come back first.
+  void spend(double amount) { spent_ += amount; }
+  /// True if nothing of the burst is spent.
+  [[nodiscard]] bool full(std::int64_t now_ns) { return has(now_ns) && spent_ == 0; }
 
  private:
   double per_second_;

@@ -33,7 +33,40 @@ Result<void> check(const Options& options) {
   for (const std::string& origin : options.origins) {
     if (auto good = check_origin(origin); !good) return good;
   }
+  for (const std::string& proxy : options.web.trusted_proxies) {
+    if (!address_key(proxy))
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("--trusted-proxy {}: not an IPv4 or IPv6 address", proxy));
+  }
   return {};
+}
+
+void add_doors(commandline::Program& app, WebOptions& web) {
+  DoorLimits& doors = web.doors;
+  app.add_option(
+         "--address-connections", doors.connections,
+         "Maximum number of connections of one address, which is an IPv4 address or the first 64 bits of an "
+         "IPv6 address. A quarter of them may be in a handshake, half may come and twice as many requests may be "
+         "made in a second")
+      .range(std::size_t{1}, 2 * kMostViewers)
+      .show_default();
+  app.add_option("--address-joins", doors.joins_per_minute,
+                 "Maximum number of viewers that join from one address in a minute")
+      .range(1.0, 1e6)
+      .show_default();
+  app.add_option(
+         "--address-bytes", doors.bytes_per_second,
+         "Maximum bytes a second of files to one address and messages from it; four times as many at once")
+      .range(65'536.0, 1e12)
+      .show_default();
+  app.add_option("--address-inputs", doors.inputs_per_second,
+                 "Maximum number of inputs a second from one address")
+      .range(1.0, 1e6)
+      .show_default();
+  app.add_option(
+      "--trusted-proxy", web.trusted_proxies,
+      "Address of a proxy; the limits then hold for the last other address in its X-Forwarded-For. "
+      "Repeatable");
 }
 
 }  // namespace
@@ -86,6 +119,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
          "them")
       .range(kLeastQueueBytes, kMostQueueBytes)
       .show_default();
+  add_doors(app, options.web);
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
   if (const auto good = check(options); !good) {
     std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);

@@ -19,6 +19,11 @@ std::optional<std::string> CountLog::line(const Counts& counts, std::size_t view
     if (counts.refused[i] > told_.refused[i])
       changes += fmt::format(", {} refused: {}", counts.refused[i] - told_.refused[i], kClosings[i].reason);
   }
+  for (std::size_t i = 0; i < counts.turned_away.size(); ++i) {
+    if (counts.turned_away[i] > told_.turned_away[i])
+      changes +=
+          fmt::format(", {} turned away: {}", counts.turned_away[i] - told_.turned_away[i], kTurnedAway[i]);
+  }
   if (changes.empty()) return std::nullopt;
   told_ = counts;
   told_ns_ = now_ns;

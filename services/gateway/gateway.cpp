@@ -85,10 +85,11 @@ void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_n
   tell(verdicts_, now_ns);
 }
 
-std::optional<ViewerId> Gateway::admit() {
+std::optional<ViewerId> Gateway::admit(std::shared_ptr<accounts::TokenBucket> inputs) {
   if (viewers_.size() >= limits_.viewers) return std::nullopt;
   ++last_id_;
   viewers_[last_id_].id = last_id_;
+  viewers_[last_id_].address_inputs = std::move(inputs);
   ++counts_.joined;
   return last_id_;
 }
@@ -141,6 +142,20 @@ void Gateway::list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) 
   out.clear();
   for (const auto& [id, viewer] : viewers_) {
     if (viewer.waiting_since_ns && now_ns - *viewer.waiting_since_ns > kNotReadingNs) out.push_back(id);
+  }
+}
+
+// Without a session there is nothing to acknowledge.
+void Gateway::list_silent(std::int64_t now_ns, std::vector<ViewerId>& out) {
+  out.clear();
+  for (auto& [id, viewer] : viewers_) {
+    if (!alive_ || viewer.told_announcement != announcement_number_) {
+      viewer.silent_since_ns.reset();
+    } else if (!viewer.silent_since_ns) {
+      viewer.silent_since_ns = now_ns;
+    } else if (now_ns - *viewer.silent_since_ns > kSilentNs) {
+      out.push_back(id);
+    }
   }
 }
 

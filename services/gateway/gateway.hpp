@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -39,6 +40,8 @@ class Gateway {
   static constexpr std::int64_t kBehindNs = kSecond;
   /// A viewer that reads nothing for this time is disconnected.
   static constexpr std::int64_t kNotReadingNs = 30 * kSecond;
+  /// A viewer that was told of a session and acknowledges nothing for this time is disconnected.
+  static constexpr std::int64_t kSilentNs = 10 * kSecond;
   /// Maximum number of a viewer's inputs without an outcome, which is as many as a reply can list.
   static constexpr std::size_t kMostUndecided = transport::kReplyRing;
 
@@ -46,8 +49,9 @@ class Gateway {
   Gateway(const Limits& limits, World& world);
 
   // What viewers do.
-  /// Adds a connection; returns nothing if there are too many.
-  [[nodiscard]] std::optional<ViewerId> admit();
+  /// Adds a connection; returns nothing if there are too many. `inputs` limits the inputs of all viewers that
+  /// share it.
+  [[nodiscard]] std::optional<ViewerId> admit(std::shared_ptr<accounts::TokenBucket> inputs = nullptr);
   void leave(ViewerId id);
   /// Takes one message. Untrusted. Returns why the connection has to end, if it has to.
   [[nodiscard]] std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message,
@@ -62,6 +66,8 @@ class Gateway {
   void list_ready(std::int64_t now_ns, std::vector<ViewerId>& out);
   /// Lists the viewers that have to be disconnected because they read nothing. Replaces `out`.
   void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
+  /// Lists the viewers that have to be disconnected because they acknowledge nothing. Replaces `out`.
+  void list_silent(std::int64_t now_ns, std::vector<ViewerId>& out);
 
   // What happens in the session.
   /// The session that is followed, with the stream that is played. All that belongs to another epoch is

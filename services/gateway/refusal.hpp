@@ -18,6 +18,9 @@ enum class Refusal : std::uint8_t {
   kTooManyMessages,
   kNotReading,
   kTooLarge,
+  kSilent,
+  kAddressJoins,
+  kAddressBytes,
 };
 
 struct Closing {
@@ -26,7 +29,7 @@ struct Closing {
   std::string_view label;   ///< of its count in metrics
 };
 
-inline constexpr std::array<Closing, 9> kClosings{{
+inline constexpr std::array<Closing, 12> kClosings{{
     {4001, "token missing or wrong", "token"},
     {4002, "origin not allowed", "origin"},
     {4003, "too many viewers", "full"},
@@ -36,6 +39,9 @@ inline constexpr std::array<Closing, 9> kClosings{{
     {4007, "too many messages", "too_many_messages"},
     {4008, "nothing was read for too long", "not_reading"},
     {1009, "message too large", "too_large"},
+    {4009, "nothing was acknowledged for too long", "silent"},
+    {4010, "too many connections or joins from this address", "address_connections"},
+    {4011, "too many bytes from this address", "address_bytes"},
 }};
 
 [[nodiscard]] constexpr const Closing& closing(Refusal refusal) {

@@ -14,6 +14,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/gateway/admission.hpp"
+#include "services/gateway/listener.hpp"
 #include "services/gateway/metrics.hpp"
 #include "services/gateway/session_client.hpp"
 #include "services/gateway/site.hpp"
@@ -81,7 +82,7 @@ class Service final : public WebServer::Handler {
       refusal = Refusal::kOrigin;
     } else if (!admission_.token_fits(request.token)) {
       refusal = Refusal::kToken;
-    } else if (const auto id = gateway_.admit()) {
+    } else if (const auto id = gateway_.admit(request.inputs)) {
       return *id;
     }
     const Refusal why = refusal.value_or(Refusal::kFull);
@@ -109,6 +110,24 @@ class Service final : public WebServer::Handler {
     gateway_.list_not_reading(steady_ns(), out);
     gateway_.counts().of(Refusal::kNotReading) += out.size();
   }
+  void list_silent(std::vector<ViewerId>& out) override {
+    const std::lock_guard lock(mutex_);
+    gateway_.list_silent(steady_ns(), out);
+  }
+  void refused(Refusal refusal) override {
+    const std::lock_guard lock(mutex_);
+    ++gateway_.counts().of(refusal);
+  }
+  void turned_away(TurnedAway why) override {
+    const std::lock_guard lock(mutex_);
+    ++gateway_.counts().of(why);
+    if (why != TurnedAway::kDescriptors) return;
+    const std::int64_t now_ns = steady_ns();
+    if (now_ns < quiet_until_ns_) return;
+    quiet_until_ns_ = now_ns + CountLog::kPeriodNs;
+    spdlog::warn(
+        "out of file descriptors, so connections are closed: raise the limit (ulimit -n, LimitNOFILE=)");
+  }
   void tick() override {
     const std::lock_guard lock(mutex_);
     if (const auto line = log_.line(gateway_.counts(), gateway_.viewers(), steady_ns())) spdlog::info(*line);
@@ -118,6 +137,9 @@ class Service final : public WebServer::Handler {
     const Counts& counts = gateway_.counts();
     Json refused = Json::object();
     for (std::size_t i = 0; i < kClosings.size(); ++i) refused[kClosings[i].reason] = counts.refused[i];
+    Json turned_away = Json::object();
+    for (std::size_t i = 0; i < kTurnedAway.size(); ++i)
+      turned_away[std::string(kTurnedAway[i])] = counts.turned_away[i];
     const Json health{{"phase", phase_name(client_.core().phase())},
                       {"server_alive", gateway_.server_alive()},
                       {"epoch", gateway_.session() ? gateway_.session()->epoch : 0},
@@ -133,7 +155,8 @@ class Service final : public WebServer::Handler {
                       {"inputs_sent", counts.inputs_sent},
                       {"inputs_refused", counts.inputs_refused},
                       {"stale", counts.stale},
-                      {"refused", refused}};
+                      {"refused", refused},
+                      {"turned_away", turned_away}};
     return health.dump() + '\n';
   }
 
@@ -169,7 +192,8 @@ class Service final : public WebServer::Handler {
   SessionClient client_;
   Gateway gateway_;
   CountLog log_;
-  std::vector<ViewerId> ready_;  // kept to reuse its memory
+  std::int64_t quiet_until_ns_ = 0;  // about descriptors
+  std::vector<ViewerId> ready_;      // kept to reuse its memory
   std::int64_t next_figures_ns_ = 0;
   metrics::ClientWatch client_watch_;
   // Not guarded by the lock.
@@ -223,7 +247,12 @@ int run(const Options& options, SignalWatch& signals) {
     if (const auto served = service.serve_metrics(*options.metrics, options.session); !served)
       return signals.finish(report_error(served.error(), 1));
   }
-  auto server = WebServer::create(options.web, site, service);
+  WebOptions web = options.web;
+  web.connections = connections_that_fit(options.web.connections);
+  if (web.connections < options.web.connections)
+    spdlog::warn("the limit of file descriptors (ulimit -n, LimitNOFILE=) leaves {} of {} connections",
+                 web.connections, options.web.connections);
+  auto server = WebServer::create(web, site, service);
   if (!server) return signals.finish(report_error(server.error(), 1));
   const bool v6 = options.web.address.find(':') != std::string::npos;
   warn_of_open_doors(options);

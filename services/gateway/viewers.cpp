@@ -72,6 +72,7 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, transport::ViewerMessage&& 
 
 std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns) {
   if (ack.protocol_version != transport::kProtocolVersion) return Refusal::kProtocolVersion;
+  viewer.silent_since_ns.reset();
   // Under way while the session changed.
   const bool of_this = session_ && !session_->streams.empty() && ack.epoch == session_->epoch &&
                        ack.stream == session_->streams.front().id;
@@ -142,6 +143,7 @@ void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t
 Reason Gateway::check(Viewer& viewer, const transport::InputMessage& input, std::int64_t now_ns) const {
   const Viewer::InEpoch& state = viewer.now;
   if (!viewer.inputs.take(now_ns)) return Reason::kRateLimited;
+  if (viewer.address_inputs && !viewer.address_inputs->take(now_ns)) return Reason::kRateLimited;
   if (state.phase != Phase::kPlaying || !world_.playing()) return Reason::kNotPlaying;
   if (state.wanted == Role::kObserver) return Reason::kObserver;
   if (world_.role() == Role::kObserver) return Reason::kDemoted;

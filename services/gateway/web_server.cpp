@@ -1,18 +1,22 @@
 #include "services/gateway/web_server.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <libwebsockets.h>
+#include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstring>
+#include <map>
 #include <unordered_map>
 #include <utility>
+
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/units.hpp"
+#include "services/gateway/listener.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -26,7 +30,13 @@ constexpr std::string_view kPath = "/tandem";
 constexpr int kUnsentBytes = 16 * 1024;
 constexpr int kSendBufferBytes = 256 * 1024;
 constexpr std::size_t kChunkBytes = 16 * 1024;  // of a file
-constexpr int kRefusedSeconds = 5, kFileSeconds = 30;
+constexpr int kRefusedSeconds = 5, kFileSeconds = 30, kHandshakeSeconds = 3, kKeptSeconds = 15;
+// Taken or turned away at once, before those that are in are served.
+constexpr int kArrivalsAtOnce = 128;
+// Told by HTTP that they are turned away, a second; the rest just end.
+constexpr accounts::TokenBucket kTold{20, 20};
+constexpr unsigned kTooManyRequests = 429;
+constexpr std::size_t kOwnDescriptors = 16;  // of libwebsockets: the listener, pipes
 constexpr std::size_t kMostHeaderBytes = 2048;
 // A silent connection gets a ping, and is ended if it does not answer.
 constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
@@ -53,11 +63,25 @@ bool names(std::string_view list, std::string_view wanted) {
   return false;
 }
 
+using transport::steady_ns;
+
+/// One connection from its start on. Handshake: until the headers of the first request are there.
+struct Visit {
+  lws* wsi = nullptr;
+  AccountPtr account;  // of the peer, or of the client behind a trusted proxy
+  AddressKey peer{};
+  bool counted = false;             // in `account`
+  bool greeted = false;             // has shaken hands
+  bool waits_for_bytes = false;     // a file goes on when its address may have more
+  std::int64_t due_ns = INT64_MAX;  // ended then, unless the headers of a request came
+};
+
 /// One WebSocket connection.
 struct Connection {
   ViewerId id = 0;
   std::optional<Refusal> refused;
   std::vector<std::byte> message;  // the received part of the current message
+  AccountPtr account;
 };
 
 /// A response that is being sent.
@@ -80,7 +104,17 @@ void drop(void* user) {
 }  // namespace
 
 struct WebServer::Impl {
-  Impl(const Site& the_site, Handler& the_handler) : site(the_site), handler(the_handler) {}
+  Impl(const WebOptions& options, Listener the_listener, const Site& the_site, Handler& the_handler)
+      : site(the_site),
+        handler(the_handler),
+        listener(std::move(the_listener)),
+        doors(options.doors),
+        most(options.connections),
+        encrypted(!options.tls_cert.empty()) {
+    for (const std::string& proxy : options.trusted_proxies) {
+      if (const auto key = address_key(proxy)) trusted.push_back(*key);
+    }
+  }
   ~Impl() {
     if (context != nullptr) lws_context_destroy(context);
   }
@@ -94,11 +128,25 @@ struct WebServer::Impl {
   static int on_socket(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len);
   static void on_tick(lws_sorted_usec_list_t* sul);
 
+  // Arrivals
+  void take_arrivals();
+  void arrive(int fd, const sockaddr_storage& peer);
+  void turn_away(int fd, TurnedAway why);
+  static Visit& visit(lws* wsi) { return *static_cast<Visit*>(lws_get_opaque_user_data(wsi)); }
+  void greet(Visit& visit);
+  void leave(const Visit* visit);
+  void find_account(lws* wsi);
+  void end_slow(std::int64_t now_ns);
+  [[nodiscard]] bool is_trusted(const AddressKey& peer) const {
+    return std::ranges::find(trusted, peer) != trusted.end();
+  }
+
   // HTTP
   int respond(lws* wsi, void* user, std::string_view path);
   int send_head(lws* wsi, void* user, unsigned status, std::string_view type, std::string_view cache,
                 bool compressed);
-  static int send_body(lws* wsi, void* user);
+  int send_body(lws* wsi, void* user);
+  static int complete(lws* wsi);
   static int confirm_upgrade(lws* wsi);
 
   // WebSocket
@@ -109,6 +157,7 @@ struct WebServer::Impl {
   static int end(lws* wsi, Refusal refusal);
   void ask_to_write();
   void let_go();
+  void end_silent();
 
   struct Tick {
     lws_sorted_usec_list_t sul{};  // first, because libwebsockets hands back its address
@@ -117,12 +166,112 @@ struct WebServer::Impl {
 
   const Site& site;
   Handler& handler;
+  Listener listener;
+  Doors doors;
+  const std::size_t most;  // connections
+  const bool encrypted;
+  std::vector<AddressKey> trusted;
+  accounts::TokenBucket told = kTold;
+  std::map<const Visit*, std::unique_ptr<Visit>> visits;
+  lws_vhost* vhost = nullptr;
+  lws* entrance = nullptr;  // of the listener
+  int ticks = 0;
   lws_context* context = nullptr;
   std::array<lws_protocols, 3> protocols{};
   std::unordered_map<ViewerId, lws*> connections;
   std::vector<ViewerId> ids;  // kept to reuse its memory
   Tick tick;
 };
+
+void WebServer::Impl::take_arrivals() {
+  for (int i = 0; i < kArrivalsAtOnce; ++i) {
+    const Listener::Accepted got = listener.accept();
+    if (got.outcome == Listener::Outcome::kNothing) return;
+    if (got.outcome == Listener::Outcome::kConnection) {
+      arrive(got.fd, got.peer);
+      continue;
+    }
+    handler.turned_away(TurnedAway::kDescriptors);
+    if (i + 1 < kArrivalsAtOnce) continue;
+    lws_rx_flow_control(entrance, 0);  // until the next tick
+  }
+}
+
+void WebServer::Impl::arrive(int fd, const sockaddr_storage& peer) {
+  const std::int64_t now_ns = steady_ns();
+  auto made = std::make_unique<Visit>();
+  Visit& by = *made;
+  by.peer = address_key(reinterpret_cast<const sockaddr&>(peer)).value_or(AddressKey{});
+  by.account = doors.of(by.peer);
+  by.due_ns = now_ns + kHandshakeSeconds * kSecond;
+  if (visits.size() >= most) return turn_away(fd, TurnedAway::kFull);
+  if (!is_trusted(by.peer)) {
+    if (const auto why = doors.arrive(*by.account, now_ns)) return turn_away(fd, *why);
+    by.counted = true;
+  }
+  visits.emplace(&by, std::move(made));
+  lws_adopt_desc_t adopt{};
+  adopt.vh = vhost;
+  adopt.type = static_cast<lws_adoption_type>(LWS_ADOPT_SOCKET | LWS_ADOPT_HTTP | LWS_ADOPT_ALLOW_SSL);
+  adopt.fd.sockfd = fd;
+  adopt.opaque = &by;
+  lws* const wsi = lws_adopt_descriptor_vhost_via_info(&adopt);
+  if (wsi != nullptr) {
+    by.wsi = wsi;
+  } else {
+    leave(&by);  // unless that has happened
+  }
+}
+
+void WebServer::Impl::turn_away(int fd, TurnedAway why) {
+  handler.turned_away(why);
+  if (!encrypted && told.take(steady_ns())) {
+    std::array<char, 1024> said{};  // what is not read makes the kernel drop the answer
+    [[maybe_unused]] const ssize_t read = recv(fd, said.data(), said.size(), MSG_DONTWAIT);
+    constexpr std::string_view kAnswer =
+        "HTTP/1.1 429 Too Many Requests\r\nconnection: close\r\nretry-after: 10\r\ncontent-type: text/plain\r\n"
+        "content-length: 40\r\n\r\ntoo many connections from your address\r\n";
+    [[maybe_unused]] const ssize_t sent =
+        send(fd, kAnswer.data(), kAnswer.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    shutdown(fd, SHUT_WR);
+  }
+  close(fd);
+}
+
+void WebServer::Impl::greet(Visit& visit) {
+  visit.due_ns = INT64_MAX;
+  if (std::exchange(visit.greeted, true) || !visit.counted) return;
+  Doors::greeted(*visit.account);
+}
+
+// Each request through a proxy may be another client's.
+void WebServer::Impl::find_account(lws* wsi) {
+  Visit& by = visit(wsi);
+  if (by.counted) return;
+  by.account = doors.of(client_address(by.peer, header(wsi, WSI_TOKEN_X_FORWARDED_FOR), trusted));
+}
+
+void WebServer::Impl::leave(const Visit* visit) {
+  const auto found = visits.find(visit);
+  if (found == visits.end()) return;
+  if (visit->counted) Doors::leave(*visit->account, visit->greeted);
+  visits.erase(found);
+}
+
+void WebServer::Impl::end_slow(std::int64_t now_ns) {
+  for (const auto& [key, by] : visits) {
+    if (std::exchange(by->waits_for_bytes, false)) lws_callback_on_writable(by->wsi);
+    if (now_ns < by->due_ns) continue;
+    by->due_ns = INT64_MAX;
+    if (!by->greeted) handler.turned_away(TurnedAway::kSlow);
+    lws_set_timeout(by->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
+  }
+}
+
+int WebServer::Impl::complete(lws* wsi) {
+  visit(wsi).due_ns = steady_ns() + kKeptSeconds * kSecond;
+  return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+}
 
 int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::string_view type,
                                std::string_view cache, bool compressed) {
@@ -143,8 +292,7 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
                     add("cache-control:", cache) && (!compressed || add("content-encoding:", "gzip")) &&
                     lws_finalize_write_http_header(wsi, start, &at, end) == 0;
   if (!good) return -1;
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty())
-    return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty()) return complete(wsi);
   lws_callback_on_writable(wsi);
   return 0;
 }
@@ -159,6 +307,10 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
   };
   const bool reads =
       lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 || lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+  if (!visit(wsi).account->requests.take(steady_ns())) {
+    handler.turned_away(TurnedAway::kRequests);
+    return say(kTooManyRequests, "too many requests from your address\n", "text/plain");
+  }
   if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
   if (path == "/healthz") return say(HTTP_STATUS_OK, handler.health(), "application/json");
   const Site::File* file = site.find(path);
@@ -173,31 +325,44 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
 int WebServer::Impl::send_body(lws* wsi, void* user) {
   if (user == nullptr || slot<Exchange>(user) == nullptr) return 0;
   Exchange& exchange = *slot<Exchange>(user);
+  Visit& by = visit(wsi);
+  lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, kFileSeconds);
+  by.waits_for_bytes = !by.account->bytes.has(steady_ns());
+  if (by.waits_for_bytes) return 0;
   std::array<unsigned char, LWS_PRE + kChunkBytes> buffer{};
   const std::size_t size = std::min(exchange.body.size(), kChunkBytes);
   std::memcpy(buffer.data() + LWS_PRE, exchange.body.data(), size);
   exchange.body.remove_prefix(size);
   const bool last = exchange.body.empty();
-  lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, kFileSeconds);
+  by.account->bytes.spend(static_cast<double>(size));
   if (lws_write(wsi, buffer.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) <
       static_cast<int>(size))
     return -1;
-  if (last) return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
+  if (last) return complete(wsi);
   lws_callback_on_writable(wsi);
   return 0;
 }
 
 int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len) {
   switch (reason) {
+    case LWS_CALLBACK_RAW_RX_FILE:
+      of(wsi).take_arrivals();
+      return 0;
+    case LWS_CALLBACK_WSI_DESTROY:
+      of(wsi).leave(static_cast<const Visit*>(lws_get_opaque_user_data(wsi)));
+      return 0;
     case LWS_CALLBACK_HTTP:
+      of(wsi).greet(visit(wsi));
+      of(wsi).find_account(wsi);
       return of(wsi).respond(wsi, user, {static_cast<const char*>(in), len});
     case LWS_CALLBACK_HTTP_WRITEABLE:
-      return send_body(wsi, user);
+      return of(wsi).send_body(wsi, user);
     case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
     case LWS_CALLBACK_CLOSED_HTTP:
       drop<Exchange>(user);
       return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+      of(wsi).greet(visit(wsi));
       return confirm_upgrade(wsi);
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
       return -1;  // asked for by the name of this protocol
@@ -220,17 +385,31 @@ int WebServer::Impl::confirm_upgrade(lws* wsi) {
 
 // The headers exist only now; a refusal is sent as soon as a close frame can be.
 int WebServer::Impl::open(lws* wsi, void* user) {
-  Handler::Request request{
-      .origin = header(wsi, WSI_TOKEN_ORIGIN), .host = header(wsi, WSI_TOKEN_HOST), .token = {}};
+  Handler::Request request{.origin = header(wsi, WSI_TOKEN_ORIGIN),
+                           .host = header(wsi, WSI_TOKEN_HOST),
+                           .token = {},
+                           .inputs = {}};
   std::array<char, 256> token{};
   if (const char* given = lws_get_urlarg_by_name(wsi, "token=", token.data(), static_cast<int>(token.size())))
     request.token = given;
   auto connection = std::make_unique<Connection>();
-  const auto opened = handler.open(request);
-  if (const auto* id = std::get_if<ViewerId>(&opened)) {
-    connection->id = *id;
+  Visit& by = visit(wsi);
+  if (!by.counted) {
+    find_account(wsi);
+    by.counted = doors.arrive_behind_proxy(*by.account);
+  }
+  connection->account = by.account;
+  request.inputs = {by.account, &by.account->inputs};
+  if (!by.counted || !by.account->joins.take(steady_ns())) {
+    connection->refused = Refusal::kAddressJoins;
+    handler.refused(*connection->refused);
   } else {
-    connection->refused = std::get<Refusal>(opened);
+    const auto opened = handler.open(request);
+    if (const auto* id = std::get_if<ViewerId>(&opened)) {
+      connection->id = *id;
+    } else {
+      connection->refused = std::get<Refusal>(opened);
+    }
   }
   slot<Connection>(user) = connection.release();
   return 0;
@@ -262,6 +441,11 @@ int WebServer::Impl::end(lws* wsi, Refusal refusal) {
 
 int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, std::size_t len) {
   if (connection.refused) return 0;
+  if (!connection.account->bytes.has(steady_ns())) {
+    handler.refused(Refusal::kAddressBytes);
+    return end(wsi, Refusal::kAddressBytes);
+  }
+  connection.account->bytes.spend(static_cast<double>(len));
   if (lws_frame_is_binary(wsi) == 0) return end(wsi, Refusal::kMalformed);
   const auto* const bytes = static_cast<const std::byte*>(in);
   const bool first = lws_is_first_fragment(wsi) != 0;
@@ -296,6 +480,23 @@ void WebServer::Impl::ask_to_write() {
   for (const ViewerId id : ids) {
     const auto found = connections.find(id);
     if (found != connections.end()) lws_callback_on_writable(found->second);
+  }
+}
+
+// A viewer that takes nothing takes no close frame either, so its time is limited.
+void WebServer::Impl::end_silent() {
+  handler.list_silent(ids);
+  for (const ViewerId id : ids) {
+    const auto found = connections.find(id);
+    if (found == connections.end()) continue;
+    lws* const wsi = found->second;
+    Connection& connection = *slot<Connection>(lws_wsi_user(wsi));
+    connection.refused = Refusal::kSilent;
+    handler.refused(Refusal::kSilent);
+    connections.erase(found);
+    handler.closed(id);
+    lws_set_timeout(wsi, PENDING_TIMEOUT_CLOSE_SEND, kRefusedSeconds);
+    lws_callback_on_writable(wsi);
   }
 }
 
@@ -342,46 +543,20 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
   self.handler.tick();
   self.ask_to_write();
   self.let_go();
+  self.end_silent();
+  const std::int64_t now_ns = steady_ns();
+  self.end_slow(now_ns);
+  if (self.ticks++ % 10 == 0) self.doors.forget(now_ns);
+  lws_rx_flow_control(self.entrance, LWS_RXFLOW_REASON_APPLIES_ENABLE | LWS_RXFLOW_REASON_USER_BOOL |
+                                         LWS_RXFLOW_REASON_FLAG_PROCESS_NOW);
   lws_sul_schedule(self.context, 0, sul, on_tick, 100 * LWS_US_PER_MS);
 }
 
-namespace {
-
-/// The reason why listening there is impossible, which libwebsockets does not report; empty if it is
-/// possible.
-std::optional<std::string> cannot_listen(const WebOptions& options) {
-  const bool v6 = options.address.find(':') != std::string::npos;
-  sockaddr_in6 six{};
-  sockaddr_in four{};
-  six.sin6_family = AF_INET6;
-  six.sin6_port = htons(options.port);
-  four.sin_family = AF_INET;
-  four.sin_port = htons(options.port);
-  const int parsed = v6 ? inet_pton(AF_INET6, options.address.c_str(), &six.sin6_addr)
-                        : inet_pton(AF_INET, options.address.c_str(), &four.sin_addr);
-  if (parsed != 1) return "not an IPv4 or IPv6 address";
-  const int fd = socket(v6 ? AF_INET6 : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return std::strerror(errno);
-  constexpr int kOn = 1;
-  setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
-  const int bound = v6 ? bind(fd, reinterpret_cast<const sockaddr*>(&six), sizeof six)
-                       : bind(fd, reinterpret_cast<const sockaddr*>(&four), sizeof four);
-  std::optional<std::string> why;
-  if (bound != 0) why = std::strerror(errno);
-  if (!why && listen(fd, 1) != 0) why = std::strerror(errno);
-  close(fd);
-  return why;
-}
-
-}  // namespace
-
 Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, const Site& site,
                                                      Handler& handler) {
-  if (const auto why = cannot_listen(options)) {
-    return fail(ErrorCode::kIo,
-                fmt::format("cannot listen on {} port {}: {}", options.address, options.port, *why));
-  }
-  auto impl = std::make_unique<Impl>(site, handler);
+  auto listener = Listener::open(options.address, options.port);
+  if (!listener) return tl::unexpected(listener.error());
+  auto impl = std::make_unique<Impl>(options, std::move(*listener), site, handler);
   constexpr std::size_t kReceiveBytes = 2 * kMostViewerBytes;
   impl->protocols[0] = {"http", Impl::on_http, sizeof(void*), 0, 0, nullptr, 0};
   impl->protocols[1] = {kSubprotocol, Impl::on_socket, sizeof(void*), kReceiveBytes, 0, nullptr, 0};
@@ -389,16 +564,13 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
   // The handlers of connections count their errors, which must not fill a log.
   lws_set_log_level(0, nullptr);
   lws_context_creation_info info{};
-  info.port = options.port;
-  info.iface = options.address.c_str();
+  info.port = CONTEXT_PORT_NO_LISTEN_SERVER;  // the listener is ours, because libwebsockets' stops for all
   info.protocols = impl->protocols.data();
   info.user = impl.get();
-  info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
-  if (options.address.find(':') == std::string::npos) info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
-  info.fd_limit_per_thread = static_cast<unsigned>(options.connections);
+  info.fd_limit_per_thread = static_cast<unsigned>(options.connections + kOwnDescriptors);
   info.retry_and_idle_policy = &kIdlePolicy;
-  info.timeout_secs = 10;
-  info.keepalive_timeout = 15;
+  info.timeout_secs = kHandshakeSeconds;
+  info.keepalive_timeout = kKeptSeconds;
   info.server_string = "tandem-gateway";
   info.alpn = "http/1.1";
   if (!options.tls_cert.empty()) {
@@ -414,6 +586,12 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
             ? fmt::format("cannot listen on {} port {}", options.address, options.port)
             : fmt::format("{} and {} are not a certificate and its key", options.tls_cert, options.tls_key));
   }
+  impl->vhost = lws_get_vhost_by_name(impl->context, "default");
+  lws_sock_file_fd_type entrance{};
+  entrance.filefd = dup(impl->listener.fd());  // libwebsockets closes it
+  impl->entrance = lws_adopt_descriptor_vhost(impl->vhost, LWS_ADOPT_RAW_FILE_DESC, entrance,
+                                              impl->protocols[0].name, nullptr);
+  if (impl->entrance == nullptr) return fail(ErrorCode::kIo, "cannot watch the listening socket");
   impl->tick.self = impl.get();
   lws_sul_schedule(impl->context, 0, &impl->tick.sul, Impl::on_tick, 1);
   return std::unique_ptr<WebServer>(new WebServer(std::move(impl)));
@@ -430,9 +608,6 @@ void WebServer::run(const std::atomic<bool>& stop) {
 
 void WebServer::wake() { lws_cancel_service(impl_->context); }
 
-std::uint16_t WebServer::port() const {
-  return static_cast<std::uint16_t>(
-      lws_get_vhost_listen_port(lws_get_vhost_by_name(impl_->context, "default")));
-}
+std::uint16_t WebServer::port() const { return impl_->listener.port(); }
 
 }  // namespace tandem::gateway

@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "services/gateway/doors.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/site.hpp"
 #include "tandem/result.hpp"
@@ -19,10 +20,12 @@
 namespace tandem::gateway {
 
 struct WebOptions {
-  std::string address = "127.0.0.1";  ///< of IPv4 or IPv6
-  std::uint16_t port = 8080;          ///< 0: any free one
-  std::string tls_cert, tls_key;      ///< files; empty: no TLS
-  std::size_t connections = 512;      ///< maximum number of connections of all kinds
+  std::string address = "127.0.0.1";         ///< of IPv4 or IPv6
+  std::uint16_t port = 8080;                 ///< 0: any free one
+  std::string tls_cert, tls_key;             ///< files; empty: no TLS
+  std::size_t connections = 512;             ///< maximum number of connections of all kinds
+  DoorLimits doors;                          ///< of each address
+  std::vector<std::string> trusted_proxies;  ///< addresses whose X-Forwarded-For counts
 };
 
 /// Serves the viewer's files and the connections of viewers. Their number is limited; a handler deals with
@@ -33,7 +36,8 @@ class WebServer {
   class Handler {
    public:
     struct Request {
-      std::string origin, host, token;  ///< empty if missing
+      std::string origin, host, token;                ///< empty if missing
+      std::shared_ptr<accounts::TokenBucket> inputs;  ///< of the viewers of its address
     };
     virtual ~Handler() = default;
     virtual std::variant<ViewerId, Refusal> open(const Request& request) = 0;
@@ -42,6 +46,10 @@ class WebServer {
     virtual void closed(ViewerId id) = 0;
     virtual void list_ready(std::vector<ViewerId>& out) = 0;
     virtual void list_not_reading(std::vector<ViewerId>& out) = 0;
+    virtual void list_silent(std::vector<ViewerId>& out) = 0;
+    /// Counts a refusal that the server itself decided.
+    virtual void refused(Refusal refusal) = 0;
+    virtual void turned_away(TurnedAway why) = 0;
     /// Ten times a second.
     virtual void tick() = 0;
     /// A JSON object for /healthz.

@@ -2,6 +2,7 @@
 // The data that a gateway keeps for one connection.
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -37,6 +38,9 @@ struct Viewer {
   accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;
   /// The time since which messages have waited without one being taken.
   std::optional<std::int64_t> waiting_since_ns;
+  /// The time since which it has acknowledged nothing, although it was told of a session.
+  std::optional<std::int64_t> silent_since_ns;
+  std::shared_ptr<accounts::TokenBucket> address_inputs;  ///< shared by viewers of an address; null: no limit
 
   /// The data of one epoch; a new epoch starts with a new object.
   struct InEpoch {

@@ -134,9 +134,11 @@ int run(const Options& options) {
   const Child server({options.tandemd, "--scene", options.scene, "--bodies", std::to_string(options.bodies),
                       "--session", session, "--domain", domain, "--scripted"},
                      "/tmp/" + session + ".server");
-  const Child gateway({options.gateway, "--session", session, "--domain", domain, "--port", "0",
-                       "--max-viewers", std::to_string(options.viewers)},
-                      "/tmp/" + session + ".gateway");
+  const Child gateway(
+      {options.gateway, "--session", session, "--domain", domain, "--port", "0", "--max-viewers",
+       std::to_string(options.viewers), "--address-connections", std::to_string(4 * options.viewers + 64),
+       "--address-joins", std::to_string(2 * options.viewers + 64)},
+      "/tmp/" + session + ".gateway");
   DirectClient direct(session, static_cast<std::uint32_t>(options.domain));
   const std::int64_t give_up_ns = transport::steady_ns() + 60 * kSecond;
   while (gateway.said().find("playing") == std::string::npos && transport::steady_ns() < give_up_ns)

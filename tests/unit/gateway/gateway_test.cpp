@@ -336,5 +336,29 @@ TEST_F(SlowViewerTest, TooManyAreRefusedUntilOneLeaves) {
   EXPECT_TRUE(gateway.admit());
 }
 
+TEST_F(GatewayTest, AViewerThatAcknowledgesNothingIsListedAfterTenSeconds) {
+  const ViewerId id = *gateway.admit();
+  std::vector<ViewerId> silent;
+  const auto listed = [&] {
+    gateway.list_silent(now_ns, silent);
+    return !silent.empty();
+  };
+  read(id);
+  EXPECT_FALSE(listed());
+  now_ns += 60 * kSecond;
+  EXPECT_FALSE(listed()) << "there is no session";
+  gateway.on_session(fake_session());
+  read(id);
+  EXPECT_FALSE(listed());
+  now_ns += 9 * kSecond;
+  EXPECT_FALSE(listed());
+  EXPECT_FALSE(say(id, ack(7, Phase::kJoining)));
+  EXPECT_FALSE(listed());
+  now_ns += 10 * kSecond;
+  EXPECT_FALSE(listed());
+  now_ns += 1;
+  EXPECT_TRUE(listed());
+}
+
 }  // namespace
 }  // namespace tandem::gateway
