@@ -11,7 +11,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/commandline/commandline.hpp"
-#include "services/gateway/admission.hpp"
+#include "services/gateway/doors/admission.hpp"
 
 namespace tandem::gateway {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "sdk/transport/units.hpp"
-#include "services/gateway/doors.hpp"
+#include "services/gateway/doors/doors.hpp"
 #include "services/gateway/refusal.hpp"
 
 namespace tandem::gateway {

@@ -16,7 +16,7 @@
 
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/units.hpp"
-#include "services/gateway/listener.hpp"
+#include "services/gateway/doors/listener.hpp"
 
 namespace tandem::gateway {
 namespace {

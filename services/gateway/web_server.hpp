@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "services/gateway/doors.hpp"
+#include "services/gateway/doors/doors.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/site.hpp"
 #include "tandem/result.hpp"

@@ -94,9 +94,10 @@ EDGES = {
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
+    "services/gateway/doors": ["public/result.hpp", "services/accounts"],
     "services/gateway": OF_CLIENT
     + CLIENT
-    + ["services/gateway/viewing"]
+    + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
     + ["services/metrics", "services/process"],
     "services/tool": OF_CLIENT

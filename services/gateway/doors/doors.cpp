@@ -1,4 +1,4 @@
-#include "services/gateway/doors.hpp"
+#include "services/gateway/doors/doors.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
