@@ -149,6 +149,14 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
       "--checkpoint", &Config::mutable_checkpoint,
       "auto: start afresh where there is no good checkpoint; require: do not start then; off: neither read "
       "nor write any [auto]");
+  app.add_flag_function(
+      "--standby", [&config] { config.set_standby(true); },
+      "Stand by for the session's live server: receive its checkpoints, and take over when it is gone or hands "
+      "over (tandem handover). Give the same scene, bodies and seed as there");
+  flags.add(
+      "--standby-rank", &Config::set_standby_rank,
+      fmt::format("Of several servers that stand by, the one of the lowest rank takes over: 1 to {} [{}]",
+                  kMostRank, defaults.standby_rank));
   flags.add("--metrics", &Config::mutable_metrics,
             "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and /healthz "
             "and /readyz [none]");

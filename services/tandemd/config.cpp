@@ -74,6 +74,18 @@ Result<void> check_numbers(const Options& options) {
   return {};
 }
 
+Result<void> read_standby(const ServerConfig& config, Options& options) {
+  options.standby = config.standby();
+  if (config.has_standby_rank()) options.standby_rank = config.standby_rank();
+  if (!within(options.standby_rank, 1, kMostRank))
+    return refuse("standby-rank", fmt::format("must be 1 to {}", kMostRank));
+  if (config.has_standby_rank() && !options.standby) return refuse("standby-rank", "needs --standby");
+  if (options.standby && options.checkpoint.required)
+    return refuse("standby",
+                  "conflicts with --checkpoint require: a server that stands by goes on from the live one");
+  return {};
+}
+
 Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
   checkpoint::Settings& settings = options.checkpoint;
   const std::string& wanted = config.checkpoint();
@@ -263,6 +275,7 @@ Result<Options> check_config(const ServerConfig& config) {
   return read_service(config, options)
       .and_then([&] { return check_numbers(options); })
       .and_then([&] { return read_checkpoint(config, options); })
+      .and_then([&] { return read_standby(config, options); })
       .and_then([&] { return check_quality(config, options.choice); })
       .and_then([&] { return check_streams(config, options.choice); })
       .map([&] { return options; });

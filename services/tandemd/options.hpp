@@ -11,6 +11,8 @@
 
 namespace tandem::daemon {
 
+inline constexpr std::uint32_t kMostRank = 1000;
+
 struct Options : planning::ServiceWishes {
   std::string scene;               ///< name or file
   sessions::SessionChoice choice;  ///< its bodies and threads also apply to the full simulation
@@ -22,6 +24,8 @@ struct Options : planning::ServiceWishes {
   std::optional<double> duration_s;  ///< empty: until stopped
 
   checkpoint::Settings checkpoint;
+  bool standby = false;            ///< stand by for the session's live server
+  std::uint32_t standby_rank = 1;  ///< 1 .. kMostRank
 
   std::string hash_log;  ///< path; empty: none
   bool json = false;     ///< a report on stdout at the end

@@ -25,7 +25,8 @@ TIMELINE = TABLES + ["sdk/core/timeline"]
 FIGURES = ["public/client_figures.hpp", "public/server_figures.hpp"]
 CLIENT = ["sdk/client", "sdk/client/drawing", "sdk/client/following", "sdk/client/session"]
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
-HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/outgoing", "services/host/streams"]
+HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/keeping", "services/host/outgoing"]
+HOST += ["services/host/standbys", "services/host/streams"]
 LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
@@ -77,6 +78,9 @@ EDGES = {
     "services/host/outgoing": OF_HOST,
     "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],
     "services/host/clients": OF_HOST + ["services/host/frames", "services/host/outgoing"],
+    "services/host/standbys": OF_HOST + ["services/host/clients", "services/host/frames", "services/host/outgoing"],
+    "services/host/keeping": OF_HOST + ["services/host/frames", "services/host"],
+    "services/standby": LAYOUT + ["sdk/transport", "services/checkpoint"] + SIMULATION,
     "services/host": OF_HOST + HOST,
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
@@ -91,7 +95,8 @@ EDGES = {
     "services/tandemd": SIMULATION
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
-    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
+    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
+    + ["services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
     "services/gateway/doors": ["public/result.hpp", "services/accounts"],
