@@ -22,30 +22,13 @@
 
 #include "services/metrics/process_series.hpp"
 #include "services/metrics/request.hpp"
+#include "services/system/descriptor.hpp"
 
 namespace tandem::metrics {
 namespace {
 
+using system::Descriptor;
 using transport::steady_ns;
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) close(fd_);
-  }
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 union SocketAddress {
   sockaddr any;
