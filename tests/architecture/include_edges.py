@@ -95,12 +95,12 @@ EDGES = {
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
-    "services/gateway/doors": ["public/result.hpp", "services/accounts"],
+    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process"],
+    + ["services/metrics", "services/process", "services/system"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
