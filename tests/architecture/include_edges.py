@@ -67,7 +67,7 @@ EDGES = {
     "services/process": [],
     "services/commandline": [],
     "services/json": [],
-    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/system"],
+    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
