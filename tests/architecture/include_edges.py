@@ -38,7 +38,7 @@ OF_LAB = (
     + CLIENT
     + HOST
     + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
-    + ["services/planning", "services/sessions", "services/tool", "services/workers"]
+    + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
 )
 EDGES = {
     "sdk/include": [],
@@ -64,13 +64,14 @@ EDGES = {
     "sdk/web/module": OF_CLIENT + CLIENT,
     "sdk/python": ["public"],
     "sdk/examples": ["public", "services/host/include"],
+    "services/system": [],
     "services/process": [],
     "services/commandline": [],
     "services/json": [],
-    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport"],
+    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
-    "services/checkpoint": LAYOUT + ["sdk/transport"] + SIMULATION,
+    "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
     "services/planning": OF_HOST
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
@@ -90,7 +91,7 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
-    "services/recording": OF_CLIENT + CLIENT,
+    "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd": SIMULATION
     + TABLES
@@ -99,17 +100,17 @@ EDGES = {
     + ["services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
-    "services/gateway/doors": ["public/result.hpp", "services/accounts"],
+    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process"],
+    + ["services/metrics", "services/process", "services/system"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/recording", "services/scenes"],
+    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
