@@ -25,6 +25,7 @@
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
+#include "services/tandemd/service.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -183,6 +184,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
              Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, const Options& options,
              const std::atomic<bool>& stop) {
   Console console;
+  Service service;
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
       options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
@@ -193,6 +195,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     const std::int64_t now_ns = steady_ns();
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, produced, now_ns);
+    service.watch(host, now_ns);
     if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
