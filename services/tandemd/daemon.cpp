@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -47,7 +49,9 @@ class HashLog {
     for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
-      if (!files_.back()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", paths_.back()));
+      if (!files_.back())
+        return fail(ErrorCode::kIo,
+                    fmt::format("{}: cannot be written: {}", paths_.back(), std::strerror(errno)));
       // Line buffering leaves whole lines even if the server is killed.
       std::setvbuf(files_.back().get(), nullptr, _IOLBF, BUFSIZ);
     }
@@ -304,13 +308,13 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const Keepi
 
 int run_daemon(const Options& options, SignalWatch& signals) {
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report_error(scene.error(), 2);
+  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
   auto config =
       planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
-  if (!config) return report_error(config.error(), 2);
+  if (!config) return report_error(placed(options.places, "", config.error()), 2);
   auto simulation =
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
-  if (!simulation) return report_error(simulation.error(), 2);
+  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
   config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
   std::unique_ptr<checkpoint::Keeper> keeper;
   if (!options.checkpoint.folder.empty()) {
