@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -24,6 +26,7 @@
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
+#include "services/tandemd/service.hpp"
 #include "services/tandemd/stand_by.hpp"
 
 namespace tandem::daemon {
@@ -46,7 +49,9 @@ class HashLog {
     for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
-      if (!files_.back()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", paths_.back()));
+      if (!files_.back())
+        return fail(ErrorCode::kIo,
+                    fmt::format("{}: cannot be written: {}", paths_.back(), std::strerror(errno)));
       // Line buffering leaves whole lines even if the server is killed.
       std::setvbuf(files_.back().get(), nullptr, _IOLBF, BUFSIZ);
     }
@@ -141,7 +146,7 @@ void log_line(const std::string& line, bool warning) {
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
-             host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics,
+             host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
              const Options& options, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
@@ -154,6 +159,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     const std::int64_t now_ns = steady_ns();
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, produced, now_ns);
+    service.watch(host, now_ns);
     if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
@@ -264,13 +270,13 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
 
 int run_daemon(const Options& options, SignalWatch& signals) {
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report_error(scene.error(), 2);
+  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
   auto config =
       planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
-  if (!config) return report_error(config.error(), 2);
+  if (!config) return report_error(placed(options.places, "", config.error()), 2);
   auto simulation =
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
-  if (!simulation) return report_error(simulation.error(), 2);
+  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
   config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
   auto keeping = options.standby
                      ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
@@ -278,8 +284,10 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   if (!keeping) return report_error(keeping.error(), 1);
   auto port = open_port(*config, options, signals.stop());
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+  Service service;
   if (options.standby) {
-    const auto takes_over = stand_by(options, **simulation, **port, *config, *keeping, signals.stop());
+    const auto takes_over =
+        stand_by(options, **simulation, **port, *config, *keeping, service, signals.stop());
     if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
     if (!*takes_over) return signals.finish(0);
   }
@@ -310,7 +318,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   ScriptSender script(*scene, options);
   if (goes_on) script.skip_to((*host)->frame());
   const Ending ending =
-      serve(**host, **port, script, hashes, *keeping, publisher, metrics, options, signals.stop());
+      serve(**host, **port, script, hashes, *keeping, publisher, metrics, service, options, signals.stop());
   keeping->end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =

@@ -8,6 +8,7 @@
 #include "services/checkpoint/keeper.hpp"
 #include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
+#include "services/tandemd/places.hpp"
 
 namespace tandem::daemon {
 
@@ -31,6 +32,8 @@ struct Options : planning::ServiceWishes {
   bool json = false;     ///< a report on stdout at the end
 
   std::optional<metrics::Address> metrics;  ///< empty: none are served
+
+  Places places;  ///< of what comes from a file, for errors
 };
 
 }  // namespace tandem::daemon

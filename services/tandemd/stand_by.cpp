@@ -31,7 +31,8 @@ void log_notices(standby::Standby& standby) {
 }  // namespace
 
 Result<bool> stand_by(const Options& options, engine::Simulation& simulation, transport::ServerPort& port,
-                      host::HostConfig& config, host::Keeping& keeping, const std::atomic<bool>& stop) {
+                      host::HostConfig& config, host::Keeping& keeping, Service& service,
+                      const std::atomic<bool>& stop) {
   const checkpoint::World world = host::checkpoint_world(config);
   const auto accept = [&](const checkpoint::Checkpoint& checkpoint) -> Result<void> {
     if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
@@ -51,6 +52,7 @@ Result<bool> stand_by(const Options& options, engine::Simulation& simulation, tr
   while (!(*standby)->poll(steady_ns())) {
     if (stop.load(std::memory_order_relaxed)) return false;
     log_notices(**standby);
+    service.watch(**standby, options.session, steady_ns());
     const std::int64_t wait_ns = (*standby)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
   }

@@ -7,6 +7,7 @@
 #include "services/host/frames/configuration.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/tandemd/options.hpp"
+#include "services/tandemd/service.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::daemon {
@@ -16,6 +17,6 @@ namespace tandem::daemon {
 /// of the port and of the folder of checkpoints.
 [[nodiscard]] Result<bool> stand_by(const Options& options, engine::Simulation& simulation,
                                     transport::ServerPort& port, host::HostConfig& config,
-                                    host::Keeping& keeping, const std::atomic<bool>& stop);
+                                    host::Keeping& keeping, Service& service, const std::atomic<bool>& stop);
 
 }  // namespace tandem::daemon

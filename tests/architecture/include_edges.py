@@ -129,6 +129,7 @@ OWNERS = [
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
+    (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
