@@ -91,8 +91,22 @@ bool Passage::acknowledged(const transport::AckMessage& ack, std::int64_t now_ns
     return progress_ns_ == began_ns_;
   }
   heard_ns_ = now_ns;
+  take_back(ack);
   arrived(held_parts(ack, holds_.size()), now_ns);
   return true;
+}
+
+// A receiver that was sent damaged bytes drops all that it holds, and may hold the next part that comes.
+void Passage::take_back(const transport::AckMessage& ack) {
+  for (std::size_t i = 0; i + 1 < ack.missing.size(); i += 2) {
+    const std::size_t first = std::min<std::size_t>(ack.missing[i], holds_.size());
+    const std::size_t end = first + std::min<std::size_t>(ack.missing[i + 1], holds_.size() - first);
+    for (std::size_t part = first; part < end; ++part) {
+      if (!holds_[part]) continue;
+      holds_[part] = false;
+      again_.push_back(part);
+    }
+  }
 }
 
 // DDS delivers in the order of sending. A part that left before one that arrived, and has not arrived itself,

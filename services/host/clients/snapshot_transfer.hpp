@@ -59,6 +59,8 @@ class Passage {
 
   [[nodiscard]] std::optional<std::size_t> wanted();
   [[nodiscard]] bool names(const transport::AckMessage& ack) const;
+  /// Parts that the receiver held, and lacks by now, are sent again.
+  void take_back(const transport::AckMessage& ack);
   void arrived(const std::vector<bool>& held, std::int64_t now_ns);
   std::size_t send(std::size_t part, std::int64_t now_ns);
   [[nodiscard]] std::int64_t probe_ns() const;
