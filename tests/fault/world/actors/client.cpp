@@ -132,7 +132,9 @@ void Client::check() {
   const host::Host& host = *server_.host();
   if (status.phase != ClientPhase::kPlaying)
     return blame("getting in", std::string(name_of(status.phase)) + " for " + std::to_string(well_ns / kMs) +
-                                   " ms without a fault (" + status.reason + ")");
+                                   " ms without a fault (" + status.reason + "; attempt " +
+                                   std::to_string(core_->join_attempt()) + ", " +
+                                   std::to_string(figures.refused_messages) + " messages refused)");
   if (status.epoch != host.session().epoch)
     return blame("getting in", "plays epoch " + std::to_string(status.epoch));
   const auto behind = static_cast<Frame>(stage_.settings.frame_rate_hz);
