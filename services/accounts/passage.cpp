@@ -60,7 +60,22 @@ void Passage::hold(std::size_t part) {
 
 void Passage::acknowledged(std::span<const std::uint32_t> missing, std::int64_t now_ns) {
   heard_ns_ = now_ns;
+  take_back(missing);
   arrived(held_parts(missing, holds_.size()), now_ns);
+}
+
+// A receiver that was sent damaged bytes drops all that it holds, and may hold the next part that comes.
+void Passage::take_back(std::span<const std::uint32_t> missing) {
+  for (std::size_t i = 0; i + 1 < missing.size(); i += 2) {
+    const std::size_t first = std::min<std::size_t>(missing[i], holds_.size());
+    const std::size_t end = first + std::min<std::size_t>(missing[i + 1], holds_.size() - first);
+    for (std::size_t part = first; part < end; ++part) {
+      if (!holds_[part]) continue;
+      holds_[part] = false;
+      --held_;
+      again_.push_back(part);
+    }
+  }
 }
 
 // DDS delivers in the order of sending. A part that left before one that arrived, and has not arrived itself,

@@ -47,6 +47,8 @@ class Passage {
 
   [[nodiscard]] std::optional<std::size_t> wanted();
   void hold(std::size_t part);
+  /// Parts that the receiver held, and lacks by now, are sent again.
+  void take_back(std::span<const std::uint32_t> missing);
   void arrived(const std::vector<bool>& held, std::int64_t now_ns);
   std::size_t send(std::size_t part, std::int64_t now_ns);
   [[nodiscard]] std::int64_t probe_ns() const;

@@ -12,6 +12,8 @@ constexpr std::int64_t kEndNs = 2'000'000'000;
 constexpr Epoch kLastEpoch = Epoch{1}
                              << 53U;  // later ones are no milliseconds; some clients count in doubles
 
+constexpr Epoch kEpochsAhead = 1'000'000;  // where a clock went back; in ms a quarter of an hour
+
 tl::unexpected<Error> refuse(std::string why) { return fail(ErrorCode::kInvalidArgument, std::move(why)); }
 
 std::string told_of(const Checkpoint& checkpoint, const std::string& file) {
@@ -36,7 +38,10 @@ Result<void> check_world(const Checkpoint& checkpoint, const World& world, std::
   return {};
 }
 
-Epoch Start::epoch(Epoch wanted) const { return std::max(wanted, newest_epoch + 1); }
+// A server may announce an epoch and end before it has written a checkpoint of it.
+Epoch Start::epoch(Epoch wanted) const {
+  return wanted > newest_epoch ? wanted : newest_epoch + 1 + wanted % kEpochsAhead;
+}
 
 Result<std::unique_ptr<Keeper>> Keeper::open(const Settings& settings, std::int64_t (*clock_ns)()) {
   if (!(settings.interval_s >= kLeastIntervalS && settings.interval_s <= kMostIntervalS))
@@ -48,8 +53,9 @@ Result<std::unique_ptr<Keeper>> Keeper::open(const Settings& settings, std::int6
   });
 }
 
-Keeper::Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_t (*clock_ns)())
-    : settings_(settings), clock_ns_(clock_ns), disk_(std::move(disk)) {
+Keeper::Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_t (*clock_ns)(),
+               WritesIn writes_in)
+    : settings_(settings), clock_ns_(clock_ns), writes_in_(writes_in), disk_(std::move(disk)) {
   if (disk_) folder_.emplace(*disk_);
 }
 
@@ -105,7 +111,7 @@ Result<Epoch> Keeper::take_over(const engine::Simulation& simulation) {
 
 void Keeper::make_writer(std::vector<std::byte> memory) {
   writer_.emplace(folder_ ? &*folder_ : nullptr, static_cast<std::int64_t>(settings_.interval_s * 1e9),
-                  clock_ns_, std::move(memory));
+                  clock_ns_, std::move(memory), writes_in_);
 }
 
 void Keeper::serve_standbys(bool any) {
@@ -126,6 +132,10 @@ void Keeper::end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& ca
   if (!folder_ || !writer_ || !writer_->finish(kEndNs)) return;
   writer_->take(now_ns, capture);
   writer_->finish(kEndNs);
+}
+
+void Keeper::write_now() {
+  if (writer_) writer_->write_now();
 }
 
 std::vector<std::string> Keeper::take_notices(std::int64_t now_ns) {

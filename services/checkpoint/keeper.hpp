@@ -39,18 +39,20 @@ struct Start {
   std::vector<std::string> warnings;               ///< one line each
   std::string told;        ///< one line: what it goes on from, or that it starts afresh
   Epoch newest_epoch = 0;  ///< the server's epoch has to be above this one
-  /// The wanted epoch, or one above newest_epoch where a clock went back.
+  /// The wanted epoch, or one above newest_epoch where a clock went back. Two starts from the same checkpoint
+  /// have different ones, if they wanted different ones.
   [[nodiscard]] Epoch epoch(Epoch wanted) const;
 };
 
-/// Not thread-safe; the writing is done by a thread of its own.
+/// Not thread-safe; the writing is done by a thread of its own, unless a simulated machine does it.
 class Keeper {
  public:
   /// Opens and locks the folder, if there is one. Errors: as open_folder(); kInvalidArgument for settings out
   /// of range.
   static Result<std::unique_ptr<Keeper>> open(const Settings& settings, std::int64_t (*clock_ns)());
   /// `disk`: null for none.
-  Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_t (*clock_ns)());
+  Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_t (*clock_ns)(),
+         WritesIn writes_in = WritesIn::kOwnThread);
 
   /// Looks for the newest checkpoint of this world that `simulation` can load, and loads it. Without one, a
   /// simulation is left as it is. Errors: kUnsupported (required, and the simulation has no save()), kIo
@@ -69,6 +71,10 @@ class Keeper {
   [[nodiscard]] std::shared_ptr<const Encoded> latest() const;
   /// Writes a last checkpoint, so that an orderly end loses nothing. Waits at most two seconds.
   void end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture);
+  /// Writes the copy that was made last, if it is not written yet. Only for WritesIn::kWriteNow.
+  void write_now();
+  /// True if a copy is not written yet.
+  [[nodiscard]] bool writing() const { return writer_ && !writer_->idle(); }
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns);
   /// Empty without a folder; all 0 for a simulation that cannot be saved.
   [[nodiscard]] std::optional<Figures> figures(std::int64_t now_ns) const;
@@ -78,6 +84,7 @@ class Keeper {
 
   Settings settings_;
   std::int64_t (*clock_ns_)();
+  WritesIn writes_in_;
   std::unique_ptr<Disk> disk_;
   std::optional<Folder> folder_;
   bool can_save_ = false;

@@ -20,14 +20,14 @@ constexpr std::int64_t kSlowNs = 10'000'000'000;
 }  // namespace
 
 Writer::Writer(Folder* folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(),
-               std::vector<std::byte> memory)
+               std::vector<std::byte> memory, WritesIn writes_in)
     : folder_(folder),
       interval_ns_(interval_ns),
       clock_ns_(clock_ns),
       began_ns_(clock_ns()),
       asked_ns_(began_ns_) {
   checkpoint_.engine_state = std::move(memory);
-  thread_ = std::thread([this] { run(); });
+  if (writes_in == WritesIn::kOwnThread) thread_ = std::thread([this] { run(); });
 }
 
 Writer::~Writer() {
@@ -36,7 +36,7 @@ Writer::~Writer() {
     stop_ = true;
   }
   changed_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 bool Writer::idle() const {
@@ -60,14 +60,21 @@ void Writer::take(std::int64_t now_ns, const std::function<void(Checkpoint&)>& f
   {
     const std::lock_guard lock(mutex_);
     busy_ = true;
-    figures_.copy_ms_max = std::max(figures_.copy_ms_max, ms(clock_ns_() - start_ns));
+    handed_over_ns_ = clock_ns_();
+    figures_.copy_ms_max = std::max(figures_.copy_ms_max, ms(handed_over_ns_ - start_ns));
   }
   changed_.notify_all();
 }
 
 bool Writer::finish(std::int64_t longest_ns) {
+  if (!thread_.joinable()) write_now();
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, std::chrono::nanoseconds(longest_ns), [this] { return !busy_; });
+}
+
+void Writer::write_now() {
+  std::unique_lock lock(mutex_);
+  if (busy_) write(lock);
 }
 
 void Writer::run() {
@@ -75,33 +82,37 @@ void Writer::run() {
   while (true) {
     changed_.wait(lock, [this] { return busy_ || stop_; });
     if (!busy_) return;
-    const std::int64_t taken_ns = *taken_ns_;
-    lock.unlock();
-    const std::int64_t start_ns = clock_ns_();
-    encode(checkpoint_, file_);
-    const Moment moment{checkpoint_.epoch, checkpoint_.frame};
-    // Servers that stand by do not wait for the disk.
-    lock.lock();
-    if (keep_latest_) latest_ = std::make_shared<const Encoded>(Encoded{moment, checkpoint_.journal, file_});
-    lock.unlock();
-    const auto stored = folder_ == nullptr ? Result<void>() : folder_->store(moment, file_);
-    const std::int64_t took_ns = clock_ns_() - start_ns;
-    lock.lock();
-    figures_.write_ms_max = std::max(figures_.write_ms_max, ms(took_ns));
-    write_ns_ = took_ns;
-    if (stored) {
-      ++figures_.written;
-      figures_.frame = checkpoint_.frame;
-      figures_.bytes = file_.size();
-      newest_ns_ = taken_ns;
-      trouble_.clear();
-    } else {
-      ++figures_.failed;
-      trouble_ = stored.error().message;
-    }
-    busy_ = false;
-    changed_.notify_all();
+    write(lock);
   }
+}
+
+void Writer::write(std::unique_lock<std::mutex>& lock) {
+  const std::int64_t taken_ns = *taken_ns_;
+  const std::int64_t start_ns = handed_over_ns_;
+  lock.unlock();
+  encode(checkpoint_, file_);
+  const Moment moment{checkpoint_.epoch, checkpoint_.frame};
+  // Servers that stand by do not wait for the disk.
+  lock.lock();
+  if (keep_latest_) latest_ = std::make_shared<const Encoded>(Encoded{moment, checkpoint_.journal, file_});
+  lock.unlock();
+  const auto stored = folder_ == nullptr ? Result<void>() : folder_->store(moment, file_);
+  const std::int64_t took_ns = clock_ns_() - start_ns;
+  lock.lock();
+  figures_.write_ms_max = std::max(figures_.write_ms_max, ms(took_ns));
+  write_ns_ = took_ns;
+  if (stored) {
+    ++figures_.written;
+    figures_.frame = checkpoint_.frame;
+    figures_.bytes = file_.size();
+    newest_ns_ = taken_ns;
+    trouble_.clear();
+  } else {
+    ++figures_.failed;
+    trouble_ = stored.error().message;
+  }
+  busy_ = false;
+  changed_.notify_all();
 }
 
 std::shared_ptr<const Encoded> Writer::latest() const {

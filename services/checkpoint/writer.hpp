@@ -1,5 +1,5 @@
 #pragma once
-// Writes checkpoints in a thread of its own.
+// Writes checkpoints beside the simulation.
 
 #include <condition_variable>
 #include <cstdint>
@@ -33,6 +33,12 @@ struct Figures {
   double write_ms_max = 0;      ///< longest time from copy to disk
 };
 
+/// Where a writer writes.
+enum class WritesIn : std::uint8_t {
+  kOwnThread,
+  kWriteNow,  ///< in the caller's thread, when write_now() is called: for a simulated machine
+};
+
 /// All members are called from one thread, that of the simulation. It waits only in finish().
 class Writer {
  public:
@@ -41,7 +47,8 @@ class Writer {
   /// `folder` is used by the writer's thread from now on, and must outlive it; null: checkpoints are only
   /// encoded, for latest(). `clock_ns`: a steady clock. `memory`: for the engine's part. The first copy takes
   /// several times as long into memory that the system has not handed out yet.
-  Writer(Folder* folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(), std::vector<std::byte> memory);
+  Writer(Folder* folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(), std::vector<std::byte> memory,
+         WritesIn writes_in = WritesIn::kOwnThread);
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
@@ -58,6 +65,8 @@ class Writer {
   [[nodiscard]] bool idle() const;
   /// Waits until no write is under way, at most so long. Returns idle().
   bool finish(std::int64_t longest_ns);
+  /// Writes what was taken, if there is something. Only for WritesIn::kWriteNow.
+  void write_now();
 
   /// The newest checkpoint, for servers that stand by; null: none was encoded since keep_latest(true).
   [[nodiscard]] std::shared_ptr<const Encoded> latest() const;
@@ -69,13 +78,16 @@ class Writer {
 
  private:
   void run();
+  /// Writes what was taken. The lock is held before and after, but not meanwhile.
+  void write(std::unique_lock<std::mutex>& lock);
 
   Folder* folder_;
   std::int64_t interval_ns_;
   std::int64_t (*clock_ns_)();
   std::int64_t began_ns_;
   std::optional<std::int64_t> taken_ns_;
-  std::int64_t asked_ns_;  // in due()
+  std::int64_t handed_over_ns_ = 0;  // by the clock, after the copy
+  std::int64_t asked_ns_;            // in due()
   std::int64_t told_ns_ = INT64_MIN;
   bool told_trouble_ = false;
 
@@ -91,7 +103,7 @@ class Writer {
   std::int64_t newest_ns_ = 0;
   std::int64_t write_ns_ = 0;  // of the last write
   std::string trouble_;        // of the last write; empty: it was good
-  std::thread thread_;
+  std::thread thread_;         // none for WritesIn::kWriteNow
 };
 
 }  // namespace tandem::checkpoint

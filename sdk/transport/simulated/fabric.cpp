@@ -269,7 +269,7 @@ void Fabric::process(Index pair) {
   if (reader.closed || writer.closed || gone(reader.participant)) return;
   const bool unreachable = participants_[reader.participant].frozen_ns != kNever ||
                            participants_[writer.participant].frozen_ns != kNever ||
-                           is_cut(writer.participant, reader.participant);
+                           is_cut_either_way(writer.participant, reader.participant);
   if (!way.matched) {
     if (gone(writer.participant)) return;
     if (unreachable) {  // discovery is repeated until it succeeds
@@ -305,7 +305,7 @@ bool Fabric::settle_front(Pair& pair, Index index) {
       return true;
     }
     const bool lost = participants_[writer.participant].frozen_ns != kNever ||
-                      is_cut(writer.participant, to) || loses(writer.participant, to);
+                      is_cut_either_way(writer.participant, to) || loses(writer.participant, to);
     const auto squeezed_ns = lost ? std::nullopt : squeeze_ns(model, *front.sample.message);
     if (squeezed_ns) ++counts_.repaired;
     if (!squeezed_ns || *squeezed_ns > 0) {
@@ -333,8 +333,25 @@ void Fabric::deliver(const Pair& pair, const Sample& sample) {
     reader.arrived.erase(std::find_if(reader.arrived.begin(), reader.arrived.end(), same_key));
     ++counts_.pushed_out;
   }
-  reader.arrived.push_back(Arrived{from, sample.key, sample.message});
+  reader.arrived.push_back(Arrived{from, sample.key, arriving(link(from, reader.participant), sample)});
   ++counts_.delivered;
+  ++participants_[reader.participant].delivered;
+}
+
+std::shared_ptr<const AnyMessage> Fabric::arriving(const LinkModel& model, const Sample& sample) {
+  const bool flips = random_.chance(model.flipped);
+  const bool truncates = random_.chance(model.truncated);
+  if (!flips && !truncates) return sample.message;
+  AnyMessage message = *sample.message;
+  Bytes* bytes = nullptr;
+  if (auto* delta = std::get_if<DeltaMessage>(&message)) bytes = &delta->payload;
+  if (auto* snapshot = std::get_if<SnapshotMessage>(&message)) bytes = &snapshot->bytes;
+  if (bytes == nullptr || bytes->empty()) return sample.message;
+  const std::size_t at = random_.next() % bytes->size();
+  if (flips) (*bytes)[at] ^= std::byte{1} << (random_.next() % 8);
+  if (truncates) bytes->resize(at);
+  ++counts_.damaged;
+  return std::make_shared<const AnyMessage>(std::move(message));
 }
 
 bool Fabric::keeps(const Writer& writer, const Sample& sample) const {
@@ -347,7 +364,7 @@ WriterState Fabric::state(Index observer, Index other) const {
   const Participant& subject = participants_[other];
   if (subject.closed) return WriterState::kGone;
   std::int64_t silent_ns = std::min(subject.killed_ns, subject.frozen_ns);
-  if (const auto cut = cuts_.find(ordered(observer, other)); cut != cuts_.end()) {
+  if (const auto cut = cuts_.find({other, observer}); cut != cuts_.end()) {
     silent_ns = std::min(silent_ns, cut->second);
   }
   const bool expired = silent_ns != kNever && now_ns_ - silent_ns >= options_.lease_ns;
@@ -388,7 +405,12 @@ const LinkModel& Fabric::link(Index from, Index to) const {
   return own == links_.end() ? options_.link : own->second;
 }
 
-bool Fabric::is_cut(Index a, Index b) const { return !cuts_.empty() && cuts_.contains(ordered(a, b)); }
+bool Fabric::is_cut(Index from, Index to) const { return !cuts_.empty() && cuts_.contains({from, to}); }
+
+std::uint64_t Fabric::delivered_to(const ParticipantId& participant) const {
+  const Index index = find(participant);
+  return index == participants_.size() ? 0 : participants_[index].delivered;
+}
 
 bool Fabric::gone(Index participant) const {
   return participants_[participant].closed || participants_[participant].killed_ns != kNever;
@@ -403,12 +425,12 @@ void Fabric::set_all_links(const LinkModel& link) {
   links_.clear();
 }
 
-void Fabric::set_cut(const ParticipantId& a, const ParticipantId& b, bool cut) {
-  const auto ends = ordered(find(a), find(b));
+void Fabric::set_cut(const ParticipantId& from, const ParticipantId& to, bool cut) {
+  const std::pair<Index, Index> way{find(from), find(to)};
   if (cut) {
-    cuts_.emplace(ends, now_ns_);
+    cuts_.emplace(way, now_ns_);
   } else {
-    cuts_.erase(ends);
+    cuts_.erase(way);
   }
 }
 

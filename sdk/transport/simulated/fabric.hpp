@@ -86,10 +86,11 @@ class Fabric {
   [[nodiscard]] std::optional<std::int64_t> next_event_ns() const;
   void set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link);
   void set_all_links(const LinkModel& link);
-  void set_cut(const ParticipantId& a, const ParticipantId& b, bool cut);
+  void set_cut(const ParticipantId& from, const ParticipantId& to, bool cut);
   void set_frozen(const ParticipantId& participant, bool frozen);
   void kill(const ParticipantId& participant);
   [[nodiscard]] const NetworkCounts& counts() const { return counts_; }
+  [[nodiscard]] std::uint64_t delivered_to(const ParticipantId& participant) const;
 
  private:
   static constexpr std::int64_t kNever = INT64_MAX;
@@ -100,6 +101,7 @@ class Fabric {
     bool closed = false;
     std::int64_t killed_ns = kNever;
     std::int64_t frozen_ns = kNever;
+    std::uint64_t delivered = 0;
     std::vector<Index> writers;
     std::vector<Index> readers;
   };
@@ -174,7 +176,11 @@ class Fabric {
   /// Sends a message and perhaps a duplicate through the path's bottleneck. Returns how long that takes from
   /// now; empty if the message is dropped there.
   [[nodiscard]] std::optional<std::int64_t> squeeze_ns(const LinkModel& model, const AnyMessage& message);
-  [[nodiscard]] bool is_cut(Index a, Index b) const;
+  /// Nothing comes through on this way. What asks for something needs the way back, too.
+  [[nodiscard]] bool is_cut(Index from, Index to) const;
+  [[nodiscard]] bool is_cut_either_way(Index a, Index b) const { return is_cut(a, b) || is_cut(b, a); }
+  /// The message as it arrives: perhaps with damaged bytes.
+  [[nodiscard]] std::shared_ptr<const AnyMessage> arriving(const LinkModel& model, const Sample& sample);
   [[nodiscard]] bool gone(Index participant) const;
 
   NetworkOptions options_;
@@ -186,8 +192,7 @@ class Fabric {
   std::vector<Reader> readers_;
   std::vector<Pair> pairs_;
   std::map<std::pair<Index, Index>, LinkModel> links_;
-  std::map<std::pair<Index, Index>, std::int64_t> cuts_;    // by pair, lower index first: since when it is
-                                                            // cut
+  std::map<std::pair<Index, Index>, std::int64_t> cuts_;    // by way: since when it is cut
   std::map<std::pair<Index, Index>, std::int64_t> met_ns_;  // lower index first
   std::map<std::pair<Index, Index>, bool> bursts_;          // whether everything is lost on this way at
                                                             // present

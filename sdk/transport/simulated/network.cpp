@@ -28,7 +28,10 @@ class Member {
   Member& operator=(const Member&) = delete;
   Member(Member&&) = delete;
   Member& operator=(Member&&) = delete;
-  ~Member() { fabric_->close_participant(self_); }
+  // A process that was killed says nothing.
+  ~Member() {
+    if (!fabric_->killed(self_)) fabric_->close_participant(self_);
+  }
 
   [[nodiscard]] Fabric& fabric() const { return *fabric_; }
   [[nodiscard]] Fabric::Index index() const { return self_; }
@@ -402,11 +405,18 @@ void Network::set_link(const ParticipantId& from, const ParticipantId& to, const
 void Network::set_all_links(const LinkModel& link) { fabric_->set_all_links(link); }
 void Network::set_cut(const ParticipantId& a, const ParticipantId& b, bool cut) {
   fabric_->set_cut(a, b, cut);
+  fabric_->set_cut(b, a, cut);
+}
+void Network::set_cut_one_way(const ParticipantId& from, const ParticipantId& to, bool cut) {
+  fabric_->set_cut(from, to, cut);
 }
 void Network::set_frozen(const ParticipantId& participant, bool frozen) {
   fabric_->set_frozen(participant, frozen);
 }
 void Network::kill(const ParticipantId& participant) { fabric_->kill(participant); }
 const NetworkCounts& Network::counts() const { return fabric_->counts(); }
+std::uint64_t Network::delivered_to(const ParticipantId& participant) const {
+  return fabric_->delivered_to(participant);
+}
 
 }  // namespace tandem::transport::simulated

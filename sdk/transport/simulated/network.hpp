@@ -31,6 +31,8 @@ struct LinkModel {
   double burst_loss = 0, burst_samples = 1;
   /// Chance that a transmission comes twice. DDS delivers it once, but the bottleneck has to take both.
   double duplicates = 0;
+  /// Chances that a delta or a part of a snapshot arrives with one bit flipped, or cut short.
+  double flipped = 0, truncated = 0;
 };
 
 struct NetworkOptions {
@@ -55,6 +57,7 @@ struct NetworkCounts {
   std::uint64_t overwritten = 0;  ///< samples that left the writer's history before their repair
   std::uint64_t lost_for_good = 0;
   std::uint64_t pushed_out = 0;  ///< samples displaced at a reader that did not take them in time
+  std::uint64_t damaged = 0;
 };
 
 /// Sends commands to servers, as an operator's tool does. They are lost before the two have found each other.
@@ -101,6 +104,9 @@ class Network {
   void set_all_links(const LinkModel& link);
   /// Cuts or restores both directions.
   void set_cut(const ParticipantId& a, const ParticipantId& b, bool cut);
+  /// Cuts or restores one direction. What is lost there is not repaired, and nobody finds the other anew, as
+  /// long as either direction is cut.
+  void set_cut_one_way(const ParticipantId& from, const ParticipantId& to, bool cut);
   /// A frozen process neither receives nor repairs. Its port must not be called meanwhile.
   void set_frozen(const ParticipantId& participant, bool frozen);
   /// Kills a participant without notice; others notice after the lease. Calls on its port have no effect any
@@ -108,6 +114,8 @@ class Network {
   void kill(const ParticipantId& participant);
 
   [[nodiscard]] const NetworkCounts& counts() const;
+  /// Samples that a participant was delivered so far: it has something to take when this has grown.
+  [[nodiscard]] std::uint64_t delivered_to(const ParticipantId& participant) const;
 
  private:
   std::shared_ptr<Fabric> fabric_;

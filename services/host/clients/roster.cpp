@@ -56,8 +56,7 @@ Account* Roster::admit(const transport::AckMessage& ack, const transport::Partic
   account.from = from;
   account.heard_ns = now_ns;
   account.attempt = ack.join_attempt;
-  if (const auto known = remembered_.find(ack.client);
-      known != remembered_.end() && known->second.from == from) {
+  if (const auto known = remembered_.find(ack.client); known != remembered_.end()) {
     account.inputs.highest = known->second.highest;
     // Told again from now on: the client may have missed the last replies of the epoch before.
     for (const transport::ReplyEntry& entry : known->second.outcomes)
@@ -84,7 +83,8 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
                            const PublishTimes& times, const Now& now) {
   const auto known = accounts_.find(ack.client);
   Account* account = known == accounts_.end() ? nullptr : &known->second;
-  if (account != nullptr && account->from != from) return Reason::kForeignClient;
+  if (account != nullptr ? account->from != from : expects_another(ack.client, from))
+    return Reason::kForeignClient;
   if (ack.protocol_version != transport::kProtocolVersion) return Reason::kProtocolVersion;
   if (ack.epoch == 0) return expect(ack, account, from, now.ns);
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
@@ -154,7 +154,7 @@ bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, b
 Account* Roster::find(transport::ClientId id, const transport::ParticipantId& from, Reason& reason) {
   const auto known = accounts_.find(id);
   if (known == accounts_.end()) {
-    reason = Reason::kNotPlaying;
+    reason = expects_another(id, from) ? Reason::kForeignClient : Reason::kNotPlaying;
     return nullptr;
   }
   if (known->second.from != from) {
@@ -163,6 +163,12 @@ Account* Roster::find(transport::ClientId id, const transport::ParticipantId& fr
   }
   reason = Reason::kNone;
   return &known->second;
+}
+
+// Otherwise whoever comes first under a known id would be told what its owner has to be told.
+bool Roster::expects_another(transport::ClientId id, const transport::ParticipantId& from) const {
+  const auto known = remembered_.find(id);
+  return known != remembered_.end() && known->second.from != from;
 }
 
 void Roster::remember(const std::vector<checkpoint::ClientState>& clients) {

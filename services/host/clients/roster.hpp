@@ -135,7 +135,7 @@ class Roster {
   Account* find(transport::ClientId id, const transport::ParticipantId& from, transport::Reason& reason);
 
   /// Remembers what clients were told of their inputs in the epoch that this one continues. An account that
-  /// such a client opens here, from the same DDS participant, goes on from there.
+  /// such a client opens here goes on from there. As long as they are remembered, nobody else can open it.
   void remember(const std::vector<checkpoint::ClientState>& clients);
   /// Copies what clients were told of their inputs, including those that have not come back yet.
   void capture(std::vector<checkpoint::ClientState>& out) const;
@@ -181,6 +181,8 @@ class Roster {
   transport::Reason expect(const transport::AckMessage& ack, Account* account,
                            const transport::ParticipantId& from, std::int64_t now_ns);
   Account* admit(const transport::AckMessage& ack, const transport::ParticipantId& from, std::int64_t now_ns);
+  /// The epoch before this one knew the id, of another DDS participant.
+  [[nodiscard]] bool expects_another(transport::ClientId id, const transport::ParticipantId& from) const;
   using Accounts = std::map<transport::ClientId, Account>;
   [[nodiscard]] bool lists(const StreamId& stream) const {
     return stream.id < rules_.streams.size() && stream.generation == 0;

@@ -18,7 +18,8 @@
 #include "sdk/transport/simulated/network.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
-#include "world.hpp"
+#include "tests/support/dice/dice.hpp"
+#include "wanderers.hpp"
 
 namespace tandem::client {
 namespace {

@@ -230,6 +230,33 @@ TEST(GoingOn, EveryInputActsOnceOrIsToldAsLostOnce) {
   EXPECT_GT(waited, 5U) << "some inputs waited in a checkpoint, and acted";
 }
 
+// Everybody in the domain can read the ids of clients.
+TEST(GoingOn, AStrangerCannotTakeTheAccountOfAClientBeforeItComesBack) {
+  World world(1);
+  world.start(nullptr);
+  Player& player = world.add_player();
+  world.run_ms(2500);
+  world.send(player);
+  world.run_ms(1500);
+  ASSERT_EQ(player.watcher.outcomes.size(), 1U);
+  const auto stranger = must(world.network.make_client("default"));
+  world.kill();
+  world.start(&world.file);
+  const auto says = [&](Epoch epoch) {
+    transport::AckMessage ack;
+    ack.client = 100;
+    ack.epoch = epoch;
+    World::must_do(stranger->write(ack));
+  };
+  for (int i = 0; i < 100; ++i) {  // before the player sees the announcement
+    says(i % 2 == 0 ? 0 : world.host->session().epoch);
+    world.run_ms(20);
+  }
+  EXPECT_GT(world.host->totals().refused_messages, 10U);
+  EXPECT_TRUE(world.all_play());
+  EXPECT_EQ(player.watcher.outcomes.at(1).kind, client::InputOutcome::Kind::kActed);
+}
+
 TEST(GoingOn, AnEpochThatIsNotAboveTheOldOneIsRefused) {
   World world(1);
   world.start(nullptr);

@@ -14,6 +14,7 @@
 #include "sdk/transport/simulated/network.hpp"
 #include "services/host/host.hpp"
 #include "tests/fault/client/wanderers.hpp"
+#include "tests/support/dice/dice.hpp"
 
 namespace tandem::host {
 
@@ -22,23 +23,6 @@ T must(Result<T> result) {
   if (!result) throw std::runtime_error(result.error().message);
   return std::move(*result);
 }
-
-/// splitmix64 (Steele, Lea, Flood 2014).
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ULL);
-    z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-    z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
-    return z ^ (z >> 31U);
-  }
-  std::uint64_t below(std::uint64_t n) { return next() % n; }
-  bool one_in(std::uint64_t n) { return below(n) == 0; }
-
- private:
-  std::uint64_t state_;
-};
 
 /// Calls `live` for every seed of this run, stopping at the first failure.
 inline void for_seeds(std::uint64_t count, const std::function<void(std::uint64_t seed)>& live) {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "services/checkpoint/format.hpp"
+#include "tests/support/disk/simulated_disk.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
-#include "tests/unit/checkpoint/simulated_disk.hpp"
 
 namespace tandem::checkpoint {
 namespace {

@@ -92,7 +92,9 @@ TEST_F(KeeperTest, AServerGoesOnFromTheNewestUnderAHigherEpoch) {
   EXPECT_EQ(begun->goes_on_from->frame, 90U);
   EXPECT_EQ(simulation.value, std::byte{90});
   EXPECT_EQ(begun->epoch(5000), 5000U);
-  EXPECT_EQ(begun->epoch(7), 1001U) << "a clock that went back";
+  EXPECT_GT(begun->epoch(7), 1000U) << "a clock that went back";
+  EXPECT_NE(begun->epoch(7), begun->epoch(8))
+      << "the server before may have ended without a checkpoint of its own";
   EXPECT_NE(begun->told.find("frame 90 of epoch 1000"), std::string::npos);
 }
 

@@ -352,6 +352,20 @@ TEST_F(SnapshotTransferTest, WhoeverDropsWhatItHeldIsServedNoMore) {
   EXPECT_TRUE(transfer.idle());
 }
 
+// Damaged bytes make a receiver drop all that it holds. If it then takes the next part, it names the snapshot
+// again.
+TEST_F(SnapshotTransferTest, WhoeverDropsPartsAndGoesOnWithTheNextIsSentThemAgain) {
+  start(7, 2 * kPart, {1});
+  const auto parts = send();
+  ASSERT_EQ(parts.size(), 2U);
+  receivers[1].held.add(transport::SnapshotMessage(parts[0].part));
+  acknowledge(1);
+  receivers[1].held = SnapshotAssembly{std::size_t{1} << 26U};
+  receivers[1].held.add(transport::SnapshotMessage(parts[1].part));
+  acknowledge(1);
+  EXPECT_LT(run_until_whole(1, 2'000), 2'000);
+}
+
 TEST_F(SnapshotTransferTest, WhoeverPlaysOrIsGoneIsForgotten) {
   start(7, 10 * kPart, {1, 2});
   send();

@@ -1,0 +1,36 @@
+#pragma once
+// A participant of the session that sends arbitrary samples, under its own names and under those of others.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "tests/fault/world/stage.hpp"
+#include "tests/support/dice/dice.hpp"
+
+namespace tandem::world {
+
+class Forger {
+ public:
+  /// `known`: ids that clients of the world have.
+  Forger(Stage& stage, std::uint64_t salt, std::uint64_t known_ids);
+  /// Sends one sample.
+  void speak();
+
+ private:
+  void speak_as_client();
+  void speak_as_server();
+  [[nodiscard]] transport::ClientId some_client();
+  [[nodiscard]] Epoch some_epoch();
+  [[nodiscard]] Frame some_frame();
+  [[nodiscard]] double some_value();
+  [[nodiscard]] transport::Bytes some_bytes(std::uint64_t most);
+
+  Stage& stage_;
+  Dice dice_;
+  std::uint64_t known_ids_;
+  std::unique_ptr<transport::ClientPort> client_;
+  std::unique_ptr<transport::ServerPort> server_;
+};
+
+}  // namespace tandem::world

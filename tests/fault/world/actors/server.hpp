@@ -1,0 +1,93 @@
+#pragma once
+// The server: host, engine, checkpoints on a disk that may fail.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/checkpoint/keeper.hpp"
+#include "services/host/host.hpp"
+#include "tests/fault/world/actors/actor.hpp"
+#include "tests/fault/world/actors/engine.hpp"
+#include "tests/support/disk/simulated_disk.hpp"
+
+namespace tandem::world {
+
+class Server final : public Actor {
+ public:
+  Server(Stage& stage, std::string name);
+  ~Server() override;
+
+  // What the faults do.
+  void set_disk_delay(std::int64_t ns);
+  void set_disk_full(bool full);
+  void set_disk_lies(bool lies);
+  /// The power fails in one of the steps of the next write.
+  void tear_next_write(std::uint64_t salt, double kept, std::int64_t back_after_ns);
+  void keep_next_write_whole() { tear_.reset(); }
+  void set_publishing(bool publishing);
+  void change_quality(std::uint64_t salt);
+  void set_power_kept(double kept) { power_kept_ = kept; }
+
+  [[nodiscard]] std::vector<transport::ParticipantId> participants() const override;
+  [[nodiscard]] const host::Host* host() const { return host_.get(); }
+  void check() override;
+  /// How long the host has been announced, and nothing was wrong with it.
+  [[nodiscard]] std::int64_t serves_for_ns() const;
+
+ protected:
+  void on_start() override;
+  void on_crash(bool power_fails) override;
+  void on_leave() override;
+  void on_poll() override;
+  [[nodiscard]] std::int64_t due_ns() const override;
+
+ private:
+  void begin();
+  void check_start(const checkpoint::Start& start);
+  void note_frame();
+  void note_acts();
+  void write_checkpoint();
+  void check_folder();
+  void drop();
+  void lose_power(double kept);
+  [[nodiscard]] std::optional<checkpoint::Moment> newest_on_disk() const;
+
+  std::shared_ptr<checkpoint::SimulatedDisk> disk_;
+  std::int64_t disk_delay_ns_ = 2 * kMs;
+  double power_kept_ = 0;
+  bool disk_sound_ = true;            ///< it has kept its promises since the world began
+  std::int64_t disk_trouble_ns_ = 0;  ///< until when it was slow, full or lied
+  struct Tear {
+    std::uint64_t step = 0;
+    double kept = 0;
+    std::int64_t back_after_ns = 0;
+  };
+  std::optional<Tear> tear_;
+
+  std::unique_ptr<transport::ServerPort> port_;
+  std::unique_ptr<WatchedEngine> engine_;
+  std::unique_ptr<checkpoint::Keeper> keeper_;
+  std::unique_ptr<host::Host> host_;
+  std::optional<std::int64_t> write_at_ns_;
+  bool publishing_ = true;
+  std::int64_t starts_ = 0;
+  Epoch epoch_ = 0;
+  std::size_t acts_seen_ = 0;
+  std::int64_t last_frame_ns_ = 0, last_poll_ns_ = 0;
+  host::Host::State told_state_ = host::Host::State::kClaiming;
+
+  // Of the life before, for the next start.
+  struct Before {
+    Epoch epoch = 0;
+    Frame frame = 0;
+    std::int64_t frame_ns = 0;
+    bool orderly = false;
+    bool sound = false;  ///< nothing was wrong with server and disk for long enough
+  };
+  std::optional<Before> before_;
+};
+
+}  // namespace tandem::world

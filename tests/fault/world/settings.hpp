@@ -1,0 +1,58 @@
+#pragma once
+// What a world is made of, drawn from its seed.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sdk/transport/messages.hpp"
+#include "sdk/transport/simulated/network.hpp"
+#include "services/engine/common/world.hpp"
+#include "services/host/frames/configuration.hpp"
+
+namespace tandem::world {
+
+/// Times that the rules allow (idl/STATES.md), with the steps in which this world looks.
+struct Rules {
+  /// Whoever can get in plays: the longest patience between two questions, and a lease.
+  static constexpr std::int64_t kPlaysNs = 10'000'000'000;
+  /// Who was demoted is a participant again: in time for 10 s, besides.
+  static constexpr std::int64_t kReturnsNs = 10'000'000'000;
+  /// Everybody else waits for one that does not answer.
+  static constexpr std::int64_t kStallNs = 500'000'000;
+  /// What a checkpoint may be old.
+  static constexpr std::int64_t kCheckpointNs = 1'000'000'000;
+};
+
+struct ClientSettings {
+  transport::Role role = transport::Role::kParticipant;
+  std::uint32_t lead = 1;
+  std::string prefer;
+  double inputs_per_s = 1;
+  bool draws = false;  ///< an application that shows the bodies
+};
+
+struct Settings {
+  std::uint64_t seed = 1;
+  double seconds = 60;  ///< of which the last kHealingS are without faults
+  double frame_rate_hz = 30;
+  engine::World scene;
+  std::vector<std::string> codecs;  ///< one for each stream
+  std::uint32_t lead = 1;
+  bool narrow_window = false;
+  transport::simulated::LinkModel link;
+  std::vector<ClientSettings> clients;    ///< that are there from the start
+  std::vector<ClientSettings> newcomers;  ///< that may join
+
+  static constexpr double kHealingS = 22;
+};
+
+/// In a line.
+[[nodiscard]] std::string text_of(const Settings& settings);
+
+[[nodiscard]] Settings draw_settings(std::uint64_t seed, double seconds);
+
+/// How the server is started, but for its epoch.
+[[nodiscard]] host::HostConfig host_config(const Settings& settings);
+
+}  // namespace tandem::world

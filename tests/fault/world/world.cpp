@@ -1,0 +1,111 @@
+#include "tests/fault/world/world.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "tests/fault/world/actors/client.hpp"
+
+namespace tandem::world {
+namespace {
+
+constexpr std::int64_t kTickNs = kMs;
+constexpr std::int64_t kChecksNs = 100 * kMs;
+
+std::int64_t heal_ns(double run_s) { return static_cast<std::int64_t>((run_s - Settings::kHealingS) * 1e9); }
+
+class World {
+ public:
+  World(const RunOptions& options, const Plan& plan)
+      : stage_(draw_settings(options.seed, options.seconds)),
+        end_ns_(static_cast<std::int64_t>(options.seconds * 1e9)),
+        newcomers_from_(fill()),
+        chaos_(stage_, cast_, newcomers_from_, plan, heal_ns(options.seconds)) {}
+
+  Outcome live() {
+    stage_.journal.add(0, "world", text_of(stage_.settings));
+    for (std::size_t i = 0; i < newcomers_from_; ++i) cast_[i]->start();
+    std::uint64_t turns = 0;
+    try {
+      while (stage_.now_ns < end_ns_ && !stage_.finding) {
+        advance();
+        ++turns;
+      }
+      if (!stage_.finding)
+        for (const auto& actor : cast_) actor->check_end();
+    } catch (const std::exception& thrown) {
+      stage_.blame("nothing throws", "world", thrown.what());
+    }
+    Outcome outcome;
+    outcome.counts.turns = turns;
+    outcome.counts.acts = stage_.truth.acts();
+    outcome.counts.epochs = stage_.truth.epochs();
+    outcome.counts.network = stage_.network.counts();
+    const Lineage* last = stage_.truth.lineage(stage_.live_epoch);
+    outcome.counts.frames = last == nullptr ? 0 : last->last;
+    stage_.journal.fold(stage_.network.counts().delivered);
+    stage_.journal.fold(outcome.counts.acts);
+    outcome.digest = stage_.journal.digest();
+    outcome.finding = stage_.finding;
+    outcome.journal = std::move(stage_.journal);
+    return outcome;
+  }
+
+ private:
+  std::size_t fill() {
+    auto server = std::make_unique<Server>(stage_, "server");
+    const Server& of = *server;
+    cast_.push_back(std::move(server));
+    std::uint64_t id = 1000;
+    const auto add = [&](const ClientSettings& settings, const std::string& name) {
+      cast_.push_back(std::make_unique<Client>(stage_, name, settings, of, id));
+      id += 1000;
+    };
+    int number = 0;
+    for (const ClientSettings& settings : stage_.settings.clients) {
+      const bool participates = settings.role == transport::Role::kParticipant;
+      add(settings, std::string(settings.draws ? "application "
+                                : participates ? "participant "
+                                               : "observer ") +
+                        std::to_string(++number));
+    }
+    const std::size_t newcomers_from = cast_.size();
+    number = 0;
+    for (const ClientSettings& settings : stage_.settings.newcomers)
+      add(settings, "newcomer " + std::to_string(++number));
+    return newcomers_from;
+  }
+
+  void advance() {
+    std::int64_t next_ns = std::min({end_ns_, chaos_.wake_ns(), next_check_ns_});
+    if (const auto event_ns = stage_.network.next_event_ns()) next_ns = std::min(next_ns, *event_ns);
+    for (const auto& actor : cast_) next_ns = std::min(next_ns, actor->wake_ns());
+    next_ns = (next_ns + kTickNs - 1) / kTickNs * kTickNs;
+    stage_.now_ns = std::max(next_ns, stage_.now_ns + kTickNs);
+    stage_.network.advance_to(stage_.now_ns);
+    chaos_.turn();
+    for (const auto& actor : cast_) actor->turn();
+    if (stage_.now_ns < next_check_ns_) return;
+    next_check_ns_ = stage_.now_ns + kChecksNs;
+    for (const auto& actor : cast_)
+      if (actor->up() && !actor->paused()) actor->check();
+  }
+
+  Stage stage_;
+  std::int64_t end_ns_;
+  Cast cast_;
+  std::size_t newcomers_from_;
+  Chaos chaos_;
+  std::int64_t next_check_ns_ = 0;
+};
+
+}  // namespace
+
+Plan plan_of(const RunOptions& options, const std::vector<FaultKind>& kinds) {
+  return draw_plan(options.seed,
+                   {.from_ms = 500, .until_ms = heal_ns(options.seconds) / kMs, .kinds = kinds});
+}
+
+Outcome run_world(const RunOptions& options, const Plan& plan) { return World(options, plan).live(); }
+
+}  // namespace tandem::world
