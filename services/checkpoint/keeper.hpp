@@ -56,6 +56,8 @@ class Keeper {
 
   /// Call after a frame: has `capture` copy the world if a checkpoint is due.
   void after_frame(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture);
+  /// Changes Settings::interval_s, which is in its range, from the next checkpoint on.
+  void set_interval(double interval_s);
   /// Writes a last checkpoint, so that an orderly end loses nothing. Waits at most two seconds.
   void end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture);
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns);

@@ -158,6 +158,7 @@ class Keeping {
   Keeping(checkpoint::Keeper* keeper, const host::Host& host) : keeper_(keeper) {
     capture_ = [&host](checkpoint::Checkpoint& out) { host.capture(out); };
   }
+  [[nodiscard]] checkpoint::Keeper* keeper() const { return keeper_; }
   void after_frame(std::int64_t now_ns) {
     ran_ = true;
     if (keeper_ != nullptr) keeper_->after_frame(now_ns, capture_);
@@ -200,6 +201,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, produced, now_ns);
     service.watch(host, now_ns);
+    service.reload(options, host, keeping.keeper(), now_ns);
     if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
