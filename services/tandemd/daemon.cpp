@@ -160,6 +160,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, produced, now_ns);
     service.watch(host, now_ns);
+    service.reload(options, host, keeping, now_ns);
     if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);

@@ -13,9 +13,17 @@
 int main(int argc, char** argv) {
   try {
     spdlog::set_default_logger(spdlog::stderr_color_mt("tandemd"));
-    const auto command = tandem::daemon::parse_command_line(argc, argv);
+    auto command = tandem::daemon::parse_command_line(argc, argv);
     if (!command.options) return command.exit_code;
-    tandem::SignalWatch signals("tandemd");  // first, so that its signal mask holds for all threads
+    // First, so that its signal mask holds for all threads.
+    using Hangup = tandem::SignalWatch::Hangup;
+    tandem::SignalWatch signals("tandemd", command.reread ? Hangup::kReload : Hangup::kStop);
+    if (command.reread) {
+      command.options->changes = [&]() -> std::optional<tandem::Result<tandem::daemon::Changes>> {
+        if (!signals.take_reload()) return std::nullopt;
+        return command.reread();
+      };
+    }
     const tandem::HeapTrimmer trimmer;
     return tandem::daemon::run_daemon(*command.options, signals);
   } catch (const std::exception& error) {
