@@ -189,6 +189,10 @@ template void write_cdr(const InputMessage&, Bytes&);
 template void write_cdr(const AckMessage&, Bytes&);
 template void write_cdr(const ServerStatusMessage&, Bytes&);
 template void write_cdr(const ClientStatusMessage&, Bytes&);
+template void write_cdr(const JournalMessage&, Bytes&);
+template void write_cdr(const CheckpointMessage&, Bytes&);
+template void write_cdr(const StandbyMessage&, Bytes&);
+template void write_cdr(const CommandMessage&, Bytes&);
 template Result<SessionMessage> read_cdr(std::span<const std::byte>, Padding);
 template Result<DeltaMessage> read_cdr(std::span<const std::byte>, Padding);
 template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>, Padding);
@@ -198,5 +202,9 @@ template Result<InputMessage> read_cdr(std::span<const std::byte>, Padding);
 template Result<AckMessage> read_cdr(std::span<const std::byte>, Padding);
 template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>, Padding);
 template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<JournalMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<CheckpointMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<StandbyMessage> read_cdr(std::span<const std::byte>, Padding);
+template Result<CommandMessage> read_cdr(std::span<const std::byte>, Padding);
 
 }  // namespace tandem::transport

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/standby_messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {
@@ -41,6 +42,10 @@ extern template void write_cdr(const InputMessage&, Bytes&);
 extern template void write_cdr(const AckMessage&, Bytes&);
 extern template void write_cdr(const ServerStatusMessage&, Bytes&);
 extern template void write_cdr(const ClientStatusMessage&, Bytes&);
+extern template void write_cdr(const JournalMessage&, Bytes&);
+extern template void write_cdr(const CheckpointMessage&, Bytes&);
+extern template void write_cdr(const StandbyMessage&, Bytes&);
+extern template void write_cdr(const CommandMessage&, Bytes&);
 extern template Result<SessionMessage> read_cdr(std::span<const std::byte>, Padding);
 extern template Result<DeltaMessage> read_cdr(std::span<const std::byte>, Padding);
 extern template Result<ScheduledInputMessage> read_cdr(std::span<const std::byte>, Padding);
@@ -50,5 +55,9 @@ extern template Result<InputMessage> read_cdr(std::span<const std::byte>, Paddin
 extern template Result<AckMessage> read_cdr(std::span<const std::byte>, Padding);
 extern template Result<ServerStatusMessage> read_cdr(std::span<const std::byte>, Padding);
 extern template Result<ClientStatusMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<JournalMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<CheckpointMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<StandbyMessage> read_cdr(std::span<const std::byte>, Padding);
+extern template Result<CommandMessage> read_cdr(std::span<const std::byte>, Padding);
 
 }  // namespace tandem::transport

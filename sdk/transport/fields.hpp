@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/standby_messages.hpp"
 
 namespace tandem::transport {
 
@@ -121,6 +122,39 @@ void fields(Visitor& visit, M& m) {
              m.applied, m.simulated, m.role_wanted, m.join_attempt, m.clock_ns, m.snapshot_frame,
              m.snapshot_parts);
   numbers(visit, m.missing);
+}
+
+template <class Visitor, Is<InputDecision> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.client, m.number, m.frame, m.scheduled, m.code, m.kind);
+  visit.sequence(m.participant);
+  numbers(visit, m.values);
+  visit.sequence(m.bytes);
+}
+
+template <class Visitor, Is<JournalMessage> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.epoch, m.number, m.frame, m.hash, m.state);
+  visit.sequence(m.decisions, [&](auto& decision) { fields(visit, decision); });
+}
+
+template <class Visitor, Is<CheckpointMessage> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.epoch, m.frame, m.journal, m.part, m.parts, m.total_bytes);
+  visit.sequence(m.bytes);
+}
+
+template <class Visitor, Is<StandbyMessage> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.standby, m.epoch, m.holds_frame, m.journal, m.part_frame, m.part_count,
+             m.protocol_version, m.rank);
+  numbers(visit, m.missing);
+}
+
+template <class Visitor, Is<CommandMessage> M>
+void fields(Visitor& visit, M& m) {
+  primitives(visit, m.epoch, m.kind);
+  visit.text(m.session);
 }
 
 template <class Visitor>

@@ -167,6 +167,29 @@ bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/)
          message.stream_reason.size() <= kMaxReasonBytes && is_plain_text(message.stream_reason);
 }
 
+bool within_limits(const JournalMessage& message, const Limits& /*limits*/) {
+  return message.number >= 1 && message.state <= JournalState::kLast &&
+         message.decisions.size() <= kMaxDecisions &&
+         std::all_of(message.decisions.begin(), message.decisions.end(), [](const InputDecision& decision) {
+           return decision.participant.size() == sizeof(ParticipantId::bytes) &&
+                  decision.values.size() <= kMaxInputValues && decision.bytes.size() <= kMaxInputBytes;
+         });
+}
+
+bool within_limits(const CheckpointMessage& message, const Limits& /*limits*/) {
+  return message.parts >= 1 && message.parts <= kMaxCheckpointParts && message.parts <= message.total_bytes &&
+         message.part < message.parts && message.total_bytes <= kMaxCheckpointBytes &&
+         !message.bytes.empty() && message.bytes.size() <= kMaxCheckpointPartBytes;
+}
+
+bool within_limits(const StandbyMessage& message, const Limits& /*limits*/) {
+  return message.standby != 0 && message.rank >= 1 && message.missing.size() <= 2 * kMaxMissingRuns;
+}
+
+bool within_limits(const CommandMessage& message, const Limits& /*limits*/) {
+  return message.kind == CommandKind::kHandOver && is_name(message.session);
+}
+
 std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling, std::size_t largest_delta_bytes,
                           std::uint64_t memory_bytes) {
   constexpr double kMostFrames = 1U << 20U;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/standby_messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {
@@ -35,6 +36,13 @@ inline constexpr std::size_t kMaxInputValues = 16;
 inline constexpr std::size_t kMaxInputBytes = 1024;
 inline constexpr std::size_t kMaxMissingRuns = 32;  ///< in an acknowledgement
 
+inline constexpr std::uint32_t kMaxCheckpointBytes = 1U << 30U;
+inline constexpr std::uint32_t kMaxCheckpointParts = 1U << 18U;
+inline constexpr std::size_t kMaxCheckpointPartBytes = 64U << 10U;
+inline constexpr std::size_t kMaxDecisions = 256;  ///< in a journal entry
+/// Maximum size of one decision in its byte form.
+inline constexpr std::size_t kMaxDecisionBytes = 128 + 8 * kMaxInputValues + kMaxInputBytes;
+
 /// The limits that the stream declares; until a stream is known, the fixed maximum.
 struct Limits {
   std::uint32_t max_delta_bytes = kMaxDeltaBytes;
@@ -55,6 +63,10 @@ struct Limits {
 [[nodiscard]] bool within_limits(const AckMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const ServerStatusMessage& message, const Limits& limits);
 [[nodiscard]] bool within_limits(const ClientStatusMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const JournalMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const CheckpointMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const StandbyMessage& message, const Limits& limits);
+[[nodiscard]] bool within_limits(const CommandMessage& message, const Limits& limits);
 
 /// Does the same check for an announcement and says what breaks which limit. A server calls it before it
 /// announces, because receivers only count refused messages. Errors: kInvalidArgument.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/standby_messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {
@@ -68,6 +69,31 @@ class ServerPort {
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
   /// Ends a wait() of another thread. Thread-safe.
   virtual void wake() {}
+
+  // A live server, with the servers that stand by.
+
+  virtual void take(std::vector<Received<StandbyMessage>>& out) = 0;
+  virtual void take(std::vector<Received<CommandMessage>>& out) = 0;
+  /// Makes the writer of journals, and a writer of checkpoints for that server. No effect if they exist. This
+  /// call and close_standby() belong to the writes.
+  virtual Result<void> open_standby(ClientId standby) = 0;
+  virtual void close_standby(ClientId standby) = 0;
+  /// True if both writers have a matched reader in that participant.
+  [[nodiscard]] virtual bool follows(const ParticipantId& participant, ClientId standby) = 0;
+  /// Reaches all servers that follow. Errors: also kInvalidArgument, if open_standby() was never called.
+  virtual Result<void> write(const JournalMessage&) = 0;
+  /// Reaches only that server. Errors: also kInvalidArgument, if open_standby() was not called for it.
+  virtual Result<void> write(ClientId to, const CheckpointMessage&) = 0;
+
+  // A server that stands by.
+
+  /// Subscribes to journals, and to checkpoints for `standby`. Call both while no other thread calls the
+  /// port.
+  virtual Result<void> follow(ClientId standby) = 0;
+  virtual void unfollow() = 0;
+  virtual void take(std::vector<Received<JournalMessage>>& out) = 0;
+  virtual void take(std::vector<Received<CheckpointMessage>>& out) = 0;
+  virtual Result<void> write(const StandbyMessage&) = 0;
 };
 
 /// How long an announcement is not followed.

@@ -18,13 +18,19 @@ class Budget {
   /// Takes `amount`, if it is there. More than the whole reserve is taken as the whole.
   bool take(double amount, const Rule& rule, std::int64_t now_ns) {
     if (!(rule.most > 0)) return true;
-    spent_ = std::max(spent_ - static_cast<double>(now_ns - at_ns_) * 1e-9 * rule.per_second, 0.0);
-    at_ns_ = now_ns;
     const double wanted = std::min(amount, rule.most);
-    if (!(spent_ + wanted <= rule.most)) return false;
-    spent_ += wanted;
+    if (!(spent(rule, now_ns) + wanted <= rule.most)) return false;
+    spend(wanted);
     return true;
   }
+  /// The part of the reserve that is spent now.
+  [[nodiscard]] double spent(const Rule& rule, std::int64_t now_ns) {
+    spent_ = std::max(spent_ - static_cast<double>(now_ns - at_ns_) * 1e-9 * rule.per_second, 0.0);
+    at_ns_ = now_ns;
+    return spent_;
+  }
+  /// Takes `amount` after spent(), also more than there is: what is missing has to come back first.
+  void spend(double amount) { spent_ += amount; }
 
  private:
   double spent_ = 0;  // as of at_ns_

@@ -60,6 +60,7 @@ struct Checkpoint {
   std::vector<Scheduled> scheduled;      ///< consecutive numbers up to last_input, ascending by frame
   std::vector<engine::Input> immediate;  ///< inputs of the next frame, in the order of arrival
   std::vector<ClientState> clients;
+  std::uint64_t journal = 0;  ///< number of the last journal entry before the frame was over; not in the file
   std::vector<std::byte> engine_state;  ///< of Simulation::save()
 
   [[nodiscard]] std::uint32_t capacity() const { return static_cast<std::uint32_t>(next_reuse.size()); }

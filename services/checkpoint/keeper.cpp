@@ -47,6 +47,7 @@ Result<std::unique_ptr<Keeper>> Keeper::open(const Settings& settings, std::int6
   if (!(settings.interval_s >= kLeastIntervalS && settings.interval_s <= kMostIntervalS))
     return refuse(
         fmt::format("the interval of checkpoints must be {} to {} s", kLeastIntervalS, kMostIntervalS));
+  if (settings.folder.empty()) return std::make_unique<Keeper>(settings, nullptr, clock_ns);
   return open_folder(settings.folder).map([&](std::unique_ptr<Disk>&& disk) {
     return std::make_unique<Keeper>(settings, std::move(disk), clock_ns);
   });
@@ -54,11 +55,9 @@ Result<std::unique_ptr<Keeper>> Keeper::open(const Settings& settings, std::int6
 
 Keeper::Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_t (*clock_ns)(),
                WritesIn writes_in)
-    : settings_(settings),
-      clock_ns_(clock_ns),
-      writes_in_(writes_in),
-      disk_(std::move(disk)),
-      folder_(*disk_) {}
+    : settings_(settings), clock_ns_(clock_ns), writes_in_(writes_in), disk_(std::move(disk)) {
+  if (disk_) folder_.emplace(*disk_);
+}
 
 Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) {
   Start start;
@@ -68,11 +67,13 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
     constexpr const char* kWhy = "this simulation cannot be saved (it has no save() and load())";
     if (settings_.required)
       return fail(ErrorCode::kUnsupported, fmt::format("{}, but a checkpoint is required", kWhy));
-    start.warnings.push_back(fmt::format("{}: there are no checkpoints", kWhy));
+    if (disk_) start.warnings.push_back(fmt::format("{}: there are no checkpoints", kWhy));
     start.told = "starts afresh";
     return start;
   }
-  auto found = folder_.newest([&](const Checkpoint& checkpoint) -> Result<void> {
+  can_save_ = true;
+  if (!disk_) return start;
+  auto found = folder_->newest([&](const Checkpoint& checkpoint) -> Result<void> {
     if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
     if (simulation.load(checkpoint.engine_state)) return {};
     return refuse(
@@ -93,17 +94,42 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
     }
     start.told = none + "; starts afresh";
   }
-  writer_.emplace(folder_, static_cast<std::int64_t>(settings_.interval_s * 1e9), clock_ns_, std::move(state),
-                  writes_in_);
+  make_writer(std::move(state));
   return start;
 }
 
-void Keeper::after_frame(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture) {
-  if (writer_ && writer_->due(now_ns)) writer_->take(now_ns, capture);
+Result<Epoch> Keeper::take_over(const engine::Simulation& simulation) {
+  std::vector<std::byte> state;
+  simulation.save(state);
+  can_save_ = !state.empty();
+  if (!disk_) return Epoch{0};
+  const auto found = folder_->newest([](const Checkpoint&) { return refuse("it is not needed"); });
+  if (!found) return tl::unexpected(found.error());
+  make_writer(std::move(state));
+  return found->newest_epoch < kLastEpoch ? found->newest_epoch : 0;
 }
 
+void Keeper::make_writer(std::vector<std::byte> memory) {
+  writer_.emplace(folder_ ? &*folder_ : nullptr, static_cast<std::int64_t>(settings_.interval_s * 1e9),
+                  clock_ns_, std::move(memory), writes_in_);
+}
+
+void Keeper::serve_standbys(bool any) {
+  if (any && !writer_ && can_save_) make_writer({});
+  if (writer_) writer_->keep_latest(any);
+  if (!any && !folder_) writer_.reset();
+}
+
+void Keeper::after_frame(std::int64_t now_ns, bool at_once, const std::function<void(Checkpoint&)>& capture) {
+  if (!writer_) return;
+  const bool due = writer_->due(now_ns);
+  if (due || (at_once && writer_->idle())) writer_->take(now_ns, capture);
+}
+
+std::shared_ptr<const Encoded> Keeper::latest() const { return writer_ ? writer_->latest() : nullptr; }
+
 void Keeper::end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture) {
-  if (!writer_ || !writer_->finish(kEndNs)) return;
+  if (!folder_ || !writer_ || !writer_->finish(kEndNs)) return;
   writer_->take(now_ns, capture);
   writer_->finish(kEndNs);
 }
@@ -116,6 +142,9 @@ std::vector<std::string> Keeper::take_notices(std::int64_t now_ns) {
   return writer_ ? writer_->take_notices(now_ns) : std::vector<std::string>();
 }
 
-Figures Keeper::figures(std::int64_t now_ns) const { return writer_ ? writer_->figures(now_ns) : Figures(); }
+std::optional<Figures> Keeper::figures(std::int64_t now_ns) const {
+  if (!folder_) return std::nullopt;
+  return writer_ ? writer_->figures(now_ns) : Figures();
+}
 
 }  // namespace tandem::checkpoint

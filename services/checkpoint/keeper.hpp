@@ -1,5 +1,6 @@
 #pragma once
-// What a server does with its checkpoints: go on from the newest, and keep new ones.
+// What a server does with its checkpoints: go on from the newest, keep new ones, and have them at hand for
+// servers that stand by.
 
 #include <cstdint>
 #include <functional>
@@ -16,7 +17,7 @@ namespace tandem::checkpoint {
 
 /// A server's choice.
 struct Settings {
-  std::string folder;     ///< empty: no checkpoints
+  std::string folder;     ///< empty: none on a disk
   double interval_s = 1;  ///< between two checkpoints, kLeastIntervalS .. kMostIntervalS
   bool required = false;  ///< a server does not start without a checkpoint to go on from
 };
@@ -46,8 +47,10 @@ struct Start {
 /// Not thread-safe; the writing is done by a thread of its own, unless a simulated machine does it.
 class Keeper {
  public:
-  /// Opens and locks the folder. Errors: as open_folder(); kInvalidArgument for settings out of range.
+  /// Opens and locks the folder, if there is one. Errors: as open_folder(); kInvalidArgument for settings out
+  /// of range.
   static Result<std::unique_ptr<Keeper>> open(const Settings& settings, std::int64_t (*clock_ns)());
+  /// `disk`: null for none.
   Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_t (*clock_ns)(),
          WritesIn writes_in = WritesIn::kOwnThread);
 
@@ -55,9 +58,17 @@ class Keeper {
   /// simulation is left as it is. Errors: kUnsupported (required, and the simulation has no save()), kIo
   /// (required, and no checkpoint is good; the folder cannot be listed).
   [[nodiscard]] Result<Start> start(const World& world, engine::Simulation& simulation);
+  /// Instead of start(), for a server that takes over: `simulation` holds its state already. Returns the
+  /// highest epoch in the folder. Errors: kIo.
+  [[nodiscard]] Result<Epoch> take_over(const engine::Simulation& simulation);
 
-  /// Call after a frame: has `capture` copy the world if a checkpoint is due.
-  void after_frame(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture);
+  /// Servers stand by, or none any more. Without a folder nothing is copied while there are none.
+  void serve_standbys(bool any);
+  /// Call after a frame: has `capture` copy the world if a checkpoint is due. `at_once`: also within the
+  /// interval.
+  void after_frame(std::int64_t now_ns, bool at_once, const std::function<void(Checkpoint&)>& capture);
+  /// The newest checkpoint since servers stand by; null: none yet.
+  [[nodiscard]] std::shared_ptr<const Encoded> latest() const;
   /// Writes a last checkpoint, so that an orderly end loses nothing. Waits at most two seconds.
   void end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture);
   /// Writes the copy that was made last, if it is not written yet. Only for WritesIn::kWriteNow.
@@ -65,15 +76,18 @@ class Keeper {
   /// True if a copy is not written yet.
   [[nodiscard]] bool writing() const { return writer_ && !writer_->idle(); }
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns);
-  /// All 0 for a simulation that cannot be saved.
-  [[nodiscard]] Figures figures(std::int64_t now_ns) const;
+  /// Empty without a folder; all 0 for a simulation that cannot be saved.
+  [[nodiscard]] std::optional<Figures> figures(std::int64_t now_ns) const;
 
  private:
+  void make_writer(std::vector<std::byte> memory);
+
   Settings settings_;
   std::int64_t (*clock_ns_)();
   WritesIn writes_in_;
   std::unique_ptr<Disk> disk_;
-  Folder folder_;
+  std::optional<Folder> folder_;
+  bool can_save_ = false;
   std::optional<Writer> writer_;  // last member: it stops before its folder is destroyed
 };
 

@@ -2,71 +2,30 @@
 
 #include <dirent.h>
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include "services/checkpoint/disk.hpp"
+#include "services/system/descriptor.hpp"
+#include "services/system/file_lock.hpp"
 
 namespace tandem::checkpoint {
 namespace {
 
-/// Closes a file descriptor.
-class Descriptor {
- public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(number_, other.number_);
-    return *this;
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  [[nodiscard]] int get() const { return number_; }
-  [[nodiscard]] bool open() const { return number_ >= 0; }
-  /// Reports what the system found out only now.
-  [[nodiscard]] bool close() { return ::close(std::exchange(number_, -1)) == 0; }
-
- private:
-  int number_;
-};
+using system::Descriptor;
 
 tl::unexpected<Error> told_by_system(const std::string& what) {
   return fail(ErrorCode::kIo, what + ": " + std::strerror(errno));
 }
 
-/// The process that holds the lock of an open folder, in words. One in another container is not told.
-std::string holder_of(int descriptor) {
-  struct stat about {};
-  if (::fstat(descriptor, &about) != 0) return "another process";
-  std::ifstream locks("/proc/locks");
-  for (std::string line; std::getline(locks, line);) {
-    // "1: FLOCK ADVISORY WRITE 4711 fd:00:1234 0 EOF", the inode in decimal
-    std::istringstream fields(line);
-    std::string number, type, mode, access, pid, place;
-    fields >> number >> type >> mode >> access >> pid >> place;
-    if (type == "FLOCK" && access == "WRITE" &&
-        place.substr(place.rfind(':') + 1) == std::to_string(about.st_ino) &&
-        std::strtol(pid.c_str(), nullptr, 10) > 0)
-      return "process " + pid;
-  }
-  return "another process";
-}
-
 Result<std::vector<std::byte>> read_at(int folder, const std::string& path, std::uint64_t most_bytes) {
   // A FIFO in place of a file must not block.
   const Descriptor file(::openat(folder, path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
-  if (!file.open()) return told_by_system("cannot be opened");
+  if (!file.is_open()) return told_by_system("cannot be opened");
   struct stat about {};
   if (::fstat(file.get(), &about) != 0) return told_by_system("cannot be read");
   if (!S_ISREG(about.st_mode)) return fail(ErrorCode::kIo, "is no regular file");
@@ -95,10 +54,10 @@ class SystemDisk final : public Disk {
   Result<void> open() {
     if (::mkdir(path_.c_str(), 0777) != 0 && errno != EEXIST) return told_by_system("cannot be made");
     Descriptor folder(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (!folder.open()) return told_by_system("cannot be opened");
+    if (!folder.is_open()) return told_by_system("cannot be opened");
     // The folder itself is locked, so that a read-only one can be, too.
-    if (::flock(folder.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-      return fail(ErrorCode::kConflict, holder_of(folder.get()) + " keeps its checkpoints there");
+    if (const auto holder = system::lock_or_holder(folder.get(), system::LockKind::kExclusive))
+      return fail(ErrorCode::kConflict, *holder + " keeps its checkpoints there");
     folder_ = std::move(folder);
     return {};
   }
@@ -126,7 +85,7 @@ class SystemDisk final : public Disk {
     ::unlinkat(folder_.get(), file.c_str(), 0);
     Descriptor made(
         ::openat(folder_.get(), file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
-    if (!made.open()) return told_by_system("cannot be made");
+    if (!made.is_open()) return told_by_system("cannot be made");
     while (!bytes.empty()) {
       const ssize_t taken = ::write(made.get(), bytes.data(), bytes.size());
       if (taken < 0 && errno == EINTR) continue;
@@ -139,7 +98,8 @@ class SystemDisk final : public Disk {
 
   [[nodiscard]] Result<void> sync(const std::string& file) override {
     const Descriptor opened(::openat(folder_.get(), file.c_str(), O_RDONLY | O_CLOEXEC));
-    if (!opened.open() || ::fsync(opened.get()) != 0) return told_by_system("cannot be written to the disk");
+    if (!opened.is_open() || ::fsync(opened.get()) != 0)
+      return told_by_system("cannot be written to the disk");
     return {};
   }
 

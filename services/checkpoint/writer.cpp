@@ -19,9 +19,9 @@ constexpr std::int64_t kSlowNs = 10'000'000'000;
 
 }  // namespace
 
-Writer::Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(),
+Writer::Writer(Folder* folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(),
                std::vector<std::byte> memory, WritesIn writes_in)
-    : folder_(&folder),
+    : folder_(folder),
       interval_ns_(interval_ns),
       clock_ns_(clock_ns),
       began_ns_(clock_ns()),
@@ -91,7 +91,12 @@ void Writer::write(std::unique_lock<std::mutex>& lock) {
   const std::int64_t start_ns = handed_over_ns_;
   lock.unlock();
   encode(checkpoint_, file_);
-  const auto stored = folder_->store({checkpoint_.epoch, checkpoint_.frame}, file_);
+  const Moment moment{checkpoint_.epoch, checkpoint_.frame};
+  // Servers that stand by do not wait for the disk.
+  lock.lock();
+  if (keep_latest_) latest_ = std::make_shared<const Encoded>(Encoded{moment, checkpoint_.journal, file_});
+  lock.unlock();
+  const auto stored = folder_ == nullptr ? Result<void>() : folder_->store(moment, file_);
   const std::int64_t took_ns = clock_ns_() - start_ns;
   lock.lock();
   figures_.write_ms_max = std::max(figures_.write_ms_max, ms(took_ns));
@@ -108,6 +113,17 @@ void Writer::write(std::unique_lock<std::mutex>& lock) {
   }
   busy_ = false;
   changed_.notify_all();
+}
+
+std::shared_ptr<const Encoded> Writer::latest() const {
+  const std::lock_guard lock(mutex_);
+  return latest_;
+}
+
+void Writer::keep_latest(bool keep) {
+  const std::lock_guard lock(mutex_);
+  keep_latest_ = keep;
+  if (!keep) latest_.reset();
 }
 
 Figures Writer::figures(std::int64_t now_ns) const {

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -14,6 +15,13 @@
 #include "services/checkpoint/folder.hpp"
 
 namespace tandem::checkpoint {
+
+/// A checkpoint as the bytes of a file.
+struct Encoded {
+  Moment moment;
+  std::uint64_t journal = 0;  ///< see Checkpoint::journal
+  std::vector<std::byte> bytes;
+};
 
 /// What a writer has done since it was made.
 struct Figures {
@@ -36,10 +44,10 @@ class Writer {
  public:
   static constexpr std::int64_t kTellNs = 10'000'000'000;  ///< between two lines about the same trouble
 
-  /// `folder` is used by the writer's thread from now on, and must outlive it. `clock_ns`: a steady clock.
-  /// `memory`: for the engine's part. The first copy takes several times as long into memory that the system
-  /// has not handed out yet.
-  Writer(Folder& folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(), std::vector<std::byte> memory,
+  /// `folder` is used by the writer's thread from now on, and must outlive it; null: checkpoints are only
+  /// encoded, for latest(). `clock_ns`: a steady clock. `memory`: for the engine's part. The first copy takes
+  /// several times as long into memory that the system has not handed out yet.
+  Writer(Folder* folder, std::int64_t interval_ns, std::int64_t (*clock_ns)(), std::vector<std::byte> memory,
          WritesIn writes_in = WritesIn::kOwnThread);
   ~Writer();
   Writer(const Writer&) = delete;
@@ -59,6 +67,10 @@ class Writer {
   bool finish(std::int64_t longest_ns);
   /// Writes what was taken, if there is something. Only for WritesIn::kWriteNow.
   void write_now();
+
+  /// The newest checkpoint, for servers that stand by; null: none was encoded since keep_latest(true).
+  [[nodiscard]] std::shared_ptr<const Encoded> latest() const;
+  void keep_latest(bool keep);
 
   [[nodiscard]] Figures figures(std::int64_t now_ns) const;
   /// Lines for a log: the first failure at once and then one every kTellNs, and when it is over.
@@ -85,6 +97,8 @@ class Writer {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool busy_ = false, stop_ = false;
+  bool keep_latest_ = false;
+  std::shared_ptr<const Encoded> latest_;
   Figures figures_;
   std::int64_t newest_ns_ = 0;
   std::int64_t write_ns_ = 0;  // of the last write

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -21,6 +22,15 @@ std::string installed_viewer() {
   std::error_code error;
   const bool found = std::filesystem::exists(TANDEM_VIEWER_INSTALL_DIR "/index.html", error);
   return found ? TANDEM_VIEWER_INSTALL_DIR : "";
+}
+
+/// The file of that name that systemd hands over (LoadCredential= in the unit); empty if there is none.
+std::string credential(const char* name) {
+  const char* const folder = std::getenv("CREDENTIALS_DIRECTORY");
+  if (folder == nullptr) return {};
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::path(folder) / name;
+  return std::filesystem::exists(path, error) ? path.string() : std::string();
 }
 
 constexpr std::size_t kMostViewers = 16'384;
@@ -94,10 +104,13 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "--viewer", options.viewer,
       "Folder with the viewer's files, which are read once at the start [" TANDEM_VIEWER_INSTALL_DIR
       " if it is installed]");
-  app.add_option("--token-file", options.token_file,
-                 "File whose first line is a token that viewers must give: ?token=TOKEN");
-  app.add_option("--tls-cert", options.web.tls_cert, "Certificate chain, PEM");
-  app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM");
+  app.add_option(
+      "--token-file", options.token_file,
+      "File whose first line is a token that viewers must give: ?token=TOKEN [the systemd credential "
+      "token, if there is one]");
+  app.add_option("--tls-cert", options.web.tls_cert,
+                 "Certificate chain, PEM [the systemd credential tls-cert]");
+  app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM [the systemd credential tls-key]");
   app.add_option(
       "--origin", options.origins,
       "Origin whose pages may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that this "
@@ -121,6 +134,11 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       .show_default();
   add_doors(app, options.web);
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
+  if (options.token_file.empty()) options.token_file = credential("token");
+  if (options.web.tls_cert.empty() && options.web.tls_key.empty()) {
+    options.web.tls_cert = credential("tls-cert");
+    options.web.tls_key = credential("tls-key");
+  }
   if (const auto good = check(options); !good) {
     std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
     return {.options = std::nullopt, .exit_code = 2};

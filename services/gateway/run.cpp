@@ -23,6 +23,7 @@
 #include "services/metrics/endpoint.hpp"
 #include "services/metrics/health.hpp"
 #include "services/metrics/latest.hpp"
+#include "services/process/service_notifier.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -130,7 +131,13 @@ class Service final : public WebServer::Handler {
   }
   void tick() override {
     const std::lock_guard lock(mutex_);
-    if (const auto line = log_.line(gateway_.counts(), gateway_.viewers(), steady_ns())) spdlog::info(*line);
+    const std::int64_t now_ns = steady_ns();
+    if (const auto line = log_.line(gateway_.counts(), gateway_.viewers(), now_ns)) spdlog::info(*line);
+    // With the lock, so that it is silent if either thread hangs.
+    notifier_.alive(now_ns);
+    if (notifier_.wants_status(now_ns))
+      notifier_.tell(fmt::format("{}, frame {}, {} viewers", phase_name(client_.core().phase()),
+                                 gateway_.frame(), gateway_.viewers()));
   }
   std::string health() override {
     const std::lock_guard lock(mutex_);
@@ -192,6 +199,7 @@ class Service final : public WebServer::Handler {
   SessionClient client_;
   Gateway gateway_;
   CountLog log_;
+  ServiceNotifier notifier_;
   std::int64_t quiet_until_ns_ = 0;  // about descriptors
   std::vector<ViewerId> ready_;      // kept to reuse its memory
   std::int64_t next_figures_ns_ = 0;

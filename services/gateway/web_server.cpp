@@ -2,10 +2,7 @@
 
 #include <fmt/format.h>
 #include <libwebsockets.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -17,6 +14,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/gateway/doors/listener.hpp"
+#include "services/system/descriptor.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -25,10 +23,6 @@ static_assert(Outgoing::kHeadroom >= LWS_PRE);
 
 constexpr const char* kSubprotocol = "tandem.2";
 constexpr std::string_view kPath = "/tandem";
-// Maximum unsent bytes in the kernel for one connection. A small value decides late what is sent next; a
-// larger one makes only slow viewers wait.
-constexpr int kUnsentBytes = 16 * 1024;
-constexpr int kSendBufferBytes = 256 * 1024;
 constexpr std::size_t kChunkBytes = 16 * 1024;  // of a file
 constexpr int kRefusedSeconds = 5, kFileSeconds = 30, kHandshakeSeconds = 3, kKeptSeconds = 15;
 // Taken or turned away at once, before those that are in are served.
@@ -130,8 +124,8 @@ struct WebServer::Impl {
 
   // Arrivals
   void take_arrivals();
-  void arrive(int fd, const sockaddr_storage& peer);
-  void turn_away(int fd, TurnedAway why);
+  void arrive(system::Descriptor connection, const sockaddr_storage& peer);
+  void turn_away(const system::Descriptor& connection, TurnedAway why);
   static Visit& visit(lws* wsi) { return *static_cast<Visit*>(lws_get_opaque_user_data(wsi)); }
   void greet(Visit& visit);
   void leave(const Visit* visit);
@@ -185,10 +179,10 @@ struct WebServer::Impl {
 
 void WebServer::Impl::take_arrivals() {
   for (int i = 0; i < kArrivalsAtOnce; ++i) {
-    const Listener::Accepted got = listener.accept();
+    Listener::Accepted got = listener.accept();
     if (got.outcome == Listener::Outcome::kNothing) return;
     if (got.outcome == Listener::Outcome::kConnection) {
-      arrive(got.fd, got.peer);
+      arrive(std::move(got.connection), got.peer);
       continue;
     }
     handler.turned_away(TurnedAway::kDescriptors);
@@ -197,23 +191,23 @@ void WebServer::Impl::take_arrivals() {
   }
 }
 
-void WebServer::Impl::arrive(int fd, const sockaddr_storage& peer) {
+void WebServer::Impl::arrive(system::Descriptor connection, const sockaddr_storage& peer) {
   const std::int64_t now_ns = steady_ns();
   auto made = std::make_unique<Visit>();
   Visit& by = *made;
   by.peer = address_key(reinterpret_cast<const sockaddr&>(peer)).value_or(AddressKey{});
   by.account = doors.of(by.peer);
   by.due_ns = now_ns + kHandshakeSeconds * kSecond;
-  if (visits.size() >= most) return turn_away(fd, TurnedAway::kFull);
+  if (visits.size() >= most) return turn_away(connection, TurnedAway::kFull);
   if (!is_trusted(by.peer)) {
-    if (const auto why = doors.arrive(*by.account, now_ns)) return turn_away(fd, *why);
+    if (const auto why = doors.arrive(*by.account, now_ns)) return turn_away(connection, *why);
     by.counted = true;
   }
   visits.emplace(&by, std::move(made));
   lws_adopt_desc_t adopt{};
   adopt.vh = vhost;
   adopt.type = static_cast<lws_adoption_type>(LWS_ADOPT_SOCKET | LWS_ADOPT_HTTP | LWS_ADOPT_ALLOW_SSL);
-  adopt.fd.sockfd = fd;
+  adopt.fd.sockfd = connection.release();  // closed by libwebsockets, also if it refuses it
   adopt.opaque = &by;
   lws* const wsi = lws_adopt_descriptor_vhost_via_info(&adopt);
   if (wsi != nullptr) {
@@ -223,19 +217,9 @@ void WebServer::Impl::arrive(int fd, const sockaddr_storage& peer) {
   }
 }
 
-void WebServer::Impl::turn_away(int fd, TurnedAway why) {
+void WebServer::Impl::turn_away(const system::Descriptor& connection, TurnedAway why) {
   handler.turned_away(why);
-  if (!encrypted && told.take(steady_ns())) {
-    std::array<char, 1024> said{};  // what is not read makes the kernel drop the answer
-    [[maybe_unused]] const ssize_t read = recv(fd, said.data(), said.size(), MSG_DONTWAIT);
-    constexpr std::string_view kAnswer =
-        "HTTP/1.1 429 Too Many Requests\r\nconnection: close\r\nretry-after: 10\r\ncontent-type: text/plain\r\n"
-        "content-length: 40\r\n\r\ntoo many connections from your address\r\n";
-    [[maybe_unused]] const ssize_t sent =
-        send(fd, kAnswer.data(), kAnswer.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
-    shutdown(fd, SHUT_WR);
-  }
-  close(fd);
+  if (!encrypted && told.take(steady_ns())) say_too_many(connection);
 }
 
 void WebServer::Impl::greet(Visit& visit) {
@@ -416,11 +400,7 @@ int WebServer::Impl::open(lws* wsi, void* user) {
 }
 
 int WebServer::Impl::established(lws* wsi, Connection& connection) {
-  const int fd = lws_get_socket_fd(wsi);
-  constexpr int kOn = 1;
-  setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &kOn, sizeof kOn);
-  setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
-  setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
+  keep_little_unsent(lws_get_socket_fd(wsi));
   if (connection.refused) {
     lws_set_timeout(wsi, PENDING_TIMEOUT_CLOSE_SEND, kRefusedSeconds);
   } else {

@@ -24,6 +24,7 @@
 #include "services/host/frames/live_source.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "services/host/outgoing/status.hpp"
+#include "services/host/standbys/succession.hpp"
 
 namespace tandem::host {
 namespace {
@@ -100,11 +101,13 @@ struct Host::Impl {
                 .stall_timeout_ns = config.stall_timeout_ns,
                 .fixed_window = config.window,
                 .window_ceiling = config.window_ceiling}),
-        inputs(config.epoch, *source, outbox),
+        succession(config.session, config.epoch, outbox),
+        inputs(config.epoch, *source, outbox, succession.journal()),
         replies(config.epoch, outbox),
         claim(config.epoch, endpoints.self()),
         pacing(config.frame_rate_hz, config.free_rate),
         overrun(config.frame_rate_hz) {
+    if (config.takes_over_from) claim.ignore(*config.takes_over_from);
     const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
     for (std::uint32_t id = 0; id < streams; ++id) {
       lanes.emplace_back(id, config, outbox);
@@ -178,6 +181,7 @@ struct Host::Impl {
   std::unique_ptr<FrameSource> source;
   Outbox outbox;
   Roster roster;
+  Succession succession;
   InputDesk inputs;
   Audience audience;
   std::deque<Lane> lanes;
@@ -218,6 +222,7 @@ bool Host::Impl::poll() {
   if (state == State::kWaiting || state == State::kRunning) {
     charge_waiting();
     receive();
+    succession.poll(*port, source->frame(), roster.notices(), now_ns);
     look_around();
     roster.refresh(moment());
     const StreamSet due = snapshots_due();
@@ -228,6 +233,7 @@ bool Host::Impl::poll() {
     first_to_send = (first_to_send + 1) % lanes.size();
     for (std::size_t i = 0; i < lanes.size(); ++i)
       lanes[(first_to_send + i) % lanes.size()].transfer.send(roster.accounts(), now_ns);
+    succession.send(now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
   }
@@ -270,6 +276,7 @@ void Host::Impl::receive() {
   port->take(input_samples);
   port->take(acks);
   for (const auto& ack : acks) digest(ack);
+  if (succession.stopped()) return;  // the next server tells clients that these inputs are lost
   for (const auto& input : input_samples) digest(input);
 }
 
@@ -343,11 +350,13 @@ void Host::Impl::choose_streams(StreamSet joined) {
 
 void Host::Impl::look_around() {
   // More often while the server waits for a client, because that client may be gone.
-  if (now_ns - last_look_ns < (waiting == Waiting::kParticipants ? kLongestWakeNs : kLookNs)) return;
+  const bool hurries = waiting == Waiting::kParticipants || succession.stopped();
+  if (now_ns - last_look_ns < (hurries ? kShortWakeNs : kLookNs)) return;
   last_look_ns = now_ns;
   roster.look_for_dead(*port, moment());
   error = claim.check(*port, roster.notices(), now_ns);
   if (error) state = State::kRefused;
+  if (succession.stopped() && claim.has_successor()) state = State::kHandedOver;
 }
 
 bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
@@ -356,7 +365,7 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
     pacing.start(now_ns);
   }
   waiting = Waiting::kNothing;
-  if (state != State::kRunning || !pacing.due(now_ns)) return false;
+  if (state != State::kRunning || succession.stopped() || !pacing.due(now_ns)) return false;
   const Roster::Now then = moment();
   written_then = then.written;
   if (roster.blocked(then)) waiting = roster.blamed(then) ? Waiting::kParticipants : Waiting::kQueue;
@@ -382,6 +391,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
     return false;
   }
   const std::int64_t produced = clock();
+  succession.made(*source, now_ns);
   push_frame(outbox, config.epoch, *frame, wall_ns + (produced - start));
   times.published(frame->frame, now_ns);
   report.frame = frame->frame;
@@ -483,7 +493,9 @@ void Host::Impl::plan_wake() {
   wake_ns = now_ns + kLongestWakeNs;
   const auto at = [this](std::int64_t ns) { wake_ns = std::min(wake_ns, ns); };
   if (state == State::kClaiming) at(*first_poll_ns + config.claim_ns);
-  if (state == State::kRunning && waiting == Waiting::kNothing) at(pacing.deadline_ns());
+  if (succession.stopped()) at(now_ns + kShortWakeNs);
+  if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped())
+    at(pacing.deadline_ns());
   if (waiting == Waiting::kQueue) at(now_ns + kMillisecond);
   if (waiting == Waiting::kParticipants) {
     if (const auto left = roster.patience_ns(moment())) {
@@ -492,7 +504,7 @@ void Host::Impl::plan_wake() {
   }
   const bool serves = state == State::kWaiting || state == State::kRunning;
   for (const Lane& lane : lanes) {
-    if (serves) at(lane.transfer.next_ns());
+    if (serves) at(std::min(lane.transfer.next_ns(), succession.standbys().next_ns()));
     if (const auto due = lane.joins.due_ns(lane.transfer, now_ns))
       at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
   }
@@ -551,7 +563,9 @@ Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
-Result<Frame> Host::inject(const engine::Input& input) { return impl_->source->inject(input, impl_->outbox); }
+Result<Frame> Host::inject(const engine::Input& input) {
+  return impl_->inputs.inject(input, impl_->source->frame() + 1, impl_->now_ns);
+}
 Result<void> Host::set_parameters(const StreamParameters& parameters, std::uint32_t stream) {
   return impl_->source->set_parameters(stream, parameters);
 }
@@ -562,7 +576,14 @@ void Host::capture(checkpoint::Checkpoint& out) const {
   out.wall_ms = impl_->wall_ns / kMillisecond;
   impl_->source->capture(out);
   impl_->roster.capture(out.clients);
+  out.journal = impl_->succession.journal().number();
 }
+bool Host::wants_checkpoints() const { return impl_->succession.standbys().any(); }
+bool Host::wants_checkpoint_now() const { return impl_->succession.wants_checkpoint_now(); }
+void Host::offer_checkpoint(const std::shared_ptr<const checkpoint::Encoded>& checkpoint) {
+  impl_->succession.standbys().offer(checkpoint, impl_->now_ns);
+}
+const Standbys& Host::standbys() const { return impl_->succession.standbys(); }
 double Host::threshold_m(std::uint32_t stream) const { return impl_->threshold_m(stream); }
 std::uint32_t Host::first_made() const { return impl_->first_made(); }
 const transport::SessionMessage& Host::session() const { return impl_->source->session(); }

@@ -14,6 +14,7 @@
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/report.hpp"
+#include "services/host/standbys/standbys.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 
@@ -28,8 +29,9 @@ class Host {
     kClaiming,  ///< looks for another server of the same session; nothing was announced
     kWaiting,   ///< announced; joiners are served; frame 1 waits for participants
     kRunning,
-    kRefused,  ///< another server owns the session: see error()
-    kEnded,    ///< the source has no more frames: see error()
+    kRefused,     ///< another server owns the session: see error()
+    kHandedOver,  ///< a server that stood by continues the session
+    kEnded,       ///< the source has no more frames: see error()
   };
 
   /// Creates a host. `simulation` and `port` must outlive it. `simulation` must not have been stepped; its
@@ -67,6 +69,15 @@ class Host {
   /// Copies all that a server needs to go on from frame(), for a checkpoint: HostConfig::goes_on_from. Call
   /// it right after a poll() that returned true. Keeps the memory that `out` has. Only for a simulation.
   void capture(checkpoint::Checkpoint& out) const;
+
+  /// True if servers stand by: checkpoints are needed, and offered with offer_checkpoint(). Only for a
+  /// simulation.
+  [[nodiscard]] bool wants_checkpoints() const;
+  /// True if a checkpoint of the next frame is needed without waiting for the interval.
+  [[nodiscard]] bool wants_checkpoint_now() const;
+  /// Sends a checkpoint of this epoch to the servers that stand by.
+  void offer_checkpoint(const std::shared_ptr<const checkpoint::Encoded>& checkpoint);
+  [[nodiscard]] const Standbys& standbys() const;
 
   /// Sets what decoder and predicted step read (threshold, quantisation steps, gains, decay): see
   /// Stream::set_parameters(). Errors: also kUnsupported without a simulation and kOutOfOrder while the

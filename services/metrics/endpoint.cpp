@@ -20,32 +20,16 @@
 #include <utility>
 #include <vector>
 
+#include "services/accounts/token_bucket.hpp"
 #include "services/metrics/process_series.hpp"
 #include "services/metrics/request.hpp"
+#include "services/system/descriptor.hpp"
 
 namespace tandem::metrics {
 namespace {
 
+using system::Descriptor;
 using transport::steady_ns;
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) close(fd_);
-  }
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 union SocketAddress {
   sockaddr any;
@@ -85,22 +69,6 @@ Result<Descriptor> listen_at(Address& address) {
   return fd;
 }
 
-/// Grants `per_second` on average, and `burst` at once.
-class Pace {
- public:
-  explicit Pace(const EndpointLimits& limits)
-      : each_ns_(kSecond / std::max<std::int64_t>(limits.per_second, 1)),
-        burst_ns_(each_ns_ * limits.burst) {}
-  /// The time of the next grant, which may be over.
-  [[nodiscard]] std::int64_t next_ns() const { return full_ns_ - burst_ns_; }
-  void take(std::int64_t now_ns) { full_ns_ = std::max(full_ns_, now_ns) + each_ns_; }
-  void pause(std::int64_t now_ns, std::int64_t duration_ns) { full_ns_ = now_ns + burst_ns_ + duration_ns; }
-
- private:
-  std::int64_t each_ns_, burst_ns_;
-  std::int64_t full_ns_ = 0;  // when nothing of the burst is used up any more
-};
-
 struct Connection {
   Descriptor fd;
   std::int64_t end_ns = 0;
@@ -121,7 +89,8 @@ struct Endpoint::Impl {
         stop_event(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         health(&state),
         describe(std::move(program)),
-        pace(bounds),
+        pace(static_cast<double>(std::max<std::int64_t>(bounds.per_second, 1)),
+             static_cast<double>(bounds.burst)),
         thread([this](const std::stop_token& stop) { run(stop); }) {}
   ~Impl() {
     thread.request_stop();
@@ -148,10 +117,10 @@ struct Endpoint::Impl {
     const std::int64_t now_ns = steady_ns();
     std::int64_t until_ns = now_ns + 60 * kSecond;
     polled.assign(1, {.fd = stop_event.get(), .events = POLLIN, .revents = 0});
-    if (pace.next_ns() <= now_ns) {
+    if (const std::int64_t next_ns = next_accept_ns(now_ns); next_ns <= now_ns) {
       polled.push_back({.fd = listener.get(), .events = POLLIN, .revents = 0});
     } else {
-      until_ns = pace.next_ns();
+      until_ns = next_ns;
     }
     for (const Connection& connection : connections) {
       polled.push_back({.fd = connection.fd.get(),
@@ -164,18 +133,22 @@ struct Endpoint::Impl {
     poll(polled.data(), polled.size(), static_cast<int>(wait_ms));
   }
 
+  std::int64_t next_accept_ns(std::int64_t now_ns) {
+    return std::max(now_ns + pace.wait_ns(now_ns), paused_until_ns);
+  }
+
   void accept_due() {
-    while (pace.next_ns() <= steady_ns()) {
-      const int fd = accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-      const std::int64_t now_ns = steady_ns();
-      if (fd < 0) {
+    for (std::int64_t now_ns = steady_ns(); next_accept_ns(now_ns) <= now_ns; now_ns = steady_ns()) {
+      Descriptor fd(accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+      if (!fd.is_open()) {
         // No descriptors or no memory: waiting in poll() would not wait.
-        if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR) pace.pause(now_ns, kSecond / 10);
+        if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR)
+          paused_until_ns = now_ns + kSecond / 10;
         return;
       }
-      pace.take(now_ns);
+      pace.spend(1);
       if (connections.size() >= limits.connections) connections.pop_front();
-      connections.push_back({.fd = Descriptor(fd), .end_ns = now_ns + limits.longest_ns, .received = {}});
+      connections.push_back({.fd = std::move(fd), .end_ns = now_ns + limits.longest_ns, .received = {}});
       serve(connections.back());  // a scraper's request mostly is there already
       if (connections.back().over) connections.pop_back();
     }
@@ -262,7 +235,8 @@ struct Endpoint::Impl {
   const Health* health;
   Describe describe;
   // Of the thread alone.
-  Pace pace;
+  accounts::TokenBucket pace;  // of connections that are accepted
+  std::int64_t paused_until_ns = 0;
   std::deque<Connection> connections;  // oldest first
   std::vector<pollfd> polled;
   std::string text;

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
 
@@ -41,31 +40,20 @@ Result<InputFile> InputFile::open(const std::string& path) {
   if (::stat(path.c_str(), &about) != 0) return refuse(std::strerror(errno));
   if (!S_ISREG(about.st_mode)) return refuse_kind(about.st_mode);
   // Another file may have its name by now. So the opening must not block, and its kind is checked again.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (descriptor < 0) return refuse(std::strerror(errno));
-  InputFile file(descriptor, 0);
-  if (::fstat(descriptor, &about) != 0) return refuse(std::strerror(errno));
+  InputFile file(system::Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)));
+  if (!file.file_.is_open() || ::fstat(file.file_.get(), &about) != 0) return refuse(std::strerror(errno));
   if (!S_ISREG(about.st_mode)) return refuse_kind(about.st_mode);
   file.size_bytes_ = static_cast<std::uint64_t>(about.st_size);
   return file;
 }
 
-InputFile::InputFile(InputFile&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)),
-      memory_(other.memory_),
-      size_bytes_(other.size_bytes_) {}
-
-InputFile::~InputFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
-}
-
 Result<std::span<const std::byte>> InputFile::read(std::uint64_t at, std::size_t count,
                                                    ReadBuffer& buffer) const {
   TANDEM_ASSERT(at <= size_bytes_ && count <= size_bytes_ - at);
-  if (descriptor_ < 0) return memory_.subspan(at, count);
+  if (!file_.is_open()) return memory_.subspan(at, count);
   const std::span<std::byte> bytes = buffer.of(count);
   for (std::size_t done = 0; done < count;) {
-    const ssize_t taken = ::pread(descriptor_, &bytes[done], count - done, static_cast<off_t>(at + done));
+    const ssize_t taken = ::pread(file_.get(), &bytes[done], count - done, static_cast<off_t>(at + done));
     if (taken < 0 && errno == EINTR) continue;
     if (taken < 0) return fail(ErrorCode::kIo, std::string("cannot read: ") + std::strerror(errno));
     if (taken == 0) return fail(ErrorCode::kIo, "it became shorter while it was read");

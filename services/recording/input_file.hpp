@@ -6,7 +6,9 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
+#include "services/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::recording {
@@ -30,11 +32,6 @@ class InputFile {
   static Result<InputFile> open(const std::string& path);
   /// Makes a file of bytes that outlive it.
   explicit InputFile(std::span<const std::byte> bytes) : memory_(bytes), size_bytes_(bytes.size()) {}
-  InputFile(InputFile&& other) noexcept;
-  InputFile& operator=(InputFile&&) = delete;
-  InputFile(const InputFile&) = delete;
-  InputFile& operator=(const InputFile&) = delete;
-  ~InputFile();
 
   [[nodiscard]] std::uint64_t size_bytes() const { return size_bytes_; }
   /// Returns `count` bytes from `at` on, all within size_bytes(). They stand in `buffer` or in memory that
@@ -44,8 +41,8 @@ class InputFile {
                                                         ReadBuffer& buffer) const;
 
  private:
-  InputFile(int descriptor, std::uint64_t size_bytes) : descriptor_(descriptor), size_bytes_(size_bytes) {}
-  int descriptor_ = -1;  // none: in memory
+  explicit InputFile(system::Descriptor file) : file_(std::move(file)) {}
+  system::Descriptor file_;  // none: in memory
   std::span<const std::byte> memory_;
   std::uint64_t size_bytes_ = 0;
 };

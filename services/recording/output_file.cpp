@@ -1,25 +1,25 @@
 #include "services/recording/output_file.hpp"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <system_error>
 #include <utility>
+
+#include "services/system/descriptor.hpp"
+#include "services/system/file_lock.hpp"
 
 namespace tandem::recording {
 namespace {
 
 namespace fs = std::filesystem;
+using system::Descriptor;
 
 // The end of a chain of links, whether a file exists there or not. There is no cycle, because the caller has
 // asked for the status.
@@ -45,37 +45,11 @@ bool same_file(int descriptor, const std::string& path) {
          held.st_dev == named.st_dev && held.st_ino == named.st_ino;
 }
 
-/// False if another holds a lock that excludes this one. A file system without locks excludes nobody.
-bool lock(int descriptor, int kind) {
-  return ::flock(descriptor, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;
-}
-
-/// Names the process that holds the lock of an open file. The system does not name one of another container.
-std::string holder_of(int descriptor) {
-  struct stat about {};
-  if (::fstat(descriptor, &about) != 0) return "another process";
-  std::ifstream locks("/proc/locks");
-  for (std::string line; std::getline(locks, line);) {
-    // "1: FLOCK ADVISORY WRITE 4711 fd:00:1234 0 EOF", the inode in decimal
-    std::istringstream fields(line);
-    std::string number, type, mode, access, pid, place;
-    fields >> number >> type >> mode >> access >> pid >> place;
-    const std::size_t inode = place.rfind(':') + 1;
-    if (type == "FLOCK" && access == "WRITE" && place.substr(inode) == std::to_string(about.st_ino) &&
-        std::strtol(pid.c_str(), nullptr, 10) > 0)
-      return "process " + pid;
-  }
-  return "another process";
-}
-
 /// Names the process that writes the file `path`, if there is one.
 std::optional<std::string> writer_of(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (descriptor < 0) return std::nullopt;
-  std::optional<std::string> holder;
-  if (!lock(descriptor, LOCK_SH)) holder = holder_of(descriptor);
-  ::close(descriptor);
-  return holder;
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  if (!file.is_open()) return std::nullopt;
+  return system::lock_or_holder(file.get(), system::LockKind::kShared);
 }
 
 Error written_by(const std::string& holder) {
@@ -89,15 +63,18 @@ Error told_by_system() { return {ErrorCode::kIo, std::string("cannot create: ") 
 Result<File> create_locked(const std::string& path) {
   constexpr int kMostRetries = 100;  // each one only if another process creates or removes the file meanwhile
   for (int i = 0; i < kMostRetries; ++i) {
-    const int descriptor =
-        ::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
-    if (descriptor < 0) return tl::unexpected(told_by_system());
-    File file(::fdopen(descriptor, "r+b"));
+    Descriptor opened(
+        ::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666));
+    if (!opened.is_open()) return tl::unexpected(told_by_system());
+    File file(::fdopen(opened.get(), "r+b"));
+    if (file == nullptr) return tl::unexpected(told_by_system());
+    const int descriptor = opened.release();  // of the FILE now
     struct stat about {};
-    if (file == nullptr || ::fstat(descriptor, &about) != 0) return tl::unexpected(told_by_system());
+    if (::fstat(descriptor, &about) != 0) return tl::unexpected(told_by_system());
     if (!S_ISREG(about.st_mode))
       return fail(ErrorCode::kIo, "cannot create: " + path + " exists and is no regular file");
-    if (!lock(descriptor, LOCK_EX)) return tl::unexpected(written_by(holder_of(descriptor)));
+    if (const auto holder = system::lock_or_holder(descriptor, system::LockKind::kExclusive))
+      return tl::unexpected(written_by(*holder));
     if (!same_file(descriptor, path)) continue;  // its writer has renamed or removed it meanwhile
     if (about.st_size == 0 && about.st_nlink == 1) return file;
     ::unlink(path.c_str());

@@ -2,15 +2,12 @@
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/io/tokenizer.h>
-#include <google/protobuf/text_format.h>
 
-#include <array>
-#include <fstream>
 #include <limits>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/codec_table.hpp"
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
@@ -22,20 +19,6 @@ namespace {
 
 using idl::ServerConfig;
 using planning::number;
-
-// Keeps the first error as one line; protobuf counts lines and columns from 0.
-class FirstError final : public google::protobuf::io::ErrorCollector {
- public:
-  explicit FirstError(std::string path) : path_(std::move(path)) {}
-  void AddError(int line, int column, const std::string& message) override {
-    if (text_.empty()) text_ = fmt::format("{}:{}:{}: {}", path_, line + 1, column + 1, message);
-  }
-  [[nodiscard]] const std::string& text() const { return text_; }
-
- private:
-  std::string path_;
-  std::string text_;
-};
 
 tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
   return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
@@ -74,6 +57,18 @@ Result<void> check_numbers(const Options& options) {
   return {};
 }
 
+Result<void> read_standby(const ServerConfig& config, Options& options) {
+  options.standby = config.standby();
+  if (config.has_standby_rank()) options.standby_rank = config.standby_rank();
+  if (!within(options.standby_rank, 1, kMostRank))
+    return refuse("standby-rank", fmt::format("must be 1 to {}", kMostRank));
+  if (config.has_standby_rank() && !options.standby) return refuse("standby-rank", "needs --standby");
+  if (options.standby && options.checkpoint.required)
+    return refuse("standby",
+                  "conflicts with --checkpoint require: a server that stands by goes on from the live one");
+  return {};
+}
+
 Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
   checkpoint::Settings& settings = options.checkpoint;
   const std::string& wanted = config.checkpoint();
@@ -88,6 +83,14 @@ Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
     return refuse("checkpoint-interval", fmt::format("must be {} to {} seconds", checkpoint::kLeastIntervalS,
                                                      checkpoint::kMostIntervalS));
   }
+  return {};
+}
+
+Result<void> check_names(const sessions::SessionChoice& choice) {
+  if (const auto known = codec_traits(choice.codec); !known) return refuse("codec", known.error().message);
+  if (choice.predictor == planning::kAutomaticPredictor) return {};
+  if (const auto known = find_predictor(choice.predictor); !known)
+    return refuse("predictor", known.error().message);
   return {};
 }
 
@@ -184,23 +187,6 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
 
 }  // namespace
 
-Result<ServerConfig> load_config(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened", path));
-  // Does not use iterators, because they throw if reading fails, for example for a directory.
-  std::string text;
-  std::array<char, 4096> piece{};
-  while (in.read(piece.data(), piece.size()), in.gcount() > 0)
-    text.append(piece.data(), static_cast<std::size_t>(in.gcount()));
-  if (in.bad()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be read", path));
-  ServerConfig config;
-  FirstError errors(path);
-  google::protobuf::TextFormat::Parser parser;
-  parser.RecordErrorsTo(&errors);
-  if (!parser.ParseFromString(text, &config)) return fail(ErrorCode::kMalformed, errors.text());
-  return config;
-}
-
 Result<idl::Stream> parse_stream(const std::string& text) {
   const auto wishes = planning::read_stream(text);
   if (!wishes) return tl::unexpected(wishes.error());
@@ -237,7 +223,9 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   return file;
 }
 
-Result<Options> check_config(const ServerConfig& config) {
+namespace {
+
+Result<Options> checked(const ServerConfig& config) {
   if (config.scene().empty()) return refuse("scene", "give a scene's name or file");
   if (!config.has_bodies()) return refuse("bodies", "give the number of bodies");
   Options options;
@@ -263,9 +251,20 @@ Result<Options> check_config(const ServerConfig& config) {
   return read_service(config, options)
       .and_then([&] { return check_numbers(options); })
       .and_then([&] { return read_checkpoint(config, options); })
+      .and_then([&] { return read_standby(config, options); })
+      .and_then([&] { return check_names(options.choice); })
       .and_then([&] { return check_quality(config, options.choice); })
       .and_then([&] { return check_streams(config, options.choice); })
       .map([&] { return options; });
+}
+
+}  // namespace
+
+Result<Options> check_config(const ServerConfig& config, const Places& places) {
+  auto options = checked(config);
+  if (!options) return tl::unexpected(placed(places, options.error()));
+  options->places = places;
+  return options;
 }
 
 }  // namespace tandem::daemon

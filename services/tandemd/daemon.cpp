@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,9 +17,8 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
-#include "services/checkpoint/keeper.hpp"
-#include "services/host/frames/going_on.hpp"
 #include "services/host/host.hpp"
+#include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/json/json.hpp"
 #include "services/scenes/scene.hpp"
@@ -25,6 +26,8 @@
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
+#include "services/tandemd/service.hpp"
+#include "services/tandemd/stand_by.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -46,7 +49,9 @@ class HashLog {
     for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
-      if (!files_.back()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be written", paths_.back()));
+      if (!files_.back())
+        return fail(ErrorCode::kIo,
+                    fmt::format("{}: cannot be written: {}", paths_.back(), std::strerror(errno)));
       // Line buffering leaves whole lines even if the server is killed.
       std::setvbuf(files_.back().get(), nullptr, _IOLBF, BUFSIZ);
     }
@@ -134,54 +139,15 @@ class FailureLog {
   std::int64_t next_ns_ = 0;
 };
 
-/// Finds the checkpoint to go on from, has the simulation and the session begin there, and says so.
-Result<std::unique_ptr<checkpoint::Keeper>> begin(const Options& options, engine::Simulation& simulation,
-                                                  host::HostConfig& config) {
-  auto keeper = checkpoint::Keeper::open(options.checkpoint, &steady_ns);
-  if (!keeper) return keeper;
-  const auto start = (*keeper)->start(host::checkpoint_world(config), simulation);
-  if (!start) return tl::unexpected(start.error());
-  for (const std::string& warning : start->warnings) spdlog::warn("checkpoint: {}", warning);
-  spdlog::info("checkpoint: {}", start->told);
-  host::begin_from(*start, config);
-  return keeper;
+void log_line(const std::string& line, bool warning) {
+  spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
 }
 
-/// A keeper, if there is one, at work for a host.
-class Keeping {
- public:
-  Keeping(checkpoint::Keeper* keeper, const host::Host& host) : keeper_(keeper) {
-    capture_ = [&host](checkpoint::Checkpoint& out) { host.capture(out); };
-  }
-  void after_frame(std::int64_t now_ns) {
-    ran_ = true;
-    if (keeper_ != nullptr) keeper_->after_frame(now_ns, capture_);
-  }
-  void show(std::int64_t now_ns) {
-    if (keeper_ == nullptr) return;
-    for (const std::string& line : keeper_->take_notices(now_ns)) spdlog::warn("checkpoint: {}", line);
-  }
-  void end() {
-    if (keeper_ == nullptr || !ran_) return;
-    keeper_->end(steady_ns(), capture_);
-    show(steady_ns());
-  }
-  /// Empty without a keeper.
-  [[nodiscard]] std::optional<checkpoint::Figures> figures() const {
-    return keeper_ == nullptr ? std::nullopt : std::optional(keeper_->figures(steady_ns()));
-  }
-
- private:
-  checkpoint::Keeper* keeper_;
-  std::function<void(checkpoint::Checkpoint&)> capture_;
-  bool ran_ = false;
-};
-
-enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite };
+enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
-             Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, const Options& options,
-             const std::atomic<bool>& stop) {
+             host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
+             const Options& options, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
@@ -193,12 +159,14 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     const std::int64_t now_ns = steady_ns();
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, produced, now_ns);
+    service.watch(host, now_ns);
     if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
-      keeping.after_frame(now_ns);
     }
+    keeping.after_poll(host, produced, now_ns);
     if (host.error()) return Ending::kRefused;
+    if (host.state() == host::Host::State::kHandedOver) return Ending::kHandedOver;
     if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
     if (host.state() == host::Host::State::kRunning) {
       if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;
@@ -206,7 +174,6 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     }
     console.show(host, keeping.figures(), now_ns);
     failures.show(now_ns);
-    keeping.show(now_ns);
     if (publisher.gave_up()) return Ending::kCannotWrite;
     if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
     const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
@@ -273,7 +240,7 @@ bool is_alone(const std::vector<host::StreamConfig>& streams) {
 }
 
 /// Finishes the hash log, reports the result, and returns the exit code.
-int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const Keeping& keeping,
+int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host::Keeping& keeping,
              const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options) {
   const auto closed = hashes.close();
   if (!closed) spdlog::error(closed.error().message);
@@ -289,6 +256,8 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const Keepi
   if (ending == Ending::kCannotWrite) {
     return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
   }
+  if (ending == Ending::kHandedOver)
+    spdlog::info("another server continues the session from frame {}", host.frame());
   if (ending == Ending::kNobodyCame) {
     return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
                                                           options.wait_for, *options.duration_s)},
@@ -301,33 +270,38 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const Keepi
 
 int run_daemon(const Options& options, SignalWatch& signals) {
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report_error(scene.error(), 2);
+  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
   auto config =
       planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
-  if (!config) return report_error(config.error(), 2);
+  if (!config) return report_error(placed(options.places, "", config.error()), 2);
   auto simulation =
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
-  if (!simulation) return report_error(simulation.error(), 2);
+  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
   config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
-  std::unique_ptr<checkpoint::Keeper> keeper;
-  if (!options.checkpoint.folder.empty()) {
-    auto begun = begin(options, **simulation, *config);
-    if (!begun) return report_error(begun.error(), 1);
-    keeper = std::move(*begun);
+  auto keeping = options.standby
+                     ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
+                     : host::Keeping::begin(options.checkpoint, **simulation, *config, &log_line, &steady_ns);
+  if (!keeping) return report_error(keeping.error(), 1);
+  auto port = open_port(*config, options, signals.stop());
+  if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+  Service service;
+  if (options.standby) {
+    const auto takes_over =
+        stand_by(options, **simulation, **port, *config, *keeping, service, signals.stop());
+    if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
+    if (!*takes_over) return signals.finish(0);
   }
   const bool goes_on = config->goes_on_from != nullptr;
   HashLog hashes;
   if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
-    return report_error(opened.error(), 1);
+    return signals.finish(report_error(opened.error(), 1));
 
   Metrics metrics;
   if (options.metrics) {
     auto served =
         metrics.serve(*options.metrics, facts_of(*config, options.session, scene->name, options.free_rate));
-    if (!served) return report_error(served.error(), 1);
+    if (!served) return signals.finish(report_error(served.error(), 1));
   }
-  auto port = open_port(*config, options, signals.stop());
-  if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   const double frame_rate_hz = config->frame_rate_hz;
   const std::vector<host::StreamConfig> streams = config->streams;
   auto host = host::Host::create(std::move(*config), **simulation, **port);
@@ -343,13 +317,12 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   host::Publisher publisher((*host)->outbox(), **port);
   ScriptSender script(*scene, options);
   if (goes_on) script.skip_to((*host)->frame());
-  Keeping keeping(keeper.get(), **host);
   const Ending ending =
-      serve(**host, **port, script, hashes, keeping, publisher, metrics, options, signals.stop());
-  if (ending != Ending::kRefused) keeping.end();
+      serve(**host, **port, script, hashes, *keeping, publisher, metrics, service, options, signals.stop());
+  keeping->end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =
-      signals.finish(tell_end(**host, ending, hashes, keeping, streams, frame_rate_hz, options));
+      signals.finish(tell_end(**host, ending, hashes, *keeping, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {

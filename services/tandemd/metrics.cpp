@@ -184,6 +184,8 @@ const char* Metrics::obstacle(const Host& host, const host::Publisher& publisher
       return "another server has the session";
     case Host::State::kEnded:
       return "there are no more frames";
+    case Host::State::kHandedOver:
+      return "another server continues the session";
   }
   const double due_hz = facts_.frame_rate_hz;
   if (rate_.per_second() > 0 && rate_.per_second() >= kHeldShare * due_hz) return nullptr;

@@ -8,7 +8,6 @@
 #include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -18,6 +17,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/json/json.hpp"
+#include "services/system/descriptor.hpp"
 #include "services/tool/commands.hpp"
 
 namespace tandem::tool {
@@ -31,24 +31,9 @@ constexpr const char* kLoopbackUri =
     R"(<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/>)"
     R"(</Interfaces></General></Domain></CycloneDDS>)";
 
-/// A file descriptor with an owner.
-class Socket {
- public:
-  Socket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  ~Socket() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
-
 template <class T>
-bool set_option(const Socket& socket, int level, int option, const T& value) {
-  return ::setsockopt(socket.fd(), level, option, &value, sizeof value) == 0;
+bool set_option(const system::Descriptor& socket, int level, int option, const T& value) {
+  return ::setsockopt(socket.get(), level, option, &value, sizeof value) == 0;
 }
 
 // The sockets API wants its own address types seen as sockaddr.
@@ -59,14 +44,14 @@ sockaddr* as_sockaddr(T* address) {
 
 /// Whether a datagram sent to the group on this interface comes back to a member of the group.
 bool multicast_comes_back(const Interface& interface) {
-  Socket socket;
-  if (socket.fd() < 0) return false;
+  const system::Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (!socket.is_open()) return false;
   sockaddr_in local{};
   local.sin_family = AF_INET;
   local.sin_addr.s_addr = htonl(INADDR_ANY);
-  if (::bind(socket.fd(), as_sockaddr(&local), sizeof local) != 0) return false;
+  if (::bind(socket.get(), as_sockaddr(&local), sizeof local) != 0) return false;
   socklen_t length = sizeof local;
-  if (::getsockname(socket.fd(), as_sockaddr(&local), &length) != 0) return false;
+  if (::getsockname(socket.get(), as_sockaddr(&local), &length) != 0) return false;
   in_addr address{};
   ip_mreq membership{};
   if (::inet_pton(AF_INET, interface.address.c_str(), &address) != 1 ||
@@ -85,12 +70,12 @@ bool multicast_comes_back(const Interface& interface) {
   sockaddr_in group = local;
   group.sin_addr = membership.imr_multiaddr;
   const char probe[] = "tandem doctor";
-  if (::sendto(socket.fd(), probe, sizeof probe, 0, as_sockaddr(&group), sizeof group) != sizeof probe)
+  if (::sendto(socket.get(), probe, sizeof probe, 0, as_sockaddr(&group), sizeof group) != sizeof probe)
     return false;
-  pollfd waiting{socket.fd(), POLLIN, 0};
+  pollfd waiting{socket.get(), POLLIN, 0};
   if (::poll(&waiting, 1, 200) != 1) return false;
   char received[sizeof probe] = {};
-  return ::recv(socket.fd(), received, sizeof received, MSG_DONTWAIT) == sizeof probe &&
+  return ::recv(socket.get(), received, sizeof received, MSG_DONTWAIT) == sizeof probe &&
          std::memcmp(received, probe, sizeof probe) == 0;
 }
 

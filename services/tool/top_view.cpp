@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "sdk/transport/plain_text.hpp"
 #include "services/json/json.hpp"
 #include "services/tool/figures.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 constexpr std::int64_t kSilenceNs = 3'000'000'000;
 // A machine that floods the status topics must not fill this one's memory.
 constexpr std::size_t kMostShown = 4096;
+constexpr std::size_t kMostTextBytes = 64;
 
 const char* role_word(std::uint32_t role) {
   return role == static_cast<std::uint32_t>(transport::Role::kParticipant) ? "participant" : "observer";
@@ -29,14 +31,8 @@ double share_percent(const transport::ServerStatusMessage& s) {
   return s.raw_mbit_per_s > 0 ? 100 * s.mbit_per_s / s.raw_mbit_per_s : 0;
 }
 
-/// Names come from the network: what is not printable must not reach the terminal.
-std::string printable(const std::string& text) {
-  std::string clean = text.substr(0, 64);
-  for (char& c : clean) {
-    if (c < 0x20 || c > 0x7e) c = '?';
-  }
-  return clean;
-}
+/// Texts come from the network: control characters must not reach the terminal.
+std::string plain(std::string_view text) { return transport::plain_text(text, kMostTextBytes); }
 
 /// The names of byte counts in JSON; they share one object.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kBytes{
@@ -74,7 +70,7 @@ Json json_of(const transport::ClientStatusMessage& c) {
            {"lag_ms", c.lag_ms},
            {"too_slow", c.too_slow != 0},
            {"queue_high_water", c.queue_high_water},
-           {"stream_reason", printable(c.stream_reason)}};
+           {"stream_reason", plain(c.stream_reason)}};
   each_reported_figure([&out](const char* name, auto value) { out[name] = value; }, c);
   return out;
 }
@@ -146,7 +142,7 @@ bool TopView::several(const std::string& session) const {
 std::string TopView::stream_of(const transport::ClientStatusMessage& client) const {
   const auto heard = streams_.find({client.session, client.stream.id});
   if (heard == streams_.end()) return fmt::format("{}", client.stream.id);
-  return fmt::format("{} {}", client.stream.id, printable(heard->second.status.predictor));
+  return fmt::format("{} {}", client.stream.id, plain(heard->second.status.predictor));
 }
 
 std::string TopView::to_json() const {
@@ -172,13 +168,13 @@ std::string TopView::to_table() const {
     const transport::ServerStatusMessage& s = heard.status;
     text += fmt::format(
         "{:<20} {:>9} {:>6.1f} {:>8} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {:<20} {}, {}, {:.3g}\n",
-        several(key.first) ? fmt::format("{}/{}", printable(key.first), s.stream) : printable(key.first),
-        s.frame, s.frame_rate_hz, s.bodies, s.at_rest,
+        several(key.first) ? fmt::format("{}/{}", plain(key.first), s.stream) : plain(key.first), s.frame,
+        s.frame_rate_hz, s.bodies, s.at_rest,
         fmt::format("{:.2f} ({:.1f} %)", s.mbit_per_s, share_percent(s)), s.corrected_per_frame,
         s.frame_ms_p50, fmt::format("{}+{}", s.participants, s.observers), s.window, s.stalls,
         fmt::format("{} {} {} {}", short_bytes(s.delta_bytes), short_bytes(s.reply_bytes),
                     short_bytes(s.input_bytes), short_bytes(s.snapshot_bytes)),
-        printable(s.codec), printable(s.predictor), s.threshold);
+        plain(s.codec), plain(s.predictor), s.threshold);
   }
   text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}  {}\n",
                       "CLIENT", "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS",
@@ -187,9 +183,9 @@ std::string TopView::to_table() const {
     const transport::ClientStatusMessage& c = heard.status;
     text +=
         fmt::format("{:016x} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8.2f} {:>8.2f} {:>8.2f} {:>7} {:>6}  {}{}\n",
-                    c.client, printable(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
+                    c.client, plain(c.session), stream_of(c), role_word(c.role), phase_word(c.phase),
                     c.applied, c.lag_ms, c.client_ms_p50, c.mbit_per_s, c.resyncs, c.hash_mismatches,
-                    printable(c.stream_reason), c.too_slow != 0 ? "  too slow" : "");
+                    plain(c.stream_reason), c.too_slow != 0 ? "  too slow" : "");
   }
   return text;
 }

@@ -25,7 +25,8 @@ TIMELINE = TABLES + ["sdk/core/timeline"]
 FIGURES = ["public/client_figures.hpp", "public/server_figures.hpp"]
 CLIENT = ["sdk/client", "sdk/client/drawing", "sdk/client/following", "sdk/client/session"]
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
-HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/outgoing", "services/host/streams"]
+HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/keeping", "services/host/outgoing"]
+HOST += ["services/host/standbys", "services/host/streams"]
 LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
@@ -37,7 +38,7 @@ OF_LAB = (
     + CLIENT
     + HOST
     + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
-    + ["services/planning", "services/sessions", "services/tool", "services/workers"]
+    + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
 )
 EDGES = {
     "sdk/include": [],
@@ -63,13 +64,14 @@ EDGES = {
     "sdk/web/module": OF_CLIENT + CLIENT,
     "sdk/python": ["public"],
     "sdk/examples": ["public", "services/host/include"],
+    "services/system": [],
     "services/process": [],
     "services/commandline": [],
     "services/json": [],
-    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport"],
+    "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
-    "services/checkpoint": LAYOUT + ["sdk/transport"] + SIMULATION,
+    "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
     "services/planning": OF_HOST
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
@@ -77,6 +79,9 @@ EDGES = {
     "services/host/outgoing": OF_HOST,
     "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],
     "services/host/clients": OF_HOST + ["services/host/frames", "services/host/outgoing"],
+    "services/host/standbys": OF_HOST + ["services/host/clients", "services/host/frames", "services/host/outgoing"],
+    "services/host/keeping": OF_HOST + ["services/host/frames", "services/host"],
+    "services/standby": LAYOUT + ["sdk/transport", "services/checkpoint"] + SIMULATION,
     "services/host": OF_HOST + HOST,
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
@@ -86,25 +91,26 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
-    "services/recording": OF_CLIENT + CLIENT,
+    "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd": SIMULATION
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
-    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/workers"]
+    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
+    + ["services/workers"]
     + HOST,
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
-    "services/gateway/doors": ["public/result.hpp", "services/accounts"],
+    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process"],
+    + ["services/metrics", "services/process", "services/system"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/recording", "services/scenes"],
+    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
@@ -123,6 +129,7 @@ OWNERS = [
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
+    (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),

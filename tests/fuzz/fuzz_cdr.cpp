@@ -30,7 +30,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   constexpr void (*kChecks[])(std::span<const std::byte>) = {
       check<SessionMessage>,  check<DeltaMessage>,        check<ScheduledInputMessage>,
       check<SnapshotMessage>, check<ReplyMessage>,        check<InputMessage>,
-      check<AckMessage>,      check<ServerStatusMessage>, check<ClientStatusMessage>};
+      check<AckMessage>,      check<ServerStatusMessage>, check<ClientStatusMessage>,
+      check<JournalMessage>,  check<CheckpointMessage>,   check<StandbyMessage>,
+      check<CommandMessage>};
   kChecks[data[0] % std::size(kChecks)](std::as_bytes(std::span(data, size)).subspan(1));
   return 0;
 }

@@ -1,8 +1,8 @@
 #pragma once
 // The figures of a server. Each figure is written here once: as a line in a struct and as a line in the list
 // below the struct. The status message, the host's totals, tandem::Server, `tandemd --json`, the browser and
-// `tandem top` use the lists. CONTRIBUTING.md, "Where a new thing goes", says where else a new figure has to
-// be named and what checks it.
+// `tandem top` use the lists. In Tandem's sources, CONTRIBUTING.md says under "Where a new thing goes" where
+// else a new figure has to be named and what checks it.
 
 #include <cstdint>
 

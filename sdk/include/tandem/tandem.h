@@ -103,8 +103,7 @@ enum {
   TANDEM_INTERNAL = 16 /**< a fault of this library: please report its error text */
 };
 
-/** Returns the name of a result, such as "TANDEM_TIMEOUT". The name is never null and stays valid for ever.
- */
+/** Returns the name of a result, such as "TANDEM_TIMEOUT": never null, and valid for ever. */
 TANDEM_API const char* tandem_result_text(tandem_result result) TANDEM_NOEXCEPT;
 /** Describes this thread's last failed call in one line of at most 511 bytes. The line is empty before the
  * first failure. It is valid until the next call of this thread fails. */
@@ -162,8 +161,7 @@ typedef struct tandem_options {
   /** Which of the session's streams to play: "auto" (the fewest bits, if that costs this processor little),
    * "bandwidth" (the fewest bits), "computing" (the least computing), "error" (the smallest error), or a
    * stream's name. While it plays, the client changes to another stream if processor or link cannot follow,
-   * or if another stream suits the preference better. It never leaves a stream that was named. Null: "auto".
-   */
+   * or if another stream suits the preference better, but never leaves one that was named. Null: "auto". */
   const char* prefer;
 } tandem_options;
 /** The defaults. */
@@ -185,8 +183,7 @@ TANDEM_API tandem_result tandem_join(const tandem_options* options, tandem_clien
  * CYCLONEDDS_URI; DDS then needs no packet to stop. */
 TANDEM_API tandem_result tandem_leave(tandem_client client) TANDEM_NOEXCEPT;
 
-/** Updates a client that has no thread: takes what arrived, follows the session, and waits for the next thing
- * to do.
+/** Updates a client that has no thread: takes what arrived, follows the session, and waits for more to do.
  * @param wait_s  maximum wait, seconds; 0 or less: no wait
  * @return also TANDEM_WRONG_THREAD (the client has its own thread, or another thread is in this call) */
 TANDEM_API tandem_result tandem_update(tandem_client client, double wait_s) TANDEM_NOEXCEPT;
@@ -200,8 +197,7 @@ TANDEM_API tandem_result tandem_wait_until_playing(tandem_client client, double 
  * new preference needs another stream, the client changes to it while it plays. */
 TANDEM_API tandem_result tandem_prefer(tandem_client client, const char* prefer) TANDEM_NOEXCEPT;
 
-/** State of a client, and its figures since tandem_join(). Times are in milliseconds. Percentiles are over
- * all frames. */
+/** State of a client, and its figures since tandem_join(). Times are in ms, percentiles over all frames. */
 typedef struct tandem_status {
   uint32_t size;
   tandem_phase phase;
@@ -325,8 +321,7 @@ typedef struct tandem_frame {
   uint32_t capacity;          /**< slots of the session: each column received this many bodies */
   uint64_t epoch;             /**< one run of a server */
   double frame;               /**< the moment that is drawn, in frames */
-  double seconds_since_delta; /**< time since the last delta from the server: the drawn state is a guess for
-                                 so long */
+  double seconds_since_delta; /**< since the server's last delta: the drawn state is a guess for so long */
   uint32_t alive;             /**< slots that hold a body */
   uint32_t has_orientations;  /**< 1: the session has them. 0: its bodies are points */
   tandem_sample_mode mode;    /**< in force */
@@ -336,8 +331,7 @@ typedef struct tandem_frame {
 #define TANDEM_FRAME_INIT \
   { sizeof(tandem_frame), 0, 0, 0, 0, 0, 0, 0, 0 }
 
-/** Reads the clock of tandem_sample_options::at_ns: the system's monotonic clock (CLOCK_MONOTONIC),
- * nanoseconds. */
+/** Reads the clock of tandem_sample_options::at_ns: the system's CLOCK_MONOTONIC, nanoseconds. */
 TANDEM_API int64_t tandem_clock_ns(void) TANDEM_NOEXCEPT;
 
 /** Writes the bodies as they should be drawn at a moment. It never changes what the client holds. It may be
@@ -372,7 +366,7 @@ enum {
   TANDEM_EVENT_NEW_EPOCH = 11,     /**< another run of a server: `epoch`. The old epoch's state is void */
   TANDEM_EVENT_SESSION_BACK = 12,  /**< the server that was gone is back, in the same epoch */
   /** Input `number` did not act: the server went on from a frame before it (tandem_scene::continues_frame).
-   * Comes once, after TANDEM_EVENT_NEW_EPOCH, also where TANDEM_EVENT_INPUT_ACTED came in the epoch before. */
+   * Comes once, after TANDEM_EVENT_NEW_EPOCH, also if TANDEM_EVENT_INPUT_ACTED came in the epoch before. */
   TANDEM_EVENT_INPUT_LOST = 13
 };
 
@@ -385,10 +379,9 @@ typedef struct tandem_event {
   uint64_t epoch;
   int64_t at_ns;    /**< when the client recorded it, by tandem_clock_ns() */
   uint32_t reason;  /**< the server's reason: "Reasons" in idl/PROTOCOL.md */
-  uint32_t dropped; /**< events dropped between the previously taken one and this one, because the queue was
-                       full */
-  char text[256];   /**< for a human; may be empty. Of a refused input: the simulation's own words, if it gave
-                       some */
+  uint32_t dropped; /**< events that a full queue dropped between the previously taken one and this one */
+  char text[256];   /**< for a human; may be empty. If an input was refused, these are the simulation's own
+                       words, if it gave some */
 } tandem_event;
 /** An empty one, to be filled in. */
 #define TANDEM_EVENT_INIT                            \
@@ -472,8 +465,7 @@ typedef struct tandem_scene {
  * @return also TANDEM_MALFORMED (the server's description of the scene cannot be read) */
 TANDEM_API tandem_result tandem_get_scene(tandem_client client, tandem_scene* scene) TANDEM_NOEXCEPT;
 
-/** One part of the scene that does not move. Fields that its shape does not use are 0, orientation 0, 0, 0,
- * 1. */
+/** A part of the scene that does not move. Fields that its shape does not use are 0, orientation 0 0 0 1. */
 typedef struct tandem_solid {
   uint32_t size;
   tandem_shape shape;   /**< TANDEM_SHAPE_PLANE, _BOX or _SPHERE */
@@ -519,8 +511,7 @@ TANDEM_API tandem_result tandem_get_type(tandem_client client, uint32_t index,
 /** Writes all values of a type's shape, such as the points of a hull.
  * @param values    `capacity` floats; may be null if capacity is 0
  * @param count     receives how many there are, also with TANDEM_CAPACITY
- * @return also TANDEM_CAPACITY: there are more than `capacity`, which is not 0; the first ones were written
- */
+ * @return also TANDEM_CAPACITY: there are more than `capacity`, which is not 0; the first were written */
 TANDEM_API tandem_result tandem_get_type_values(tandem_client client, uint32_t index, float* values,
                                                 size_t capacity, size_t* count) TANDEM_NOEXCEPT;
 /** The size of an array that every name of a body fits into, with the 0 at its end. */
@@ -539,8 +530,7 @@ TANDEM_API tandem_result tandem_get_body_name(tandem_client client, uint32_t slo
 /** A watcher of a DDS domain. */
 typedef uint64_t tandem_browser;
 
-/** A session on a domain. What is not known yet is 0 or empty; the server publishes its status once a second.
- */
+/** A session on a domain. What is not known yet is 0 or empty; a server tells its status once a second. */
 typedef struct tandem_session_info {
   uint32_t size;
   uint32_t playable; /**< 1: tandem_join() can play it. 0: its version or codec is unknown here */
@@ -582,8 +572,7 @@ TANDEM_API tandem_result tandem_browser_open(uint32_t domain, tandem_browser* br
  * @param sessions  `capacity` structs, the first with its size; may be null if capacity is 0
  * @param capacity  maximum number of structs to write
  * @param count     receives how many there are, also with TANDEM_CAPACITY
- * @return also TANDEM_CAPACITY: there are more than `capacity`, which is not 0; the first ones were written
- */
+ * @return also TANDEM_CAPACITY: there are more than `capacity`, which is not 0; the first were written */
 TANDEM_API tandem_result tandem_browser_list(tandem_browser browser, tandem_session_info* sessions,
                                              size_t capacity, size_t* count) TANDEM_NOEXCEPT;
 /** Frees everything that the browser holds. Waits for calls of other threads with it. */

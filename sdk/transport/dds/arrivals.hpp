@@ -27,6 +27,8 @@ template <class M>
   if constexpr (std::is_same_v<M, SessionMessage>) return kMaxSampleBytes;
   if constexpr (std::is_same_v<M, DeltaMessage>) return kFieldBytes + limits.max_delta_bytes;
   if constexpr (std::is_same_v<M, SnapshotMessage>) return kFieldBytes + limits.max_snapshot_bytes;
+  if constexpr (std::is_same_v<M, CheckpointMessage>) return kFieldBytes + kMaxCheckpointPartBytes;
+  if constexpr (std::is_same_v<M, JournalMessage>) return kFieldBytes + kMaxDecisions * kMaxDecisionBytes;
   return kFieldBytes;
 }
 

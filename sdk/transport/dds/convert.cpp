@@ -244,4 +244,64 @@ dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& messag
   return dds_write(writer, &wire);
 }
 
+dds_return_t write_sample(dds_entity_t writer, const JournalMessage& message) {
+  std::vector<tandem_InputDecision> decisions;
+  decisions.reserve(message.decisions.size());
+  for (const InputDecision& decision : message.decisions) {
+    tandem_InputDecision wire{};
+    wire.client = decision.client;
+    wire.number = decision.number;
+    wire.frame = decision.frame;
+    wire.scheduled = decision.scheduled;
+    wire.code = decision.code;
+    wire.kind = decision.kind;
+    lend(wire.participant, decision.participant);
+    lend(wire.values, decision.values);
+    lend(wire.bytes, decision.bytes);
+    decisions.push_back(wire);
+  }
+  tandem_TandemJournal wire{};
+  wire.epoch = message.epoch;
+  wire.number = message.number;
+  wire.frame = message.frame;
+  wire.hash = message.hash;
+  wire.state = static_cast<std::uint32_t>(message.state);
+  lend(wire.decisions, decisions);
+  return dds_write(writer, &wire);
+}
+
+dds_return_t write_sample(dds_entity_t writer, const CheckpointMessage& message) {
+  tandem_TandemCheckpoint wire{};
+  wire.epoch = message.epoch;
+  wire.frame = message.frame;
+  wire.journal = message.journal;
+  wire.part = message.part;
+  wire.parts = message.parts;
+  wire.total_bytes = message.total_bytes;
+  lend(wire.bytes, message.bytes);
+  return dds_write(writer, &wire);
+}
+
+dds_return_t write_sample(dds_entity_t writer, const StandbyMessage& message) {
+  tandem_TandemStandby wire{};
+  wire.standby = message.standby;
+  wire.epoch = message.epoch;
+  wire.holds_frame = message.holds_frame;
+  wire.journal = message.journal;
+  wire.part_frame = message.part_frame;
+  wire.part_count = message.part_count;
+  wire.protocol_version = message.protocol_version;
+  wire.rank = message.rank;
+  lend(wire.missing, message.missing);
+  return dds_write(writer, &wire);
+}
+
+dds_return_t write_sample(dds_entity_t writer, const CommandMessage& message) {
+  tandem_TandemCommand wire{};
+  wire.epoch = message.epoch;
+  wire.kind = static_cast<std::uint32_t>(message.kind);
+  wire.session = lend(message.session);
+  return dds_write(writer, &wire);
+}
+
 }  // namespace tandem::transport::dds

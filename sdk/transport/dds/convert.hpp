@@ -4,6 +4,7 @@
 #include <dds/dds.h>
 
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/standby_messages.hpp"
 #include "tandem.h"  // generated from idl/tandem.idl
 
 namespace tandem::transport::dds {
@@ -18,5 +19,9 @@ namespace tandem::transport::dds {
 [[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const AckMessage& message);
 [[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const ServerStatusMessage& message);
 [[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const ClientStatusMessage& message);
+[[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const JournalMessage& message);
+[[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const CheckpointMessage& message);
+[[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const StandbyMessage& message);
+[[nodiscard]] dds_return_t write_sample(dds_entity_t writer, const CommandMessage& message);
 
 }  // namespace tandem::transport::dds

@@ -53,6 +53,8 @@ class Monitor {
   /// The status samples since the last call: at most the latest 8 of each server and client, oldest first.
   virtual void take(std::vector<Received<ServerStatusMessage>>& out) = 0;
   virtual void take(std::vector<Received<ClientStatusMessage>>& out) = 0;
+  /// Sends a command to the server of the session that it names.
+  virtual Result<void> write(const CommandMessage& message) = 0;
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
 };
 

@@ -1,4 +1,5 @@
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "sdk/transport/dds/announcements.hpp"
@@ -29,6 +30,15 @@ class DdsMonitor final : public Monitor {
   void take(std::vector<Received<ClientStatusMessage>>& out) override {
     endpoints_.clients.take(dropped_, out);
   }
+  // Its writer is made when it is needed, as most monitors only watch.
+  Result<void> write(const CommandMessage& message) override {
+    if (!command_) {
+      auto writer = endpoints_.node.writer<CommandMessage>("commands");
+      if (!writer) return tl::unexpected(writer.error());
+      command_.emplace(std::move(*writer));
+    }
+    return command_->write(message);
+  }
   void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
 
  private:
@@ -37,6 +47,7 @@ class DdsMonitor final : public Monitor {
   }
 
   Endpoints endpoints_;
+  std::optional<dds::Writer<CommandMessage>> command_;
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 

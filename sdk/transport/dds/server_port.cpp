@@ -2,6 +2,7 @@
 #include <deque>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -26,6 +27,8 @@ class DdsServerPort final : public ServerPort {
     dds::Announcements others;
     Reader<InputMessage> input;
     Reader<AckMessage> ack;
+    Reader<StandbyMessage> standby;
+    Reader<CommandMessage> command;
   };
 
   DdsServerPort(Endpoints endpoints, const DdsOptions& options)
@@ -121,7 +124,75 @@ class DdsServerPort final : public ServerPort {
   void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
   void wake() override { endpoints_.node.wake(); }
 
+  void take(std::vector<Received<StandbyMessage>>& out) override { endpoints_.standby.take(dropped_, out); }
+  void take(std::vector<Received<CommandMessage>>& out) override { endpoints_.command.take(dropped_, out); }
+  Result<void> open_standby(ClientId standby) override {
+    if (standbys_.contains(standby)) return {};
+    auto checkpoints = endpoints_.node.writer<CheckpointMessage>(
+        "checkpoints", Topic<CheckpointMessage>::kQos.writer_depth, client_partition(session_, standby));
+    if (!checkpoints) return tl::unexpected(checkpoints.error());
+    auto journal = journal_ ? Result<Writer<JournalMessage>>(fail(ErrorCode::kConflict, ""))
+                            : endpoints_.node.writer<JournalMessage>("journal");
+    if (!journal_ && !journal) return tl::unexpected(journal.error());
+    const std::scoped_lock lock(clients_mutex_);
+    if (!journal_) journal_.emplace(std::move(*journal));
+    standbys_.emplace(standby, std::move(*checkpoints));
+    return {};
+  }
+  void close_standby(ClientId standby) override {
+    const std::scoped_lock lock(clients_mutex_);
+    standbys_.erase(standby);
+  }
+  [[nodiscard]] bool follows(const ParticipantId& participant, ClientId standby) override {
+    const std::scoped_lock lock(clients_mutex_);
+    const auto own = standbys_.find(standby);
+    return own != standbys_.end() && reads(own->second.get(), participant) &&
+           reads(journal_->get(), participant);
+  }
+  Result<void> write(const JournalMessage& message) override {
+    if (!journal_) return fail(ErrorCode::kInvalidArgument, "nobody stands by");
+    return journal_->write(message);
+  }
+  Result<void> write(ClientId to, const CheckpointMessage& message) override {
+    const auto own = standbys_.find(to);
+    if (own == standbys_.end()) return fail(ErrorCode::kInvalidArgument, "a standby that is not open");
+    return own->second.write(message);
+  }
+
+  Result<void> follow(ClientId standby) override {
+    auto journal = endpoints_.node.reader<JournalMessage>("journal");
+    if (!journal) return tl::unexpected(journal.error());
+    auto checkpoints = endpoints_.node.reader<CheckpointMessage>(
+        "checkpoints", {.partitions = {client_partition(session_, standby)}});
+    if (!checkpoints) return tl::unexpected(checkpoints.error());
+    auto progress = endpoints_.node.writer<StandbyMessage>("standby");
+    if (!progress) return tl::unexpected(progress.error());
+    following_.emplace(Following{std::move(*journal), std::move(*checkpoints), std::move(*progress)});
+    return {};
+  }
+  void unfollow() override {
+    if (!following_) return;
+    // Deleting a writer would wait for acknowledgements of the server that is gone.
+    former_progress_.emplace(std::move(following_->progress));
+    following_.reset();
+  }
+  void take(std::vector<Received<JournalMessage>>& out) override {
+    if (following_) following_->journal.take(dropped_, out);
+  }
+  void take(std::vector<Received<CheckpointMessage>>& out) override {
+    if (following_) following_->checkpoints.take(dropped_, out);
+  }
+  Result<void> write(const StandbyMessage& message) override {
+    if (!following_) return fail(ErrorCode::kOutOfOrder, "this server does not stand by");
+    return following_->progress.write(message);
+  }
+
  private:
+  struct Following {
+    Reader<JournalMessage> journal;
+    Reader<CheckpointMessage> checkpoints;
+    Writer<StandbyMessage> progress;
+  };
   struct Client {
     Writer<SnapshotMessage> snapshot;
     Writer<ReplyMessage> reply;
@@ -177,12 +248,16 @@ class DdsServerPort final : public ServerPort {
   std::string session_;
   std::int32_t delta_depth_;
   std::vector<Writer<DeltaMessage>> streams_;
-  // Only the writing thread changes this, so it reads without the lock.
+  // Only the writing thread changes these, so it reads without the lock.
   std::map<ClientId, Client> clients_;
+  std::optional<Writer<JournalMessage>> journal_;
+  std::map<ClientId, Writer<CheckpointMessage>> standbys_;
   std::mutex clients_mutex_;
   std::set<ClientId> asked_for_;    // used by the writing thread: clients whose writers exist or are tried
                                     // again
   std::deque<ClientId> strangers_;  // used by the writing thread
+  std::optional<Following> following_;
+  std::optional<Writer<StandbyMessage>> former_progress_;
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
@@ -200,17 +275,19 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   auto others = dds::Announcements::create(*node, {.ignore_own = true, .watched = false});
   auto input = node->reader<InputMessage>("inputs");
   auto ack = node->reader<AckMessage>("acknowledgements");
+  auto standby = node->reader<StandbyMessage>("standbys");
+  auto command = node->reader<CommandMessage>("commands");
   const Error* failed = nullptr;
   const auto check = [&failed](const auto& part) {
     if (!part && failed == nullptr) failed = &part.error();
   };
   check(session), check(scheduled), check(reply), check(status);
-  check(others), check(input), check(ack);
+  check(others), check(input), check(ack), check(standby), check(command);
   if (failed != nullptr) return tl::unexpected(*failed);
   auto port = std::make_unique<DdsServerPort>(
       DdsServerPort::Endpoints{std::move(*node), std::move(*session), std::move(*scheduled),
                                std::move(*reply), std::move(*status), std::move(*others), std::move(*input),
-                               std::move(*ack)},
+                               std::move(*ack), std::move(*standby), std::move(*command)},
       options);
   if (auto opened = port->open_streams(1); !opened) return tl::unexpected(opened.error());
   return port;

@@ -1,5 +1,5 @@
 #pragma once
-// The nine topics, each with its generated type and QoS. Reasons: idl/PROTOCOL.md, "Topics".
+// The topics, each with its generated type and QoS. Reasons: idl/PROTOCOL.md, "Topics".
 
 #include <dds/dds.h>
 
@@ -74,6 +74,28 @@ template <>
 struct Topic<ClientStatusMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemClientStatus_desc; }
   static constexpr TopicQos kQos{false, false, 1, 1, 8};
+};
+
+template <>
+struct Topic<JournalMessage> {
+  static const dds_topic_descriptor_t& descriptor() { return tandem_TandemJournal_desc; }
+  static constexpr TopicQos kQos{true, false, 4096, 4096, 4096};
+};
+template <>
+struct Topic<CheckpointMessage> {
+  static const dds_topic_descriptor_t& descriptor() { return tandem_TandemCheckpoint_desc; }
+  // Without a lifespan the repetitions would fill a thin link, as with snapshots.
+  static constexpr TopicQos kQos{true, false, 256, 1024, 1024, 0, DDS_MSECS(300)};
+};
+template <>
+struct Topic<StandbyMessage> {
+  static const dds_topic_descriptor_t& descriptor() { return tandem_TandemStandby_desc; }
+  static constexpr TopicQos kQos{true, false, 1, 16, 16};
+};
+template <>
+struct Topic<CommandMessage> {
+  static const dds_topic_descriptor_t& descriptor() { return tandem_TandemCommand_desc; }
+  static constexpr TopicQos kQos{true, false, 1, 1, 8};
 };
 
 /// The QoS of a writer (`depth` samples of history) or of a reader. A reader leaves `lease` infinite and so

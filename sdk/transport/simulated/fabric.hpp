@@ -20,7 +20,8 @@ namespace tandem::transport::simulated {
 /// Any message; its index() is the topic.
 using AnyMessage =
     std::variant<SessionMessage, DeltaMessage, ScheduledInputMessage, SnapshotMessage, ReplyMessage,
-                 InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage>;
+                 InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage, JournalMessage,
+                 CheckpointMessage, StandbyMessage, CommandMessage>;
 template <class M, class... Messages>
 [[nodiscard]] constexpr std::size_t topic_in(const std::variant<Messages...>* /*type*/) {
   std::size_t index = 0;

@@ -16,6 +16,8 @@ constexpr std::uint32_t kScheduledDepth = 4096;
 constexpr std::uint32_t kInputDepth = 64;
 constexpr std::uint32_t kSnapshotWriterDepth = 64;
 constexpr std::uint32_t kSnapshotReaderDepth = 4096;
+constexpr std::uint32_t kJournalDepth = 4096;
+constexpr std::uint32_t kCheckpointDepth = 256;
 
 /// The common part of both kinds of port: a participant and its samples.
 class Member {
@@ -91,7 +93,9 @@ class SimulatedServerPort final : public ServerPort {
         status_(member_.writer<ServerStatusMessage>()),
         others_(member_.reader<SessionMessage>(kSessionReaderDepth)),
         input_(member_.reader<InputMessage>(kInputDepth)),
-        ack_(member_.reader<AckMessage>(16)) {
+        ack_(member_.reader<AckMessage>(16)),
+        standby_(member_.reader<StandbyMessage>(16)),
+        command_(member_.reader<CommandMessage>(8)) {
     open_stream();
   }
 
@@ -162,9 +166,66 @@ class SimulatedServerPort final : public ServerPort {
   [[nodiscard]] std::uint64_t dropped() const override { return member_.dropped(); }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
+  void take(std::vector<Received<StandbyMessage>>& out) override { member_.take(standby_, Limits{}, out); }
+  void take(std::vector<Received<CommandMessage>>& out) override { member_.take(command_, Limits{}, out); }
+  Result<void> open_standby(ClientId standby) override {
+    if (!journal_) journal_ = member_.writer<JournalMessage>(kJournalDepth);
+    if (!standbys_.contains(standby))
+      standbys_.emplace(standby, member_.writer<CheckpointMessage>(
+                                     kCheckpointDepth, client_partition(member_.session(), standby)));
+    return {};
+  }
+  void close_standby(ClientId standby) override {
+    const auto own = standbys_.find(standby);
+    if (own == standbys_.end()) return;
+    member_.fabric().close_writer(own->second);
+    standbys_.erase(own);
+  }
+  [[nodiscard]] bool follows(const ParticipantId& participant, ClientId standby) override {
+    const auto own = standbys_.find(standby);
+    return own != standbys_.end() && member_.fabric().reaches(own->second, participant) &&
+           member_.fabric().reaches(*journal_, participant);
+  }
+  Result<void> write(const JournalMessage& message) override {
+    if (!journal_) return fail(ErrorCode::kInvalidArgument, "nobody stands by");
+    return member_.fabric().write(*journal_, 0, message);
+  }
+  Result<void> write(ClientId to, const CheckpointMessage& message) override {
+    const auto own = standbys_.find(to);
+    if (own == standbys_.end()) return fail(ErrorCode::kInvalidArgument, "a standby that is not open");
+    return member_.fabric().write(own->second, 0, message);
+  }
+  Result<void> follow(ClientId standby) override {
+    following_ =
+        Following{member_.reader<JournalMessage>(kJournalDepth),
+                  member_.reader<CheckpointMessage>(1024, {client_partition(member_.session(), standby)}),
+                  member_.writer<StandbyMessage>()};
+    return {};
+  }
+  void unfollow() override {
+    if (!following_) return;
+    member_.fabric().close_reader(following_->journal);
+    member_.fabric().close_reader(following_->checkpoints);
+    member_.fabric().close_writer(following_->progress);
+    following_.reset();
+  }
+  void take(std::vector<Received<JournalMessage>>& out) override {
+    if (following_) member_.take(following_->journal, Limits{}, out);
+  }
+  void take(std::vector<Received<CheckpointMessage>>& out) override {
+    if (following_) member_.take(following_->checkpoints, Limits{}, out);
+  }
+  Result<void> write(const StandbyMessage& message) override {
+    if (!following_) return fail(ErrorCode::kOutOfOrder, "this server does not stand by");
+    return member_.fabric().write(following_->progress, message.standby, message);
+  }
+
  private:
   struct Client {
     Fabric::Index snapshot = 0, reply = 0;
+  };
+  struct Following {
+    Fabric::Index journal = 0, checkpoints = 0, progress = 0;
   };
   void open_stream() {
     const auto stream = static_cast<std::uint32_t>(streams_.size());
@@ -178,9 +239,12 @@ class SimulatedServerPort final : public ServerPort {
   Member member_;
   std::uint32_t delta_depth_;
   Fabric::Index session_, scheduled_, reply_, status_;
-  Fabric::Index others_, input_, ack_;
+  Fabric::Index others_, input_, ack_, standby_, command_;
   std::vector<Fabric::Index> streams_;  // their delta writers
   std::map<ClientId, Client> clients_;
+  std::optional<Fabric::Index> journal_;
+  std::map<ClientId, Fabric::Index> standbys_;  // their writers of checkpoints
+  std::optional<Following> following_;
   SessionBook book_;
 };
 
@@ -298,6 +362,19 @@ class SimulatedClientPort final : public ClientPort {
   SessionBook book_;
 };
 
+class SimulatedCommandPort final : public CommandPort {
+ public:
+  SimulatedCommandPort(std::shared_ptr<Fabric> fabric, const std::string& session)
+      : member_(std::move(fabric), session), command_(member_.writer<CommandMessage>()) {}
+  Result<void> write(const CommandMessage& message) override {
+    return member_.fabric().write(command_, 0, message);
+  }
+
+ private:
+  Member member_;
+  Fabric::Index command_;
+};
+
 }  // namespace
 
 Network::Network(const NetworkOptions& options) : fabric_(std::make_shared<Fabric>(options)) {}
@@ -315,6 +392,11 @@ Result<std::unique_ptr<ClientPort>> Network::make_client(const std::string& sess
                                                          std::uint32_t delta_depth) {
   if (auto named = check_session_name(session); !named) return tl::unexpected(named.error());
   return std::make_unique<SimulatedClientPort>(fabric_, session, delta_depth);
+}
+
+Result<std::unique_ptr<CommandPort>> Network::make_commander(const std::string& session) {
+  if (auto named = check_session_name(session); !named) return tl::unexpected(named.error());
+  return std::make_unique<SimulatedCommandPort>(fabric_, session);
 }
 
 void Network::set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link) {

@@ -60,6 +60,13 @@ struct NetworkCounts {
   std::uint64_t damaged = 0;
 };
 
+/// Sends commands to servers, as an operator's tool does. They are lost before the two have found each other.
+class CommandPort {
+ public:
+  virtual ~CommandPort() = default;
+  virtual Result<void> write(const CommandMessage&) = 0;
+};
+
 class Fabric;
 
 /// Makes ports and moves the clock. The same calls with the same seed give the same deliveries.
@@ -89,6 +96,8 @@ class Network {
                                                                 std::uint32_t delta_depth = 64);
   [[nodiscard]] Result<std::unique_ptr<ClientPort>> make_client(const std::string& session,
                                                                 std::uint32_t delta_depth = 64);
+
+  [[nodiscard]] Result<std::unique_ptr<CommandPort>> make_commander(const std::string& session);
 
   /// Changes the link in this direction from now on.
   void set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 
 namespace tandem::gateway {
@@ -64,8 +66,9 @@ bool Admission::origin_fits(std::string_view origin, std::string_view host) cons
 
 Result<std::string> read_token(const std::string& path) {
   std::ifstream in(path);
+  if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
   std::string token;
-  if (!in || !std::getline(in, token))
+  if (!std::getline(in, token))
     return fail(ErrorCode::kIo, fmt::format("{}: cannot be read, or is empty", path));
   if (token.size() < kLeastToken || token.size() > kMostToken ||
       !std::ranges::all_of(token, is_token_character)) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "services/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::gateway {
@@ -16,19 +17,14 @@ class Listener {
  public:
   /// Port 0: any free one. Errors: kIo.
   [[nodiscard]] static Result<Listener> open(const std::string& address, std::uint16_t port);
-  Listener(Listener&& other) noexcept;
-  Listener(const Listener&) = delete;
-  Listener& operator=(const Listener&) = delete;
-  Listener& operator=(Listener&&) = delete;
-  ~Listener();
 
-  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] int fd() const { return socket_.get(); }
   [[nodiscard]] std::uint16_t port() const;
 
   enum class Outcome : std::uint8_t { kNothing, kConnection, kNoDescriptor };
   struct Accepted {
     Outcome outcome = Outcome::kNothing;
-    int fd = -1;  ///< the caller's; does not block
+    system::Descriptor connection;  ///< does not block
     sockaddr_storage peer{};
   };
   /// Without a free descriptor (kNoDescriptor) the connection was closed by means of one in reserve, or waits
@@ -36,10 +32,16 @@ class Listener {
   [[nodiscard]] Accepted accept();
 
  private:
-  explicit Listener(int fd);
-  int fd_ = -1;
-  int reserve_ = -1;
+  explicit Listener(system::Descriptor socket);
+  system::Descriptor socket_;
+  system::Descriptor reserve_;
 };
+
+/// Answers a new connection by HTTP with 429 (too many requests), as far as that needs no waiting.
+void say_too_many(const system::Descriptor& connection);
+
+/// Limits how much of a connection waits in the kernel, so that what is sent next is decided late.
+void keep_little_unsent(int connection);
 
 /// Raises the process's limit of descriptors, as far as it may, to what so many connections need. Returns how
 /// many connections fit.

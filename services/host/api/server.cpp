@@ -9,9 +9,8 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
-#include "services/checkpoint/keeper.hpp"
-#include "services/host/frames/going_on.hpp"
 #include "services/host/host.hpp"
+#include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/planning/plan.hpp"
 
@@ -88,37 +87,18 @@ Result<host::HostConfig> configure(const ServerOptions& options, const engine::S
   });
 }
 
-/// Null without a folder.
-Result<std::unique_ptr<checkpoint::Keeper>> begin(const ServerOptions& options,
-                                                  engine::Simulation& simulation, host::HostConfig& config) {
-  if (options.checkpoint_dir.empty()) return nullptr;
-  auto keeper = checkpoint::Keeper::open(
-      {options.checkpoint_dir, options.checkpoint_interval_s, options.checkpoint_required}, &steady_ns);
-  if (!keeper) return keeper;
-  const auto start = (*keeper)->start(host::checkpoint_world(config), simulation);
-  if (!start) return tl::unexpected(start.error());
-  const auto log = [&options](const std::string& line) {
-    if (options.log) options.log("checkpoint: " + line);
-  };
-  for (const std::string& warning : start->warnings) log(warning);
-  log(start->told);
-  host::begin_from(*start, config);
-  return keeper;
-}
-
 }  // namespace
 
 struct Server::Impl {
-  Impl(const ServerOptions& options, std::unique_ptr<checkpoint::Keeper> the_keeper,
+  Impl(const ServerOptions& options, host::Keeping the_keeping,
        std::unique_ptr<transport::ServerPort> the_port, std::unique_ptr<host::Host> the_host)
       : log(options.log),
-        keeper(std::move(the_keeper)),
+        keeping(std::move(the_keeping)),
         port(std::move(the_port)),
         host(std::move(the_host)),
-        publisher(host->outbox(), *port),
-        capture([this](checkpoint::Checkpoint& out) { host->capture(out); }) {}
+        publisher(host->outbox(), *port) {}
   ~Impl() {
-    if (keeper && ran && host->state() != host::Host::State::kRefused) keeper->end(steady_ns(), capture);
+    keeping.end(*host);
     publisher.flush();
   }
   Impl(const Impl&) = delete;
@@ -127,7 +107,8 @@ struct Server::Impl {
   Impl& operator=(Impl&&) = delete;
 
   [[nodiscard]] bool over() const {
-    return host->state() == host::Host::State::kRefused || host->state() == host::Host::State::kEnded;
+    return host->state() == host::Host::State::kRefused || host->state() == host::Host::State::kEnded ||
+           host->state() == host::Host::State::kHandedOver;
   }
   bool poll(std::int64_t longest_ns) {
     if (polling) {
@@ -143,15 +124,12 @@ struct Server::Impl {
     if (over() || publisher.gave_up()) return false;
     const std::int64_t now_ns = steady_ns();
     const bool produced = host->poll(now_ns, wall_ns());
-    ran = ran || produced;
-    if (keeper && produced) keeper->after_frame(now_ns, capture);
+    keeping.after_poll(*host, produced, now_ns);
     for (const std::string& line : host->take_notices())
       if (log) log(line);
-    if (keeper) {
-      for (const std::string& line : keeper->take_notices(now_ns))
-        if (log) log("checkpoint: " + line);
-    }
     if (over()) {
+      if (host->state() == host::Host::State::kHandedOver)
+        error = {ErrorCode::kConflict, "the session was handed over to a server that stood by"};
       error = host->error().value_or(error);
       return false;
     }
@@ -165,12 +143,10 @@ struct Server::Impl {
   }
 
   std::function<void(std::string_view)> log;
-  std::unique_ptr<checkpoint::Keeper> keeper;
+  host::Keeping keeping;
   std::unique_ptr<transport::ServerPort> port;
   std::unique_ptr<host::Host> host;
   host::Publisher publisher;  // after outbox and port, as it stops before they are destroyed
-  std::function<void(checkpoint::Checkpoint&)> capture;
-  bool ran = false;  // a frame was made
   bool polling = false;
   Error error{ErrorCode::kOutOfOrder, "the session goes on"};
 };
@@ -189,13 +165,19 @@ Result<Server> Server::start(const ServerOptions& options, engine::Simulation& s
   dds.domain = options.domain;
   dds.session = options.session;
   dds.delta_depth = transport::delta_depth(config->frame_rate_hz, config->window_ceiling, *largest);
-  auto keeper = begin(options, simulation, *config);
-  if (!keeper) return tl::unexpected(keeper.error());
+  auto keeping = host::Keeping::begin(
+      {options.checkpoint_dir, options.checkpoint_interval_s, options.checkpoint_required}, simulation,
+      *config,
+      [log = options.log](const std::string& line, bool /*warning*/) {
+        if (log) log(line);
+      },
+      &steady_ns);
+  if (!keeping) return tl::unexpected(keeping.error());
   auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
   auto host = host::Host::create(std::move(*config), simulation, **port);
   if (!host) return tl::unexpected(host.error());
-  return Server(std::make_unique<Impl>(options, std::move(*keeper), std::move(*port), std::move(*host)));
+  return Server(std::make_unique<Impl>(options, std::move(*keeping), std::move(*port), std::move(*host)));
 }
 
 bool Server::poll(double wait_s) { return impl_ != nullptr && impl_->poll(to_ns(wait_s, 1)); }
@@ -236,10 +218,9 @@ ServerStatus Server::status() const {
   status.frame_ms_p99 = totals.frame_ms_p99;
   status.continues_epoch = host.session().continues_epoch;
   status.continues_frame = host.session().continues_frame;
-  if (impl_->keeper) {
-    const checkpoint::Figures figures = impl_->keeper->figures(steady_ns());
-    status.checkpoints = figures.written;
-    status.checkpoint_age_s = figures.age_s;
+  if (const auto figures = impl_->keeping.figures()) {
+    status.checkpoints = figures->written;
+    status.checkpoint_age_s = figures->age_s;
   }
   return status;
 }

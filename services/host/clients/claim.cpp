@@ -68,8 +68,13 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
   std::erase_if(behind_since_, [this](const auto& entry) {
     return std::ranges::none_of(others_, [&](const Other& o) { return o.from == entry.first; });
   });
+  has_successor_ = std::ranges::any_of(others_, [this](const Other& other) {
+    return other.message.server_role == transport::ServerRole::kLive &&
+           other.message.continues_epoch == epoch_;
+  });
   for (const Other& other : others_) {
     if (other.from == self_ || other.message.server_role != transport::ServerRole::kLive) continue;
+    if (other.from == ignored_ && (!announced_ns_ || now_ns - *announced_ns_ < kIgnoredNs)) continue;
     if (!gives_way(other, now_ns)) {
       note(other, notices, now_ns);
       continue;

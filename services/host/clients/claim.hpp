@@ -30,9 +30,17 @@ class Claim {
   /// Epochs that are closer than this do not tell which server was first.
   static constexpr std::int64_t kOlderMs = 2000;
 
+  /// The time for a server to leave after it has handed over.
+  static constexpr std::int64_t kIgnoredNs = 5'000'000'000;
+
   Claim(Epoch epoch, const transport::ParticipantId& self) : epoch_(epoch), self_(self) {}
 
   void announced(std::int64_t now_ns) { announced_ns_ = now_ns; }
+  /// This server takes over from that one. It has no claim before this server has announced itself for
+  /// kIgnoredNs.
+  void ignore(const transport::ParticipantId& server) { ignored_ = server; }
+  /// True if, at the last check(), a live server continued this server's epoch.
+  [[nodiscard]] bool has_successor() const { return has_successor_; }
   /// Notes an acknowledgement, whatever its content.
   void acknowledged(Epoch epoch, const transport::ParticipantId& from, std::int64_t now_ns);
   /// Returns kConflict, naming the other server, if this server has to give way. A server that this one does
@@ -54,6 +62,8 @@ class Claim {
   Epoch epoch_;
   transport::ParticipantId self_;
   std::optional<std::int64_t> announced_ns_;
+  std::optional<transport::ParticipantId> ignored_;
+  bool has_successor_ = false;
   std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
                                                                 // kFollowedNs
   std::map<transport::ParticipantId, std::int64_t> behind_since_;

@@ -43,6 +43,8 @@ Reason InputDesk::handle(Account& account, Peer& peer, const transport::InputMes
   }
   InputVerdict verdict = decide(account, peer, input, now_ns);
   if (verdict.reason != Reason::kNone) refused_.add(verdict.reason);
+  journal_->decided({input.client, input.number}, account.from,
+                    {.kind = input.kind, .values = input.values, .bytes = input.bytes}, verdict);
   entry.frame = verdict.acts_on;
   entry.code = static_cast<std::uint32_t>(verdict.reason);
   account.inputs.highest = input.number;
@@ -59,6 +61,23 @@ InputVerdict InputDesk::decide(Account& account, Peer& peer, const transport::In
   if (!well_formed(input)) return {Reason::kInvalid};
   return source_->accept({.kind = input.kind, .values = input.values, .bytes = input.bytes},
                          {input.client, input.number, now_ns, &peer.inputs}, *outbox_);
+}
+
+Result<Frame> InputDesk::inject(const engine::Input& input, Frame next, std::int64_t now_ns) {
+  const InputVerdict verdict = source_->accept(input, {}, *outbox_);
+  switch (verdict.reason) {
+    case Reason::kNone:
+      journal_->decided({}, {}, input, verdict);
+      journal_->write(next, now_ns);
+      return verdict.acts_on;
+    case Reason::kInvalid:
+      return fail(ErrorCode::kInvalidArgument,
+                  "the simulation refuses this input" + (verdict.text.empty() ? "" : ": " + verdict.text));
+    case Reason::kRecording:
+      return fail(ErrorCode::kUnsupported, "nothing is simulated here");
+    default:
+      return fail(ErrorCode::kCapacity, "too many inputs at once");
+  }
 }
 
 }  // namespace tandem::host

@@ -1,6 +1,7 @@
 #include "services/host/clients/moment.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace tandem::host {
 
@@ -14,11 +15,12 @@ HostMoment host_moment(const Roster& roster, const FrameSource& source, const Ou
   const StreamSet active = source.active();
   const transport::SessionMessage& session = source.session();
   moment.streams.resize(session.streams.size());
+  bool counted = false;  // the bodies, which are the same in all streams
   for (std::uint32_t id = 0; id < moment.streams.size(); ++id) {
     StreamMoment& stream = moment.streams[id];
     stream.threshold_m = source.parameters(id).codec.threshold * session.lattice_unit;
     if (!active[id]) continue;
-    moment.bodies = source.agreed(id).alive_count();
+    if (!std::exchange(counted, true)) moment.bodies = source.agreed(id).alive_count();
     stream.at_rest = source.agreed(id).rest_count();
     const PositionError error = source.error_of(id);
     stream.error_rms_m = error.rms;

@@ -32,6 +32,8 @@ struct ServiceConfig {
                                          ///< seats
   std::int64_t claim_ns = kSecond / 2;   ///< how long to look for another server before announcing
   Outbox::Limits outbox;
+  /// The server that this one takes over from. It may still be heard for a while and has no claim then.
+  std::optional<transport::ParticipantId> takes_over_from;
 
   /// For measurement only: a monotonic clock in nanoseconds. Without a clock all durations read 0, and deltas
   /// are stamped with the time at which their frame started.

@@ -33,6 +33,7 @@ struct InputVerdict {
   transport::Reason reason = transport::Reason::kNone;  ///< kNone: it acts
   Frame acts_on = 0;                                    ///< the frame that it acts on
   std::string text = {};                                ///< the words of a simulation that refuses it
+  std::uint64_t scheduled = 0;                          ///< number of its scheduled input; 0: none
 };
 
 /// A subset of a session's streams, by their ids.
@@ -77,9 +78,6 @@ class FrameSource {
 
   /// The name of a stream, for logs and figures; empty if it has none.
   [[nodiscard]] virtual std::string name(std::uint32_t stream) const { return std::to_string(stream); }
-  /// Decides an input of the server itself. Returns the frame that it acts on. Errors: kInvalidArgument (the
-  /// simulation refuses it), kCapacity, kUnsupported.
-  virtual Result<Frame> inject(const engine::Input& /*input*/, Outbox& /*outbox*/) { return unsupported(); }
   /// Sets parameters from the next frame on, as Stream::set_parameters(). Errors: those of that function;
   /// kOutOfOrder for a stream that is not made now; kUnsupported.
   virtual Result<void> set_parameters(std::uint32_t /*stream*/, const StreamParameters& /*parameters*/) {
@@ -88,6 +86,9 @@ class FrameSource {
   /// Copies all that a checkpoint holds of the frames, right after one was made; the clients are the host's.
   /// Keeps the memory that `out` has.
   virtual void capture(checkpoint::Checkpoint& /*out*/) const {}
+  /// The hash of the simulation's bodies on the lattice at frame(), by which a server that stands by knows
+  /// that it makes the same; 0 where there is no simulation.
+  [[nodiscard]] virtual std::uint64_t bodies_hash() { return 0; }
   /// Lines for a log since the last call.
   [[nodiscard]] virtual std::vector<std::string> take_notices(std::int64_t /*now_ns*/) { return {}; }
   /// The error that ended the frames; empty if they did not end by an error.

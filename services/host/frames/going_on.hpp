@@ -12,4 +12,7 @@ namespace tandem::host {
 /// Has the session begin as `start` says. Its epoch is above that of every checkpoint.
 void begin_from(const checkpoint::Start& start, HostConfig& config);
 
+/// The same for a server that stood by and takes over from the server `from`: it announces itself at once.
+void begin_takeover(checkpoint::Start start, const transport::ParticipantId& from, HostConfig& config);
+
 }  // namespace tandem::host

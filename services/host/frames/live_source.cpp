@@ -259,20 +259,7 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
       .source_number = origin.number,
       .kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive),
       .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping}});
-  return {queued ? Reason::kNone : Reason::kRateLimited, frame};
-}
-
-Result<Frame> LiveSource::inject(const engine::Input& input, Outbox& outbox) {
-  const InputVerdict verdict = accept(input, {}, outbox);
-  switch (verdict.reason) {
-    case Reason::kNone:
-      return verdict.acts_on;
-    case Reason::kInvalid:
-      return fail(ErrorCode::kInvalidArgument,
-                  "the simulation refuses this input" + (verdict.text.empty() ? "" : ": " + verdict.text));
-    default:
-      return fail(ErrorCode::kCapacity, "too many inputs at once");
-  }
+  return {queued ? Reason::kNone : Reason::kRateLimited, frame, {}, scheduled.number};
 }
 
 Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters& parameters) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/core/lattice/hash.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/frames/recent_senders.hpp"
@@ -45,9 +46,9 @@ class LiveSource final : public FrameSource {
   bool refresh_names() override;
 
   [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
-  Result<Frame> inject(const engine::Input& input, Outbox& outbox) override;
   Result<void> set_parameters(std::uint32_t id, const StreamParameters& parameters) override;
   void capture(checkpoint::Checkpoint& out) const override;
+  [[nodiscard]] std::uint64_t bodies_hash() override { return bodies_hasher_.hash(mirror_.target()); }
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns) override;
   [[nodiscard]] std::optional<Error> error() const override { return error_; }
 
@@ -109,6 +110,7 @@ class LiveSource final : public FrameSource {
   std::vector<std::string> refusals_;              // not told yet
   std::int64_t told_budget_ns_ = INT64_MIN / 2;
   RecentSenders senders_;
+  StateHasher bodies_hasher_;
   std::int64_t noted_mishaps_ns_ = -kSecond;
   engine::Mishaps noted_mishaps_;
   bool names_are_old_ = true;

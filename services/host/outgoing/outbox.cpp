@@ -18,6 +18,10 @@ std::uint32_t* Outbox::count_of(const Outgoing& message, std::uint32_t& limit) {
     limit = limits_.snapshots;
     return &snapshots_;
   }
+  if (std::holds_alternative<CheckpointPart>(message)) {
+    limit = limits_.checkpoints;
+    return &checkpoints_;
+  }
   limit = limits_.control;
   return &control_;
 }
@@ -35,6 +39,11 @@ bool Outbox::has_control_room() const {
 bool Outbox::has_snapshot_room() const {
   const std::scoped_lock lock(mutex_);
   return snapshots_ < limits_.snapshots;
+}
+
+bool Outbox::has_checkpoint_room() const {
+  const std::scoped_lock lock(mutex_);
+  return checkpoints_ < limits_.checkpoints;
 }
 
 void Outbox::weigh(const Outgoing& message) {
@@ -109,6 +118,14 @@ struct Write {
   }
   Result<void> operator()(const SnapshotPart& snapshot) const {
     return port.write(snapshot.client, snapshot.part);
+  }
+  Result<void> operator()(const OpenStandby& open) const { return port.open_standby(open.standby); }
+  Result<void> operator()(const CloseStandby& close) const {
+    port.close_standby(close.standby);
+    return {};
+  }
+  Result<void> operator()(const CheckpointPart& checkpoint) const {
+    return port.write(checkpoint.standby, checkpoint.part);
   }
   template <class M>
   Result<void> operator()(const M& sample) const {

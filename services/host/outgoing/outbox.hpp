@@ -29,21 +29,37 @@ struct SnapshotPart {
   transport::SnapshotMessage part;
 };
 
+/// Asks the publisher to open the writers for a server that stands by.
+struct OpenStandby {
+  transport::ClientId standby = 0;
+};
+/// Asks the publisher to close the writer for a server that stands by.
+struct CloseStandby {
+  transport::ClientId standby = 0;
+};
+/// One part of a checkpoint for one server that stands by.
+struct CheckpointPart {
+  transport::ClientId standby = 0;
+  transport::CheckpointMessage part;
+};
+
 /// Marks the end of a frame: all its deltas, one for each stream that is made, are in front of this.
 struct EndOfFrame {};
 
 using Outgoing = std::variant<transport::SessionMessage, transport::DeltaMessage,
                               transport::ScheduledInputMessage, SnapshotPart, transport::ReplyMessage,
-                              transport::ServerStatusMessage, OpenClient, CloseClient, EndOfFrame>;
+                              transport::ServerStatusMessage, OpenClient, CloseClient, OpenStandby,
+                              CloseStandby, transport::JournalMessage, CheckpointPart, EndOfFrame>;
 
 /// First in, first out over all kinds of messages, so that an input that is issued before a delta leaves
 /// before it. Thread-safe for one producer and one consumer.
 class Outbox {
  public:
   struct Limits {
-    std::uint32_t frames = 8;       ///< frames, whatever their number of streams and parts
-    std::uint32_t snapshots = 512;  ///< parts of snapshots
-    std::uint32_t control = 1024;   ///< everything else
+    std::uint32_t frames = 8;        ///< frames, whatever their number of streams and parts
+    std::uint32_t snapshots = 512;   ///< parts of snapshots
+    std::uint32_t checkpoints = 64;  ///< parts of checkpoints
+    std::uint32_t control = 1024;    ///< everything else
   };
   explicit Outbox(const Limits& limits) : limits_(limits) {}
 
@@ -52,6 +68,7 @@ class Outbox {
   [[nodiscard]] bool has_frame_room() const;
   [[nodiscard]] bool has_control_room() const;
   [[nodiscard]] bool has_snapshot_room() const;
+  [[nodiscard]] bool has_checkpoint_room() const;
   /// Queues a message. Returns false and queues nothing if the message's kind is at its limit. The deltas of
   /// a frame count once, with the frame's end; check has_frame_room() before the first.
   [[nodiscard]] bool push(Outgoing message);
@@ -80,7 +97,7 @@ class Outbox {
   std::condition_variable ready_;
   Limits limits_;
   std::deque<Outgoing> queue_;
-  std::uint32_t frames_ = 0, snapshots_ = 0, control_ = 0;
+  std::uint32_t frames_ = 0, snapshots_ = 0, checkpoints_ = 0, control_ = 0;
   std::size_t high_water_ = 0;
   Traffic traffic_;
   transport::Bytes cdr_;  // kept to reuse its memory

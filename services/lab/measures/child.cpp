@@ -87,8 +87,8 @@ std::string find_server() {
 Result<Child> Child::start(const std::vector<std::string>& arguments, const ChildPlace& place) {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) return failure("pipe");
-  Descriptor out(ends[0]);
-  const Descriptor in(ends[1]);
+  system::Descriptor out(ends[0]);
+  const system::Descriptor in(ends[1]);
   const Prepared program(arguments, place);
   const pid_t parent = getpid();
   const pid_t pid = fork();

@@ -44,11 +44,11 @@ class Child {
   Result<std::string> finish(std::chrono::seconds at_most, const std::atomic<bool>& stop);
 
  private:
-  Child(pid_t pid, Descriptor out) : pid_(pid), out_(std::move(out)) {}
+  Child(pid_t pid, system::Descriptor out) : pid_(pid), out_(std::move(out)) {}
   void kill_it();
 
   pid_t pid_;
-  Descriptor out_;
+  system::Descriptor out_;
   double cpu_ms_ = 0;
 };
 

@@ -26,6 +26,8 @@
 namespace tandem::lab {
 namespace {
 
+using system::Descriptor;
+
 constexpr const char* kDevice = "tandem0";
 constexpr std::size_t kMostPacketBytes = 65536;
 
@@ -122,17 +124,8 @@ struct Way {
 
 }  // namespace
 
-Descriptor::~Descriptor() {
-  if (fd_ >= 0) close(fd_);
-}
-Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  return *this;
-}
-int Descriptor::release() { return std::exchange(fd_, -1); }
-
 Result<Enclave> make_enclave(const std::string& address) {
-  Result<Enclave> made{Enclave{Descriptor(), Descriptor()}};
+  Result<Enclave> made{Enclave{}};
   std::jthread([&] { made = make_here(address); }).join();
   return made;
 }

@@ -7,30 +7,15 @@
 #include <thread>
 
 #include "sdk/transport/simulated/bottleneck.hpp"
+#include "services/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {
 
-/// A file descriptor that the destructor closes.
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor();
-  Descriptor(Descriptor&& other) noexcept : fd_(other.release()) {}
-  Descriptor& operator=(Descriptor&& other) noexcept;
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-  int release();
-
- private:
-  int fd_;
-};
-
 /// A network namespace with `lo` and one device, `tandem0`, whose packets come out of a descriptor.
 struct Enclave {
-  Descriptor name_space;  ///< for setns()
-  Descriptor device;
+  system::Descriptor name_space;  ///< for setns()
+  system::Descriptor device;
 };
 
 /// `address`: the IPv4 address of its device in 10.77.0.0/24. Errors: kIo, which names what was not

@@ -86,7 +86,7 @@ std::optional<SyscallCounter> SyscallCounter::start(const ProcessReading& proces
 
 std::uint64_t SyscallCounter::calls() const {
   std::uint64_t sum = 0;
-  for (const Descriptor& counter : counters_) {
+  for (const system::Descriptor& counter : counters_) {
     std::uint64_t calls = 0;
     if (read(counter.get(), &calls, sizeof calls) == sizeof calls) sum += calls;
   }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "services/lab/measures/enclave.hpp"
+#include "services/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {
@@ -47,7 +47,7 @@ class SyscallCounter {
   [[nodiscard]] std::uint64_t calls() const;
 
  private:
-  std::vector<Descriptor> counters_;
+  std::vector<system::Descriptor> counters_;
 };
 
 }  // namespace tandem::lab

@@ -65,7 +65,8 @@ class DdsCdr : public ::testing::Test {
 
 using Messages =
     ::testing::Types<SessionMessage, DeltaMessage, ScheduledInputMessage, SnapshotMessage, ReplyMessage,
-                     InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage>;
+                     InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage, JournalMessage,
+                     CheckpointMessage, StandbyMessage, CommandMessage>;
 TYPED_TEST_SUITE(DdsCdr, Messages);
 
 TYPED_TEST(DdsCdr, OurBytesAreThoseOfCycloneDds) {

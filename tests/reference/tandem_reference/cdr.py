@@ -78,6 +78,24 @@ TYPES = {
         ("uint64", "frames_applied"), ("uint64", "resyncs"), ("uint64", "hash_mismatches"), ("uint64", "inputs_sent"),
         ("uint64", "inputs_refused"), ("string", "session"), ("string", "stream_reason"),
     ],
+    "InputDecision": [
+        ("uint64", "client"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "scheduled"), ("uint32", "code"),
+        ("uint32", "kind"), ("[octet]", "participant"), ("[double]", "values"), ("[octet]", "bytes"),
+    ],
+    "TandemJournal": [
+        ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "hash"), ("uint32", "state"),
+        ("[InputDecision]", "decisions"),
+    ],
+    "TandemCheckpoint": [
+        ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "journal"), ("uint32", "part"), ("uint32", "parts"),
+        ("uint32", "total_bytes"), ("[octet]", "bytes"),
+    ],
+    "TandemStandby": [
+        ("uint64", "standby"), ("uint64", "epoch"), ("uint64", "holds_frame"), ("uint64", "journal"),
+        ("uint64", "part_frame"), ("uint32", "part_count"), ("uint32", "protocol_version"), ("uint32", "rank"),
+        ("[uint32]", "missing"),
+    ],
+    "TandemCommand": [("uint64", "epoch"), ("uint32", "kind"), ("string", "session")],
 }  # fmt: skip
 TOPICS = [name for name in TYPES if name.startswith("Tandem")]
 

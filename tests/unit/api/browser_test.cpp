@@ -27,6 +27,7 @@ class FakeMonitor final : public transport::Monitor {
     out = std::exchange(domain_.statuses, {});
   }
   void take(std::vector<transport::Received<transport::ClientStatusMessage>>& /*out*/) override {}
+  Result<void> write(const transport::CommandMessage& /*message*/) override { return {}; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
  private:

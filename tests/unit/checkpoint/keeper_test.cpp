@@ -73,7 +73,7 @@ class KeeperTest : public ::testing::Test {
         out.engine_state = {static_cast<std::byte>(frame)};
       });
     }
-    EXPECT_EQ((*keeper)->figures(clock_ns()).written, frames.size());
+    EXPECT_EQ((*keeper)->figures(clock_ns())->written, frames.size());
   }
   Result<Start> start(engine::Simulation& simulation, World of = world(), bool required = false) {
     auto keeper = Keeper::open(settings(required), &clock_ns);
@@ -169,10 +169,10 @@ TEST_F(KeeperTest, AFolderThatVanishesIsMadeAgainAndOneThatCannotBeIsTold) {
     const auto capture = [](Checkpoint& out) { out = sample(); };
     fs::remove_all(folder_);
     (*keeper)->end(clock_ns(), capture);
-    EXPECT_EQ((*keeper)->figures(clock_ns()).written, 1U);
+    EXPECT_EQ((*keeper)->figures(clock_ns())->written, 1U);
     fs::remove_all(parent);
     for (int i = 0; i < 3; ++i) (*keeper)->end(clock_ns(), capture);
-    EXPECT_EQ((*keeper)->figures(clock_ns()).failed, 3U);
+    EXPECT_EQ((*keeper)->figures(clock_ns())->failed, 3U);
     const auto lines = (*keeper)->take_notices(clock_ns());
     ASSERT_EQ(lines.size(), 1U);
     EXPECT_NE(
@@ -194,7 +194,7 @@ TEST_F(KeeperTest, AFrameIsNotKeptWaitingWhileACheckpointIsUnderWay) {
   ASSERT_TRUE((*keeper)->start(world(), simulation));
   int copies = 0;
   for (std::int64_t now = 0; now < 10'000'000'000; now += 33'333'333)
-    (*keeper)->after_frame(now, [&](Checkpoint& out) { out = sample(1000, static_cast<Frame>(++copies)); });
+    (*keeper)->after_frame(now, false, [&](Checkpoint& out) { out = sample(1000, static_cast<Frame>(++copies)); });
   EXPECT_GE(copies, 1);
   EXPECT_LE(copies, 20) << "two a second, if the disk is slow";
 }

@@ -139,10 +139,38 @@ class FakePort final : public transport::ServerPort {
   [[nodiscard]] bool ended(const transport::ParticipantId& id) override { return gone.contains(id); }
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
+  void take(std::vector<transport::Received<transport::StandbyMessage>>& out) override {
+    move(standbys, out);
+  }
+  void take(std::vector<transport::Received<transport::CommandMessage>>& out) override {
+    move(commands, out);
+  }
+  Result<void> open_standby(transport::ClientId standby) override {
+    standby_writers.insert(standby);
+    return {};
+  }
+  void close_standby(transport::ClientId standby) override { standby_writers.erase(standby); }
+  [[nodiscard]] bool follows(const transport::ParticipantId& id, transport::ClientId standby) override {
+    return standby_writers.contains(standby) && !unmatched.contains(id);
+  }
+  Result<void> write(const transport::JournalMessage& m) override { return keep(journal, m, "journal"); }
+  Result<void> write(transport::ClientId /*to*/, const transport::CheckpointMessage& m) override {
+    return keep(checkpoints, m, "checkpoint");
+  }
+  Result<void> follow(transport::ClientId /*standby*/) override { return {}; }
+  void unfollow() override {}
+  void take(std::vector<transport::Received<transport::JournalMessage>>& /*out*/) override {}
+  void take(std::vector<transport::Received<transport::CheckpointMessage>>& /*out*/) override {}
+  Result<void> write(const transport::StandbyMessage& /*m*/) override { return {}; }
 
   std::vector<transport::Received<transport::SessionMessage>> rivals;
   std::vector<transport::Received<transport::InputMessage>> inputs;
   std::vector<transport::Received<transport::AckMessage>> acks;
+  std::vector<transport::Received<transport::StandbyMessage>> standbys;
+  std::vector<transport::Received<transport::CommandMessage>> commands;
+  std::vector<transport::JournalMessage> journal;
+  std::vector<transport::CheckpointMessage> checkpoints;
+  std::set<transport::ClientId> standby_writers;
   std::set<transport::ParticipantId> unmatched, dead, gone;
   std::vector<transport::SessionMessage> sessions;
   std::vector<transport::DeltaMessage> deltas;

@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 
 #include "sdk/core/codec/codec.hpp"
@@ -32,16 +29,6 @@ std::string refusal(const std::function<void(Config&)>& spoil) {
   const auto options = check_config(config);
   return options ? "" : options.error().message;
 }
-
-class ConfigFile : public ::testing::Test {
- protected:
-  ~ConfigFile() override { std::remove(path.c_str()); }
-  void write(const std::string& text) const { std::ofstream(path) << text; }
-  std::string path = (std::filesystem::temp_directory_path() /
-                      ("tandem-options-" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
-                       "-" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".textproto"))
-                         .string();
-};
 
 TEST(Options, DefaultsAreThoseOfTheManual) {
   const auto options = check_config(least());
@@ -214,47 +201,6 @@ TEST(Options, WhatDependedOnADisplacedChoiceInTheFileGoesWithIt) {
   EXPECT_TRUE(check_config(merge(flags, file)));
   flags.set_codec("limited");
   EXPECT_EQ(merge(flags, file).budget_bytes(), 1000U);
-}
-
-TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
-  write(
-      "scene: \"cube\" bodies: 500 session: \"arena\" window: \"4\" scripted: true seed: 9 duration: 2.5\n");
-  const std::string flag = "--config=" + path;
-  const char* arguments[] = {"tandemd", flag.c_str(), "--bodies", "300", "--json"};
-  const CommandLine command = parse_command_line(5, arguments);
-  ASSERT_TRUE(command.options);
-  EXPECT_EQ(command.options->scene, "cube");
-  EXPECT_EQ(command.options->choice.bodies, 300U) << "the flag wins";
-  EXPECT_EQ(command.options->session, "arena");
-  EXPECT_EQ(command.options->window, 4U);
-  EXPECT_TRUE(command.options->scripted);
-  EXPECT_EQ(command.options->seed, 9U);
-  EXPECT_EQ(command.options->duration_s, 2.5);
-  EXPECT_TRUE(command.options->json);
-}
-
-TEST_F(ConfigFile, AMistakeIsNamedWithFileLineAndField) {
-  write("scene: \"cube\"\nbodys: 500\n");
-  const auto unknown = load_config(path);
-  ASSERT_FALSE(unknown);
-  EXPECT_EQ(unknown.error().code, ErrorCode::kMalformed);
-  EXPECT_NE(unknown.error().message.find(path + ":2:"), std::string::npos) << unknown.error().message;
-  EXPECT_NE(unknown.error().message.find("bodys"), std::string::npos) << unknown.error().message;
-  write("bodies: \"many\"\n");
-  EXPECT_FALSE(load_config(path));
-}
-
-TEST_F(ConfigFile, AFileThatIsNotThereIsAnError) {
-  const auto missing = load_config(path + ".missing");
-  ASSERT_FALSE(missing);
-  EXPECT_EQ(missing.error().code, ErrorCode::kIo);
-}
-
-TEST_F(ConfigFile, ADirectoryIsAnErrorThatNamesIt) {
-  const auto folder = load_config("/tmp");
-  ASSERT_FALSE(folder);
-  EXPECT_EQ(folder.error().code, ErrorCode::kIo);
-  EXPECT_NE(folder.error().message.find("/tmp: cannot be read"), std::string::npos);
 }
 
 TEST(CommandLineOf, UnknownFlagsAndMissingValuesAreUsageErrors) {

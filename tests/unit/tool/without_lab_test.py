@@ -1,4 +1,4 @@
-"""`tandem` built without the evaluation, as the Debian package has it: it says so, and does not offer it."""
+"""`tandem` built without the evaluation, as the quickstart builds it: it says so, and does not offer it."""
 
 import subprocess
 import sys

@@ -11,7 +11,8 @@ template <class M>
 class Cdr : public ::testing::Test {};
 using Messages =
     ::testing::Types<SessionMessage, DeltaMessage, ScheduledInputMessage, SnapshotMessage, ReplyMessage,
-                     InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage>;
+                     InputMessage, AckMessage, ServerStatusMessage, ClientStatusMessage, JournalMessage,
+                     CheckpointMessage, StandbyMessage, CommandMessage>;
 TYPED_TEST_SUITE(Cdr, Messages);
 
 template <class M>

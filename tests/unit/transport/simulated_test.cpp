@@ -1,103 +1,13 @@
+// Tests what the simulated network does to samples.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <string>
 
-#include "sdk/transport/simulated/network.hpp"
+#include "tests/unit/transport/simulated_pair.hpp"
 
 namespace tandem::transport::simulated {
 namespace {
-
-constexpr std::int64_t kMs = 1'000'000;
-constexpr Epoch kEpoch = 7;
-constexpr ClientId kClient = 77;
-
-SessionMessage session(Epoch epoch = kEpoch) {
-  SessionMessage message;
-  message.session = "s";
-  message.epoch = epoch;
-  message.capacity = 10;
-  message.lattice_unit = 1;
-  message.types.resize(1);
-  message.streams.resize(1);
-  message.streams[0].layout.capacity = message.capacity;
-  message.streams[0].max_delta_bytes = 100;
-  message.streams[0].max_snapshot_bytes = 100;
-  return message;
-}
-
-Result<void> open_stream(ClientPort& port, const SessionMessage& about = session(),
-                         ClientId client = kClient) {
-  return port.open_stream(about, about.streams[0], client);
-}
-
-DeltaMessage delta(Frame frame) {
-  DeltaMessage message;
-  message.epoch = kEpoch;
-  message.frame = frame;
-  return message;
-}
-
-ScheduledInputMessage scheduled(std::uint64_t number) {
-  ScheduledInputMessage message;
-  message.epoch = kEpoch;
-  message.number = number;
-  return message;
-}
-
-SnapshotMessage snapshot(Frame frame) {
-  SnapshotMessage message;
-  message.epoch = kEpoch;
-  message.frame = frame;
-  message.bytes.resize(1);
-  message.total_bytes = 1;
-  return message;
-}
-
-AckMessage ack(ClientId client, Frame applied) {
-  AckMessage message;
-  message.client = client;
-  message.applied = applied;
-  return message;
-}
-
-template <class M, class Port>
-std::vector<Received<M>> take(Port& port) {
-  std::vector<Received<M>> out;
-  port.take(out);
-  return out;
-}
-
-std::vector<Frame> frames(ClientPort& port) {
-  std::vector<Frame> out;
-  for (const auto& received : take<DeltaMessage>(port)) out.push_back(received.message.frame);
-  return out;
-}
-
-std::vector<Frame> range(Frame first, Frame last) {
-  std::vector<Frame> out;
-  for (Frame frame = first; frame <= last; ++frame) out.push_back(frame);
-  return out;
-}
-
-/// A server and a client that have found each other.
-struct Pair {
-  explicit Pair(const NetworkOptions& options, std::uint32_t delta_depth = 64)
-      : network(options),
-        server(std::move(*network.make_server("s", delta_depth))),
-        client(std::move(*network.make_client("s", delta_depth))) {
-    EXPECT_TRUE(server->write(session()));
-    EXPECT_TRUE(open_stream(*client));
-    EXPECT_TRUE(client->open_snapshots(0));
-    EXPECT_TRUE(server->open_client(kClient));
-    run(100 * kMs);
-    EXPECT_TRUE(server->joined(client->self(), kClient, 0));
-  }
-  void run(std::int64_t duration_ns) { network.advance_to(network.now_ns() + duration_ns); }
-  Network network;
-  std::unique_ptr<ServerPort> server;
-  std::unique_ptr<ClientPort> client;
-};
 
 TEST(Simulated, NothingArrivesBeforeTheDelayOfItsLink) {
   NetworkOptions options;
@@ -338,98 +248,6 @@ TEST(Simulated, StatusIsBestEffortAndOnlyEverLost) {
   EXPECT_EQ(pair.network.counts().repaired, 0U);
 }
 
-TEST(Simulated, AKilledClientIsNoticedAfterTheLeaseAndAClosedOneAtOnce) {
-  Pair pair(NetworkOptions{});
-  auto second = std::move(*pair.network.make_client("s"));
-  pair.run(100 * kMs);
-  const ParticipantId first_id = pair.client->self();
-  const ParticipantId second_id = second->self();
-  ASSERT_TRUE(pair.server->alive(second_id));
-  pair.network.kill(first_id);
-  second.reset();
-  EXPECT_FALSE(pair.server->alive(second_id));
-  pair.run(999 * kMs);
-  EXPECT_TRUE(pair.server->alive(first_id));
-  pair.run(kMs);
-  EXPECT_FALSE(pair.server->alive(first_id));
-  EXPECT_FALSE(pair.server->joined(first_id, kClient, 0));
-  EXPECT_FALSE(pair.client->write(ack(1, 1)));
-}
-
-TEST(Simulated, ClientsNoticeTheEndOfAServerAndTheNextOne) {
-  Pair pair(NetworkOptions{});
-  EXPECT_TRUE(pair.client->server_alive());
-  pair.network.kill(pair.server->self());
-  const auto next = std::move(*pair.network.make_server("s"));
-  ASSERT_TRUE(next->write(session(kEpoch + 1)));
-  std::vector<Received<SessionMessage>> sessions;
-  pair.client->take_sessions(sessions);
-  sessions.clear();
-  pair.run(100 * kMs);
-  pair.client->take_sessions(sessions);
-  EXPECT_TRUE(sessions.empty()) << "the lease of the first has not run out";
-  EXPECT_TRUE(pair.client->server_alive());
-  pair.run(1000 * kMs);
-  EXPECT_FALSE(pair.client->server_alive());
-  pair.client->take_sessions(sessions);
-  ASSERT_EQ(sessions.size(), 1U);
-  EXPECT_EQ(sessions[0].message.epoch, kEpoch + 1);
-  ASSERT_TRUE(open_stream(*pair.client, session(kEpoch + 1)));
-  EXPECT_TRUE(pair.client->server_alive());
-}
-
-TEST(Simulated, AFrozenClientGetsAfterwardsWhatTheServerStillKeeps) {
-  Pair pair(NetworkOptions{}, 8);
-  pair.network.set_frozen(pair.client->self(), true);
-  for (Frame frame = 1; frame <= 20; ++frame) {
-    ASSERT_TRUE(pair.server->write(delta(frame)));
-    pair.run(100 * kMs);
-  }
-  EXPECT_FALSE(pair.server->alive(pair.client->self()));
-  pair.network.set_frozen(pair.client->self(), false);
-  EXPECT_TRUE(pair.server->alive(pair.client->self()));
-  pair.run(100 * kMs);
-  EXPECT_EQ(frames(*pair.client), range(13, 20));
-}
-
-TEST(Simulated, ACutLinkDeliversNothingUntilMended) {
-  Pair pair(NetworkOptions{});
-  const auto other = std::move(*pair.network.make_client("s"));
-  ASSERT_TRUE(open_stream(*other));
-  pair.run(100 * kMs);
-  pair.network.set_cut(pair.server->self(), pair.client->self(), true);
-  ASSERT_TRUE(pair.server->write(delta(1)));
-  ASSERT_TRUE(pair.client->write(ack(1, 1)));
-  pair.run(2000 * kMs);
-  EXPECT_TRUE(frames(*pair.client).empty());
-  EXPECT_TRUE(take<AckMessage>(*pair.server).empty());
-  EXPECT_FALSE(pair.client->server_alive());
-  EXPECT_EQ(frames(*other), range(1, 1));
-  EXPECT_TRUE(other->server_alive());
-  pair.network.set_cut(pair.server->self(), pair.client->self(), false);
-  pair.run(100 * kMs);
-  EXPECT_EQ(frames(*pair.client), range(1, 1));
-  EXPECT_EQ(take<AckMessage>(*pair.server).size(), 1U);
-  EXPECT_TRUE(pair.client->server_alive());
-}
-
-TEST(Simulated, AServerSeesOthersButNotItself) {
-  Network network(NetworkOptions{});
-  const auto first = std::move(*network.make_server("s"));
-  const auto second = std::move(*network.make_server("s"));
-  const auto elsewhere = std::move(*network.make_server("t"));
-  ASSERT_TRUE(first->write(session(1)));
-  ASSERT_TRUE(second->write(session(2)));
-  network.advance_to(100 * kMs);
-  std::vector<Received<SessionMessage>> sessions;
-  first->take_sessions(sessions);
-  ASSERT_EQ(sessions.size(), 1U);
-  EXPECT_EQ(sessions[0].from, second->self());
-  sessions.clear();
-  elsewhere->take_sessions(sessions);
-  EXPECT_TRUE(sessions.empty());
-}
-
 TEST(Simulated, SamplesThatBreakALimitAreDroppedAndCounted) {
   Pair pair(NetworkOptions{});
   DeltaMessage large = delta(1);
@@ -498,69 +316,6 @@ TEST(Simulated, OpeningTheStreamForAnotherEpochDropsWhatWasBuffered) {
   pair.run(100 * kMs);
   EXPECT_TRUE(frames(*pair.client).empty());
   EXPECT_EQ(take<ScheduledInputMessage>(*pair.client).size(), 1U) << "kept by the server for new readers";
-}
-
-TEST(Bottleneck, PacketsLeaveOneAfterTheOtherAtItsRate) {
-  Bottleneck link({.bits_per_s = 8e6, .delay_ns = 5 * kMs, .queue_ns = 50 * kMs});
-  EXPECT_EQ(link.offer(0, 1000), 6 * kMs) << "1 ms to leave, 5 ms on its way";
-  EXPECT_EQ(link.offer(0, 2000), 8 * kMs) << "waits for the first";
-  EXPECT_EQ(link.offer(100 * kMs, 1000), 106 * kMs) << "an idle link saves nothing up";
-  EXPECT_EQ(link.bytes(), 4000U);
-}
-
-TEST(Bottleneck, DropsWhatWouldWaitTooLongAndNothingElse) {
-  Bottleneck link({.bits_per_s = 8e6, .delay_ns = 0, .queue_ns = 50 * kMs});
-  int taken = 0;
-  while (link.offer(0, 1000)) ++taken;
-  EXPECT_EQ(taken, 51) << "the one that leaves, and 50 ms of others";
-  EXPECT_EQ(link.dropped(), 1U);
-  EXPECT_FALSE(link.offer(0, 1));
-  EXPECT_TRUE(link.offer(2 * kMs, 1000)) << "there is room as soon as packets have left";
-  EXPECT_EQ(link.dropped(), 2U);
-}
-
-TEST(Bottleneck, CarriesItsRateHoweverMuchIsOffered) {
-  Bottleneck link({});  // 15e6 bit/s, 50 ms
-  for (std::int64_t ms = 0; ms < 10'000; ++ms) {
-    for (int i = 0; i < 3; ++i) static_cast<void>(link.offer(ms * kMs, 1400));  // 33.6e6 bit/s
-  }
-  EXPECT_NEAR(8 * static_cast<double>(link.bytes()) / 10, 15e6, 0.01 * 15e6);
-}
-
-TEST(Bottleneck, IsSharedByAllPathsThatNameIt) {
-  NetworkOptions options;
-  options.link.delay_ns = 0;
-  options.link.bottleneck = std::make_shared<Bottleneck>(BottleneckOptions{8e6, kMs, 1000 * kMs});
-  Network network(options);
-  const auto server = std::move(*network.make_server("s", 64));
-  std::vector<std::unique_ptr<ClientPort>> clients;
-  auto about = session();
-  about.streams[0].max_delta_bytes = 10'000;
-  EXPECT_TRUE(server->write(about));
-  for (int i = 0; i < 2; ++i) {
-    clients.push_back(std::move(*network.make_client("s", 64)));
-    EXPECT_TRUE(open_stream(*clients.back(), about));
-  }
-  network.advance_to(100 * kMs);
-  DeltaMessage large = delta(1);
-  large.payload.resize(9'850);  // 10,000 bytes with what goes around it: 10 ms
-  EXPECT_TRUE(server->write(large));
-  network.advance_to(112 * kMs);
-  EXPECT_EQ(frames(*clients[0]).size() + frames(*clients[1]).size(), 1U);
-  network.advance_to(122 * kMs);
-  EXPECT_EQ(frames(*clients[0]).size() + frames(*clients[1]).size(), 1U) << "the second waited for the first";
-}
-
-TEST(Bottleneck, WhatItDropsIsRepairedLater) {
-  NetworkOptions options;
-  options.link.delay_ns = 0;
-  options.link.repair_ns = 20 * kMs;
-  options.link.bottleneck = std::make_shared<Bottleneck>(BottleneckOptions{8e5, kMs, 5 * kMs});
-  Pair pair(options, 1000);
-  for (Frame frame = 1; frame <= 20; ++frame) ASSERT_TRUE(pair.server->write(delta(frame)));
-  pair.run(1000 * kMs);
-  EXPECT_EQ(frames(*pair.client), range(1, 20));
-  EXPECT_GT(options.link.bottleneck->dropped(), 0U);
 }
 
 /// A busy session under every kind of trouble; what everybody received, as text.

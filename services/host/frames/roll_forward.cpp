@@ -1,0 +1,96 @@
+#include "services/host/frames/roll_forward.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "sdk/core/lattice/hash.hpp"
+#include "services/host/streams/mirror.hpp"
+
+namespace tandem::host {
+namespace {
+
+using checkpoint::Checkpoint;
+using checkpoint::ClientState;
+
+// What a client was told, as the roster keeps it.
+void remember(Checkpoint& world, const transport::InputDecision& decision) {
+  transport::ParticipantId from;
+  std::memcpy(from.bytes.data(), decision.participant.data(), from.bytes.size());
+  auto known = std::ranges::find_if(world.clients, [&](const ClientState& client) {
+    return client.id == decision.client && client.from == from;
+  });
+  if (known == world.clients.end()) {
+    world.clients.push_back({.id = decision.client, .from = from, .highest = 0, .outcomes = {}});
+    known = world.clients.end() - 1;
+  }
+  known->highest = std::max(known->highest, decision.number);
+  if (known->outcomes.size() >= transport::kReplyRing) known->outcomes.erase(known->outcomes.begin());
+  known->outcomes.push_back({decision.number, decision.frame, decision.code});
+}
+
+void decide(Checkpoint& world, const transport::InputDecision& decision) {
+  if (decision.client != 0) remember(world, decision);
+  if (decision.code != static_cast<std::uint32_t>(transport::Reason::kNone)) return;
+  engine::Input input{.kind = decision.kind, .values = decision.values, .bytes = decision.bytes};
+  if (decision.scheduled == 0) {
+    world.immediate.push_back(std::move(input));
+    return;
+  }
+  world.scheduled.push_back({decision.scheduled, decision.frame, std::move(input)});
+  world.last_input = decision.scheduled;
+}
+
+// In the order of LiveSource.
+void apply(Checkpoint& world, engine::Simulation& simulation) {
+  const auto later = std::ranges::find_if(
+      world.scheduled, [&](const checkpoint::Scheduled& waiting) { return waiting.frame > world.frame + 1; });
+  for (auto it = world.scheduled.begin(); it != later; ++it) simulation.apply(it->input);
+  world.scheduled.erase(world.scheduled.begin(), later);
+  for (const engine::Input& input : world.immediate) simulation.apply(input);
+  world.immediate.clear();
+}
+
+}  // namespace
+
+Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& simulation, Checkpoint from,
+                                std::span<const transport::JournalMessage> journal) {
+  Checkpoint world = std::move(from);
+  auto mirror = make_mirror(config.streams, simulation.bodies(), config.extent);
+  if (!mirror) return tl::unexpected(mirror.error());
+  mirror->restore(world.next_reuse, world.withheld);
+  StateHasher hasher;
+  for (const transport::JournalMessage& entry : journal) {
+    for (const transport::InputDecision& decision : entry.decisions) decide(world, decision);
+    if (entry.state == transport::JournalState::kNotMade) continue;
+    if (entry.frame != world.frame + 1) return fail(ErrorCode::kMalformed, "the journal leaves out a frame");
+    apply(world, simulation);
+    simulation.step();
+    const engine::Bodies bodies = simulation.bodies();
+    if (auto good = mirror->check(bodies); !good) return tl::unexpected(good.error());
+    mirror->update(bodies, simulation.events());
+    ++world.frame;
+    if (hasher.hash(mirror->target()) != entry.hash)
+      return fail(ErrorCode::kMismatch,
+                  fmt::format("this machine makes another frame {} than the live server did", world.frame));
+  }
+  world.gravity = simulation.gravity();
+  world.damping_per_s = simulation.damping_per_s();
+  world.bodies = mirror->target().alive_count();
+  mirror->save(world.next_reuse, world.withheld);
+  return world;
+}
+
+Result<Continued> continue_world(const HostConfig& config, engine::Simulation& simulation,
+                                 const Checkpoint& from, std::span<const transport::JournalMessage> journal) {
+  constexpr const char* kRefused = "the engine refuses its part of the checkpoint";
+  if (!simulation.load(from.engine_state)) return fail(ErrorCode::kMismatch, kRefused);
+  auto world = roll_forward(config, simulation, from, journal);
+  if (world) return Continued{std::move(*world), {}};
+  if (!simulation.load(from.engine_state)) return fail(ErrorCode::kMismatch, kRefused);
+  return Continued{from, std::move(world.error().message)};
+}
+
+}  // namespace tandem::host

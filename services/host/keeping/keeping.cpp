@@ -1,0 +1,68 @@
+#include "services/host/keeping/keeping.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "services/host/frames/going_on.hpp"
+
+namespace tandem::host {
+
+Keeping::Keeping(std::unique_ptr<checkpoint::Keeper> keeper, Log log, std::int64_t (*clock_ns)())
+    : keeper_(std::move(keeper)), log_(std::move(log)), clock_ns_(clock_ns) {}
+
+Result<Keeping> Keeping::stand_by(const checkpoint::Settings& settings, Log log, std::int64_t (*clock_ns)()) {
+  return checkpoint::Keeper::open(settings, clock_ns).map([&](std::unique_ptr<checkpoint::Keeper>&& keeper) {
+    return Keeping(std::move(keeper), std::move(log), clock_ns);
+  });
+}
+
+Result<Keeping> Keeping::begin(const checkpoint::Settings& settings, engine::Simulation& simulation,
+                               HostConfig& config, Log log, std::int64_t (*clock_ns)()) {
+  auto keeping = stand_by(settings, std::move(log), clock_ns);
+  if (!keeping) return keeping;
+  const auto start = keeping->keeper_->start(checkpoint_world(config), simulation);
+  if (!start) return tl::unexpected(start.error());
+  for (const std::string& warning : start->warnings) keeping->log_("checkpoint: " + warning, true);
+  if (!settings.folder.empty()) keeping->log_("checkpoint: " + start->told, false);
+  begin_from(*start, config);
+  return keeping;
+}
+
+Result<void> Keeping::take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
+                                const transport::ParticipantId& from, std::int64_t wall_ms,
+                                const engine::Simulation& simulation, HostConfig& config) {
+  const auto newest = keeper_->take_over(simulation);
+  if (!newest) return tl::unexpected(newest.error());
+  checkpoint::Start start;
+  start.newest_epoch = *newest;
+  start.goes_on_from = std::move(world);
+  config.epoch = static_cast<Epoch>(wall_ms);
+  begin_takeover(start, from, config);
+  return {};
+}
+
+void Keeping::after_poll(Host& host, bool produced, std::int64_t now_ns) {
+  if (std::exchange(serves_, host.wants_checkpoints()) != serves_) keeper_->serve_standbys(serves_);
+  if (produced) {
+    ran_ = true;
+    keeper_->after_frame(now_ns, host.wants_checkpoint_now(),
+                         [&host](checkpoint::Checkpoint& out) { host.capture(out); });
+  }
+  if (serves_) {
+    auto latest = keeper_->latest();
+    if (latest && latest->moment.epoch == host.session().epoch) host.offer_checkpoint(latest);
+  }
+  tell(now_ns);
+}
+
+void Keeping::end(const Host& host) {
+  if (!ran_ || host.state() == Host::State::kRefused || host.state() == Host::State::kHandedOver) return;
+  keeper_->end(clock_ns_(), [&host](checkpoint::Checkpoint& out) { host.capture(out); });
+  tell(clock_ns_());
+}
+
+void Keeping::tell(std::int64_t now_ns) {
+  for (const std::string& line : keeper_->take_notices(now_ns)) log_("checkpoint: " + line, true);
+}
+
+}  // namespace tandem::host

@@ -1,0 +1,81 @@
+#include "services/tandemd/stand_by.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <memory>
+#include <random>
+#include <utility>
+
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/units.hpp"
+#include "services/checkpoint/keeper.hpp"
+#include "services/host/frames/going_on.hpp"
+#include "services/host/frames/roll_forward.hpp"
+#include "services/standby/standby.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using transport::steady_ns;
+
+transport::ClientId random_id() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32U | device()) | 1U;
+}
+
+void log_notices(standby::Standby& standby) {
+  for (const std::string& line : standby.take_notices()) spdlog::info("standby: {}", line);
+}
+
+}  // namespace
+
+Result<bool> stand_by(const Options& options, engine::Simulation& simulation, transport::ServerPort& port,
+                      host::HostConfig& config, host::Keeping& keeping, Service& service,
+                      const std::atomic<bool>& stop) {
+  const checkpoint::World world = host::checkpoint_world(config);
+  const auto accept = [&](const checkpoint::Checkpoint& checkpoint) -> Result<void> {
+    if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
+    if (simulation.load(checkpoint.engine_state)) return {};
+    return fail(ErrorCode::kInvalidArgument,
+                "the engine refuses its part: it is of another scene file, number of bodies, seed or build");
+  };
+  // Clients find the writers before they are needed.
+  if (auto opened = port.open_streams(static_cast<std::uint32_t>(config.streams.size())); !opened)
+    return tl::unexpected(opened.error());
+  auto standby = standby::Standby::create(
+      {.session = options.session, .id = random_id(), .rank = options.standby_rank, .epoch = config.epoch},
+      port, accept);
+  if (!standby) return tl::unexpected(standby.error());
+  spdlog::info("standby: waits for the live server of session '{}' on domain {}", options.session,
+               options.domain);
+  while (!(*standby)->poll(steady_ns())) {
+    if (stop.load(std::memory_order_relaxed)) return false;
+    log_notices(**standby);
+    service.watch(**standby, options.session, steady_ns());
+    const std::int64_t wait_ns = (*standby)->next_wake_ns() - steady_ns();
+    if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
+  }
+  log_notices(**standby);
+  const std::int64_t began_ns = steady_ns();
+  const standby::Takeover takeover = (*standby)->take_over();
+  const Frame published = (*standby)->live_frame();
+  auto continued = host::continue_world(config, simulation, *takeover.checkpoint, takeover.journal);
+  if (!continued) return tl::unexpected(continued.error());
+  if (!continued->why_not.empty())
+    spdlog::warn("standby: {}; goes on from the checkpoint, and what came after it is lost",
+                 continued->why_not);
+  const Frame frame = continued->world.frame;
+  auto taken = keeping.take_over(std::make_shared<const checkpoint::Checkpoint>(std::move(continued->world)),
+                                 takeover.from, transport::wall_ns() / kMillisecond, simulation, config);
+  if (!taken) return tl::unexpected(taken.error());
+  spdlog::info(
+      "standby: takes over from epoch {} at frame {}, {} frames after its checkpoint, {} behind the live server, "
+      "after {:.0f} ms{}",
+      takeover.checkpoint->epoch, frame, frame - takeover.checkpoint->frame,
+      published > frame ? published - frame : 0, static_cast<double>(steady_ns() - began_ns) * 1e-6,
+      takeover.handed_over ? " (handed over)" : "");
+  return true;
+}
+
+}  // namespace tandem::daemon

@@ -1,0 +1,22 @@
+#pragma once
+// tandemd --standby, until it takes over.
+
+#include <atomic>
+
+#include "sdk/transport/port.hpp"
+#include "services/host/frames/configuration.hpp"
+#include "services/host/keeping/keeping.hpp"
+#include "services/tandemd/options.hpp"
+#include "services/tandemd/service.hpp"
+#include "tandem/simulation.hpp"
+
+namespace tandem::daemon {
+
+/// Stands by for the session's live server until that one is gone or hands over. Then `simulation` holds the
+/// world, and `config` says how the session continues. Returns false if it was stopped before. Errors: those
+/// of the port and of the folder of checkpoints.
+[[nodiscard]] Result<bool> stand_by(const Options& options, engine::Simulation& simulation,
+                                    transport::ServerPort& port, host::HostConfig& config,
+                                    host::Keeping& keeping, Service& service, const std::atomic<bool>& stop);
+
+}  // namespace tandem::daemon

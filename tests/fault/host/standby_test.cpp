@@ -1,0 +1,496 @@
+// A live server, servers that stand by for it, and clients, on a simulated network.
+#include "services/standby/standby.hpp"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+#include "services/checkpoint/format.hpp"
+#include "services/host/frames/going_on.hpp"
+#include "services/host/frames/roll_forward.hpp"
+#include "tests/fault/host/fountain.hpp"
+#include "tests/fault/host/stage.hpp"
+
+namespace tandem::host {
+namespace {
+
+/// An engine that is not deterministic: after it was loaded it goes another way.
+class Wayward final : public engine::Simulation {
+ public:
+  explicit Wayward(Logged& inner) : inner_(&inner) {}
+  [[nodiscard]] std::uint32_t capacity() const override { return inner_->capacity(); }
+  [[nodiscard]] double dt_s() const override { return inner_->dt_s(); }
+  [[nodiscard]] engine::Vec3 gravity() const override { return inner_->gravity(); }
+  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override {
+    return inner_->classify(input);
+  }
+  void apply(const engine::Input& input) override { inner_->apply(input); }
+  void step() override {
+    inner_->step();
+    if (loaded_) inner_->step();
+  }
+  [[nodiscard]] engine::Bodies bodies() const override { return inner_->bodies(); }
+  void save(std::vector<std::byte>& out) const override { inner_->save(out); }
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) override {
+    loaded_ = true;
+    return inner_->load(bytes);
+  }
+
+ private:
+  Logged* inner_;
+  bool loaded_ = false;
+};
+
+/// A process that is a live server, or stands by and becomes one.
+struct Server {
+  std::unique_ptr<transport::ServerPort> port;
+  std::unique_ptr<Logged> simulation;
+  std::unique_ptr<Wayward> wayward;
+  HostConfig config;
+  std::unique_ptr<standby::Standby> standby;
+  std::unique_ptr<Host> host;
+  bool frozen = false;
+  std::string why_not;
+  std::int64_t took_over_ns = 0;
+  Frame captured = 0;
+
+  [[nodiscard]] engine::Simulation& engine() {
+    if (wayward) return *wayward;
+    return *simulation;
+  }
+};
+
+struct Member {
+  std::unique_ptr<transport::ClientPort> port;
+  Watcher watcher;
+  std::unique_ptr<client::ClientCore> core;
+  std::map<std::uint64_t, double> sent;
+};
+
+class Cast {
+ public:
+  explicit Cast(std::uint64_t seed,
+                const transport::simulated::LinkModel& link = {.delay_ns = 2'000'000, .jitter_ns = 2'000'000})
+      : network({.seed = seed, .link = link}) {
+    network.advance_to(now_ns);
+  }
+
+  Server& add_live() {
+    Server& server = add();
+    server.host = must(Host::create(server.config, server.engine(), *server.port));
+    return server;
+  }
+  Server& add_standby(std::uint32_t rank = 1, bool wayward = false) {
+    Server& server = add();
+    if (wayward) server.wayward = std::make_unique<Wayward>(*server.simulation);
+    server.standby = must(standby::Standby::create(
+        {.session = "default", .id = 500 + servers.size(), .rank = rank, .epoch = server.config.epoch},
+        *server.port, [&server](const checkpoint::Checkpoint& checkpoint) -> Result<void> {
+          if (auto good = check_world(checkpoint, checkpoint_world(server.config), kSlots); !good)
+            return good;
+          if (server.engine().load(checkpoint.engine_state)) return {};
+          return fail(ErrorCode::kInvalidArgument, "not loaded");
+        }));
+    return server;
+  }
+  Member& add_client() {
+    auto client = std::make_unique<Member>();
+    client->port = must(network.make_client("default"));
+    client::CoreOptions options;
+    options.session = "default";
+    options.id = 100 + clients.size();
+    client->core = std::make_unique<client::ClientCore>(std::move(options), *client->port, &client->watcher);
+    clients.push_back(std::move(client));
+    return *clients.back();
+  }
+  void run_ms(std::int64_t ms) {
+    for (std::int64_t i = 0; i < ms; ++i) {
+      now_ns += kMillisecond;
+      network.advance_to(now_ns);
+      for (auto& server : servers)
+        if (server->port && !server->frozen) poll(*server);
+      for (auto& client : clients) client->core->poll({now_ns, wall_ns()});
+    }
+  }
+  void kill(Server& server) {
+    network.kill(server.port->self());
+    server.host.reset();
+    server.standby.reset();
+    server.port.reset();
+  }
+  void freeze(Server& server, bool frozen) {
+    server.frozen = frozen;
+    network.set_frozen(server.port->self(), frozen);
+  }
+  void send(Member& client) {
+    const double unique = 0.001 * static_cast<double>(++sent_);
+    const auto number =
+        client.core->send(transport::InputKind::kGravity, {unique, -3, 0}, {}, {now_ns, wall_ns()});
+    if (number) client.sent[*number] = unique;
+  }
+  void hand_over(Server& live) {
+    if (!tool_) {
+      tool_ = must(network.make_commander("default"));
+      run_ms(100);  // they find each other
+    }
+    transport::CommandMessage command;
+    command.epoch = live.host->session().epoch;
+    command.session = "default";
+    must_do(tool_->write(command));
+  }
+  [[nodiscard]] bool all_play(const Server& server) const {
+    return std::ranges::all_of(clients, [&](const auto& client) {
+      return client->core->phase() == ClientPhase::kPlaying &&
+             client->core->session()->epoch == server.host->session().epoch;
+    });
+  }
+  [[nodiscard]] std::uint64_t mismatches() const {
+    std::uint64_t sum = 0;
+    for (const auto& client : clients) sum += client->core->statistics().hash_mismatches;
+    return sum;
+  }
+  [[nodiscard]] std::int64_t wall_ns() const { return now_ns + 1'700'000'000 * kSecond; }
+
+  template <class R>
+  static void must_do(const R& result) {
+    if (!result) throw std::runtime_error(result.error().message);
+  }
+
+  transport::simulated::Network network;
+  std::int64_t now_ns = kSecond;
+  std::vector<std::unique_ptr<Server>> servers;
+  std::vector<std::unique_ptr<Member>> clients;
+
+ private:
+  Server& add() {
+    auto server = std::make_unique<Server>();
+    server->port = must(network.make_server("default"));
+    server->simulation = std::make_unique<Logged>();
+    HostConfig& config = server->config;
+    config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond) + servers.size();
+    config.engine = "particles";
+    config.streams.resize(1);
+    StreamConfig& stream = config.streams[0];
+    stream.layout.capacity = kSlots;
+    stream.layout.codec = "tracker";
+    stream.lattice = must(choose_lattice(0.01, 20, server->simulation->dt_s()));
+    stream.layout.parameters.codec = must(codec_parameters(stream.lattice, 0.01, 0, 0));
+    must_do(choose_gains(stream));
+    servers.push_back(std::move(server));
+    return *servers.back();
+  }
+  void poll(Server& server) {
+    if (server.standby && server.standby->poll(now_ns)) take_over(server);
+    if (!server.host) return;
+    const bool produced = server.host->poll(now_ns, wall_ns());
+    const bool due = server.host->wants_checkpoint_now() ||
+                     (server.host->wants_checkpoints() && server.host->frame() >= server.captured + 30);
+    if (produced && due) {
+      server.captured = server.host->frame();
+      checkpoint::Checkpoint copy;
+      server.host->capture(copy);
+      auto encoded = std::make_shared<checkpoint::Encoded>();
+      encoded->moment = {copy.epoch, copy.frame};
+      encoded->journal = copy.journal;
+      checkpoint::encode(copy, encoded->bytes);
+      server.host->offer_checkpoint(encoded);
+    }
+    must_do(drain(server.host->outbox(), *server.port));
+    const Host::State state = server.host->state();
+    if (state == Host::State::kHandedOver || state == Host::State::kRefused) {
+      server.host.reset();
+      server.port.reset();
+    }
+  }
+  void take_over(Server& server) {
+    const standby::Takeover takeover = server.standby->take_over();
+    server.standby.reset();
+    server.simulation->frame = takeover.checkpoint->frame;
+    auto continued =
+        must(continue_world(server.config, server.engine(), *takeover.checkpoint, takeover.journal));
+    server.why_not = continued.why_not;
+    server.simulation->frame = continued.world.frame;
+    server.config.epoch = static_cast<Epoch>(wall_ns() / kMillisecond);
+    checkpoint::Start start;
+    start.goes_on_from = std::make_shared<const checkpoint::Checkpoint>(std::move(continued.world));
+    begin_takeover(start, takeover.from, server.config);
+    server.host = must(Host::create(server.config, server.engine(), *server.port));
+    server.captured = server.host->frame();
+    server.took_over_ns = now_ns;
+  }
+
+  std::uint64_t sent_ = 0;
+  std::unique_ptr<transport::simulated::CommandPort> tool_;
+};
+
+TEST(Standby, WhenTheServerDiesNoFrameIsLostAndClientsPlayOnWithin3Seconds) {
+  for_seeds(15, [](std::uint64_t seed) {
+    Dice dice(seed);
+    Cast cast(seed);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    for (int i = 0; i < 3; ++i) cast.add_client();
+    cast.run_ms(3000 + static_cast<std::int64_t>(dice.below(1500)));
+    ASSERT_TRUE(cast.all_play(live));
+    const Frame last = live.host->frame();
+    const Epoch epoch = live.host->session().epoch;
+    const auto positions = live.simulation->positions;
+    cast.kill(live);
+    cast.run_ms(1500);
+    ASSERT_NE(other.host, nullptr);
+    EXPECT_EQ(other.why_not, "");
+    EXPECT_EQ(other.host->session().continues_epoch, epoch);
+    EXPECT_EQ(other.host->session().continues_frame, last);
+    for (const auto& [frame, bodies] : other.simulation->positions) {
+      const auto before = positions.find(frame);
+      if (before != positions.end()) {
+        ASSERT_EQ(bodies, before->second) << "frame " << frame << " of the same world";
+      }
+    }
+    cast.run_ms(1500);
+    EXPECT_TRUE(cast.all_play(other));
+    EXPECT_EQ(cast.mismatches(), 0U);
+  });
+}
+
+TEST(Standby, EveryInputActsOnceOrIsToldAsLost) {
+  std::size_t acted_before = 0, lost = 0;
+  for_seeds(25, [&](std::uint64_t seed) {
+    Dice dice(seed);
+    Cast cast(seed);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    for (int i = 0; i < 2; ++i) cast.add_client();
+    cast.run_ms(2500);
+    const auto play = [&](std::int64_t ms) {
+      for (std::int64_t t = 0; t < ms; t += 20) {
+        cast.run_ms(20);
+        if (dice.one_in(3)) cast.send(*cast.clients[static_cast<std::size_t>(dice.below(2))]);
+      }
+    };
+    play(1500 + static_cast<std::int64_t>(dice.below(1000)));
+    const auto before = live.simulation->acted;
+    cast.kill(live);
+    play(4000);
+    ASSERT_NE(other.host, nullptr);
+    ASSERT_TRUE(cast.all_play(other));
+    cast.run_ms(1000);
+    auto history = before;
+    const Frame from = other.host->session().continues_frame;
+    for (const auto& [frame, value] : other.simulation->acted)
+      if (frame > from) history.emplace_back(frame, value);
+    acted_before += before.size();
+    for (const auto& client : cast.clients) {
+      for (const auto& [number, value] : client->sent) {
+        const auto of_value = [&](const auto& entry) { return entry.second == value; };
+        const auto acted = std::ranges::count_if(history, of_value);
+        ASSERT_LE(acted, 1) << "input " << number;
+        const auto told = client->watcher.outcomes.find(number);
+        ASSERT_NE(told, client->watcher.outcomes.end()) << "nothing is known of input " << number;
+        const bool says_acted = told->second.kind == client::InputOutcome::Kind::kActed;
+        ASSERT_EQ(acted, says_acted ? 1 : 0) << "input " << number;
+        if (says_acted) {
+          ASSERT_EQ(std::ranges::find_if(history, of_value)->first, told->second.frame);
+        }
+        if (told->second.kind == client::InputOutcome::Kind::kLost) ++lost;
+      }
+    }
+  });
+  EXPECT_GT(acted_before, 100U);
+  EXPECT_GT(lost, 0U) << "sent while there was no server";
+}
+
+TEST(Standby, AnEngineThatGoesAnotherWayIsContinuedFromItsCheckpoint) {
+  Cast cast(3);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby(1, true);
+  cast.add_client();
+  cast.run_ms(4000);
+  const Frame last = live.host->frame();
+  cast.kill(live);
+  cast.run_ms(3000);
+  ASSERT_NE(other.host, nullptr);
+  EXPECT_NE(other.why_not, "");
+  EXPECT_LT(other.host->session().continues_frame, last);
+  EXPECT_LE(last - other.host->session().continues_frame, 32U) << "a second, and the time to send it";
+  EXPECT_TRUE(cast.all_play(other));
+  EXPECT_EQ(cast.mismatches(), 0U);
+}
+
+TEST(Standby, TheLowestRankTakesOverAndTheOthersFollowIt) {
+  Cast cast(4);
+  Server& live = cast.add_live();
+  Server& second = cast.add_standby(2);
+  Server& first = cast.add_standby(1);
+  cast.add_client();
+  cast.run_ms(4000);
+  cast.kill(live);
+  cast.run_ms(4000);
+  ASSERT_NE(first.host, nullptr);
+  ASSERT_EQ(second.host, nullptr);
+  ASSERT_TRUE(cast.all_play(first));
+  EXPECT_EQ(second.standby->follows(), first.host->session().epoch);
+  const Frame last = first.host->frame();
+  cast.kill(first);
+  cast.run_ms(3000);
+  ASSERT_NE(second.host, nullptr);
+  EXPECT_EQ(second.host->session().continues_frame, last);
+  EXPECT_TRUE(cast.all_play(second));
+}
+
+TEST(Standby, WhereTheFirstInRankFailsTooTheNextTakesOver) {
+  Cast cast(5);
+  Server& live = cast.add_live();
+  Server& first = cast.add_standby(1);
+  Server& second = cast.add_standby(2);
+  cast.add_client();
+  cast.run_ms(4000);
+  cast.freeze(first, true);
+  cast.kill(live);
+  cast.run_ms(3000);
+  ASSERT_NE(second.host, nullptr) << "the frozen one is not waited for";
+  cast.run_ms(500);
+  EXPECT_TRUE(cast.all_play(second));
+  cast.freeze(first, false);
+  cast.run_ms(3000);
+  EXPECT_EQ(first.host, nullptr) << "it sees that there is a live server";
+  EXPECT_TRUE(cast.all_play(second));
+}
+
+TEST(Standby, AHandoverLosesNoFrameAndPausesForLessThanHalfASecond) {
+  for_seeds(10, [](std::uint64_t seed) {
+    Dice dice(seed);
+    Cast cast(seed);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    for (int i = 0; i < 3; ++i) cast.add_client();
+    cast.run_ms(3000 + static_cast<std::int64_t>(dice.below(1000)));
+    const Epoch epoch = live.host->session().epoch;
+    cast.hand_over(live);
+    Frame last = 0;
+    for (int i = 0; i < 2000 && live.host; ++i) {
+      last = live.host->frame();
+      cast.run_ms(1);
+    }
+    ASSERT_EQ(live.host, nullptr) << "it did not leave";
+    ASSERT_NE(other.host, nullptr);
+    EXPECT_EQ(other.host->session().continues_epoch, epoch);
+    EXPECT_EQ(other.host->session().continues_frame, last);
+    cast.run_ms(500);
+    EXPECT_TRUE(cast.all_play(other));
+    EXPECT_EQ(cast.mismatches(), 0U);
+  });
+}
+
+TEST(Standby, AHandoverWithoutAnybodyReadyChangesNothing) {
+  Cast cast(6);
+  Server& live = cast.add_live();
+  cast.add_client();
+  cast.run_ms(2000);
+  cast.hand_over(live);
+  const Frame before = live.host->frame();
+  cast.run_ms(2000);
+  ASSERT_NE(live.host, nullptr);
+  EXPECT_GT(live.host->frame(), before + 50);
+}
+
+TEST(Standby, AHandoverToAServerThatDiesGoesOnHere) {
+  Cast cast(7);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby();
+  cast.add_client();
+  cast.run_ms(3500);
+  cast.hand_over(live);
+  cast.run_ms(20);
+  cast.kill(other);
+  cast.run_ms(14'000);
+  ASSERT_NE(live.host, nullptr);
+  const Frame before = live.host->frame();
+  cast.run_ms(1000);
+  EXPECT_GE(live.host->frame(), before + 25) << "frames are made again";
+  EXPECT_TRUE(cast.all_play(live));
+}
+
+// Both sides of a cut go on; when it heals, one world survives within seconds, and clients of the other are
+// told which of their inputs are lost.
+TEST(Standby, OfTwoWorldsOneSurvivesWhenAPartitionHeals) {
+  for_seeds(10, [](std::uint64_t seed) {
+    Cast cast(seed);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    Member& here = cast.add_client();
+    Member& there = cast.add_client();
+    Member& there_too = cast.add_client();
+    cast.run_ms(3500);
+    ASSERT_TRUE(cast.all_play(live));
+    const auto cut = [&](bool is_cut) {
+      for (const auto& a : {live.port->self(), here.port->self()})
+        for (const auto& b : {other.port->self(), there.port->self(), there_too.port->self()})
+          cast.network.set_cut(a, b, is_cut);
+    };
+    cut(true);
+    cast.run_ms(4000);
+    ASSERT_NE(other.host, nullptr);
+    for (Member* client : {&here, &there}) cast.send(*client);
+    cast.run_ms(1000);
+    ASSERT_EQ(here.watcher.outcomes.rbegin()->second.kind, client::InputOutcome::Kind::kActed);
+    cut(false);
+    cast.run_ms(4000);
+    ASSERT_NE(other.host == nullptr, live.host == nullptr) << "one of the two";
+    Server& survivor = other.host ? other : live;
+    EXPECT_EQ(&survivor, &other) << "it has more followers";
+    EXPECT_TRUE(cast.all_play(survivor));
+    EXPECT_EQ(here.watcher.lost.size(), 1U) << "what acted in the world that is gone";
+    EXPECT_EQ(there.watcher.lost.size(), 0U);
+    EXPECT_EQ(cast.mismatches(), 0U);
+  });
+}
+
+TEST(Standby, AStrangersCheckpointsAndJournalAreNotTaken) {
+  Cast cast(8);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby();
+  cast.run_ms(2500);
+  const auto stranger = must(cast.network.make_server("default"));
+  Cast::must_do(stranger->open_standby(501 + 1));
+  cast.run_ms(200);
+  transport::CheckpointMessage part;
+  part.epoch = live.host->session().epoch;
+  part.frame = live.host->frame() + 1'000;
+  part.total_bytes = 3;
+  part.bytes.resize(3);
+  Cast::must_do(stranger->write(501 + 1, part));
+  transport::JournalMessage entry;
+  entry.epoch = part.epoch;
+  entry.number = 1'000'000;
+  entry.frame = part.frame;
+  entry.state = transport::JournalState::kLast;
+  Cast::must_do(stranger->write(entry));
+  cast.run_ms(500);
+  EXPECT_EQ(other.host, nullptr) << "nobody handed over";
+  const Frame last = live.host->frame();
+  cast.kill(live);
+  cast.run_ms(2000);
+  ASSERT_NE(other.host, nullptr);
+  EXPECT_EQ(other.host->session().continues_frame, last);
+}
+
+TEST(Standby, OverALossyLinkTheWorldIsAtMostASecondOlder) {
+  for_seeds(10, [](std::uint64_t seed) {
+    Cast cast(seed, {.delay_ns = 20'000'000, .jitter_ns = 10'000'000, .loss = 0.05});
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    cast.add_client();
+    cast.run_ms(6000);
+    const Frame last = live.host->frame();
+    cast.kill(live);
+    cast.run_ms(3500);
+    ASSERT_NE(other.host, nullptr);
+    EXPECT_LE(last - std::min(last, other.host->session().continues_frame), 30U);
+    EXPECT_TRUE(cast.all_play(other));
+    EXPECT_EQ(cast.mismatches(), 0U);
+  });
+}
+
+}  // namespace
+}  // namespace tandem::host

@@ -1,0 +1,201 @@
+#include "services/tandemd/config_file.hpp"
+
+#include <google/protobuf/descriptor.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "services/tandemd/command_line.hpp"
+#include "services/tandemd/config.hpp"
+#include "services/tandemd/rehearsal.hpp"
+#include "services/tandemd/settings.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using Config = idl::ServerConfig;
+
+Config least() {
+  Config config;
+  config.set_scene("cube");
+  config.set_bodies(100);
+  return config;
+}
+
+class ConfigFile : public ::testing::Test {
+ protected:
+  ~ConfigFile() override { std::remove(path.c_str()); }
+  void write(const std::string& text) const { std::ofstream(path) << text; }
+  std::string path = (std::filesystem::temp_directory_path() /
+                      ("tandem-options-" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
+                       "-" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".textproto"))
+                         .string();
+};
+
+TEST_F(ConfigFile, SetsWhatFlagsLeaveOpen) {
+  write(
+      "scene: \"cube\" bodies: 500 session: \"arena\" window: \"4\" scripted: true seed: 9 duration: 2.5\n");
+  const std::string flag = "--config=" + path;
+  const char* arguments[] = {"tandemd", flag.c_str(), "--bodies", "300", "--json"};
+  const CommandLine command = parse_command_line(5, arguments);
+  ASSERT_TRUE(command.options);
+  EXPECT_EQ(command.options->scene, "cube");
+  EXPECT_EQ(command.options->choice.bodies, 300U) << "the flag wins";
+  EXPECT_EQ(command.options->session, "arena");
+  EXPECT_EQ(command.options->window, 4U);
+  EXPECT_TRUE(command.options->scripted);
+  EXPECT_EQ(command.options->seed, 9U);
+  EXPECT_EQ(command.options->duration_s, 2.5);
+  EXPECT_TRUE(command.options->json);
+}
+
+TEST_F(ConfigFile, AMistakeIsNamedWithFileLineAndField) {
+  write("scene: \"cube\"\nbodys: 500\n");
+  const auto unknown = load_config(path);
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::kMalformed);
+  EXPECT_NE(unknown.error().message.find(path + ":2:"), std::string::npos) << unknown.error().message;
+  EXPECT_NE(unknown.error().message.find("bodys"), std::string::npos) << unknown.error().message;
+  write("bodies: \"many\"\n");
+  EXPECT_FALSE(load_config(path));
+}
+
+TEST_F(ConfigFile, EveryMistakeNamesFileLineFieldAndWhatItTakes) {
+  struct Mistake {
+    const char *line, *field, *takes;
+  };
+  const std::vector<Mistake> mistakes = {
+      {"client_limit: 70000", "client_limit", "1 to 65536"},
+      {"client_limit: -5", "client_limit", "1 to 65536"},
+      {"bodies: 99999999999", "bodies", "1 to 4194304"},
+      {"bodies: 5000000", "bodies", "1 to 4194304"},
+      {"rate: 30", "rate", "1 to 1000, or max"},
+      {"rate: \"fast\"", "rate", "1 to 1000 Hz, or max"},
+      {"lead: 2", "lead", "0 or 1"},
+      {"window: \"25\"", "window", "1 to 24 frames, or auto"},
+      {"codec: \"zip\"", "codec", "known: none, selective"},
+      {"predictor: \"none\"", "predictor", "known: ballistic, contact, field"},
+      {"threads: 65", "threads", "1 to 64"},
+      {"domain: 231", "domain", "0 to 230"},
+      {"stall_timeout: \"11\"", "stall_timeout", "0.01 to 10 seconds, or off"},
+      {"checkpoint: \"maybe\"", "checkpoint", "auto, require or off"},
+      {"checkpoint_interval: 0", "checkpoint_interval", "0.01 to 86400"},
+      {"metrics: \"9730x\"", "metrics", "a port of 0 to 65535"},
+      {"threshold: -1", "threshold", "a length from 1e-9 to 1e9 metres"},
+      {"threshold_scale: 0", "threshold_scale", "1e-6 to 1e6"},
+      {"duration: -1", "duration", "seconds"},
+      {"budget_bytes: 3", "budget_bytes", "at least 64 bytes"},
+      {"stream { name: \"a\" threshold: -1 }", "stream", "a: threshold must be a length from 1e-9"},
+      {"speed: 1", "speed", "--print-config shows all"},
+  };
+  for (const Mistake& mistake : mistakes) {
+    SCOPED_TRACE(mistake.line);
+    const bool bodies = std::string(mistake.field) == "bodies";
+    write(std::string("scene: \"cube\"\n") + (bodies ? "\n" : "bodies: 10\n") + mistake.line + '\n');
+    auto file = load_config(path);
+    const auto options = file ? check_config(file->config, file->places) : tl::unexpected(file.error());
+    ASSERT_FALSE(options);
+    const std::string& said = options.error().message;
+    EXPECT_EQ(said.find(path + ":3: field \"" + mistake.field + '"'), 0U) << said;
+    EXPECT_NE(said.find(mistake.takes), std::string::npos) << said;
+    EXPECT_EQ(said.find('\n'), std::string::npos);
+  }
+}
+
+TEST_F(ConfigFile, WhatIsMissingOrPlannedWronglyNamesTheFileToo) {
+  write("bodies: 10\n");
+  auto file = load_config(path);
+  ASSERT_TRUE(file);
+  EXPECT_EQ(
+      check_config(file->config, file->places).error().message.find(path + ": field \"scene\" is missing"),
+      0U);
+  const auto said = [this](const std::string& text) {
+    write(text);
+    const auto read = load_config(path);
+    const auto options = check_config(read->config, read->places);
+    if (!options) return options.error().message;
+    const auto good = rehearse(*options);
+    return good ? std::string("good") : good.error().message;
+  };
+  EXPECT_EQ(said("scene: \"cube\"\nbodies: 10\n"), "good");
+  EXPECT_EQ(
+      said("bodies: 10\nscene: \"cub\"\n").find(path + ":2: field \"scene\": unknown scene \"cub\"; known: "),
+      0U);
+  EXPECT_EQ(said("scene: \"half_pipe\"\nbodies: 1000000\n").find(path + ":2: field \"bodies\": "), 0U);
+  EXPECT_EQ(said("scene: \"cube\"\nbodies: 10\nthreshold: 1e-9\n")
+                .find(path + ":3: field \"threshold\": threshold 1e-09 is too fine"),
+            0U);
+}
+
+TEST_F(ConfigFile, AFlagThatOverridesALineIsNamedInstead) {
+  write("scene: \"cube\"\nbodies: 10\nclient_limit: 7\n");
+  auto file = load_config(path);
+  ASSERT_TRUE(file);
+  Config flags;
+  flags.set_client_limit(0);
+  const auto options =
+      check_config(merge(flags, file->config), places_beside(flags, std::move(file->places)));
+  ASSERT_FALSE(options);
+  EXPECT_EQ(options.error().message, "--client-limit: must be 1 to 65536");
+}
+
+TEST_F(ConfigFile, WhatIsPrintedIsReadAgain) {
+  Config config = least();
+  config.set_session("arena");
+  config.set_rate("max");
+  config.set_threshold(0.1);
+  *config.add_stream() = parse_stream("thin:ballistic,budget=900").value();
+  *config.add_stream() = parse_stream("rich:field").value();
+  const std::string printed = print_config(config);
+  write(printed);
+  const auto file = load_config(path);
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(print_config(file->config), printed);
+  EXPECT_EQ(file->config.SerializeAsString(), config.SerializeAsString());
+  // What is a comment is a line that could stand there.
+  std::string all;
+  std::istringstream lines(print_config({}));
+  for (std::string line; std::getline(lines, line);) {
+    const std::string field = line.substr(0, line.find(':')).substr(line.starts_with("# ") ? 2 : 0);
+    const bool is_stream = line.starts_with("# stream {");
+    if (is_stream ||
+        (Config::descriptor()->FindFieldByName(field) != nullptr && find_setting(field) != nullptr &&
+         line == "# " + field + ": " + find_setting(field)->example))
+      all += line.substr(2) + '\n';
+  }
+  write(all);
+  const auto examples = load_config(path);
+  ASSERT_TRUE(examples) << examples.error().message;
+  std::vector<const google::protobuf::FieldDescriptor*> set;
+  examples->config.GetReflection()->ListFields(examples->config, &set);
+  EXPECT_EQ(set.size(), static_cast<std::size_t>(Config::descriptor()->field_count()));
+}
+
+TEST(Settings, ThereIsOneForEachFieldOfTheConfiguration) {
+  for (int i = 0; i < Config::descriptor()->field_count(); ++i)
+    EXPECT_NE(find_setting(Config::descriptor()->field(i)->name()), nullptr)
+        << Config::descriptor()->field(i)->name();
+  for (const Setting& setting : settings()) {
+    EXPECT_NE(Config::descriptor()->FindFieldByName(setting.field), nullptr) << setting.field;
+    EXPECT_FALSE(setting.help.empty() || setting.takes.empty() || setting.example.empty()) << setting.field;
+  }
+}
+
+TEST_F(ConfigFile, AFileThatIsNotThereIsAnError) {
+  const auto missing = load_config(path + ".missing");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kIo);
+}
+
+TEST_F(ConfigFile, ADirectoryIsAnErrorThatNamesIt) {
+  const auto folder = load_config("/tmp");
+  ASSERT_FALSE(folder);
+  EXPECT_EQ(folder.error().code, ErrorCode::kIo);
+  EXPECT_NE(folder.error().message.find("/tmp: cannot be read"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::daemon
