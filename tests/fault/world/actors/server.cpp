@@ -244,7 +244,7 @@ void Server::note_frame() {
   if (waited_ns > Rules::kStallNs + 2 * period_ns + 120 * kMs && well_for_ns() > waited_ns)
     blame("waiting", "frame " + std::to_string(report.frame) + " came " + std::to_string(waited_ns / kMs) +
                          " ms after the one before");
-  keeper_->after_frame(steady_ns(), [this](checkpoint::Checkpoint& out) { host_->capture(out); });
+  keeper_->after_frame(steady_ns(), false, [this](checkpoint::Checkpoint& out) { host_->capture(out); });
   if (keeper_->writing() && !write_at_ns_) write_at_ns_ = stage_.now_ns + disk_delay_ns_;
 }
 
