@@ -67,6 +67,11 @@ Result<void> HeadlessClient::open() {
   transport::ClientPort& used =
       recording_port_ ? static_cast<transport::ClientPort&>(*recording_port_) : *port_;
   core_ = std::make_unique<client::ClientCore>(std::move(core), used, this);
+  if (recorder_) {
+    capture_ = std::make_unique<recording::Capture>(
+        *recorder_, recording::Clocks{transport::steady_ns, transport::wall_ns});
+    capture_->watch(*core_);
+  }
   return {};
 }
 
@@ -134,29 +139,20 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
   }
 }
 
-// A recording holds one stream at a time, and a change of the stream begins with a snapshot of its state.
-void HeadlessClient::record_session(const transport::StreamMessage& stream) {
-  transport::SessionMessage session = *core_->session();
-  session.streams = {stream};
-  recorder_->add(session, transport::wall_ns());
-}
-
-void HeadlessClient::on_names(const transport::SessionMessage& /*session*/) {
-  if (recorder_ && core_->stream() != nullptr) record_session(*core_->stream());
+void HeadlessClient::on_names(const transport::SessionMessage& session) {
+  if (capture_) capture_->on_names(session);
 }
 
 void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
-  if (!recorder_) return;
-  record_session(stream);
-  if (core_->timeline() != nullptr) recorder_->cut_snapshot(*core_->timeline(), client::now());
+  if (capture_) capture_->on_stream(stream);
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  if (recorder_) recorder_->add(snapshot, client::now());
+  if (capture_) capture_->on_snapshot(snapshot);
 }
 
 void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
-  if (recorder_) recorder_->add(input, transport::wall_ns());
+  if (capture_) capture_->on_scheduled(input);
 }
 
 void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
@@ -167,13 +163,11 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
     std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch, delta.frame,
                  to_hex(delta.hash).c_str());
   }
-  if (recorder_) recorder_->add(epoch, delta, transport::wall_ns());
+  if (capture_) capture_->on_applied(epoch, delta);
 }
 
 void HeadlessClient::record(client::Now now) {
-  if (!recorder_) return;
-  if (core_->timeline() != nullptr && recorder_->snapshot_due(now.steady_ns))
-    recorder_->cut_snapshot(*core_->timeline(), now);
+  if (capture_) capture_->turned(now);
 }
 
 void HeadlessClient::send_script(client::Now now) {

@@ -11,6 +11,7 @@
 
 #include "sdk/client/client_core.hpp"
 #include "services/json/json.hpp"
+#include "services/recording/capture.hpp"
 #include "services/recording/recorder.hpp"
 #include "services/tool/recording_port.hpp"
 
@@ -78,7 +79,6 @@ class HeadlessClient final : public client::CoreListener {
   explicit HeadlessClient(HeadlessOptions options) : options_(std::move(options)) {}
   Result<void> open();
   Result<void> load_script(double dt_s);
-  void record_session(const transport::StreamMessage& stream);
   void on_session(const transport::SessionMessage& session) override;
   void on_names(const transport::SessionMessage& session) override;
   void on_stream(const transport::StreamMessage& stream) override;
@@ -98,6 +98,7 @@ class HeadlessClient final : public client::CoreListener {
   std::unique_ptr<std::FILE, Closer> hash_log_;
   std::unique_ptr<recording::Recorder> recorder_;
   std::unique_ptr<RecordingPort> recording_port_;
+  std::unique_ptr<recording::Capture> capture_;  ///< null without a recorder
   std::vector<ScriptEntry> script_;
   std::size_t script_at_ = 0;
 

@@ -2,6 +2,7 @@
 // A client's port that records what a CoreListener does not receive: replies, and what the client writes.
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "sdk/transport/clock.hpp"
@@ -14,8 +15,9 @@ namespace tandem::tool {
 class RecordingPort final : public transport::ClientPort {
  public:
   /// Both must outlive it.
-  RecordingPort(transport::ClientPort& port, recording::Recorder& recorder)
-      : port_(&port), recorder_(&recorder) {}
+  RecordingPort(transport::ClientPort& port, recording::Recorder& recorder,
+                std::int64_t (*wall_ns)() = transport::wall_ns)
+      : port_(&port), recorder_(&recorder), wall_ns_(wall_ns) {}
 
   [[nodiscard]] transport::ParticipantId self() const override { return port_->self(); }
   void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
@@ -40,12 +42,12 @@ class RecordingPort final : public transport::ClientPort {
   void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override {
     const std::size_t before = out.size();
     port_->take(out);
-    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, transport::wall_ns());
+    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, wall_ns_());
   }
   void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override {
     const std::size_t before = out.size();
     port_->take(out);
-    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, transport::wall_ns());
+    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, wall_ns_());
   }
 
   Result<void> write(const transport::AckMessage& message) override { return record(message); }
@@ -60,12 +62,13 @@ class RecordingPort final : public transport::ClientPort {
   template <class M>
   Result<void> record(const M& message) {
     auto written = port_->write(message);
-    if (written) recorder_->add(message, transport::wall_ns());
+    if (written) recorder_->add(message, wall_ns_());
     return written;
   }
 
   transport::ClientPort* port_;
   recording::Recorder* recorder_;
+  std::int64_t (*wall_ns_)();
 };
 
 }  // namespace tandem::tool

@@ -103,6 +103,11 @@ void DeltaAssembly::pop() {
 
 void DeltaAssembly::drop_through(Frame frame) {
   while (size() > 0 && queue_[first_].frame <= frame) pop();
+  if (!last_complete_ || *last_complete_ >= frame) return;
+  last_complete_ = frame;
+  if (parts_ == 0 || open_.frame > frame) return;
+  open_ = {};
+  parts_ = 0;
 }
 
 void DeltaAssembly::clear() {

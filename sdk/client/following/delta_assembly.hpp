@@ -47,7 +47,7 @@ class DeltaAssembly {
   /// The oldest complete delta, or null.
   [[nodiscard]] const CompleteDelta* front() const { return size() == 0 ? nullptr : &queue_[first_]; }
   void pop();
-  /// Drops complete deltas up to and including `frame`.
+  /// Drops deltas up to and including `frame`. The one after it is no gap, whichever came last.
   void drop_through(Frame frame);
   /// Forgets everything, including the expected frame.
   void clear();

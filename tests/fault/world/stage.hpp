@@ -2,6 +2,7 @@
 // What all actors of a world share.
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -28,7 +29,10 @@ struct Stage {
   std::optional<Finding> finding;
   std::uint64_t changes = 0;  ///< processes that were started or ended: links have to be set anew
   double next_unique = 0;     ///< what makes the next input unique
-  Epoch live_epoch = 0;       ///< of the server that runs; 0: none does
+  /// Clients that a server of an epoch knows. Ids are random, and cannot be guessed; but who reads one before
+  /// the server knows it can take it away (idl/STATES.md, "A known weakness").
+  std::map<transport::ClientId, Epoch> known_ids;
+  Epoch live_epoch = 0;  ///< of the server that runs; 0: none does
 
   explicit Stage(const Settings& drawn);
   [[nodiscard]] double unique() { return next_unique += 1e-6; }

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "tests/fault/world/actors/client.hpp"
+#include "tests/fault/world/actors/gateway.hpp"
+#include "tests/fault/world/actors/recorder.hpp"
 
 namespace tandem::world {
 namespace {
@@ -68,6 +70,21 @@ class World {
                                 : participates ? "participant "
                                                : "observer ") +
                         std::to_string(++number));
+    }
+    if (stage_.settings.records) {
+      cast_.push_back(std::make_unique<RecorderActor>(stage_, "recorder", of, id));
+      id += 1000;
+    }
+    if (stage_.settings.has_gateway) {
+      auto gateway = std::make_unique<GatewayActor>(stage_, "gateway", of, id);
+      GatewayActor& entrance = *gateway;
+      cast_.push_back(std::move(gateway));
+      id += 1000;
+      for (const ClientSettings& settings : stage_.settings.viewers) {
+        cast_.push_back(std::make_unique<Browser>(stage_, "browser " + std::to_string(id / 1000), settings,
+                                                  entrance, id));
+        id += 1000;
+      }
     }
     const std::size_t newcomers_from = cast_.size();
     number = 0;

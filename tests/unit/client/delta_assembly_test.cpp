@@ -70,6 +70,22 @@ TEST(DeltaAssembly, AFrameHeldAlreadyIsIgnored) {
   EXPECT_EQ(assembly.size(), 1U);
 }
 
+// A gateway sends a viewer that joins again nothing between the gap and the snapshot.
+TEST(DeltaAssembly, FramesThatASnapshotHoldsAreNoGap) {
+  DeltaAssembly assembly({.delta_bytes = 100});
+  EXPECT_EQ(assembly.add(sample(5, 0, 1)), Outcome::kStored);
+  assembly.drop_through(20);
+  EXPECT_EQ(assembly.front(), nullptr);
+  EXPECT_EQ(assembly.add(sample(20, 0, 1)), Outcome::kIgnored);
+  EXPECT_EQ(assembly.add(sample(21, 0, 1)), Outcome::kStored);
+  EXPECT_EQ(assembly.add(sample(22, 0, 2)), Outcome::kStored);
+  assembly.drop_through(30);
+  EXPECT_EQ(assembly.add(sample(22, 1, 2)), Outcome::kIgnored)
+      << "the rest of a frame that the snapshot holds";
+  EXPECT_EQ(assembly.add(sample(31, 0, 1)), Outcome::kStored);
+  EXPECT_EQ(assembly.add(sample(33, 0, 1)), Outcome::kGap);
+}
+
 TEST(DeltaAssembly, SubscribingInTheMiddleOfAFrameIsNoLoss) {
   DeltaAssembly assembly({.delta_bytes = 100});
   EXPECT_EQ(assembly.add(sample(7, 1, 2)), Outcome::kIgnored);

@@ -68,7 +68,7 @@ std::uint64_t Actor::delivered() const {
 std::int64_t Actor::wake_ns() const {
   if (!up_) return back_at_ns_;
   if (paused_) return INT64_MAX;
-  return std::max(not_before_ns_, clock_.world_ns(due_ns()));
+  return std::max(not_before_ns_, std::min(arrival_ns(), clock_.world_ns(due_ns())));
 }
 
 void Actor::turn() {
@@ -77,7 +77,7 @@ void Actor::turn() {
     return;
   }
   if (paused_ || stage_.now_ns < not_before_ns_) return;
-  if (stage_.now_ns < clock_.world_ns(due_ns())) {
+  if (stage_.now_ns < std::min(arrival_ns(), clock_.world_ns(due_ns()))) {
     const std::uint64_t delivered = this->delivered();
     if (delivered == delivered_) return;
     delivered_ = delivered;

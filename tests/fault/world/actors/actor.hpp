@@ -28,6 +28,7 @@ class Actor {
   void set_starved(std::int64_t between_ns);
   virtual void burst(std::uint32_t /*inputs*/) {}
   virtual void prefer(std::uint64_t /*salt*/) {}
+  virtual void set_disk_full(bool /*full*/) {}
 
   /// Does what is due at the stage's time.
   void turn();
@@ -56,6 +57,8 @@ class Actor {
   virtual void on_crash(bool power_fails) = 0;
   virtual void on_leave() = 0;
   virtual void on_poll() = 0;
+  /// The time of the world at which something arrives that is not a sample.
+  [[nodiscard]] virtual std::int64_t arrival_ns() const { return INT64_MAX; }
   /// In the actor's steady time.
   [[nodiscard]] virtual std::int64_t due_ns() const = 0;
 

@@ -62,6 +62,7 @@ void Client::on_poll() {
   due_ns_ = std::min(core_->poll({steady_ns(), wall_ns()}), steady_ns() + kLooksNs);
   if (core_->phase() != told_phase_) {
     told_phase_ = core_->phase();
+    if (told_phase_ == ClientPhase::kPlaying) stage_.known_ids[next_id_ - 1] = core_->session()->epoch;
     tell(name_of(told_phase_) + (told_phase_ == ClientPhase::kRefused ? ": " + core_->status().reason : ""));
   }
   // Damage on the way looks like a client that computes otherwise (STATES, "Joining again"); its user tries
@@ -193,10 +194,11 @@ void Witness::on_resync(client::ResyncReason reason) {
   stage_.journal.add(stage_.now_ns, who_, std::string("joins again: ") + client::describe(reason));
 }
 
-void Witness::sent(std::uint64_t number, double value, bool never) {
+void Witness::sent(std::uint64_t number, double value, bool never, bool shares) {
   Sent& input = sent_[number];
   input.value = value;
   input.never = never;
+  input.shares = shares;
   input.at_ns = stage_.now_ns;
   input.epoch = epoch_;
 }
@@ -211,6 +213,7 @@ void Witness::on_outcome(const client::InputOutcome& outcome) {
     blame("acts once", input + " has two outcomes");
   sent.told = outcome;
   const auto acted = stage_.truth.acted(epoch_, sent.value);
+  if (of_ == Of::kViewer && (sent.shares || outcome.kind == Kind::kLost)) return;
   if (outcome.kind == Kind::kActed) {
     if (!acted) return blame("acts once", input + " is said to have acted, and did not");
     if (*acted != outcome.frame)

@@ -17,7 +17,11 @@ namespace tandem::world {
 /// Compares what a client takes in with the truth. Used by everybody who has a ClientCore.
 class Witness : public client::CoreListener {
  public:
-  Witness(Stage& stage, std::string who) : stage_(stage), who_(std::move(who)) {}
+  /// What a viewer of a gateway is told of its inputs is less: gravities share an outcome, and nothing is
+  /// known of what a server took back.
+  enum class Of : std::uint8_t { kClient, kViewer };
+  Witness(Stage& stage, std::string who, Of of = Of::kClient)
+      : stage_(stage), who_(std::move(who)), of_(of) {}
   void watch(const client::ClientCore& core) { core_ = &core; }
 
   void on_session(const transport::SessionMessage& session) override;
@@ -28,14 +32,14 @@ class Witness : public client::CoreListener {
   void on_resync(client::ResyncReason reason) override;
 
   /// An input was sent, with the value that makes it unique; `never`: nobody may take it.
-  void sent(std::uint64_t number, double value, bool never);
+  void sent(std::uint64_t number, double value, bool never, bool shares = false);
   /// Blames what is still wrong about inputs at the end of the world.
   void check_end();
 
  private:
   struct Sent {
     double value = 0;
-    bool never = false;
+    bool never = false, shares = false;
     std::int64_t at_ns = 0;
     Epoch epoch = 0;
     /// This and all later epochs went on from one another, as far as this client saw.
@@ -50,6 +54,7 @@ class Witness : public client::CoreListener {
 
   Stage& stage_;
   std::string who_;
+  Of of_;
   const client::ClientCore* core_ = nullptr;
   std::uint32_t stream_ = 0;
   Epoch epoch_ = 0;

@@ -7,22 +7,28 @@
 
 namespace tandem::world {
 
-Forger::Forger(Stage& stage, std::uint64_t salt, std::uint64_t known_ids)
+Forger::Forger(Stage& stage, std::uint64_t salt)
     : stage_(stage),
       dice_(salt),
-      known_ids_(known_ids),
       client_(std::move(*stage.network.make_client("default"))),
       server_(std::move(*stage.network.make_server("default"))) {}
 
 transport::ClientId Forger::some_client() {
   switch (dice_.below(3)) {
     case 0:
-      return 1000 * (1 + dice_.below(known_ids_)) + dice_.below(3);
+      return known_client();
     case 1:
       return dice_.below(3);
     default:
       return 5'000'000 + dice_.below(400);
   }
+}
+
+transport::ClientId Forger::known_client() {
+  std::vector<transport::ClientId> known;
+  for (const auto& [id, epoch] : stage_.known_ids)
+    if (epoch == stage_.live_epoch) known.push_back(id);
+  return known.empty() ? 3 : known[dice_.below(known.size())];
 }
 
 Epoch Forger::some_epoch() { return dice_.one_in(6) ? dice_.next() : stage_.live_epoch; }

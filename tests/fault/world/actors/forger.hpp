@@ -12,8 +12,7 @@ namespace tandem::world {
 
 class Forger {
  public:
-  /// `known`: ids that clients of the world have.
-  Forger(Stage& stage, std::uint64_t salt, std::uint64_t known_ids);
+  Forger(Stage& stage, std::uint64_t salt);
   /// Sends one sample.
   void speak();
 
@@ -21,6 +20,7 @@ class Forger {
   void speak_as_client();
   void speak_as_server();
   [[nodiscard]] transport::ClientId some_client();
+  [[nodiscard]] transport::ClientId known_client();
   [[nodiscard]] Epoch some_epoch();
   [[nodiscard]] Frame some_frame();
   [[nodiscard]] double some_value();
@@ -28,7 +28,6 @@ class Forger {
 
   Stage& stage_;
   Dice dice_;
-  std::uint64_t known_ids_;
   std::unique_ptr<transport::ClientPort> client_;
   std::unique_ptr<transport::ServerPort> server_;
 };

@@ -87,6 +87,8 @@ void Server::begin() {
   engine_->frame = from.frame;
   host::begin_from(*start, config);
   epoch_ = config.epoch;
+  if (found)
+    for (const checkpoint::ClientState& client : found->clients) stage_.known_ids[client.id] = epoch_;
   if (start->newest_epoch >= epoch_)
     blame("newest checkpoint", "epoch " + std::to_string(epoch_) + " is not above the folder's");
   check_start(*start);

@@ -22,7 +22,7 @@ class Server final : public Actor {
 
   // What the faults do.
   void set_disk_delay(std::int64_t ns);
-  void set_disk_full(bool full);
+  void set_disk_full(bool full) override;
   void set_disk_lies(bool lies);
   /// The power fails in one of the steps of the next write.
   void tear_next_write(std::uint64_t salt, double kept, std::int64_t back_after_ns);

@@ -22,6 +22,11 @@ bool changes_links(FaultKind kind) {
          kind == FaultKind::kTruncate || kind == FaultKind::kLostForGood;
 }
 
+bool of_the_server(FaultKind kind) {
+  return kind == FaultKind::kSlowDisk || kind == FaultKind::kFullDisk || kind == FaultKind::kLostFsync ||
+         kind == FaultKind::kStarvePublisher;
+}
+
 /// Faults after which nothing is wrong with anybody but for what they do themselves.
 bool harmless(FaultKind kind) {
   return kind == FaultKind::kForge || kind == FaultKind::kBurst || kind == FaultKind::kNewcomer ||
@@ -167,13 +172,13 @@ void Chaos::begin(const Fault& fault) {
       server().set_disk_delay(seconds(fault.strength));
       break;
     case FaultKind::kFullDisk:
-      server().set_disk_full(true);
+      for (const auto& any : cast_) any->set_disk_full(true);
       break;
     case FaultKind::kLostFsync:
       server().set_disk_lies(true);
       break;
     case FaultKind::kForge:
-      active.forger = std::make_unique<Forger>(stage_, fault.salt, cast_.size());
+      active.forger = std::make_unique<Forger>(stage_, fault.salt);
       active.speaks_at_ns = stage_.now_ns;
       break;
     case FaultKind::kThin:
@@ -193,7 +198,8 @@ void Chaos::end(const Active& active) {
   const Fault& fault = active.fault;
   Actor& whom = actor(fault.whom);
   const auto still = [&](const Active& other) {
-    return other.fault.kind == fault.kind && index_of(other.fault.whom) == index_of(fault.whom);
+    return other.fault.kind == fault.kind &&
+           (of_the_server(fault.kind) || index_of(other.fault.whom) == index_of(fault.whom));
   };
   disturb(active);
   if (cuts(fault.kind) || changes_links(fault.kind)) return set_links();
@@ -204,7 +210,8 @@ void Chaos::end(const Active& active) {
   if (fault.kind == FaultKind::kNewcomer) whom.leave(INT64_MAX);
   if (fault.kind == FaultKind::kStarvePublisher) server().set_publishing(true);
   if (fault.kind == FaultKind::kSlowDisk) server().set_disk_delay(0);
-  if (fault.kind == FaultKind::kFullDisk) server().set_disk_full(false);
+  if (fault.kind == FaultKind::kFullDisk)
+    for (const auto& any : cast_) any->set_disk_full(false);
   if (fault.kind == FaultKind::kLostFsync) server().set_disk_lies(false);
 }
 

@@ -1,0 +1,208 @@
+#include "tests/fault/world/actors/recorder.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "services/recording/playback.hpp"
+
+namespace tandem::world {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// While it lives, no file of this process can grow: the disk is full.
+class FullDisk {
+ public:
+  explicit FullDisk(bool full, const std::string& path) : full_(full) {
+    if (!full_) return;
+    std::error_code ignored;
+    const auto size = fs::file_size(path, ignored);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit now = before_;
+    now.rlim_cur = ignored ? 0 : static_cast<rlim_t>(size);
+    std::signal(SIGXFSZ, SIG_IGN);
+    setrlimit(RLIMIT_FSIZE, &now);
+  }
+  ~FullDisk() {
+    if (full_) setrlimit(RLIMIT_FSIZE, &before_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  bool full_;
+  rlimit before_{};
+};
+
+fs::path folder() {
+  const fs::path memory = "/dev/shm";
+  return fs::is_directory(memory) ? memory : fs::temp_directory_path();
+}
+
+}  // namespace
+
+/// The recording, and the truth beside it.
+class RecorderActor::Both final : public client::CoreListener {
+ public:
+  Both(Stage& stage, const std::string& who, recording::Recorder& recorder)
+      : witness_(stage, who), capture_(recorder, {&Clock::shown, &Clock::shown_wall}), recorder_(recorder) {}
+  void watch(const client::ClientCore& core) {
+    witness_.watch(core);
+    capture_.watch(core);
+  }
+  void turned(client::Now now) { capture_.turned(now); }
+  void on_session(const transport::SessionMessage& session) override { witness_.on_session(session); }
+  void on_names(const transport::SessionMessage& session) override { capture_.on_names(session); }
+  void on_stream(const transport::StreamMessage& stream) override {
+    witness_.on_stream(stream);
+    capture_.on_stream(stream);
+  }
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override {
+    witness_.on_snapshot(snapshot);
+    capture_.on_snapshot(snapshot);
+  }
+  void on_scheduled(const transport::ScheduledInputMessage& input) override { capture_.on_scheduled(input); }
+  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
+    witness_.on_applied(epoch, delta);
+    capture_.on_applied(epoch, delta);
+    if (recorder_.good()) ++frames;
+  }
+  void on_resync(client::ResyncReason reason) override { witness_.on_resync(reason); }
+
+  std::uint64_t frames = 0;  ///< that were recorded without an error
+
+ private:
+  Witness witness_;
+  recording::Capture capture_;
+  recording::Recorder& recorder_;
+};
+
+RecorderActor::RecorderActor(Stage& stage, std::string name, const Server& server, std::uint64_t first_id)
+    : Actor(stage, std::move(name)),
+      server_(server),
+      next_id_(first_id),
+      path_((folder() / ("tandem-world-" + std::to_string(getpid()) + ".mcap")).string()) {}
+
+RecorderActor::~RecorderActor() {
+  drop();
+  std::error_code ignored;
+  fs::remove(path_, ignored);
+  fs::remove(path_ + ".part", ignored);
+}
+
+std::vector<transport::ParticipantId> RecorderActor::participants() const {
+  if (!port_) return {};
+  return {port_->self()};
+}
+
+void RecorderActor::on_start() {
+  const bool packs = stage_.settings.seed % 2 == 0;
+  auto made = recording::Recorder::create(
+      path_, packs ? recording::Compression::kZstd : recording::Compression::kNone);
+  if (!made) throw std::runtime_error(made.error().message);
+  recorder_ = std::make_unique<recording::Recorder>(std::move(*made));
+  port_ = std::move(*stage_.network.make_client("default"));
+  recording_port_ = std::make_unique<tool::RecordingPort>(*port_, *recorder_, &Clock::shown_wall);
+  listener_ = std::make_unique<Both>(stage_, name(), *recorder_);
+  client::CoreOptions options;
+  options.session = "default";
+  options.id = next_id_++;
+  options.role = transport::Role::kObserver;
+  options.prefer = "bandwidth";
+  core_ = std::make_unique<client::ClientCore>(std::move(options), *recording_port_, listener_.get());
+  listener_->watch(*core_);
+  due_ns_ = 0;
+}
+
+void RecorderActor::drop() {
+  core_.reset();
+  listener_.reset();
+  recording_port_.reset();
+  recorder_.reset();
+  port_.reset();
+}
+
+void RecorderActor::on_poll() {
+  const FullDisk disk(full_, path_);
+  const client::Now now{steady_ns(), wall_ns()};
+  due_ns_ = std::min(core_->poll(now), steady_ns() + 50 * kMs);
+  listener_->turned(now);
+  if (recorder_->good()) return;
+  finish();  // as the program does, which is then started again
+  ended(stage_.now_ns + kSecond);
+}
+
+void RecorderActor::finish() {
+  const bool good = recorder_->good();
+  const std::uint64_t frames = listener_->frames;
+  const auto finished = recorder_->finish();
+  if (!finished) tell(finished.error().message);
+  if (!good && finished) blame("recording", "a file that could not be written counts as complete");
+  // What could not be written is the chunk that was open.
+  const auto chunk = static_cast<std::uint64_t>(2.5 * stage_.settings.frame_rate_hz);
+  const std::uint64_t least = finished ? frames : frames - std::min(frames, chunk);
+  if (recorder_->totals().frames < least || (finished && frames > 0 && recorder_->totals().frames != frames))
+    blame("recording", "says that it holds " + std::to_string(recorder_->totals().frames) + " of " +
+                           std::to_string(frames) + " frames");
+  drop();
+  play_back(least);
+}
+
+void RecorderActor::on_leave() {
+  const FullDisk disk(full_, path_);
+  finish();
+}
+
+void RecorderActor::on_crash(bool /*power_fails*/) {
+  // A chunk of two seconds may be open; nothing else may be missing.
+  const auto chunk = static_cast<std::uint64_t>(2.5 * stage_.settings.frame_rate_hz);
+  const std::uint64_t frames = listener_->frames;
+  drop();
+  play_back(frames - std::min(frames, chunk));
+}
+
+void RecorderActor::play_back(std::uint64_t least) {
+  if (!fs::exists(path_)) {
+    if (least > 0) blame("recording", "there is no file with " + std::to_string(least) + " frames");
+    return;
+  }
+  const auto playback = recording::Playback::open(path_);
+  if (!playback) return blame("recording", playback.error().message);
+  std::uint64_t frames = 0;
+  while (true) {
+    const auto step = (*playback)->next();
+    if (!step) return blame("recording", step.error().message);
+    if (*step == recording::Playback::Step::kEnd) break;
+    const Epoch epoch = (*playback)->session().epoch;
+    const ClientTimeline& timeline = (*playback)->timeline();
+    if (const std::string wrong =
+            stage_.truth.hold(epoch, (*playback)->stream().id.id, timeline.applied(), timeline.hash());
+        !wrong.empty())
+      return blame("recording", wrong);
+    if (*step == recording::Playback::Step::kFrame) ++frames;
+  }
+  tell("recorded " + std::to_string(frames) + " frames");
+  if (frames < least)
+    blame("recording",
+          "plays " + std::to_string(frames) + " frames, of " + std::to_string(least) + " at least");
+  fs::remove(path_);
+}
+
+void RecorderActor::check() {
+  if (!core_ || std::min(well_for_ns(), server_.serves_for_ns()) < Rules::kPlaysNs) return;
+  if (core_->phase() == ClientPhase::kRefused && stage_.network.counts().damaged > 0) return;
+  if (core_->phase() != ClientPhase::kPlaying)
+    blame("getting in", "does not play: " + core_->status().reason);
+}
+
+void RecorderActor::check_end() {
+  if (up() && !paused()) leave(INT64_MAX);
+}
+
+}  // namespace tandem::world
