@@ -110,14 +110,14 @@ TEST_F(KeeperTest, AnIntervalThatChangesHoldsFromThenOn) {
     ++captured;
   };
   const std::int64_t first_ns = clock_ns();
-  (*keeper)->after_frame(first_ns, capture);
-  while ((*keeper)->figures(clock_ns()).written < 1) std::this_thread::yield();
+  (*keeper)->after_frame(first_ns, false, capture);
+  while ((*keeper)->figures(clock_ns())->written < 1) std::this_thread::yield();
   EXPECT_EQ(captured, 1) << "the first is due at once";
   (*keeper)->set_interval(100);
-  (*keeper)->after_frame(first_ns + 20'000'000'000, capture);
+  (*keeper)->after_frame(first_ns + 20'000'000'000, false, capture);
   EXPECT_EQ(captured, 1);
   (*keeper)->set_interval(10);
-  (*keeper)->after_frame(first_ns + 20'000'000'001, capture);
+  (*keeper)->after_frame(first_ns + 20'000'000'001, false, capture);
   EXPECT_EQ(captured, 2);
 }
 
