@@ -7,7 +7,7 @@
 
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"
-#include "services/tandemd/command_line.hpp"
+#include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
 
 int main(int argc, char** argv) {

@@ -7,7 +7,7 @@
 #include "services/host/keeping/keeping.hpp"
 #include "services/process/service_notifier.hpp"
 #include "services/standby/standby.hpp"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 
 namespace tandem::daemon {
 

@@ -31,6 +31,14 @@ LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measure
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
 OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/checkpoint", "services/workers"]
+OF_TANDEMD = (
+    SIMULATION
+    + TABLES
+    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
+    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
+    + ["services/workers"]
+    + HOST
+)
 OF_LAB = (
     SIMULATION
     + TIMELINE
@@ -93,12 +101,8 @@ EDGES = {
     "services/sessions": ["public", "services/planning", "services/scenes"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
-    "services/tandemd": SIMULATION
-    + TABLES
-    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
-    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/workers"]
-    + HOST,
+    "services/tandemd/configuration": OF_TANDEMD,
+    "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
     "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system"],
     "services/gateway": OF_CLIENT

@@ -1,4 +1,4 @@
-#include "services/tandemd/config_file.hpp"
+#include "services/tandemd/configuration/config_file.hpp"
 
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
@@ -9,11 +9,11 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/tandemd/command_line.hpp"
-#include "services/tandemd/config.hpp"
-#include "services/tandemd/rehearsal.hpp"
-#include "services/tandemd/reload.hpp"
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/command_line.hpp"
+#include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/rehearsal.hpp"
+#include "services/tandemd/configuration/reload.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {

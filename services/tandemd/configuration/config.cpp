@@ -1,4 +1,4 @@
-#include "services/tandemd/config.hpp"
+#include "services/tandemd/configuration/config.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "server.pb.h"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 
 namespace tandem::daemon {
 

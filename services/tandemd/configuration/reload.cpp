@@ -1,4 +1,4 @@
-#include "services/tandemd/reload.hpp"
+#include "services/tandemd/configuration/reload.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <array>
 
-#include "services/tandemd/config.hpp"
-#include "services/tandemd/config_file.hpp"
+#include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/config_file.hpp"
 
 namespace tandem::daemon {
 namespace {

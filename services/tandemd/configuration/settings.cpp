@@ -1,4 +1,4 @@
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
 #include "services/planning/wishes.hpp"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 #include "services/workers/workers.hpp"
 #include "tandem/simulation.hpp"
 

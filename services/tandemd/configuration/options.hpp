@@ -10,7 +10,7 @@
 #include "services/checkpoint/keeper.hpp"
 #include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
-#include "services/tandemd/places.hpp"
+#include "services/tandemd/configuration/places.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {
