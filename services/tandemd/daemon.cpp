@@ -21,6 +21,7 @@
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/json/json.hpp"
+#include "services/logging/log.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"
@@ -307,6 +308,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   const std::vector<host::StreamConfig> streams = config->streams;
   auto host = host::Host::create(std::move(*config), **simulation, **port);
   if (!host) return signals.finish(report_error(host.error(), 2));
+  logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
                options.choice.bodies,

@@ -109,6 +109,8 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("standby_rank", &Config::set_standby_rank);
   flags.add("metrics", &Config::mutable_metrics);
   flags.add("hash_log", &Config::mutable_hash_log);
+  flags.add("log_format", &Config::mutable_log_format);
+  flags.add("log_level", &Config::mutable_log_level);
 }
 
 CommandLine ended(int exit_code) { return {.options = std::nullopt, .exit_code = exit_code}; }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/checkpoint/keeper.hpp"
+#include "services/logging/log.hpp"
 #include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/configuration/places.hpp"
@@ -41,7 +42,8 @@ struct Options : planning::ServiceWishes {
   std::uint32_t standby_rank = 1;  ///< 1 .. kMostRank
 
   std::string hash_log;  ///< path; empty: none
-  bool json = false;     ///< a report on stdout at the end
+  logging::Options log;
+  bool json = false;  ///< a report on stdout at the end
 
   std::optional<metrics::Address> metrics;  ///< empty: none are served
 
