@@ -134,7 +134,7 @@ void fields(Visitor& visit, M& m) {
 
 template <class Visitor, Is<JournalMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.number, m.frame, m.hash, m.state);
+  primitives(visit, m.epoch, m.number, m.frame, m.hash, m.successor, m.state);
   visit.sequence(m.decisions, [&](auto& decision) { fields(visit, decision); });
 }
 
@@ -153,7 +153,7 @@ void fields(Visitor& visit, M& m) {
 
 template <class Visitor, Is<CommandMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.kind);
+  primitives(visit, m.epoch, m.request, m.kind);
   visit.text(m.session);
 }
 

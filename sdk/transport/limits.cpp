@@ -104,6 +104,8 @@ Result<void> check_announcement(const SessionMessage& message) {
     return refuse("gravity is finite");
   if (message.up_axis > UpAxis::kZ) return refuse("the axis that is up is 0, 1 or 2");
   if (!is_role(message.server_role)) return refuse("an unknown role");
+  if (message.server_role == ServerRole::kStandby && message.standby_rank == 0)
+    return refuse("a server that stands by has a rank");
   if (message.window_ceiling < 1 || message.window_ceiling > kMaxWindowCeiling)
     return refuse("a window ceiling is 1 to 1024 frames");
   if (!is_name(message.scene)) return refuse("a scene's name has at most 64 bytes");

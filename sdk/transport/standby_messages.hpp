@@ -35,6 +35,7 @@ struct JournalMessage {
   Epoch epoch = 0;
   std::uint64_t number = 0;  ///< 1, 2, ... in this epoch
   Frame frame = 0;
+  ClientId successor = 0;  ///< kLast: the server that takes over
   std::uint64_t hash = 0;  ///< hash of the bodies on the lattice at that frame; 0 unless it was made
   JournalState state = JournalState::kNotMade;
   std::vector<InputDecision> decisions;  ///< in the order in which they were made
@@ -74,6 +75,7 @@ enum class CommandKind : std::uint32_t { kHandOver = 1 };
 struct CommandMessage {
   static constexpr const char* kTopic = "TandemCommand";
   Epoch epoch = 0;
+  std::uint64_t request = 0;  ///< random; each is obeyed once
   CommandKind kind = CommandKind::kHandOver;
   std::string session;  ///< key
   bool operator==(const CommandMessage&) const = default;

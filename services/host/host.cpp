@@ -9,7 +9,6 @@
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
-#include "sdk/transport/text_message.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/clients/audience.hpp"
 #include "services/host/clients/claim.hpp"
@@ -21,6 +20,7 @@
 #include "services/host/clients/roster.hpp"
 #include "services/host/clients/snapshot_transfer.hpp"
 #include "services/host/clients/window.hpp"
+#include "services/host/frames/configuration_check.hpp"
 #include "services/host/frames/live_source.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "services/host/outgoing/status.hpp"
@@ -38,47 +38,6 @@ constexpr std::int64_t kLookNs = kSecond / 4;  // time between checks for rivals
 constexpr std::int64_t kNamesNs = kSecond;
 // A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
 constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
-
-tl::unexpected<Error> refuse(std::string message) {
-  return fail(ErrorCode::kInvalidArgument, std::move(message));
-}
-
-Result<void> check(const ServiceConfig& config) {
-  if (auto named = transport::check_session_name(config.session); !named) return named;
-  if (!(config.frame_rate_hz >= 1 && config.frame_rate_hz <= 1000))
-    return refuse("frame rate must lie in 1..1000 Hz");
-  if (config.window_ceiling < 1 || config.window_ceiling > 64)
-    return refuse("window ceiling must lie in 1..64");
-  if (config.window && (*config.window < 1 || *config.window > config.window_ceiling)) {
-    return refuse(fmt::format("window must lie in 1..{}", config.window_ceiling));
-  }
-  if (config.client_limit == 0 || config.participant_limit == 0)
-    return refuse("client limits must be positive");
-  if (config.epoch == 0) return refuse("epoch must not be 0");
-  return {};
-}
-
-Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
-  if (auto good = check(config); !good) return good;
-  if (auto good = check_stream_names(config.streams); !good) return good;
-  const Layout& layout = config.streams.front().layout;
-  for (const StreamConfig& stream : config.streams) {
-    if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
-    if (stream.layout.lead != layout.lead) return refuse("all streams of a session must have the same lead");
-  }
-  if (config.types.size() != layout.type_count)
-    return refuse(fmt::format("the layout has {} body types, but {} are described", layout.type_count,
-                              config.types.size()));
-  static_assert(engine::kMaxBodies == kMaxCapacity);
-  const std::uint32_t capacity = simulation.capacity();
-  if (capacity != layout.capacity)
-    return refuse(
-        fmt::format("the layout has {} slots, but the simulation has {}", layout.capacity, capacity));
-  // Reads it as clients do; otherwise each of them would fail.
-  if (const auto text = transport::read_text_message(config.scene_description); !text)
-    return refuse(text.error().message);
-  return {};
-}
 
 std::vector<std::string> names_of(const FrameSource& source) {
   std::vector<std::string> names;
@@ -108,6 +67,8 @@ struct Host::Impl {
         pacing(config.frame_rate_hz, config.free_rate),
         overrun(config.frame_rate_hz) {
     if (config.takes_over_from) claim.ignore(*config.takes_over_from);
+    claim.set_successors(
+        [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
     const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
     for (std::uint32_t id = 0; id < streams; ++id) {
       lanes.emplace_back(id, config, outbox);
@@ -273,10 +234,10 @@ void Host::Impl::receive() {
   // handled before it.
   acks.clear();
   input_samples.clear();
-  port->take(input_samples);
+  // While the session is handed over, inputs wait: this server may have to go on.
+  if (!succession.stopped()) port->take(input_samples);
   port->take(acks);
   for (const auto& ack : acks) digest(ack);
-  if (succession.stopped()) return;  // the next server tells clients that these inputs are lost
   for (const auto& input : input_samples) digest(input);
 }
 
@@ -519,8 +480,10 @@ Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation
                                            transport::ServerPort& port) {
   const auto before = std::exchange(config.goes_on_from, nullptr);
   if (before) {
-    if (before->epoch >= config.epoch) return refuse("the epoch must be above the one that it continues");
-    if (before->capacity() != simulation.capacity()) return refuse("the checkpoint has another capacity");
+    if (before->epoch >= config.epoch)
+      return fail(ErrorCode::kInvalidArgument, "the epoch must be above the one that it continues");
+    if (before->capacity() != simulation.capacity())
+      return fail(ErrorCode::kInvalidArgument, "the checkpoint has another capacity");
     config.start_frame = config.continues_frame = before->frame;
     config.continues_epoch = before->epoch;
     config.wait_for = 0;
@@ -564,6 +527,7 @@ const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }
 Outbox& Host::outbox() { return impl_->outbox; }
 Result<Frame> Host::inject(const engine::Input& input) {
+  if (impl_->succession.stopped()) return fail(ErrorCode::kCapacity, "the session is being handed over");
   return impl_->inputs.inject(input, impl_->source->frame() + 1, impl_->now_ns);
 }
 Result<void> Host::set_parameters(const StreamParameters& parameters, std::uint32_t stream) {

@@ -23,20 +23,39 @@ std::size_t size_of(const transport::JournalMessage& entry) {
   return size;
 }
 
+// More servers than this do not stand by, whatever is announced.
+constexpr std::uint32_t kMostBefore = 8;
+
 }  // namespace
 
-Standby::Standby(Options options, transport::ServerPort& port, Accept accept)
-    : options_(std::move(options)), port_(&port), accept_(std::move(accept)) {}
+void Standby::Journal::add(transport::JournalMessage&& entry, transport::ClientId self) {
+  if (!entries.empty() && entry.number <= entries.back().number) return;
+  if (entries.size() >= kMostEntries || bytes >= kMostJournalBytes) return;
+  handed_over = entry.state == transport::JournalState::kLast && entry.successor == self;
+  bytes += size_of(entry);
+  entries.push_back(std::move(entry));
+}
 
-Result<std::unique_ptr<Standby>> Standby::create(Options options, transport::ServerPort& port,
-                                                 Accept accept) {
+void Standby::Journal::forget_to(std::uint64_t number) {
+  while (!entries.empty() && entries.front().number <= number) {
+    bytes -= size_of(entries.front());
+    entries.pop_front();
+  }
+}
+
+Standby::Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows)
+    : options_(std::move(options)), port_(&port), accept_(std::move(accept)), follows_(std::move(follows)) {}
+
+Result<std::unique_ptr<Standby>> Standby::create(Options options, transport::ServerPort& port, Accept accept,
+                                                 Follows follows) {
   if (auto followed = port.follow(options.id); !followed) return tl::unexpected(followed.error());
-  return std::unique_ptr<Standby>(new Standby(std::move(options), port, std::move(accept)));
+  return std::unique_ptr<Standby>(
+      new Standby(std::move(options), port, std::move(accept), std::move(follows)));
 }
 
 bool Standby::poll(std::int64_t now_ns) {
   if (started_ns_ == 0) started_ns_ = now_ns;
-  if (now_ns - looked_ns_ >= kLookNs || gone_ns_) look_around(now_ns);
+  if (now_ns - looked_ns_ >= kLookNs || due_since_ns_) look_around(now_ns);
   take_journal();
   take_checkpoints(now_ns);
   if (now_ns - told_ns_ >= kTellNs || (news_ && now_ns - told_ns_ >= kTellSoonNs)) tell(now_ns);
@@ -56,6 +75,7 @@ void Standby::look_around(std::int64_t now_ns) {
   live_is_there_ = false;
   before_us_ = 0;
   const Announcement* other = nullptr;
+  const Announcement* successor = nullptr;
   const auto place = std::pair(options_.rank, port_->self());
   for (const Announcement& server : servers_) {
     if (server.from == port_->self()) continue;
@@ -64,26 +84,31 @@ void Standby::look_around(std::int64_t now_ns) {
     } else if (from_live(server.message.epoch, server.from)) {
       live_is_there_ = true;
       live_->message = server.message;
+    } else if (live_ && server.message.continues_epoch == live_->message.epoch) {
+      successor = &server;
     } else if (other == nullptr || server.message.epoch > other->message.epoch) {
       other = &server;
     }
   }
-  if (!live_is_there_ && other != nullptr) {
-    follow(*other);
+  before_us_ = std::min(before_us_, kMostBefore);
+  // One that took over is followed, even if the one before is still there.
+  if (successor == nullptr && !live_is_there_) successor = other;
+  if (successor != nullptr) {
+    follow(*successor);
     live_is_there_ = true;
   }
-  if (live_is_there_ && !was_last()) gone_ns_.reset();
   if (checkpoint_ != nullptr && live_) announce();
 }
 
+// What is held stays until there is a checkpoint of the new world.
 void Standby::follow(const Announcement& server) {
   notices_.push_back(fmt::format("follows the server of epoch {}", server.message.epoch));
   live_ = server;
-  checkpoint_.reset();
   assembly_.clear();
-  journal_.clear();
-  journal_bytes_ = 0;
-  gone_ns_.reset();
+  fresh_ = {};
+  if (checkpoint_ == nullptr) journal_ = {};
+  journal_.handed_over = false;
+  due_since_ns_.reset();
   news_ = true;
 }
 
@@ -93,10 +118,8 @@ void Standby::take_journal() {
   port_->take(entries_);
   for (auto& [entry, from] : entries_) {
     if (!from_live(entry.epoch, from)) continue;
-    if (!journal_.empty() && entry.number <= journal_.back().number) continue;
-    if (journal_.size() >= kMostEntries || journal_bytes_ >= kMostJournalBytes) continue;
-    journal_bytes_ += size_of(entry);
-    journal_.push_back(std::move(entry));
+    Journal& journal = checkpoint_ == nullptr || holds_the_live() ? journal_ : fresh_;
+    journal.add(std::move(entry), options_.id);
     news_ = true;
   }
 }
@@ -105,7 +128,7 @@ void Standby::take_checkpoints(std::int64_t now_ns) {
   parts_.clear();
   port_->take(parts_);
   for (auto& [part, from] : parts_) {
-    if (!from_live(part.epoch, from) || part.frame <= holds()) continue;
+    if (!from_live(part.epoch, from) || (holds_the_live() && part.frame <= holds())) continue;
     news_ = true;
     if (auto whole = assembly_.add(std::move(part))) hold(*whole, now_ns);
   }
@@ -116,15 +139,14 @@ void Standby::hold(const Assembly::Whole& whole, std::int64_t now_ns) {
   if (!checkpoint) return refuse(checkpoint.error().message, now_ns);
   if (checkpoint->frame != whole.frame || checkpoint->epoch != live_->message.epoch)
     return refuse("it is of another frame or epoch than its parts say", now_ns);
-  if (auto good = accept_(*checkpoint); !good) return refuse(good.error().message, now_ns);
+  if (auto good = accept_(*checkpoint, live_->message); !good) return refuse(good.error().message, now_ns);
   checkpoint->journal = whole.journal;
-  if (checkpoint_ == nullptr)
+  if (!holds_the_live()) {
     notices_.push_back(fmt::format("holds the world of frame {} of epoch {}, and can take over as rank {}",
                                    checkpoint->frame, checkpoint->epoch, options_.rank));
-  while (!journal_.empty() && journal_.front().number <= whole.journal) {
-    journal_bytes_ -= size_of(journal_.front());
-    journal_.pop_front();
+    if (checkpoint_ != nullptr) journal_ = std::exchange(fresh_, {});
   }
+  journal_.forget_to(whole.journal);
   checkpoint_ = std::make_shared<const checkpoint::Checkpoint>(std::move(*checkpoint));
   told_ns_ = INT64_MIN / 2;  // the live server may wait for it
 }
@@ -142,9 +164,11 @@ void Standby::tell(std::int64_t now_ns) {
   transport::StandbyMessage message;
   message.standby = options_.id;
   message.epoch = live_->message.epoch;
-  message.holds_frame = holds();
-  const std::size_t usable = usable_entries();
-  message.journal = usable > 0 ? journal_[usable - 1].number : (checkpoint_ ? checkpoint_->journal : 0);
+  if (holds_the_live()) {
+    const std::size_t usable = usable_entries();
+    message.holds_frame = holds();
+    message.journal = usable > 0 ? journal_.entries[usable - 1].number : checkpoint_->journal;
+  }
   message.part_frame = assembly_.frame();
   message.part_count = assembly_.parts();
   message.rank = options_.rank;
@@ -182,38 +206,56 @@ std::size_t Standby::usable_entries() const {
   if (checkpoint_ == nullptr) return 0;
   std::uint64_t next = checkpoint_->journal + 1;
   std::size_t count = 0;
-  while (count < journal_.size() && journal_[count].number == next) ++count, ++next;
+  while (count < journal_.entries.size() && journal_.entries[count].number == next) ++count, ++next;
   return count;
 }
 
 Frame Standby::live_frame() const {
-  for (auto entry = journal_.rbegin(); entry != journal_.rend(); ++entry)
+  for (auto entry = journal_.entries.rbegin(); entry != journal_.entries.rend(); ++entry)
     if (entry->state != transport::JournalState::kNotMade) return std::max(entry->frame, holds());
   return holds();
 }
 
-bool Standby::was_last() const {
-  return !journal_.empty() && journal_.back().state == transport::JournalState::kLast;
+Standby::Cause Standby::cause() const {
+  if (checkpoint_ == nullptr || !live_) return Cause::kNone;
+  if (holds_the_live() && journal_.handed_over) return Cause::kHandedOver;
+  return live_is_there_ ? Cause::kNone : Cause::kGone;
+}
+
+// Asked once: stepping through the journal takes a while, and the checkpoint of the last frame is on its way.
+bool Standby::can_follow_the_last() {
+  if (holds() == live_frame()) return true;
+  const std::size_t usable = usable_entries();
+  if (asked_follows_ || usable != journal_.entries.size()) return false;
+  asked_follows_ = true;
+  const std::vector<transport::JournalMessage> entries(journal_.entries.begin(), journal_.entries.end());
+  return follows_(*checkpoint_, entries);
 }
 
 bool Standby::is_time(std::int64_t now_ns) {
-  if (checkpoint_ == nullptr || (live_is_there_ && !was_last())) return false;
-  if (!gone_ns_) {
-    gone_ns_ = now_ns;
-    look_around(now_ns);  // who else could take over
+  const Cause now = cause();
+  if (now == Cause::kNone) {
+    due_since_ns_.reset();
+    asked_follows_ = false;
+    return false;
   }
-  return now_ns - *gone_ns_ >= before_us_ * kRankNs;
+  if (now == Cause::kHandedOver && live_is_there_) return can_follow_the_last();
+  if (!due_since_ns_) {
+    due_since_ns_ = now_ns;
+    return false;  // the next poll sees who else could take over
+  }
+  return now_ns - *due_since_ns_ >= before_us_ * kRankNs;
 }
 
 Takeover Standby::take_over() {
   Takeover takeover;
+  takeover.published = live_frame();
+  takeover.handed_over = cause() == Cause::kHandedOver;
   takeover.checkpoint = checkpoint_;
   const auto usable = static_cast<std::ptrdiff_t>(usable_entries());
-  takeover.journal.assign(std::make_move_iterator(journal_.begin()),
-                          std::make_move_iterator(journal_.begin() + usable));
+  takeover.journal.assign(std::make_move_iterator(journal_.entries.begin()),
+                          std::make_move_iterator(journal_.entries.begin() + usable));
   takeover.from = live_->from;
-  takeover.handed_over =
-      !takeover.journal.empty() && takeover.journal.back().state == transport::JournalState::kLast;
   port_->unfollow();
   return takeover;
 }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,7 @@ struct Takeover {
   std::vector<transport::JournalMessage> journal;
   transport::ParticipantId from;  ///< the server that was live
   bool handed_over = false;       ///< that server asked for it
+  Frame published = 0;            ///< the last frame of that server that is known
 };
 
 /// Receives checkpoints and the journal of the live server, and tells everybody that it stands by as soon as
@@ -38,8 +40,12 @@ struct Takeover {
 /// Not thread-safe.
 class Standby {
  public:
-  /// Whether this machine could go on from a checkpoint; the error is told in the log.
-  using Accept = std::function<Result<void>(const checkpoint::Checkpoint&)>;
+  /// Whether this machine could go on from a checkpoint of that session; the error is told in the log.
+  using Accept = std::function<Result<void>(const checkpoint::Checkpoint&, const transport::SessionMessage&)>;
+  /// Whether this machine makes the frames of a journal from a checkpoint on. Asked when a server hands over:
+  /// if not, the checkpoint of the last frame is waited for.
+  using Follows =
+      std::function<bool(const checkpoint::Checkpoint&, std::span<const transport::JournalMessage>)>;
 
   /// A server takes over this much later for each living one that comes before it.
   static constexpr std::int64_t kRankNs = kSecond;
@@ -48,7 +54,8 @@ class Standby {
   static constexpr std::size_t kMostJournalBytes = std::size_t{64} << 20U;
 
   /// `port` must outlive the object. Errors: those of ServerPort::follow().
-  static Result<std::unique_ptr<Standby>> create(Options options, transport::ServerPort& port, Accept accept);
+  static Result<std::unique_ptr<Standby>> create(Options options, transport::ServerPort& port, Accept accept,
+                                                 Follows follows);
 
   /// Takes what arrived. Returns true if it is time to take over: call take_over() then.
   bool poll(std::int64_t now_ns);
@@ -61,7 +68,7 @@ class Standby {
   [[nodiscard]] Epoch follows() const { return live_ ? live_->message.epoch : 0; }
   /// Frame of the checkpoint held; 0: none.
   [[nodiscard]] Frame holds() const { return checkpoint_ ? checkpoint_->frame : 0; }
-  /// The last frame that it knows was made; it would step from holds() up to there.
+  /// The last frame of that world that it knows was made, at least holds().
   [[nodiscard]] Frame live_frame() const;
   /// Lines for a log since the last call.
   [[nodiscard]] std::vector<std::string> take_notices();
@@ -69,7 +76,10 @@ class Standby {
  private:
   using Announcement = transport::Received<transport::SessionMessage>;
 
-  Standby(Options options, transport::ServerPort& port, Accept accept);
+  /// Why it is time to take over, or that it is not.
+  enum class Cause : std::uint8_t { kNone, kGone, kHandedOver };
+
+  Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows);
   void look_around(std::int64_t now_ns);
   void follow(const Announcement& server);
   void take_journal();
@@ -79,8 +89,14 @@ class Standby {
   void tell(std::int64_t now_ns);
   void announce();
   void publish_status(std::int64_t now_ns);
+  [[nodiscard]] Cause cause() const;
   [[nodiscard]] bool is_time(std::int64_t now_ns);
-  [[nodiscard]] bool was_last() const;
+  /// True if this server takes over by a handover, and could do it now.
+  [[nodiscard]] bool can_follow_the_last();
+  /// The world that is held is of the server that is followed, not of one before.
+  [[nodiscard]] bool holds_the_live() const {
+    return checkpoint_ && live_ && checkpoint_->epoch == live_->message.epoch;
+  }
   /// The entries after the checkpoint, up to the first gap.
   [[nodiscard]] std::size_t usable_entries() const;
   [[nodiscard]] bool from_live(Epoch epoch, const transport::ParticipantId& from) const;
@@ -88,6 +104,7 @@ class Standby {
   Options options_;
   transport::ServerPort* port_;
   Accept accept_;
+  Follows follows_;
 
   std::optional<Announcement> live_;
   bool live_is_there_ = false;
@@ -97,13 +114,23 @@ class Standby {
 
   std::shared_ptr<const checkpoint::Checkpoint> checkpoint_;
   Assembly assembly_;
-  std::deque<transport::JournalMessage> journal_;  // ascending by number
-  std::size_t journal_bytes_ = 0;
+  /// Entries of one epoch, ascending by number.
+  struct Journal {
+    std::deque<transport::JournalMessage> entries;
+    std::size_t bytes = 0;
+    bool handed_over = false;  // the last one names this server
+
+    void add(transport::JournalMessage&& entry, transport::ClientId self);
+    void forget_to(std::uint64_t number);
+  };
+  Journal journal_;  // of the epoch of the checkpoint
+  Journal fresh_;    // of the live server, as long as the checkpoint is of one before
+  bool asked_follows_ = false;
   std::vector<transport::Received<transport::JournalMessage>> entries_;
   std::vector<transport::Received<transport::CheckpointMessage>> parts_;
 
   std::optional<transport::SessionMessage> announced_;
-  std::optional<std::int64_t> gone_ns_;  // since when the live server is gone
+  std::optional<std::int64_t> due_since_ns_;  // since when there is a cause to take over
   std::int64_t told_ns_ = INT64_MIN / 2, status_ns_ = INT64_MIN / 2, refused_ns_ = INT64_MIN / 2;
   std::int64_t started_ns_ = 0;
   bool news_ = false;  // something arrived that the live server should know

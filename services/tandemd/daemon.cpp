@@ -45,8 +45,7 @@ int report_error(const Error& error, int exit_code) {
 class HashLog {
  public:
   /// `path` for stream 0, `path`.k for stream k.
-  [[nodiscard]] Result<void> open(const std::string& path, Epoch epoch, std::size_t streams) {
-    epoch_ = epoch;
+  [[nodiscard]] Result<void> open(const std::string& path, std::size_t streams) {
     for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
@@ -58,6 +57,8 @@ class HashLog {
     }
     return {};
   }
+  /// The epoch of all lines.
+  void begin(Epoch epoch) { epoch_ = epoch; }
   void add(std::uint32_t stream, Frame frame, std::uint64_t hash) {
     if (stream >= files_.size()) return;
     std::fputs(fmt::format("{},{},{}\n", epoch_, frame, to_hex(hash)).c_str(), files_[stream].get());
@@ -286,16 +287,8 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   if (!keeping) return report_error(keeping.error(), 1);
   auto port = open_port(*config, options, signals.stop());
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
-  Service service;
-  if (options.standby) {
-    const auto takes_over =
-        stand_by(options, **simulation, **port, *config, *keeping, service, signals.stop());
-    if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
-    if (!*takes_over) return signals.finish(0);
-  }
-  const bool goes_on = config->goes_on_from != nullptr;
   HashLog hashes;
-  if (const auto opened = hashes.open(options.hash_log, config->epoch, config->streams.size()); !opened)
+  if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
     return signals.finish(report_error(opened.error(), 1));
 
   Metrics metrics;
@@ -304,10 +297,19 @@ int run_daemon(const Options& options, SignalWatch& signals) {
         metrics.serve(*options.metrics, facts_of(*config, options.session, scene->name, options.free_rate));
     if (!served) return signals.finish(report_error(served.error(), 1));
   }
+  Service service;
+  if (options.standby) {
+    const auto takes_over =
+        stand_by(options, **simulation, **port, *config, *keeping, service, signals.stop());
+    if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
+    if (!*takes_over) return signals.finish(0);
+  }
+  const bool goes_on = config->goes_on_from != nullptr;
+  hashes.begin(config->epoch);
   const double frame_rate_hz = config->frame_rate_hz;
   const std::vector<host::StreamConfig> streams = config->streams;
   auto host = host::Host::create(std::move(*config), **simulation, **port);
-  if (!host) return signals.finish(report_error(host.error(), 2));
+  if (!host) return signals.finish(report_error(host.error(), options.standby ? 1 : 2));
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,

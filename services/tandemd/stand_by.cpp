@@ -1,10 +1,12 @@
 #include "services/tandemd/stand_by.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <memory>
 #include <random>
+#include <span>
 #include <utility>
 
 #include "sdk/transport/clock.hpp"
@@ -34,18 +36,26 @@ Result<bool> stand_by(const Options& options, engine::Simulation& simulation, tr
                       host::HostConfig& config, host::Keeping& keeping, Service& service,
                       const std::atomic<bool>& stop) {
   const checkpoint::World world = host::checkpoint_world(config);
-  const auto accept = [&](const checkpoint::Checkpoint& checkpoint) -> Result<void> {
+  const auto accept = [&](const checkpoint::Checkpoint& checkpoint,
+                          const transport::SessionMessage& live) -> Result<void> {
     if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
+    if (live.frame_rate_hz != config.frame_rate_hz)
+      return fail(ErrorCode::kInvalidArgument, fmt::format("it is of {} frames a second, not {}",
+                                                           live.frame_rate_hz, config.frame_rate_hz));
     if (simulation.load(checkpoint.engine_state)) return {};
     return fail(ErrorCode::kInvalidArgument,
                 "the engine refuses its part: it is of another scene file, number of bodies, seed or build");
+  };
+  const auto follows = [&](const checkpoint::Checkpoint& from,
+                           std::span<const transport::JournalMessage> journal) {
+    return simulation.load(from.engine_state) && host::roll_forward(config, simulation, from, journal);
   };
   // Clients find the writers before they are needed.
   if (auto opened = port.open_streams(static_cast<std::uint32_t>(config.streams.size())); !opened)
     return tl::unexpected(opened.error());
   auto standby = standby::Standby::create(
       {.session = options.session, .id = random_id(), .rank = options.standby_rank, .epoch = config.epoch},
-      port, accept);
+      port, accept, follows);
   if (!standby) return tl::unexpected(standby.error());
   spdlog::info("standby: waits for the live server of session '{}' on domain {}", options.session,
                options.domain);
@@ -59,7 +69,6 @@ Result<bool> stand_by(const Options& options, engine::Simulation& simulation, tr
   log_notices(**standby);
   const std::int64_t began_ns = steady_ns();
   const standby::Takeover takeover = (*standby)->take_over();
-  const Frame published = (*standby)->live_frame();
   auto continued = host::continue_world(config, simulation, *takeover.checkpoint, takeover.journal);
   if (!continued) return tl::unexpected(continued.error());
   if (!continued->why_not.empty())
@@ -73,8 +82,8 @@ Result<bool> stand_by(const Options& options, engine::Simulation& simulation, tr
       "standby: takes over from epoch {} at frame {}, {} frames after its checkpoint, {} behind the live server, "
       "after {:.0f} ms{}",
       takeover.checkpoint->epoch, frame, frame - takeover.checkpoint->frame,
-      published > frame ? published - frame : 0, static_cast<double>(steady_ns() - began_ns) * 1e-6,
-      takeover.handed_over ? " (handed over)" : "");
+      takeover.published > frame ? takeover.published - frame : 0,
+      static_cast<double>(steady_ns() - began_ns) * 1e-6, takeover.handed_over ? " (handed over)" : "");
   return true;
 }
 

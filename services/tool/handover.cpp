@@ -5,6 +5,7 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,11 @@ struct Options {
 int failed(const std::string& why) {
   print_error(fmt::format("{}: {}\n", kName, why));
   return 1;
+}
+
+std::uint64_t random_request() {
+  std::random_device device;
+  return std::uint64_t{device()} << 32U | device();
 }
 
 /// The servers of a session, as they are announced.
@@ -79,8 +85,9 @@ int run_handover(const Options& options) {
   transport::CommandMessage command;
   command.epoch = epoch;
   command.session = options.session;
+  command.request = random_request();
   const std::int64_t asked_ns = transport::steady_ns();
-  std::int64_t told_ns = INT64_MIN / 2;
+  std::int64_t told_ns = INT64_MIN / 2, heard_ns = asked_ns;
   while (transport::steady_ns() - asked_ns < kPatienceNs && !signals.stop()) {
     const std::int64_t now_ns = transport::steady_ns();
     if (now_ns - told_ns >= kRepeatNs) {  // the server may not be discovered yet
@@ -89,6 +96,9 @@ int run_handover(const Options& options) {
     }
     (*monitor)->wait(std::chrono::milliseconds(10));
     const Servers now = look(**monitor, options.session, epoch);
+    if (now.standby) heard_ns = now_ns;
+    if (now.live && now.live->epoch == epoch && now_ns - heard_ns >= kFindNs)
+      return signals.finish(failed("the server that stood by is gone"));
     if (!now.live || now.live->continues_epoch != epoch) continue;
     const double took_s = static_cast<double>(transport::steady_ns() - asked_ns) * 1e-9;
     if (options.json) {

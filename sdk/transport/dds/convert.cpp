@@ -265,6 +265,7 @@ dds_return_t write_sample(dds_entity_t writer, const JournalMessage& message) {
   wire.number = message.number;
   wire.frame = message.frame;
   wire.hash = message.hash;
+  wire.successor = message.successor;
   wire.state = static_cast<std::uint32_t>(message.state);
   lend(wire.decisions, decisions);
   return dds_write(writer, &wire);
@@ -299,6 +300,7 @@ dds_return_t write_sample(dds_entity_t writer, const StandbyMessage& message) {
 dds_return_t write_sample(dds_entity_t writer, const CommandMessage& message) {
   tandem_TandemCommand wire{};
   wire.epoch = message.epoch;
+  wire.request = message.request;
   wire.kind = static_cast<std::uint32_t>(message.kind);
   wire.session = lend(message.session);
   return dds_write(writer, &wire);

@@ -36,12 +36,19 @@ bool Claim::comes_first(const Other& other) const {
   return self_ < other.from;
 }
 
+bool Claim::continues_ours(const Other& other) const {
+  return other.message.server_role == transport::ServerRole::kLive &&
+         other.message.continues_epoch == epoch_ && may_succeed_ && may_succeed_(other.from);
+}
+
 bool Claim::gives_way(const Other& other, std::int64_t now_ns) {
   if (!announced_ns_) return true;
   const bool settled = now_ns - *announced_ns_ >= kSettledNs;
   const std::ptrdiff_t ours = followers(epoch_), theirs = followers(other.message.epoch);
   const bool tie_counts = ours > 0 || !settled;
-  const bool behind = theirs > ours || (theirs == ours && tie_counts && !comes_first(other));
+  // Where nobody follows either of them, the world that went on elsewhere goes on.
+  const bool succeeded = theirs == ours && continues_ours(other);
+  const bool behind = theirs > ours || succeeded || (theirs == ours && tie_counts && !comes_first(other));
   if (!behind) {
     behind_since_.erase(other.from);
     return false;
@@ -68,10 +75,7 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
   std::erase_if(behind_since_, [this](const auto& entry) {
     return std::ranges::none_of(others_, [&](const Other& o) { return o.from == entry.first; });
   });
-  has_successor_ = std::ranges::any_of(others_, [this](const Other& other) {
-    return other.message.server_role == transport::ServerRole::kLive &&
-           other.message.continues_epoch == epoch_;
-  });
+  has_successor_ = std::ranges::any_of(others_, [this](const Other& other) { return continues_ours(other); });
   for (const Other& other : others_) {
     if (other.from == self_ || other.message.server_role != transport::ServerRole::kLive) continue;
     if (other.from == ignored_ && (!announced_ns_ || now_ns - *announced_ns_ < kIgnoredNs)) continue;

@@ -2,8 +2,10 @@
 // Decides which server owns a session name.
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "sdk/transport/port.hpp"
@@ -39,7 +41,11 @@ class Claim {
   /// This server takes over from that one. It has no claim before this server has announced itself for
   /// kIgnoredNs.
   void ignore(const transport::ParticipantId& server) { ignored_ = server; }
-  /// True if, at the last check(), a live server continued this server's epoch.
+  /// Tells which participants may continue this server's epoch: they stood by for it.
+  void set_successors(std::function<bool(const transport::ParticipantId&)> may_succeed) {
+    may_succeed_ = std::move(may_succeed);
+  }
+  /// True if, at the last check(), a live server that may do so continued this server's epoch.
   [[nodiscard]] bool has_successor() const { return has_successor_; }
   /// Notes an acknowledgement, whatever its content.
   void acknowledged(Epoch epoch, const transport::ParticipantId& from, std::int64_t now_ns);
@@ -54,6 +60,7 @@ class Claim {
     Epoch epoch = 0;
     std::int64_t at_ns = 0;
   };
+  [[nodiscard]] bool continues_ours(const Other& other) const;
   [[nodiscard]] bool gives_way(const Other& other, std::int64_t now_ns);
   [[nodiscard]] bool comes_first(const Other& other) const;
   [[nodiscard]] std::ptrdiff_t followers(Epoch epoch) const;
@@ -63,6 +70,7 @@ class Claim {
   transport::ParticipantId self_;
   std::optional<std::int64_t> announced_ns_;
   std::optional<transport::ParticipantId> ignored_;
+  std::function<bool(const transport::ParticipantId&)> may_succeed_;
   bool has_successor_ = false;
   std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
                                                                 // kFollowedNs

@@ -13,6 +13,7 @@ using transport::JournalMessage;
 using transport::JournalState;
 
 void Journal::set_open(bool open) {
+  if (open && !open_) ++number_;  // what happened meanwhile is missing
   open_ = open;
   noted_.clear();
 }
@@ -52,12 +53,21 @@ void Journal::write(Frame next, std::int64_t now_ns) {
   noted_.clear();
 }
 
-void Journal::made(Frame frame, std::uint64_t hash, JournalState state, std::int64_t now_ns) {
+void Journal::made(Frame frame, std::uint64_t hash, std::int64_t now_ns) {
   if (!open_) return;
   JournalMessage entry;
   entry.frame = frame;
   entry.hash = hash;
-  entry.state = state;
+  entry.state = JournalState::kMade;
+  push(std::move(entry), now_ns);
+}
+
+void Journal::last(Frame frame, std::uint64_t hash, transport::ClientId successor, std::int64_t now_ns) {
+  JournalMessage entry;
+  entry.frame = frame;
+  entry.hash = hash;
+  entry.state = JournalState::kLast;
+  entry.successor = successor;
   push(std::move(entry), now_ns);
 }
 

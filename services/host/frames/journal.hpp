@@ -29,7 +29,10 @@ class Journal {
   /// that tells anybody of them, and often.
   void write(Frame next, std::int64_t now_ns);
   /// Queues that a frame was made. Call it after write() and before the frame's deltas are queued.
-  void made(Frame frame, std::uint64_t hash, transport::JournalState state, std::int64_t now_ns);
+  void made(Frame frame, std::uint64_t hash, std::int64_t now_ns);
+  /// The same; the frame is the last one, and that server takes over. Then nothing may be queued any more,
+  /// unless the session goes on here.
+  void last(Frame frame, std::uint64_t hash, transport::ClientId successor, std::int64_t now_ns);
   /// Number of the last entry.
   [[nodiscard]] std::uint64_t number() const { return number_; }
 

@@ -11,7 +11,8 @@ namespace tandem::host {
 
 /// Goes through a handover: the best server that stands by gets a fresh checkpoint; then one more frame is
 /// made, and the journal says that it is the last; then nothing is made or decided until the other server
-/// announces itself. If that takes too long, the session goes on here. Not thread-safe.
+/// announces itself. That server gets a checkpoint of the last frame, too, in case that its engine cannot
+/// follow the journal. If it takes too long, the session goes on here. Not thread-safe.
 class Handover {
  public:
   static constexpr std::int64_t kPreparesNs = 10 * kSecond;  ///< maximum until the last frame
@@ -24,10 +25,12 @@ class Handover {
   /// A frame was made; returns true if the journal has to say that it is the last one.
   [[nodiscard]] bool made(std::int64_t now_ns);
 
-  /// True if a checkpoint of the next frame is needed.
-  [[nodiscard]] bool wants_checkpoint() const { return step_ == Step::kPreparing; }
+  /// True if a checkpoint of the frame that was just made is needed.
+  [[nodiscard]] bool wants_checkpoint() const { return step_ == Step::kPreparing || stopped(); }
   /// True if nothing may be made or decided.
   [[nodiscard]] bool stopped() const { return step_ == Step::kStopped; }
+  /// The server that takes over.
+  [[nodiscard]] transport::ClientId to() const { return to_; }
 
  private:
   enum class Step : std::uint8_t { kNone, kPreparing, kLastFrame, kStopped };

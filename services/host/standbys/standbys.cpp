@@ -11,6 +11,8 @@ namespace tandem::host {
 namespace {
 
 constexpr std::int64_t kLookNs = kSecond / 10;
+constexpr std::int64_t kTellFullNs = 10 * kSecond;
+constexpr std::size_t kMostSuccessors = 64;
 constexpr std::int64_t kReadyNs = kSecond;  // how recently a ready server was heard
 
 std::string name_of(const Standbys::Standby& server) {
@@ -39,7 +41,7 @@ void Standbys::heard(const transport::Received<transport::StandbyMessage>& recei
   if (message.epoch != epoch_ || message.protocol_version != transport::kProtocolVersion) return;
   auto known = servers_.find(message.standby);
   if (known == servers_.end()) {
-    if (servers_.size() >= kMost || !outbox_->has_control_room()) return;
+    if (!has_seat(received, notices, now_ns)) return;
     Server server;
     server.id = message.standby;
     server.from = received.from;
@@ -51,7 +53,9 @@ void Standbys::heard(const transport::Received<transport::StandbyMessage>& recei
   server.rank = message.rank;
   server.heard_ns = now_ns;
   server.journal = message.journal;
-  server.holds_frame = message.holds_frame;
+  // It cannot hold what it was not sent.
+  if (message.holds_frame <= server.offered) server.holds_frame = message.holds_frame;
+  if (server.holds_frame > 0 && successors_.size() < kMostSuccessors) successors_.insert(server.from);
   if (server.holds_frame > 0 && !std::exchange(server.told, true))
     notices.add(fmt::format("{} stands by, from frame {} on", name_of(server), server.holds_frame), now_ns);
   if (!server.sending) return;
@@ -62,6 +66,22 @@ void Standbys::heard(const transport::Received<transport::StandbyMessage>& recei
     next_ns_ = now_ns;
   }
   if (server.holds_frame >= frame) server.sending.reset();
+}
+
+// One server a participant, so that none can take all seats.
+bool Standbys::has_seat(const transport::Received<transport::StandbyMessage>& received, Notices& notices,
+                        std::int64_t now_ns) {
+  const bool has_one =
+      std::ranges::any_of(servers_, [&](const auto& entry) { return entry.second.from == received.from; });
+  if (has_one || !outbox_->has_control_room()) return false;
+  if (servers_.size() < kMost) return true;
+  if (now_ns - told_full_ns_ >= kTellFullNs) {
+    told_full_ns_ = now_ns;
+    notices.add(
+        fmt::format("{} servers stand by, so server {:016x} is not served", kMost, received.message.standby),
+        now_ns);
+  }
+  return false;
 }
 
 void Standbys::look(transport::ServerPort& port, Notices& notices, std::int64_t now_ns) {
@@ -93,6 +113,7 @@ void Standbys::offer(const std::shared_ptr<const checkpoint::Encoded>& checkpoin
     if (server.sending && !server.sending->passage.complete() && !server.sending->passage.exhausted())
       continue;
     if (server.sending && server.sending->checkpoint == checkpoint) continue;
+    server.offered = checkpoint->moment.frame;
     server.sending.emplace(Sending{checkpoint, accounts::Passage(size, kPartBytes, now_ns)});
     next_ns_ = now_ns;
   }

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "sdk/transport/port.hpp"
@@ -54,6 +55,10 @@ class Standbys {
   /// The server of the lowest rank that holds a checkpoint and was heard in the last second; null: none.
   [[nodiscard]] const Standby* first_ready(std::int64_t now_ns) const;
   [[nodiscard]] const Standby* find(transport::ClientId id) const;
+  /// True if a server of that participant has stood by and held a checkpoint of this epoch, also long ago.
+  [[nodiscard]] bool may_succeed(const transport::ParticipantId& participant) const {
+    return successors_.contains(participant);
+  }
   [[nodiscard]] std::size_t count() const { return servers_.size(); }
   /// Bytes queued since the start, repetitions too.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -65,12 +70,17 @@ class Standbys {
   };
   struct Server : Standby {
     std::optional<Sending> sending;
+    Frame offered = 0;  // of the newest checkpoint that it was sent
   };
+  [[nodiscard]] bool has_seat(const transport::Received<transport::StandbyMessage>& message, Notices& notices,
+                              std::int64_t now_ns);
   [[nodiscard]] bool serve(Server& server, std::int64_t now_ns);
 
   Epoch epoch_;
   Outbox* outbox_;
   std::map<transport::ClientId, Server> servers_;
+  std::set<transport::ParticipantId> successors_;
+  std::int64_t told_full_ns_ = INT64_MIN / 2;
   std::int64_t looked_ns_ = INT64_MIN / 2;
   std::int64_t next_ns_ = INT64_MAX;
   std::uint64_t bytes_ = 0;

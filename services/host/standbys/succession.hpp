@@ -32,6 +32,8 @@ class Succession {
   [[nodiscard]] Standbys& standbys() { return standbys_; }
 
  private:
+  static constexpr std::size_t kMostObeyed = 64;
+
   std::string session_;
   Epoch epoch_;
   Journal journal_;
@@ -39,6 +41,7 @@ class Succession {
   Handover handover_;
   std::vector<transport::Received<transport::StandbyMessage>> said_;
   std::vector<transport::Received<transport::CommandMessage>> commands_;
+  std::vector<std::uint64_t> obeyed_;  // the last requests
 };
 
 }  // namespace tandem::host

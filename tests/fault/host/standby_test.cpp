@@ -85,11 +85,17 @@ class Cast {
     if (wayward) server.wayward = std::make_unique<Wayward>(*server.simulation);
     server.standby = must(standby::Standby::create(
         {.session = "default", .id = 500 + servers.size(), .rank = rank, .epoch = server.config.epoch},
-        *server.port, [&server](const checkpoint::Checkpoint& checkpoint) -> Result<void> {
+        *server.port,
+        [&server](const checkpoint::Checkpoint& checkpoint,
+                  const transport::SessionMessage&) -> Result<void> {
           if (auto good = check_world(checkpoint, checkpoint_world(server.config), kSlots); !good)
             return good;
           if (server.engine().load(checkpoint.engine_state)) return {};
           return fail(ErrorCode::kInvalidArgument, "not loaded");
+        },
+        [&server](const checkpoint::Checkpoint& from, std::span<const transport::JournalMessage> journal) {
+          return server.engine().load(from.engine_state) &&
+                 roll_forward(server.config, server.engine(), from, journal);
         }));
     return server;
   }
@@ -136,6 +142,7 @@ class Cast {
     transport::CommandMessage command;
     command.epoch = live.host->session().epoch;
     command.session = "default";
+    command.request = ++requests_;
     must_do(tool_->write(command));
   }
   [[nodiscard]] bool all_play(const Server& server) const {
@@ -219,7 +226,7 @@ class Cast {
     server.took_over_ns = now_ns;
   }
 
-  std::uint64_t sent_ = 0;
+  std::uint64_t sent_ = 0, requests_ = 0;
   std::unique_ptr<transport::simulated::CommandPort> tool_;
 };
 
@@ -380,6 +387,126 @@ TEST(Standby, AHandoverLosesNoFrameAndPausesForLessThanHalfASecond) {
     EXPECT_TRUE(cast.all_play(other));
     EXPECT_EQ(cast.mismatches(), 0U);
   });
+}
+
+TEST(Standby, AHandoverGoesToTheFirstAndTheOthersStandByForIt) {
+  for (const std::uint32_t rank_of_other : {1U, 2U}) {
+    Cast cast(9);
+    Server* live = &cast.add_live();
+    cast.add_standby(rank_of_other);
+    cast.add_standby(1);
+    cast.add_client();
+    cast.run_ms(4000);
+    const auto count = [&](auto&& has) {
+      return std::ranges::count_if(cast.servers, [&](const auto& server) { return has(*server); });
+    };
+    for (int times = 0; times < 2; ++times) {
+      const Frame before = live->host->frame();
+      cast.hand_over(*live);
+      cast.run_ms(4000);
+      ASSERT_EQ(live->host, nullptr);
+      ASSERT_EQ(count([](const Server& server) { return server.host != nullptr; }), 1);
+      ASSERT_EQ(count([](const Server& server) { return server.standby != nullptr; }), 1 - times);
+      for (const auto& server : cast.servers)
+        if (server->host) live = server.get();
+      EXPECT_GT(live->host->frame(), before + 90);
+      EXPECT_TRUE(cast.all_play(*live));
+    }
+  }
+}
+
+TEST(Standby, AHandoverLosesNoFrameWhereTheEngineGoesAnotherWay) {
+  Cast cast(10);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby(1, true);
+  cast.add_client();
+  cast.run_ms(4100);
+  cast.hand_over(live);
+  Frame last = 0;
+  for (int i = 0; i < 3000 && live.host; ++i) {
+    last = live.host->frame();
+    cast.run_ms(1);
+  }
+  ASSERT_EQ(live.host, nullptr);
+  ASSERT_NE(other.host, nullptr);
+  EXPECT_EQ(other.host->session().continues_frame, last);
+}
+
+TEST(Standby, AHandoverToAServerThatPausesAWhileIsMade) {
+  Cast cast(11);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby();
+  cast.add_client();
+  cast.run_ms(4000);
+  cast.hand_over(live);
+  cast.run_ms(90);
+  other.frozen = true;  // not polled, but DDS goes on
+  cast.run_ms(600);
+  other.frozen = false;
+  cast.run_ms(1500);
+  EXPECT_EQ(live.host, nullptr);
+  ASSERT_NE(other.host, nullptr);
+  EXPECT_TRUE(cast.all_play(other));
+}
+
+// The other one followed the new server, and has nothing of it yet.
+TEST(Standby, IfTheNewServerDiesTooTheWorldBeforeIsHeld) {
+  Cast cast(12);
+  Server& live = cast.add_live();
+  Server& first = cast.add_standby(1);
+  Server& second = cast.add_standby(2);
+  cast.add_client();
+  cast.run_ms(4000);
+  const Frame last = live.host->frame();
+  cast.kill(live);
+  for (int i = 0; i < 3000 && !first.host; ++i) cast.run_ms(1);
+  ASSERT_NE(first.host, nullptr);
+  cast.run_ms(30);
+  cast.kill(first);
+  cast.run_ms(6000);
+  ASSERT_NE(second.host, nullptr);
+  EXPECT_GE(second.host->session().continues_frame, last);
+  EXPECT_TRUE(cast.all_play(second));
+}
+
+TEST(Standby, InputsThatCameDuringAHandoverThatFailedAreDecided) {
+  int stood_still = 0;
+  for (std::int64_t after_ms = 5; after_ms < 150; after_ms += 3) {
+    Cast cast(13);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    Member& client = cast.add_client();
+    cast.run_ms(4000);
+    cast.hand_over(live);
+    cast.run_ms(after_ms);
+    if (other.host) break;  // from here on the handover is made
+    cast.kill(other);
+    const Frame before = live.host->frame();
+    for (int i = 0; i < 5; ++i) {
+      cast.send(client);
+      cast.run_ms(50);
+    }
+    if (live.host->frame() < before + 3) ++stood_still;
+    cast.run_ms(16'000);
+    ASSERT_NE(live.host, nullptr);
+    ASSERT_EQ(client.sent.size(), 5U);
+    EXPECT_EQ(client.watcher.outcomes.size(), 5U) << "killed after " << after_ms << " ms";
+  }
+  EXPECT_GT(stood_still, 0);
+}
+
+TEST(Standby, OfTwoServersWithoutClientsTheOneThatWentOnElsewhereLeaves) {
+  Cast cast(14);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby();
+  cast.run_ms(4000);
+  cast.freeze(live, true);
+  cast.run_ms(4000);
+  ASSERT_NE(other.host, nullptr);
+  cast.freeze(live, false);
+  cast.run_ms(4000);
+  EXPECT_EQ(live.host, nullptr);
+  EXPECT_NE(other.host, nullptr);
 }
 
 TEST(Standby, AHandoverWithoutAnybodyReadyChangesNothing) {

@@ -83,8 +83,8 @@ TYPES = {
         ("uint32", "kind"), ("[octet]", "participant"), ("[double]", "values"), ("[octet]", "bytes"),
     ],
     "TandemJournal": [
-        ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "hash"), ("uint32", "state"),
-        ("[InputDecision]", "decisions"),
+        ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "hash"), ("uint64", "successor"),
+        ("uint32", "state"), ("[InputDecision]", "decisions"),
     ],
     "TandemCheckpoint": [
         ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "journal"), ("uint32", "part"), ("uint32", "parts"),
@@ -95,7 +95,7 @@ TYPES = {
         ("uint64", "part_frame"), ("uint32", "part_count"), ("uint32", "protocol_version"), ("uint32", "rank"),
         ("[uint32]", "missing"),
     ],
-    "TandemCommand": [("uint64", "epoch"), ("uint32", "kind"), ("string", "session")],
+    "TandemCommand": [("uint64", "epoch"), ("uint64", "request"), ("uint32", "kind"), ("string", "session")],
 }  # fmt: skip
 TOPICS = [name for name in TYPES if name.startswith("Tandem")]
 

@@ -1,0 +1,56 @@
+#include "services/host/frames/configuration_check.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "sdk/transport/port.hpp"
+#include "sdk/transport/text_message.hpp"
+
+namespace tandem::host {
+namespace {
+
+tl::unexpected<Error> refuse(std::string message) {
+  return fail(ErrorCode::kInvalidArgument, std::move(message));
+}
+
+}  // namespace
+
+Result<void> check(const ServiceConfig& config) {
+  if (auto named = transport::check_session_name(config.session); !named) return named;
+  if (!(config.frame_rate_hz >= 1 && config.frame_rate_hz <= 1000))
+    return refuse("frame rate must lie in 1..1000 Hz");
+  if (config.window_ceiling < 1 || config.window_ceiling > 64)
+    return refuse("window ceiling must lie in 1..64");
+  if (config.window && (*config.window < 1 || *config.window > config.window_ceiling)) {
+    return refuse(fmt::format("window must lie in 1..{}", config.window_ceiling));
+  }
+  if (config.client_limit == 0 || config.participant_limit == 0)
+    return refuse("client limits must be positive");
+  if (config.epoch == 0) return refuse("epoch must not be 0");
+  return {};
+}
+
+Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
+  if (auto good = check(config); !good) return good;
+  if (auto good = check_stream_names(config.streams); !good) return good;
+  const Layout& layout = config.streams.front().layout;
+  for (const StreamConfig& stream : config.streams) {
+    if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
+    if (stream.layout.lead != layout.lead) return refuse("all streams of a session must have the same lead");
+  }
+  if (config.types.size() != layout.type_count)
+    return refuse(fmt::format("the layout has {} body types, but {} are described", layout.type_count,
+                              config.types.size()));
+  static_assert(engine::kMaxBodies == kMaxCapacity);
+  const std::uint32_t capacity = simulation.capacity();
+  if (capacity != layout.capacity)
+    return refuse(
+        fmt::format("the layout has {} slots, but the simulation has {}", layout.capacity, capacity));
+  // Reads it as clients do; otherwise each of them would fail.
+  if (const auto text = transport::read_text_message(config.scene_description); !text)
+    return refuse(text.error().message);
+  return {};
+}
+
+}  // namespace tandem::host
