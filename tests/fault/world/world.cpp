@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
+#include "tests/fault/world/actors/camera.hpp"
 #include "tests/fault/world/actors/client.hpp"
 #include "tests/fault/world/actors/gateway.hpp"
 #include "tests/fault/world/actors/recorder.hpp"
@@ -21,12 +23,14 @@ class World {
   World(const RunOptions& options, const Plan& plan)
       : stage_(draw_settings(options.seed, options.seconds)),
         end_ns_(static_cast<std::int64_t>(options.seconds * 1e9)),
+        camera_(stage_, options.record),
         newcomers_from_(fill()),
         chaos_(stage_, cast_, newcomers_from_, plan, heal_ns(options.seconds)) {}
 
   Outcome live() {
     stage_.journal.add(0, "world", text_of(stage_.settings));
     for (std::size_t i = 0; i < newcomers_from_; ++i) cast_[i]->start();
+    camera_.start();
     std::uint64_t turns = 0;
     try {
       while (stage_.now_ns < end_ns_ && !stage_.finding) {
@@ -38,6 +42,7 @@ class World {
     } catch (const std::exception& thrown) {
       stage_.blame("nothing throws", "world", thrown.what());
     }
+    if (const auto written = camera_.finish(); !written) throw std::runtime_error(written.error().message);
     Outcome outcome;
     outcome.counts.turns = turns;
     outcome.counts.acts = stage_.truth.acts();
@@ -97,11 +102,13 @@ class World {
     std::int64_t next_ns = std::min({end_ns_, chaos_.wake_ns(), next_check_ns_});
     if (const auto event_ns = stage_.network.next_event_ns()) next_ns = std::min(next_ns, *event_ns);
     for (const auto& actor : cast_) next_ns = std::min(next_ns, actor->wake_ns());
+    next_ns = std::min(next_ns, camera_.wake_ns());
     next_ns = (next_ns + kTickNs - 1) / kTickNs * kTickNs;
     stage_.now_ns = std::max(next_ns, stage_.now_ns + kTickNs);
     stage_.network.advance_to(stage_.now_ns);
     chaos_.turn();
     for (const auto& actor : cast_) actor->turn();
+    camera_.turn();
     if (stage_.now_ns < next_check_ns_) return;
     next_check_ns_ = stage_.now_ns + kChecksNs;
     for (const auto& actor : cast_)
@@ -111,6 +118,7 @@ class World {
   Stage stage_;
   std::int64_t end_ns_;
   Cast cast_;
+  Camera camera_;
   std::size_t newcomers_from_;
   Chaos chaos_;
   std::int64_t next_check_ns_ = 0;
