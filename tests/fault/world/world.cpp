@@ -37,6 +37,8 @@ class World {
         advance();
         ++turns;
       }
+      if (!stage_.finding && service_.serves_for_ns() < Rules::kPlaysNs)
+        stage_.blame("getting in", "world", "there has not been one live server for 10 s");
       if (!stage_.finding)
         for (const auto& actor : cast_) actor->check_end();
     } catch (const std::exception& thrown) {
@@ -60,10 +62,16 @@ class World {
 
  private:
   std::size_t fill() {
-    auto server = std::make_unique<Server>(stage_, "server");
-    const Server& of = *server;
-    cast_.push_back(std::move(server));
+    const Service& of = service_;
     std::uint64_t id = 1000;
+    const auto add_server = [&](const std::string& name, bool stands_by) {
+      auto server = std::make_unique<Server>(stage_, name, id, stands_by);
+      service_.add(*server);
+      cast_.push_back(std::move(server));
+      id += 1000;
+    };
+    add_server("server", false);
+    if (stage_.settings.stands_by) add_server("standby", true);
     const auto add = [&](const ClientSettings& settings, const std::string& name) {
       cast_.push_back(std::make_unique<Client>(stage_, name, settings, of, id));
       id += 1000;
@@ -109,6 +117,7 @@ class World {
     chaos_.turn();
     for (const auto& actor : cast_) actor->turn();
     camera_.turn();
+    service_.look();
     if (stage_.now_ns < next_check_ns_) return;
     next_check_ns_ = stage_.now_ns + kChecksNs;
     for (const auto& actor : cast_)
@@ -118,6 +127,7 @@ class World {
   Stage stage_;
   std::int64_t end_ns_;
   Cast cast_;
+  Service service_{stage_};
   Camera camera_;
   std::size_t newcomers_from_;
   Chaos chaos_;

@@ -96,7 +96,7 @@ class RecorderActor::Both final : public client::CoreListener {
   recording::Recorder& recorder_;
 };
 
-RecorderActor::RecorderActor(Stage& stage, std::string name, const Server& server, std::uint64_t first_id)
+RecorderActor::RecorderActor(Stage& stage, std::string name, const Service& server, std::uint64_t first_id)
     : Actor(stage, std::move(name)),
       server_(server),
       next_id_(first_id),
