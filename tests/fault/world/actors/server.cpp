@@ -160,7 +160,6 @@ void Server::stand_by() {
 }
 
 void Server::take_over() {
-  stands_by_ = false;  // its operator starts it as the live one from now on
   const standby::Takeover takeover = standby_->take_over();
   host::HostConfig config = host_config(stage_.settings);
   auto continued = host::continue_world(config, *engine_, *takeover.checkpoint, takeover.journal);
@@ -302,7 +301,6 @@ void Server::on_poll() {
   if (host_->error() || handed_over) {
     tell(handed_over ? "is handed over" : "ends: " + host_->error()->message);
     if (host_->state() == host::Host::State::kEnded) blame("one world", host_->error()->message);
-    stands_by_ = true;
     drop();
     ended(stage_.now_ns + kServiceRestartNs);
     return;

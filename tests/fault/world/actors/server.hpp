@@ -19,8 +19,7 @@ namespace tandem::world {
 
 class Server final : public Actor {
  public:
-  /// `stands_by`: it stands by for another at first. One that was refused, as another is live, stands by when
-  /// it is started again.
+  /// `stands_by`: how it is started, each time.
   Server(Stage& stage, std::string name, transport::ClientId standby_id, bool stands_by = false);
   ~Server() override;
 
@@ -83,7 +82,7 @@ class Server final : public Actor {
   std::unique_ptr<host::Host> host_;
   std::optional<std::int64_t> write_at_ns_;
   bool publishing_ = true;
-  bool stands_by_;
+  const bool stands_by_;
   transport::ClientId standby_id_;
   Epoch epoch_ = 0;
   std::size_t acts_seen_ = 0;
