@@ -48,6 +48,16 @@ SampleColumns make_room(const Drawable& drawable, Sample& out) {
   return columns;
 }
 
+// The last frame that the worlds of two epochs have in common; empty if they are not known to have any.
+std::optional<Frame> shared_history(const transport::SessionMessage& left,
+                                    const transport::SessionMessage& entered) {
+  if (entered.continues_epoch == left.epoch) return entered.continues_frame;
+  if (left.continues_epoch == entered.epoch) return left.continues_frame;
+  if (left.continues_epoch != 0 && left.continues_epoch == entered.continues_epoch)
+    return std::min(left.continues_frame, entered.continues_frame);
+  return std::nullopt;
+}
+
 }  // namespace
 
 ClientCore::ClientCore(CoreOptions options, transport::ClientPort& port, CoreListener* listener)
@@ -159,9 +169,8 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   join_attempts_ = join_attempt();
   epoch_.reset();
   pictures_.clear();
-  const bool continues = session_ && announcement.message.continues_epoch == session_->epoch;
-  if (continues) {
-    sent_.carry_over(announcement.message.continues_frame);
+  if (const auto shared = session_ ? shared_history(*session_, announcement.message) : std::nullopt) {
+    sent_.carry_over(*shared);
   } else {
     sent_.clear(outcomes_);
   }

@@ -130,6 +130,11 @@ void Keeper::after_frame(std::int64_t now_ns, bool at_once, const std::function<
 
 std::shared_ptr<const Encoded> Keeper::latest() const { return writer_ ? writer_->latest() : nullptr; }
 
+void Keeper::set_interval(double interval_s) {
+  settings_.interval_s = interval_s;
+  if (writer_) writer_->set_interval(static_cast<std::int64_t>(interval_s * 1e9));
+}
+
 void Keeper::end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture) {
   if (!folder_ || !writer_ || !writer_->finish(kEndNs)) return;
   writer_->take(now_ns, capture);

@@ -69,6 +69,8 @@ class Keeper {
   void after_frame(std::int64_t now_ns, bool at_once, const std::function<void(Checkpoint&)>& capture);
   /// The newest checkpoint since servers stand by; null: none yet.
   [[nodiscard]] std::shared_ptr<const Encoded> latest() const;
+  /// Changes Settings::interval_s, which is in its range, from the next checkpoint on.
+  void set_interval(double interval_s);
   /// Writes a last checkpoint, so that an orderly end loses nothing. Waits at most two seconds.
   void end(std::int64_t now_ns, const std::function<void(Checkpoint&)>& capture);
   /// Writes the copy that was made last, if it is not written yet. Only for WritesIn::kWriteNow.

@@ -55,6 +55,7 @@ class Writer {
   Writer(Writer&&) = delete;
   Writer& operator=(Writer&&) = delete;
 
+  void set_interval(std::int64_t interval_ns) { interval_ns_ = interval_ns; }
   /// Call after every frame. True if the checkpoint before is written, and a copy made after the next frame
   /// might not be on the disk when the interval is over. So no more than the interval can be lost; a slow
   /// disk makes checkpoints rarer, and delays no frame.

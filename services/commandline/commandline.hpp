@@ -102,11 +102,13 @@ class Program : public Command {
   /// Sets what --version prints.
   void version(const std::string& text);
   /// Prints help, version and errors. Returns an exit code if the program has to end: 0, or 2 for wrong
-  /// usage.
+  /// usage. With --describe-options alone, which --help does not show, prints what deploy/manual reads to
+  /// make manual pages and completions.
   [[nodiscard]] std::optional<int> parse(int argc, const char* const* argv);
 
  private:
   explicit Program(std::unique_ptr<CLI::App> app);
+  [[nodiscard]] std::string description() const;
 
   std::unique_ptr<CLI::App> app_;
 };

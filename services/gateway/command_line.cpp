@@ -123,6 +123,15 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
         const auto address = metrics::read_address(text);
         return address ? std::string() : address.error().message;
       });
+  app.add_choice("--log-format", options.log.format,
+                 {{"text", logging::Format::kText}, {"json", logging::Format::kJson}},
+                 "How lines of the log look: for people and journald, or one JSON object each [text]");
+  app.add_choice("--log-level", options.log.level,
+                 {{"error", logging::Level::kError},
+                  {"warning", logging::Level::kWarning},
+                  {"info", logging::Level::kInfo},
+                  {"debug", logging::Level::kDebug}},
+                 "The least urgent lines that are logged [info]");
   app.add_option("--max-viewers", options.limits.viewers, "Maximum number of viewers")
       .range(std::size_t{1}, kMostViewers)
       .show_default();

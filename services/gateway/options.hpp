@@ -8,6 +8,7 @@
 
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/web_server.hpp"
+#include "services/logging/log.hpp"
 #include "services/metrics/address.hpp"
 
 namespace tandem::gateway {
@@ -22,6 +23,7 @@ struct Options {
   std::string token_file;  ///< empty: no token
   std::vector<std::string> origins;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
+  logging::Options log;
 };
 
 }  // namespace tandem::gateway

@@ -20,6 +20,7 @@
 #include "services/gateway/site.hpp"
 #include "services/gateway/web_server.hpp"
 #include "services/json/json.hpp"
+#include "services/logging/log.hpp"
 #include "services/metrics/endpoint.hpp"
 #include "services/metrics/health.hpp"
 #include "services/metrics/latest.hpp"
@@ -66,6 +67,10 @@ class Service final : public WebServer::Handler {
       {
         const std::lock_guard lock(mutex_);
         due_ns = client_.poll(gateway_, client::now());
+        if (const auto& session = gateway_.session(); session && session->epoch != epoch_) {
+          epoch_ = session->epoch;
+          logging::set_context(session->session, epoch_);
+        }
         watch();
         gateway_.list_ready(steady_ns(), ready_);
         ready = !ready_.empty();
@@ -200,6 +205,7 @@ class Service final : public WebServer::Handler {
   Gateway gateway_;
   CountLog log_;
   ServiceNotifier notifier_;
+  Epoch epoch_ = 0;                  // that the log names
   std::int64_t quiet_until_ns_ = 0;  // about descriptors
   std::vector<ViewerId> ready_;      // kept to reuse its memory
   std::int64_t next_figures_ns_ = 0;

@@ -590,6 +590,12 @@ const transport::SessionMessage& Host::session() const { return impl_->source->s
 Frame Host::frame() const { return impl_->source->frame(); }
 const tandem::State& Host::agreed() const { return impl_->source->agreed(impl_->first_made()); }
 std::uint64_t Host::hash() const { return impl_->source->hash(impl_->first_made()); }
+Result<void> Host::set_limits(std::uint32_t client_limit, std::optional<std::int64_t> stall_timeout_ns) {
+  if (client_limit == 0) return fail(ErrorCode::kInvalidArgument, "a limit of clients is at least 1");
+  impl_->roster.set_limits(client_limit, stall_timeout_ns);
+  return {};
+}
+
 std::uint32_t Host::window() const { return impl_->roster.window(); }
 std::uint32_t Host::participants() const { return impl_->roster.counted(); }
 std::uint32_t Host::observers() const { return impl_->roster.watching(); }

@@ -87,6 +87,11 @@ class Host {
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t stream = 0) const;
   [[nodiscard]] double threshold_m(std::uint32_t stream = 0) const;  ///< of the next frame, scene units
 
+  /// Changes what ServiceConfig says of these, while clients play: see Roster::set_limits(). Errors:
+  /// kInvalidArgument for a limit of 0.
+  [[nodiscard]] Result<void> set_limits(std::uint32_t client_limit,
+                                        std::optional<std::int64_t> stall_timeout_ns);
+
   [[nodiscard]] const transport::SessionMessage& session() const;
   [[nodiscard]] Frame frame() const;  ///< frame of the last delta
   /// The first stream that is made now; there is always one.

@@ -28,7 +28,9 @@ void ServiceNotifier::send(const std::string& /*state*/) const {}
 
 #endif
 
-ServiceNotifier::~ServiceNotifier() { send("STOPPING=1"); }
+ServiceNotifier::~ServiceNotifier() {
+  if (ready_) send("STOPPING=1");
+}
 
 void ServiceNotifier::alive(std::int64_t now_ns) {
   if (!ready_) {

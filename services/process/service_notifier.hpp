@@ -13,7 +13,7 @@ class ServiceNotifier {
   static constexpr std::int64_t kStatusPeriodNs = 5'000'000'000;
 
   ServiceNotifier();
-  ~ServiceNotifier();  ///< says that the program stops
+  ~ServiceNotifier();  ///< says that the program stops, if it was ready
   ServiceNotifier(const ServiceNotifier&) = delete;
   ServiceNotifier& operator=(const ServiceNotifier&) = delete;
   ServiceNotifier(ServiceNotifier&&) = delete;

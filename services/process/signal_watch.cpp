@@ -16,10 +16,10 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-/// Returns false for this program's own wake-up, which has `mark`, for a stop that is over, and at
+/// Returns the signal; 0 for this program's own wake-up, which has `mark`, for a stop that is over, and at
 /// `deadline`.
-bool wait_for_signal(const sigset_t& signals, const void* mark,
-                     const std::optional<Clock::time_point>& deadline) {
+int wait_for_signal(const sigset_t& signals, const void* mark,
+                    const std::optional<Clock::time_point>& deadline) {
   siginfo_t info{};
   int signal = -1;
   if (deadline) {
@@ -32,7 +32,7 @@ bool wait_for_signal(const sigset_t& signals, const void* mark,
     signal = sigwaitinfo(&signals, &info);
   }
   const bool own = info.si_code == SI_QUEUE && info.si_value.sival_ptr == mark;
-  return signal > 0 && !own;
+  return own ? 0 : std::max(signal, 0);
 }
 
 /// Seconds, with a decimal only where there is one.
@@ -44,14 +44,15 @@ std::string seconds_text(std::chrono::milliseconds time) {
 
 }  // namespace
 
-SignalWatch::SignalWatch(std::string program, Limits limits) : program_(std::move(program)), limits_(limits) {
+SignalWatch::SignalWatch(std::string program, Limits limits, Hangup hangup)
+    : program_(std::move(program)), limits_(limits), hangup_(hangup) {
   sigemptyset(&signals_);
   sigaddset(&signals_, SIGINT);
   sigaddset(&signals_, SIGTERM);
   // nohup(1) has it ignored; blocked, it would be taken all the same.
-  struct sigaction hangup {};
-  sigaction(SIGHUP, nullptr, &hangup);
-  if (hangup.sa_handler != SIG_IGN) sigaddset(&signals_, SIGHUP);
+  struct sigaction former {};
+  sigaction(SIGHUP, nullptr, &former);
+  if (former.sa_handler != SIG_IGN) sigaddset(&signals_, SIGHUP);
   std::signal(SIGXFSZ, SIG_IGN);
   pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // inherited by all threads started from here on
   thread_ = std::thread([this] { run(); });
@@ -79,8 +80,11 @@ void SignalWatch::wake() {
 void SignalWatch::run() {
   std::optional<Clock::time_point> signalled, deadline;
   for (;;) {
-    const bool asked = wait_for_signal(signals_, this, deadline);
+    const int signal = wait_for_signal(signals_, this, deadline);
     if (done_) return;
+    const bool reload = signal == SIGHUP && hangup_ == Hangup::kReload;
+    if (reload) reload_.store(true, std::memory_order_relaxed);
+    const bool asked = signal > 0 && !reload;
     const Clock::time_point now = Clock::now();
     if (asked && signalled && now - *signalled >= limits_.repeat) give_up("when a further signal came");
     if (asked && !signalled) signalled = now;

@@ -1,10 +1,10 @@
 #pragma once
-// Turns SIGINT, SIGTERM and SIGHUP into a flag, and ends the process in time even if a library waits for
-// ever.
+// Turns SIGINT, SIGTERM and SIGHUP into flags, and ends the process in time even if a library waits for ever.
 
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <string>
 #include <thread>
 #include <utility>
@@ -13,7 +13,8 @@ namespace tandem {
 
 /// A thread waits for the signals, so no handler and no global is needed. Make this object before other
 /// threads are started, because they inherit its mask. SIGHUP counts unless the parent has it ignored, as
-/// nohup(1) does. A file at its size limit (SIGXFSZ) is an error of the write, and does not end the process.
+/// nohup(1) does; it is a wish to end or, if the program asks for that, to read its configuration again. A
+/// file at its size limit (SIGXFSZ) is an error of the write, and does not end the process.
 ///
 /// The same thread is the guard of the end. Cyclone DDS, when it stops, waits for a packet to itself, which
 /// never comes once the network interface is gone. So from the first signal, or from finish() if that is
@@ -30,9 +31,13 @@ class SignalWatch {
     std::chrono::milliseconds repeat{1000};
   };
 
+  /// What SIGHUP asks for.
+  enum class Hangup : std::uint8_t { kStop, kReload };
+
   /// The guard's messages begin with `program`.
-  explicit SignalWatch(std::string program) : SignalWatch(std::move(program), Limits()) {}
-  SignalWatch(std::string program, Limits limits);
+  explicit SignalWatch(std::string program, Hangup hangup = Hangup::kStop)
+      : SignalWatch(std::move(program), Limits(), hangup) {}
+  SignalWatch(std::string program, Limits limits, Hangup hangup = Hangup::kStop);
   ~SignalWatch();
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
@@ -40,6 +45,8 @@ class SignalWatch {
   SignalWatch& operator=(SignalWatch&&) = delete;
 
   [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
+  /// True once after one or more SIGHUP that ask to reload.
+  [[nodiscard]] bool take_reload() { return reload_.exchange(false, std::memory_order_relaxed); }
 
   /// Call when all work is done, reports and files are written, and only DDS still has to end. From now on
   /// the process exits with `exit_code` even if the guard ends it; before, that would be 1. Flushes stdout,
@@ -57,8 +64,9 @@ class SignalWatch {
 
   const std::string program_;
   const Limits limits_;
+  const Hangup hangup_;
   sigset_t signals_{};
-  std::atomic<bool> stop_{false}, done_{false};
+  std::atomic<bool> stop_{false}, reload_{false}, done_{false};
   std::atomic<int> exit_code_{kAtWork};
   std::thread thread_;
 };

@@ -21,6 +21,7 @@
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/json/json.hpp"
+#include "services/logging/log.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"
@@ -160,6 +161,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, produced, now_ns);
     service.watch(host, now_ns);
+    service.reload(options, host, keeping, now_ns);
     if (produced) {
       for (const host::DeltaReport& delta : host.report().deltas)
         hashes.add(delta.stream, host.report().frame, delta.hash);
@@ -306,6 +308,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   const std::vector<host::StreamConfig> streams = config->streams;
   auto host = host::Host::create(std::move(*config), **simulation, **port);
   if (!host) return signals.finish(report_error(host.error(), 2));
+  logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
                options.choice.bodies,

@@ -2,7 +2,7 @@
 // Runs one session from start to end, with given options.
 
 #include "services/process/signal_watch.hpp"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 
 namespace tandem::daemon {
 

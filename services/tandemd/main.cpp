@@ -1,21 +1,36 @@
 // tandemd: simulates a scene and streams it. Exit 0 done, 1 failed, 2 wrong usage.
 
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <exception>
+#include <string_view>
 
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "services/logging/log.hpp"
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"
-#include "services/tandemd/command_line.hpp"
+#include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
 
 int main(int argc, char** argv) {
   try {
-    spdlog::set_default_logger(spdlog::stderr_color_mt("tandemd"));
-    const auto command = tandem::daemon::parse_command_line(argc, argv);
+    tandem::logging::begin("tandemd", {});
+    auto command = tandem::daemon::parse_command_line(argc, argv);
     if (!command.options) return command.exit_code;
-    tandem::SignalWatch signals("tandemd");  // first, so that its signal mask holds for all threads
+    tandem::logging::begin("tandemd", command.options->log);
+    tandem::logging::set_context(command.options->session, 0);
+    tandem::transport::set_dds_log([](std::string_view line, bool error) {
+      spdlog::log(error ? spdlog::level::err : spdlog::level::warn, "Cyclone DDS: {}", line);
+    });
+    // First, so that its signal mask holds for all threads.
+    using Hangup = tandem::SignalWatch::Hangup;
+    tandem::SignalWatch signals("tandemd", command.reread ? Hangup::kReload : Hangup::kStop);
+    if (command.reread) {
+      command.options->changes = [&]() -> std::optional<tandem::Result<tandem::daemon::Changes>> {
+        if (!signals.take_reload()) return std::nullopt;
+        return command.reread();
+      };
+    }
     const tandem::HeapTrimmer trimmer;
     return tandem::daemon::run_daemon(*command.options, signals);
   } catch (const std::exception& error) {

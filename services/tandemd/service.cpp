@@ -1,6 +1,8 @@
 #include "services/tandemd/service.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include "sdk/transport/units.hpp"
 
@@ -34,6 +36,28 @@ void Service::watch(const standby::Standby& standby, const std::string& session,
                      ? fmt::format("stands by for session '{}', and holds nothing yet", session)
                      : fmt::format("stands by for session '{}' from frame {}, {} frames behind", session,
                                    standby.holds(), standby.live_frame() - standby.holds()));
+}
+
+void Service::reload(const Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns) {
+  const auto changes = options.changes();
+  if (!changes) return;
+  notifier_.reloading(now_ns);
+  if (!*changes) {
+    spdlog::error("the configuration stays as it was: {}", changes->error().message);
+  } else {
+    const Changes& changed = **changes;
+    std::optional<std::int64_t> stall_timeout_ns;
+    if (changed.stall_timeout_s) stall_timeout_ns = static_cast<std::int64_t>(*changed.stall_timeout_s * 1e9);
+    const auto set = host.set_limits(changed.client_limit, stall_timeout_ns);
+    if (!set) spdlog::error(set.error().message);  // cannot be: the configuration was checked
+    keeping.set_interval(changed.checkpoint_interval_s);
+    if (!changed.live.empty()) spdlog::info("configuration: changed {}", fmt::join(changed.live, ", "));
+    if (!changed.after_restart.empty())
+      spdlog::warn("configuration: not changed, as this needs a restart: {}",
+                   fmt::join(changed.after_restart, ", "));
+    if (changed.live.empty() && changed.after_restart.empty()) spdlog::info("configuration: nothing changed");
+  }
+  notifier_.reloaded();
 }
 
 }  // namespace tandem::daemon

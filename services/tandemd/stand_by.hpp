@@ -6,7 +6,7 @@
 #include "sdk/transport/port.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/keeping/keeping.hpp"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 #include "services/tandemd/service.hpp"
 #include "tandem/simulation.hpp"
 

@@ -117,7 +117,8 @@ std::string short_bytes(std::uint64_t bytes) {
 
 void TopView::update(const transport::ServerStatusMessage& status, std::int64_t now_ns) {
   const bool live = status.server_role == transport::ServerRole::kLive;
-  const StreamKey key{status.session + (live ? "" : " (standby)"), status.stream};
+  const StreamKey key{status.session + (live ? "" : fmt::format(" (standby {})", status.epoch)),
+                      status.stream};
   if (!shown(status.session) || (streams_.size() >= kMostShown && !streams_.contains(key))) return;
   streams_[key] = {status, now_ns};
 }
@@ -164,8 +165,14 @@ std::string TopView::to_table() const {
       fmt::format("{:<20} {:>9} {:>6} {:>8} {:>8} {:>17} {:>9} {:>8} {:>7} {:>6} {:>6}  {:<20} {}\n",
                   "SESSION", "FRAME", "HZ", "BODIES", "AT REST", "MBIT/S (OF RAW)", "CORRECTED", "FRAME MS",
                   "CLIENTS", "WINDOW", "STALLS", "DELTA REPLY IN SNAP", "CODEC, PREDICTOR, THRESHOLD");
+  std::string standbys;
   for (const auto& [key, heard] : streams_) {
     const transport::ServerStatusMessage& s = heard.status;
+    if (s.server_role != transport::ServerRole::kLive) {
+      standbys += fmt::format("{:<20} {:>9} {:>8} {:>9.0f}\n", plain(s.session), s.frame, s.behind_frames,
+                              s.uptime_s);
+      continue;
+    }
     text += fmt::format(
         "{:<20} {:>9} {:>6.1f} {:>8} {:>8} {:>17} {:>9.0f} {:>8.2f} {:>7} {:>6} {:>6}  {:<20} {}, {}, {:.3g}\n",
         several(key.first) ? fmt::format("{}/{}", plain(key.first), s.stream) : plain(key.first), s.frame,
@@ -176,6 +183,9 @@ std::string TopView::to_table() const {
                     short_bytes(s.input_bytes), short_bytes(s.snapshot_bytes)),
         plain(s.codec), plain(s.predictor), s.threshold);
   }
+  if (!standbys.empty())
+    text += fmt::format("\n{:<20} {:>9} {:>8} {:>9}\n", "STANDS BY FOR", "HOLDS", "BEHIND", "UPTIME S") +
+            standbys;
   text += fmt::format("\n{:<16} {:<20} {:<11} {:<11} {:<7} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6}  {}\n",
                       "CLIENT", "SESSION", "STREAM", "ROLE", "PHASE", "APPLIED", "LAG MS", "WORK MS",
                       "MBIT/S", "REJOINS", "WRONG", "WHY THIS STREAM");

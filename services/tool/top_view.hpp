@@ -37,7 +37,7 @@ class TopView {
   [[nodiscard]] bool shown(const std::string& session) const { return !only_ || *only_ == session; }
 
   std::optional<std::string> only_;
-  /// Name of the session, of a standby with that word, and number of the stream.
+  /// Name of the session, with the epoch of a server that stands by, and number of the stream.
   using StreamKey = std::pair<std::string, std::uint32_t>;
   [[nodiscard]] bool several(const std::string& session) const;
   /// The number of the client's stream, and the predictor if that stream's status was heard.

@@ -31,6 +31,14 @@ LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measure
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
 OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/checkpoint", "services/workers"]
+OF_TANDEMD = (
+    SIMULATION
+    + TABLES
+    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
+    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
+    + ["services/logging", "services/workers"]
+    + HOST
+)
 OF_LAB = (
     SIMULATION
     + TIMELINE
@@ -81,6 +89,7 @@ EDGES = {
     "services/host/clients": OF_HOST + ["services/host/frames", "services/host/outgoing"],
     "services/host/standbys": OF_HOST + ["services/host/clients", "services/host/frames", "services/host/outgoing"],
     "services/host/keeping": OF_HOST + ["services/host/frames", "services/host"],
+    "services/logging": ["services/accounts", "services/json", "sdk/transport/units.hpp"],
     "services/standby": LAYOUT + ["sdk/transport", "services/checkpoint"] + SIMULATION,
     "services/host": OF_HOST + HOST,
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
@@ -93,19 +102,15 @@ EDGES = {
     "services/sessions": ["public", "services/planning", "services/scenes"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
-    "services/tandemd": SIMULATION
-    + TABLES
-    + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
-    + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/workers"]
-    + HOST,
+    "services/tandemd/configuration": OF_TANDEMD,
+    "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
     "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/system"],
+    + ["services/logging", "services/metrics", "services/process", "services/system"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
@@ -125,7 +130,7 @@ OWNERS = [
     (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
-    (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services"]),
+    (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services", "tests/unit/logging"]),
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),

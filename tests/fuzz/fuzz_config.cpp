@@ -1,8 +1,8 @@
 // Any text as a server's configuration: refused naming the file, or options within their ranges.
 
 #include "sdk/core/lattice/state.hpp"
-#include "services/tandemd/config.hpp"
-#include "services/tandemd/config_file.hpp"
+#include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/config_file.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -70,7 +70,7 @@ class Cdr(unittest.TestCase):
                 return {k: plain(v) for k, v in vars(value).items() if k != "type_name"}
             return [plain(one) for one in value] if isinstance(value, list) else value
 
-        self.assertEqual(len(cdr.TOPICS), 9)
+        self.assertEqual(len(cdr.TOPICS), 13)
         for kind in cdr.TOPICS:
             with self.subTest(kind=kind):
                 self.assertEqual(plain(cdr.decode(kind, writer.sample(kind, **example(kind)))), example(kind))

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sdk/transport/port.hpp"
@@ -57,6 +58,11 @@ class Monitor {
   virtual Result<void> write(const CommandMessage& message) = 0;
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
 };
+
+/// Takes the lines that Cyclone DDS would write on stderr; `error`: it is more than a warning. Called by any
+/// thread, several at once. Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened. Call
+/// it before that, and once; only programs do, as the sink is one for the process.
+void set_dds_log(void (*write)(std::string_view line, bool error));
 
 /// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
 /// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr.

@@ -1,10 +1,13 @@
 #include "sdk/transport/dds/domain.hpp"
 
 #include <dds/dds.h>
+#include <dds/ddsrt/log.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <mutex>
+#include <string_view>
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -90,6 +93,27 @@ DomainUse::~DomainUse() {
 }  // namespace tandem::transport::dds
 
 namespace tandem::transport {
+
+namespace {
+
+using WriteLine = void (*)(std::string_view line, bool error);
+// Cyclone gives back only an address of data, and a function is none.
+WriteLine write_line = nullptr;
+
+void on_line(void* /*argument*/, const dds_log_data_t* data) {
+  // In front of the message is a time and a thread, which the log has in its own way.
+  std::string_view line(data->message, data->size);
+  line.remove_prefix(std::min(data->hdrsize, line.size()));
+  while (!line.empty() && line.back() == '\n') line.remove_suffix(1);
+  write_line(line, (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0);
+}
+
+}  // namespace
+
+void set_dds_log(WriteLine write) {
+  write_line = write;
+  dds_set_log_sink(&on_line, nullptr);
+}
 
 Result<void> check_dds_domain(std::uint32_t domain) {
   return dds::DomainUse::acquire(domain, dds::Repeat::kSeldom).map([](const dds::DomainUse&) {});

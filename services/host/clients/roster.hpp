@@ -118,6 +118,13 @@ class Roster {
   explicit Roster(Rules rules)
       : rules_(std::move(rules)), window_(rules_.fixed_window.value_or(kSmallestWindow)) {}
 
+  /// Changes limits while clients play. Nobody is sent away: a lower limit of clients holds for those that
+  /// come, and a stall timeout for stalls from now on.
+  void set_limits(std::uint32_t client_limit, std::optional<std::int64_t> stall_timeout_ns) {
+    rules_.client_limit = client_limit;
+    rules_.stall_timeout_ns = stall_timeout_ns;
+  }
+
   /// The state of the server when something happens.
   struct Now {
     std::int64_t ns = 0;

@@ -118,6 +118,40 @@ class Daemons(unittest.TestCase):
         with self.assertRaises(BlockingIOError):
             service.socket.recv(4096)
 
+    def logged(self, service, text):
+        deadline = time.monotonic() + LIMIT_S
+        while text not in service.log.read_text():
+            self.assertLess(time.monotonic(), deadline, service.log.read_text())
+            time.sleep(0.02)
+
+    def test_a_server_reads_its_configuration_again_at_sighup(self):
+        file = self.folder / "arena.textproto"
+        common = 'scene: "cube"\nsession: "arena"\n'
+        file.write_text(common + "bodies: 50\n", encoding="ascii")
+        service = self.start(OPTIONS.tandemd, "--config", file)
+        service.hear("READY=1")
+        for text, *told in [
+            ("bodies: 50\nclient_limit: 9\n", "[info] configuration: changed client_limit"),
+            ("bodies: 60\nclient_limit: 9\n", "[warning] configuration: not changed, as this needs a restart: bodies"),
+            ("bodies: 50\nclient_limit: 0\n", f'[error] the configuration stays as it was: {file}:4: field "client_limit"'),
+        ]:
+            file.write_text(common + text, encoding="ascii")
+            reloads = sum(message.startswith("RELOADING=1\nMONOTONIC_USEC=") for message in service.said)
+            service.process.send_signal(signal.SIGHUP)
+            service.hear("RELOADING=1\nMONOTONIC_USEC=", reloads + 1)
+            service.hear("READY=1", reloads + 2)
+            for line in told:
+                self.logged(service, line)
+        service.process.send_signal(signal.SIGTERM)
+        self.assertEqual(service.process.wait(LIMIT_S), 0)
+
+    def test_without_a_configuration_file_sighup_ends_a_server(self):
+        service = self.server()
+        service.hear("READY=1")
+        service.process.send_signal(signal.SIGHUP)
+        service.hear("STOPPING=1")
+        self.assertEqual(service.process.wait(LIMIT_S), 0)
+
     def test_a_gateway_is_ready_when_it_listens_and_says_that_it_lives(self):
         if not OPTIONS.gateway:
             self.skipTest("tandem-gateway is not built here")

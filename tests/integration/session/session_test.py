@@ -329,6 +329,61 @@ def killed_server_goes_on(stage):
     print(f"  {report['bytes'] / bodies:.1f} bytes a body, {report}", flush=True)
 
 
+def standby_takes_over(stage):
+    """Servers stand by: one takes over without losing a frame when the live one is killed, and hands over when it is asked to."""
+    bodies = 2000
+    everybody = ["participant", "observer"]
+
+    def says(name, what):
+        return what in (stage.folder / f"{name}.err").read_text()
+
+    def start_standby(name, rank, live):
+        stage.server(name, "--standby", "--standby-rank", rank, "--scripted", scene="half_pipe", bodies=bodies)
+        stage.wait(lambda: says(name, "can take over"), f"{name} to stand by")
+        stage.wait(lambda: says(live, f"of rank {rank} stands by"), f"{live} to hear of {name}")
+
+    def check_successor(name, before, began):
+        stage.wait(lambda: stage.hashes(name), f"the first frame of {name}")
+        epoch, frame = next(iter(stage.hashes(name)))
+        last_epoch, last = max(stage.hashes(before))
+        stage.wait(lambda: (stage.folder / f"{name}.err").read_text().count(" plays as ") == len(everybody), "all playing")
+        took_s = time.monotonic() - began
+        print(f"{name}: {last - frame} frames lost, all play after {took_s:.2f} s", flush=True)
+        if epoch <= last_epoch or frame != last:
+            raise Failed(f"{name} begins at frame {frame} of epoch {epoch}, after frame {last} of {last_epoch}")
+        stage.wait_live(everybody, lambda live: live.get("frame", 0) > frame + 60, "two more seconds")
+
+    stage.server("first", "--scripted", scene="half_pipe", bodies=bodies)
+    stage.client("participant", "--input-script", stage.script("script", 1, 200, 0.1))
+    stage.client("observer", "--observe")
+    stage.wait_live(everybody, lambda live: live.get("frame", 0) > 60, "frame 60")
+    start_standby("second", 2, "first")
+    start_standby("third", 1, "first")
+    stage.wait_live(everybody, lambda live: live.get("frame", 0) > 150, "frame 150")
+    began = time.monotonic()
+    stage.kill("first")
+    check_successor("third", "first", began)
+    stage.wait(lambda: says("third", "of rank 2 stands by"), "the other to follow the new server")
+    began = time.monotonic()
+    command = [stage.options.tandem, "handover", "--json", *stage.common]
+    asked = subprocess.run(command, capture_output=True, text=True, env=stage.environment, timeout=LIMIT_S, check=False)
+    if asked.returncode != 0 or not json.loads(asked.stdout)["continues_frame"]:
+        raise Failed(f"tandem handover ended with {asked.returncode}: {asked.stdout}{asked.stderr}")
+    if stage.processes["third"].wait(LIMIT_S) != 0 or not says("third", "another server continues"):
+        raise Failed("the server that handed over did not end well")
+    check_successor("second", "third", began)
+    alone = subprocess.run(command, capture_output=True, text=True, env=stage.environment, timeout=LIMIT_S, check=False)
+    if alone.returncode != 1 or "no server stands by" not in alone.stderr:
+        raise Failed(f"a handover to nobody: {alone.returncode}, {alone.stderr}")
+    # One of another world stands by in vain, and says why.
+    stage.server("foreign", "--standby", scene="half_pipe", bodies=bodies + 1)
+    stage.wait(lambda: says("foreign", "cannot stand by"), "a refusal")
+    reports = {name: stage.stop(name) for name in everybody}
+    for name in everybody:
+        check_report(reports[name])
+        compare(stage, ["first", "third", "second"], name, 200, reports[name]["resyncs"])
+
+
 def checkpoint_refusals(stage):
     """Two servers of one folder, no checkpoint where one is required, a folder that vanishes; what the tool says of files."""
 
@@ -537,7 +592,7 @@ def reference(stage):
 MEMORY_SLACK_KB = 4096
 SCENARIOS = {
     f.__name__: f
-    for f in (two_thousand_frames, server_restart, killed_server_goes_on, checkpoint_refusals, rigid, rigid_codecs, no_server,
+    for f in (two_thousand_frames, server_restart, killed_server_goes_on, standby_takes_over, checkpoint_refusals, rigid, rigid_codecs, no_server,
               endings, emitter, reference)  # fmt: skip
 }
 

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <thread>
 
 #include "services/checkpoint/format.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
@@ -96,6 +97,28 @@ TEST_F(KeeperTest, AServerGoesOnFromTheNewestUnderAHigherEpoch) {
   EXPECT_NE(begun->epoch(7), begun->epoch(8))
       << "the server before may have ended without a checkpoint of its own";
   EXPECT_NE(begun->told.find("frame 90 of epoch 1000"), std::string::npos);
+}
+
+TEST_F(KeeperTest, AnIntervalThatChangesHoldsFromThenOn) {
+  auto keeper = Keeper::open(settings(), &clock_ns);
+  ASSERT_TRUE(keeper) << keeper.error().message;
+  Number simulation;
+  ASSERT_TRUE((*keeper)->start(world(), simulation));
+  int captured = 0;
+  const auto capture = [&](Checkpoint& out) {
+    out = sample(1000, 30);
+    ++captured;
+  };
+  const std::int64_t first_ns = clock_ns();
+  (*keeper)->after_frame(first_ns, false, capture);
+  while ((*keeper)->figures(clock_ns())->written < 1) std::this_thread::yield();
+  EXPECT_EQ(captured, 1) << "the first is due at once";
+  (*keeper)->set_interval(100);
+  (*keeper)->after_frame(first_ns + 20'000'000'000, false, capture);
+  EXPECT_EQ(captured, 1);
+  (*keeper)->set_interval(10);
+  (*keeper)->after_frame(first_ns + 20'000'000'001, false, capture);
+  EXPECT_EQ(captured, 2);
 }
 
 TEST_F(KeeperTest, WithoutACheckpointItStartsAfreshAndSaysSoOrRefuses) {

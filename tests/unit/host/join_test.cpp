@@ -326,6 +326,28 @@ TEST(ClientLimit, ClientsBeyondTheLimitAreToldAndSeatsOfTheDeadAreGivenAway) {
   EXPECT_EQ(bench.last_reply(3)->reason, static_cast<std::uint32_t>(Reason::kNone));
 }
 
+TEST(ClientLimit, ALimitThatChangesHoldsForThoseThatCome) {
+  HostConfig config = test_config();
+  config.client_limit = 2;
+  Bench bench(config);
+  bench.poll();
+  bench.joining(1);
+  bench.joining(2);
+  bench.run_ms(20);
+  EXPECT_FALSE(bench.host->set_limits(0, {}));
+  ASSERT_TRUE(bench.host->set_limits(1, {}));
+  bench.joining(1);
+  bench.joining(2);
+  bench.joining(3);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.last_reply(2)->reason, static_cast<std::uint32_t>(Reason::kNone)) << "nobody is sent away";
+  EXPECT_EQ(bench.last_reply(3)->reason, static_cast<std::uint32_t>(Reason::kFull));
+  ASSERT_TRUE(bench.host->set_limits(3, {}));
+  bench.joining(3);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.last_reply(3)->reason, static_cast<std::uint32_t>(Reason::kNone));
+}
+
 TEST(ClientLimit, OneParticipantHoldsSixteenClientsAtMost) {
   Bench bench;
   bench.poll();

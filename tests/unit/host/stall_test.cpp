@@ -61,6 +61,18 @@ TEST_F(StallTest, AFrozenParticipantDelaysTheOthersByTheStallTimeoutAtMost) {
   EXPECT_NEAR(static_cast<double>(bench.host->totals().suspended_ms), 500, 5);
 }
 
+TEST_F(StallTest, AStallTimeoutThatChangesHoldsFromThenOn) {
+  enter(1);
+  enter(2);
+  bench.run_ms(1000);
+  ASSERT_TRUE(bench.host->set_limits(256, 200'000'000));
+  awake.erase(2);
+  const std::int64_t pause = longest_pause_ms(5000);
+  EXPECT_GE(pause, 200);
+  EXPECT_LE(pause, 200 + 34 + 5);
+  EXPECT_EQ(bench.host->participants(), 1U);
+}
+
 TEST_F(StallTest, SeveralFrozenAtOnceDelayNoLongerThanOne) {
   for (transport::ClientId id = 1; id <= 5; ++id) enter(id);
   bench.run_ms(1000);

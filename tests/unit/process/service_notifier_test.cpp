@@ -82,10 +82,18 @@ TEST(ServiceNotifier, SaysThatItReloadsAndThatItStops) {
   const Manager manager;
   {
     ServiceNotifier notifier;
+    notifier.alive(2 * kSecond);
     notifier.reloading(3 * kSecond);
     notifier.reloaded();
   }
-  EXPECT_THAT(manager.heard(), ElementsAre("RELOADING=1\nMONOTONIC_USEC=3000000", "READY=1", "STOPPING=1"));
+  EXPECT_THAT(manager.heard(), ElementsAre("READY=1", "WATCHDOG=1", "RELOADING=1\nMONOTONIC_USEC=3000000",
+                                           "READY=1", "STOPPING=1"));
+}
+
+TEST(ServiceNotifier, AProgramThatWasNeverReadySaysNothingAtItsEnd) {
+  const Manager manager;
+  { const ServiceNotifier notifier; }
+  EXPECT_THAT(manager.heard(), IsEmpty());
 }
 
 TEST(ServiceNotifier, IsSilentWithoutSystemd) {

@@ -77,6 +77,19 @@ TEST(SignalWatch, AHangupIsAStopUnlessItIsIgnored) {
   EXPECT_EQ(after_hangup(true), 1);
 }
 
+TEST(SignalWatch, AHangupIsAWishToReloadWhereTheProgramSaysSo) {
+  SignalWatch watch("test", SignalWatch::Hangup::kReload);
+  EXPECT_FALSE(watch.take_reload());
+  for (int i = 0; i < 2; ++i) {
+    kill(getpid(), SIGHUP);
+    while (!watch.take_reload()) usleep(1000);
+    EXPECT_FALSE(watch.take_reload()) << "once";
+  }
+  EXPECT_FALSE(watch.stop());
+  kill(getpid(), SIGTERM);
+  while (!watch.stop()) usleep(1000);
+}
+
 TEST(SignalWatch, AFileAtItsSizeLimitDoesNotEndTheProcess) {
   const pid_t child = fork();
   if (child == 0) {

@@ -1,5 +1,6 @@
-#include "services/tandemd/config_file.hpp"
+#include "services/tandemd/configuration/config_file.hpp"
 
+#include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
@@ -8,10 +9,11 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/tandemd/command_line.hpp"
-#include "services/tandemd/config.hpp"
-#include "services/tandemd/rehearsal.hpp"
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/command_line.hpp"
+#include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/rehearsal.hpp"
+#include "services/tandemd/configuration/reload.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -172,6 +174,41 @@ TEST_F(ConfigFile, WhatIsPrintedIsReadAgain) {
   std::vector<const google::protobuf::FieldDescriptor*> set;
   examples->config.GetReflection()->ListFields(examples->config, &set);
   EXPECT_EQ(set.size(), static_cast<std::size_t>(Config::descriptor()->field_count()));
+}
+
+TEST_F(ConfigFile, ReadAgainItSaysWhatChangesLiveAndWhatNeedsARestart) {
+  using ::testing::ElementsAre;
+  using ::testing::IsEmpty;
+  const std::string common = "scene: \"cube\" bodies: 10 ";
+  write(common + "client_limit: 7");
+  Config flags;
+  flags.set_seed(3);
+  Rereader rereader(path, flags, merge(flags, load_config(path)->config));
+  const auto nothing = rereader.read();
+  ASSERT_TRUE(nothing);
+  EXPECT_THAT(nothing->live, IsEmpty());
+  EXPECT_THAT(nothing->after_restart, IsEmpty());
+
+  write("scene: \"cube\" bodies: 20 client_limit: 9 stall_timeout: \"off\" checkpoint_interval: 5 seed: 4");
+  const auto much = rereader.read();
+  ASSERT_TRUE(much) << much.error().message;
+  EXPECT_THAT(much->live, ElementsAre("stall_timeout", "client_limit", "checkpoint_interval"));
+  EXPECT_THAT(much->after_restart, ElementsAre("bodies")) << "a flag keeps its effect";
+  EXPECT_EQ(much->client_limit, 9U);
+  EXPECT_FALSE(much->stall_timeout_s);
+  EXPECT_EQ(much->checkpoint_interval_s, 5);
+
+  write("scene: \"cube\"\nbodies: 20\nclient_limit: 0\n");
+  const auto wrong = rereader.read();
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().message.find(path + ":3: field \"client_limit\""), 0U) << wrong.error().message;
+
+  write("scene: \"cube\" bodies: 20 client_limit: 9");
+  const auto back = rereader.read();
+  ASSERT_TRUE(back);
+  EXPECT_THAT(back->live, ElementsAre("stall_timeout", "checkpoint_interval")) << "the defaults again";
+  EXPECT_THAT(back->after_restart, ElementsAre("bodies")) << "as long as it was not restarted";
+  EXPECT_EQ(back->stall_timeout_s, 0.5);
 }
 
 TEST(Settings, ThereIsOneForEachFieldOfTheConfiguration) {

@@ -7,8 +7,8 @@
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 #include "services/sessions/session_plan.hpp"
-#include "services/tandemd/command_line.hpp"
-#include "services/tandemd/config.hpp"
+#include "services/tandemd/configuration/command_line.hpp"
+#include "services/tandemd/configuration/config.hpp"
 #include "services/workers/workers.hpp"
 
 namespace tandem::daemon {

@@ -1,8 +1,8 @@
-#include "services/tandemd/places.hpp"
+#include "services/tandemd/configuration/places.hpp"
 
 #include <fmt/format.h>
 
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {

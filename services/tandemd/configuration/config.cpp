@@ -1,4 +1,4 @@
-#include "services/tandemd/config.hpp"
+#include "services/tandemd/configuration/config.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
@@ -54,6 +54,20 @@ Result<void> check_numbers(const Options& options) {
     return refuse("domain", fmt::format("must be 0 to {}", transport::kMaxDomain));
   if (options.duration_s && !within(*options.duration_s, 0, 1e9))
     return refuse("duration", "must be a number of seconds, and not negative");
+  return {};
+}
+
+Result<void> read_log(const ServerConfig& config, logging::Options& options) {
+  if (config.has_log_format()) {
+    const auto format = logging::read_format(config.log_format());
+    if (!format) return refuse("log-format", fmt::format("must be {}", logging::kFormats));
+    options.format = *format;
+  }
+  if (config.has_log_level()) {
+    const auto level = logging::read_level(config.log_level());
+    if (!level) return refuse("log-level", fmt::format("must be {}", logging::kLevels));
+    options.level = *level;
+  }
   return {};
 }
 
@@ -241,6 +255,7 @@ Result<Options> checked(const ServerConfig& config) {
   options.wait_for = config.wait_for();
   if (config.has_duration() && config.duration() != 0) options.duration_s = config.duration();
   options.hash_log = config.hash_log();
+  if (const auto good = read_log(config, options.log); !good) return tl::unexpected(good.error());
   if (config.has_metrics()) {
     auto address = metrics::read_address(config.metrics());
     if (!address) return refuse("metrics", address.error().message);

@@ -1,4 +1,4 @@
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
 #include "services/planning/wishes.hpp"
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 #include "services/workers/workers.hpp"
 #include "tandem/simulation.hpp"
 
@@ -121,6 +121,10 @@ std::vector<Setting> service_settings(const Options& defaults) {
        fmt::format("1 to {}", kMostRank), number(defaults.standby_rank), number(defaults.standby_rank)},
       {"metrics", "Serve metrics for Prometheus at /metrics, and /healthz and /readyz",
        "ADDRESS:PORT, or a PORT of 127.0.0.1", "none", quoted("127.0.0.1:9730")},
+      {"log_format", "How lines of the log look: for people and journald, or one JSON object each",
+       std::string(logging::kFormats), "text", quoted("text")},
+      {"log_level", "The least urgent lines that are logged", std::string(logging::kLevels), "info",
+       quoted("info")},
       {"hash_log", "File for a line `epoch,frame,hash` of every frame", "a path", "none",
        quoted("hashes.csv")},
   };

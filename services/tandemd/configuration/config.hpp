@@ -4,8 +4,8 @@
 #include <string>
 
 #include "server.pb.h"
-#include "services/tandemd/options.hpp"
-#include "services/tandemd/places.hpp"
+#include "services/tandemd/configuration/options.hpp"
+#include "services/tandemd/configuration/places.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {

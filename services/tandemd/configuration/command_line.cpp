@@ -1,4 +1,4 @@
-#include "services/tandemd/command_line.hpp"
+#include "services/tandemd/configuration/command_line.hpp"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,11 @@
 
 #include "services/commandline/commandline.hpp"
 #include "services/planning/number.hpp"
-#include "services/tandemd/config.hpp"
-#include "services/tandemd/config_file.hpp"
-#include "services/tandemd/rehearsal.hpp"
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/config_file.hpp"
+#include "services/tandemd/configuration/rehearsal.hpp"
+#include "services/tandemd/configuration/reload.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -108,6 +109,8 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("standby_rank", &Config::set_standby_rank);
   flags.add("metrics", &Config::mutable_metrics);
   flags.add("hash_log", &Config::mutable_hash_log);
+  flags.add("log_format", &Config::mutable_log_format);
+  flags.add("log_level", &Config::mutable_log_level);
 }
 
 CommandLine ended(int exit_code) { return {.options = std::nullopt, .exit_code = exit_code}; }
@@ -126,7 +129,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.version("tandemd " TANDEM_VERSION);
   app.footer(
       "Exit codes: 0 done, 1 failed (for example, the session already has a server), 2 wrong usage. SIGINT "
-      "and SIGTERM stop the server cleanly.");
+      "and SIGTERM stop the server cleanly. At SIGHUP it reads --config again, changes client_limit, "
+      "stall_timeout and checkpoint_interval, and names what needs a restart; without --config, SIGHUP stops it.");
   idl::ServerConfig config;
   std::string path;
   bool json = false, check = false, print = false;
@@ -140,6 +144,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_flag("--json", json, "Print one JSON object on stdout at the end");
   if (const auto code = app.parse(argc, argv)) return ended(*code);
   Places places;
+  const idl::ServerConfig flags = config;
   if (!path.empty()) {
     auto file = load_config(path);
     if (!file) return refused(file.error());
@@ -158,7 +163,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
     return ended(0);
   }
   options->json = json;
-  return {.options = std::move(*options), .exit_code = 0};
+  CommandLine command{.options = std::move(*options), .exit_code = 0};
+  if (!path.empty())
+    command.reread = [rereader = Rereader(path, flags, config)]() mutable { return rereader.read(); };
+  return command;
 }
 
 }  // namespace tandem::daemon

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {

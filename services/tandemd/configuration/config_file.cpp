@@ -1,4 +1,4 @@
-#include "services/tandemd/config_file.hpp"
+#include "services/tandemd/configuration/config_file.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "services/scenes/text_file.hpp"
-#include "services/tandemd/settings.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {

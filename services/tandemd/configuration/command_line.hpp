@@ -1,9 +1,10 @@
 #pragma once
 // The flags of tandemd.
 
+#include <functional>
 #include <optional>
 
-#include "services/tandemd/options.hpp"
+#include "services/tandemd/configuration/options.hpp"
 
 namespace tandem::daemon {
 
@@ -12,6 +13,8 @@ namespace tandem::daemon {
 struct CommandLine {
   std::optional<Options> options;
   int exit_code = 0;
+  /// Reads the configuration file again, and says what changed since; empty without --config.
+  std::function<Result<Changes>()> reread = {};
 };
 [[nodiscard]] CommandLine parse_command_line(int argc, const char* const* argv);
 

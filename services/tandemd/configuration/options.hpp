@@ -2,17 +2,30 @@
 // The options of tandemd, checked and complete.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "services/checkpoint/keeper.hpp"
+#include "services/logging/log.hpp"
 #include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
-#include "services/tandemd/places.hpp"
+#include "services/tandemd/configuration/places.hpp"
+#include "tandem/result.hpp"
 
 namespace tandem::daemon {
 
 inline constexpr std::uint32_t kMostRank = 1000;
+
+/// What a configuration file says that was changed while the server runs, by names of fields; and the values
+/// that hold from now on.
+struct Changes {
+  std::vector<std::string> live, after_restart;
+  std::uint32_t client_limit = 0;
+  std::optional<double> stall_timeout_s;
+  double checkpoint_interval_s = 0;
+};
 
 struct Options : planning::ServiceWishes {
   std::string scene;               ///< name or file
@@ -29,11 +42,15 @@ struct Options : planning::ServiceWishes {
   std::uint32_t standby_rank = 1;  ///< 1 .. kMostRank
 
   std::string hash_log;  ///< path; empty: none
-  bool json = false;     ///< a report on stdout at the end
+  logging::Options log;
+  bool json = false;  ///< a report on stdout at the end
 
   std::optional<metrics::Address> metrics;  ///< empty: none are served
 
   Places places;  ///< of what comes from a file, for errors
+
+  /// Returns what changed if the file was to be read again since the last call, or why it cannot be used.
+  std::function<std::optional<Result<Changes>>()> changes = [] { return std::nullopt; };
 };
 
 }  // namespace tandem::daemon

@@ -1,4 +1,4 @@
-#include "services/tandemd/rehearsal.hpp"
+#include "services/tandemd/configuration/rehearsal.hpp"
 
 #include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "server.pb.h"
-#include "services/tandemd/places.hpp"
+#include "services/tandemd/configuration/places.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {

@@ -1,0 +1,38 @@
+#pragma once
+// The log of a program: one line each on stderr, for people, for journald or as JSON.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace tandem::logging {
+
+enum class Format : std::uint8_t {
+  kText,  ///< [time] [program] [session epoch] [level] message; to journald without time and program, which
+          ///< it knows, and with its priorities (sd-daemon(3))
+  kJson,  ///< one object a line: time (UTC), level, program, session, epoch, message
+};
+enum class Level : std::uint8_t { kError, kWarning, kInfo, kDebug };
+
+inline constexpr std::string_view kFormats = "text or json", kLevels = "error, warning, info or debug";
+[[nodiscard]] std::optional<Format> read_format(std::string_view text);
+[[nodiscard]] std::optional<Level> read_level(std::string_view text);
+
+struct Options {
+  Format format = Format::kText;
+  Level level = Level::kInfo;  ///< less urgent lines are left out
+};
+
+/// Lines of one program a second on average, and at once; of those above, one line every 10 s says how many
+/// there were. Errors count, and are never left out.
+inline constexpr double kLinesPerSecond = 10, kBurst = 300;
+
+/// Makes the log that spdlog's functions write to. Lines go to stderr whole, from any thread. Call it before
+/// other threads are started; a later call replaces the log.
+void begin(const std::string& program, const Options& options);
+
+/// Every later line names this session and epoch. `epoch` 0: not known yet.
+void set_context(std::string_view session, std::uint64_t epoch);
+
+}  // namespace tandem::logging
