@@ -346,7 +346,6 @@ void Server::write_checkpoint() {
   write_at_ns_.reset();
   if (!tear_) {
     keeper_->write_now();
-    if (disk_->lies) disk_sound_ = false;
     if (disk_sound_ && disk_->fails_with.empty()) check_folder();
     return;
   }
@@ -379,6 +378,7 @@ void Server::set_disk_full(bool full) {
 
 void Server::set_disk_lies(bool lies) {
   disk_->lies = lies;
+  if (lies) disk_sound_ = false;
   disk_trouble_ns_ = stage_.now_ns;
 }
 
