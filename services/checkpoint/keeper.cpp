@@ -98,12 +98,14 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
   return start;
 }
 
-Result<Epoch> Keeper::take_over(const engine::Simulation& simulation) {
+Result<Epoch> Keeper::take_over(const World& world, const engine::Simulation& simulation) {
   std::vector<std::byte> state;
   simulation.save(state);
   can_save_ = !state.empty();
   if (!disk_) return Epoch{0};
-  const auto found = folder_->newest([](const Checkpoint&) { return refuse("it is not needed"); });
+  // None is needed; but those of this world are removed when newer ones are there.
+  const auto found = folder_->newest(
+      [&](const Checkpoint& checkpoint) { return check_world(checkpoint, world, simulation.capacity()); });
   if (!found) return tl::unexpected(found.error());
   make_writer(std::move(state));
   return found->newest_epoch < kLastEpoch ? found->newest_epoch : 0;

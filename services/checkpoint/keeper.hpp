@@ -60,7 +60,7 @@ class Keeper {
   [[nodiscard]] Result<Start> start(const World& world, engine::Simulation& simulation);
   /// Instead of start(), for a server that takes over: `simulation` holds its state already. Returns the
   /// highest epoch in the folder. Errors: kIo.
-  [[nodiscard]] Result<Epoch> take_over(const engine::Simulation& simulation);
+  [[nodiscard]] Result<Epoch> take_over(const World& world, const engine::Simulation& simulation);
 
   /// Servers stand by, or none any more. Without a folder nothing is copied while there are none.
   void serve_standbys(bool any);

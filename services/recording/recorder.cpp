@@ -1,10 +1,30 @@
 #include "services/recording/recorder.hpp"
 
+#include <span>
+#include <string>
 #include <utility>
 
 #include "sdk/client/following/scheduled_inputs.hpp"
 
 namespace tandem::recording {
+
+namespace {
+
+constexpr const char* kEvents = "/events";
+// https://docs.foxglove.dev/docs/visualization/message-schemas/log, without the descriptions.
+constexpr std::string_view kLogSchema =
+    R"({"title":"foxglove.Log","type":"object","properties":{
+"timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+"level":{"type":"integer"},"message":{"type":"string"},"name":{"type":"string"},"file":{"type":"string"},"line":{"type":"integer"}}})";
+
+void append_escaped(std::string_view from, std::string& to) {
+  for (const char c : from) {
+    if (c == '"' || c == '\\') to += '\\';
+    to += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+}
+
+}  // namespace
 
 Result<Recorder> Recorder::create(const std::string& path, Compression compression) {
   return OutputFile::create(path).map(
@@ -107,6 +127,25 @@ void Recorder::add(const transport::InputMessage& input, std::int64_t wall_ns) {
 }
 void Recorder::add(const transport::ClientStatusMessage& status, std::int64_t wall_ns) {
   add_plain(status, wall_ns, wall_ns);
+}
+
+void Recorder::add_event(std::string_view who, std::string_view what, std::int64_t wall_ns) {
+  writer_->declare({.topic = kEvents,
+                    .message_encoding = "json",
+                    .schema_name = "foxglove.Log",
+                    .schema_encoding = "jsonschema",
+                    .schema = kLogSchema});
+  std::string text = "{\"timestamp\":{\"sec\":" + std::to_string(wall_ns / 1'000'000'000) +
+                     ",\"nsec\":" + std::to_string(wall_ns % 1'000'000'000) + "},\"level\":2,\"name\":\"";
+  append_escaped(who, text);
+  text += "\",\"message\":\"";
+  append_escaped(what, text);
+  text += "\",\"file\":\"\",\"line\":0}";
+  Share& share = counted_.topics[kEvents];
+  ++share.messages;
+  share.bytes += text.size();
+  writer_->add(kEvents, std::as_bytes(std::span(text)), wall_ns, wall_ns);
+  settle();
 }
 
 bool Recorder::snapshot_due(std::int64_t steady_ns) const {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "sdk/client/client_core.hpp"
 #include "services/recording/mcap_writer.hpp"
@@ -39,6 +40,9 @@ class Recorder {
   void add(const transport::AckMessage& ack, std::int64_t wall_ns);
   void add(const transport::InputMessage& input, std::int64_t wall_ns);
   void add(const transport::ClientStatusMessage& status, std::int64_t wall_ns);
+
+  /// Adds a line about what happened, for people, as foxglove.Log of the topic /events. `who`: who says it.
+  void add_event(std::string_view who, std::string_view what, std::int64_t wall_ns);
 
   /// kSnapshotNs have passed since the last snapshot in the file.
   [[nodiscard]] bool snapshot_due(std::int64_t steady_ns) const;

@@ -23,6 +23,8 @@ class Keeping {
                                HostConfig& config, Log log, std::int64_t (*clock_ns)());
   /// For a server that stands by: locks the folder. Call take_over() before there is a host.
   static Result<Keeping> stand_by(const checkpoint::Settings& settings, Log log, std::int64_t (*clock_ns)());
+  /// With a keeper that was started by the caller.
+  Keeping(std::unique_ptr<checkpoint::Keeper> keeper, Log log, std::int64_t (*clock_ns)());
   /// The session continues `world` of the server `from`, and `simulation` holds its state. `wall_ms`: the
   /// time of day, from which the epoch comes. Errors: kIo.
   [[nodiscard]] Result<void> take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
@@ -39,7 +41,6 @@ class Keeping {
   [[nodiscard]] std::optional<checkpoint::Figures> figures() const { return keeper_->figures(clock_ns_()); }
 
  private:
-  Keeping(std::unique_ptr<checkpoint::Keeper> keeper, Log log, std::int64_t (*clock_ns)());
   void tell(std::int64_t now_ns);
 
   std::unique_ptr<checkpoint::Keeper> keeper_;

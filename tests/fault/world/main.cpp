@@ -32,6 +32,7 @@ constexpr const char* kHelp =
   --without 3,7      leaves out these faults of the plan
   --only 3,7         leaves out all others
   --shrink           removes the faults that a finding does not need
+  --record FILE.mcap records the world as an observer sees it, with the timeline as messages of /events
   --timeline         prints what happened even if nothing was found
   --keep-going       does not stop at a finding
   --budget S         stops after so many seconds of processor time
@@ -96,6 +97,8 @@ bool read(int count, char** words, Options& options) {
       options.without = numbers(words[++i]);
     } else if (word == "--only") {
       options.only = numbers(words[++i]);
+    } else if (word == "--record") {
+      options.run.record = words[++i];
     } else if (word == "--budget") {
       options.budget_s = std::strtod(words[++i], nullptr);
     } else {
@@ -147,8 +150,11 @@ int run(const Options& options) {
     sums.network.damaged += outcome.counts.network.damaged;
     sums.turns += outcome.counts.turns;
     if (outcome.finding && options.shrinks) {
-      plan = shrink(plan, outcome.finding->invariant,
-                    [&](const Plan& smaller) { return run_world(run, smaller); });
+      plan = shrink(plan, outcome.finding->invariant, [&](const Plan& smaller) {
+        RunOptions unrecorded = run;
+        unrecorded.record.clear();
+        return run_world(unrecorded, smaller);
+      });
       outcome = run_world(run, plan);
     }
     if (options.timeline || (outcome.finding && !options.keeps_going))

@@ -94,13 +94,14 @@ def main():
     missed = 0
     for patch in patches:
         file = re.search(r"^\+\+\+ b/(\S+)", patch.read_text(encoding="utf-8"), re.MULTILINE)[1]
+        original = (tree / file).read_bytes()
         run("git", "apply", "--unsafe-paths", f"--directory={tree}", patch, cwd="/")
         reason = build(tree)
         found = None if reason else look(tree, options.seeds)
         missed += found is None
         result = f"{found[0]} | {found[1]}" if found else f"{'cannot be built' if reason else 'NOT FOUND'} | {options.seeds}"
         print(f"| {patch.stem.replace('_', ' ')} | {result} |", flush=True)
-        shutil.copy(ROOT / file, tree / file)
+        (tree / file).write_bytes(original)
     print(f"{len(patches) - missed} of {len(patches)} found")
     return 1 if missed else 0
 

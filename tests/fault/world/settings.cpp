@@ -88,6 +88,7 @@ Settings draw_settings(std::uint64_t seed, double seconds) {
   for (std::uint64_t i = 1 + dice.below(3); i > 0; --i) settings.clients.push_back(draw_client(dice));
   settings.clients.front().role = transport::Role::kParticipant;
   for (int i = 0; i < 2; ++i) settings.newcomers.push_back(draw_client(dice));
+  settings.stands_by = dice.chance(0.4);
   settings.records = dice.chance(0.5);
   settings.has_gateway = dice.chance(0.5);
   for (std::uint64_t i = settings.has_gateway ? 1 + dice.below(2) : 0; i > 0; --i)
@@ -101,11 +102,12 @@ std::string text_of(const Settings& settings) {
   char text[256];
   std::snprintf(
       text, sizeof text,
-      "%zu clients, %zu viewers%s and a server of %u bodies at %g Hz, %s, lead %u%s; links of %.1f ms, %.1f ms of jitter, %.1f %% lost",
+      "%zu clients, %zu viewers%s%s and a server of %u bodies at %g Hz, %s, lead %u%s; links of %.1f ms, %.1f ms of jitter, %.1f %% lost",
       settings.clients.size(), settings.viewers.size(), settings.records ? ", a recorder" : "",
-      settings.scene.capacity, settings.frame_rate_hz, codecs.c_str(), settings.lead,
-      settings.narrow_window ? ", a window of 2" : "", 1e-6 * static_cast<double>(settings.link.delay_ns),
-      1e-6 * static_cast<double>(settings.link.jitter_ns), 100 * settings.link.loss);
+      settings.stands_by ? ", a standby" : "", settings.scene.capacity, settings.frame_rate_hz,
+      codecs.c_str(), settings.lead, settings.narrow_window ? ", a window of 2" : "",
+      1e-6 * static_cast<double>(settings.link.delay_ns), 1e-6 * static_cast<double>(settings.link.jitter_ns),
+      100 * settings.link.loss);
   return text;
 }
 

@@ -43,6 +43,7 @@ struct Settings {
   transport::simulated::LinkModel link;
   std::vector<ClientSettings> clients;    ///< that are there from the start
   std::vector<ClientSettings> newcomers;  ///< that may join
+  bool stands_by = false;                 ///< there is a second server
   bool records = false;
   bool has_gateway = false;
   std::vector<ClientSettings> viewers;  ///< of the gateway

@@ -32,7 +32,8 @@ struct Stage {
   /// Clients that a server of an epoch knows. Ids are random, and cannot be guessed; but who reads one before
   /// the server knows it can take it away (idl/STATES.md, "A known weakness").
   std::map<transport::ClientId, Epoch> known_ids;
-  Epoch live_epoch = 0;  ///< of the server that runs; 0: none does
+  Epoch crashed_epoch = 0;  ///< of the last server that was killed while nothing else was wrong with it
+  Epoch live_epoch = 0;     ///< of the server that runs; 0: none does
 
   explicit Stage(const Settings& drawn);
   [[nodiscard]] double unique() { return next_unique += 1e-6; }

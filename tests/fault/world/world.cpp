@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
+#include "tests/fault/world/actors/camera.hpp"
 #include "tests/fault/world/actors/client.hpp"
 #include "tests/fault/world/actors/gateway.hpp"
 #include "tests/fault/world/actors/recorder.hpp"
@@ -21,23 +23,28 @@ class World {
   World(const RunOptions& options, const Plan& plan)
       : stage_(draw_settings(options.seed, options.seconds)),
         end_ns_(static_cast<std::int64_t>(options.seconds * 1e9)),
+        camera_(stage_, options.record),
         newcomers_from_(fill()),
         chaos_(stage_, cast_, newcomers_from_, plan, heal_ns(options.seconds)) {}
 
   Outcome live() {
     stage_.journal.add(0, "world", text_of(stage_.settings));
     for (std::size_t i = 0; i < newcomers_from_; ++i) cast_[i]->start();
+    camera_.start();
     std::uint64_t turns = 0;
     try {
       while (stage_.now_ns < end_ns_ && !stage_.finding) {
         advance();
         ++turns;
       }
+      if (!stage_.finding && service_.serves_for_ns() < Rules::kPlaysNs)
+        stage_.blame("getting in", "world", "there has not been one live server for 10 s");
       if (!stage_.finding)
         for (const auto& actor : cast_) actor->check_end();
     } catch (const std::exception& thrown) {
       stage_.blame("nothing throws", "world", thrown.what());
     }
+    if (const auto written = camera_.finish(); !written) throw std::runtime_error(written.error().message);
     Outcome outcome;
     outcome.counts.turns = turns;
     outcome.counts.acts = stage_.truth.acts();
@@ -55,10 +62,16 @@ class World {
 
  private:
   std::size_t fill() {
-    auto server = std::make_unique<Server>(stage_, "server");
-    const Server& of = *server;
-    cast_.push_back(std::move(server));
+    const Service& of = service_;
     std::uint64_t id = 1000;
+    const auto add_server = [&](const std::string& name, bool stands_by) {
+      auto server = std::make_unique<Server>(stage_, name, id, stands_by);
+      service_.add(*server);
+      cast_.push_back(std::move(server));
+      id += 1000;
+    };
+    add_server("server", false);
+    if (stage_.settings.stands_by) add_server("standby", true);
     const auto add = [&](const ClientSettings& settings, const std::string& name) {
       cast_.push_back(std::make_unique<Client>(stage_, name, settings, of, id));
       id += 1000;
@@ -97,11 +110,14 @@ class World {
     std::int64_t next_ns = std::min({end_ns_, chaos_.wake_ns(), next_check_ns_});
     if (const auto event_ns = stage_.network.next_event_ns()) next_ns = std::min(next_ns, *event_ns);
     for (const auto& actor : cast_) next_ns = std::min(next_ns, actor->wake_ns());
+    next_ns = std::min(next_ns, camera_.wake_ns());
     next_ns = (next_ns + kTickNs - 1) / kTickNs * kTickNs;
     stage_.now_ns = std::max(next_ns, stage_.now_ns + kTickNs);
     stage_.network.advance_to(stage_.now_ns);
     chaos_.turn();
     for (const auto& actor : cast_) actor->turn();
+    camera_.turn();
+    service_.look();
     if (stage_.now_ns < next_check_ns_) return;
     next_check_ns_ = stage_.now_ns + kChecksNs;
     for (const auto& actor : cast_)
@@ -111,6 +127,8 @@ class World {
   Stage stage_;
   std::int64_t end_ns_;
   Cast cast_;
+  Service service_{stage_};
+  Camera camera_;
   std::size_t newcomers_from_;
   Chaos chaos_;
   std::int64_t next_check_ns_ = 0;

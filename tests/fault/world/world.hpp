@@ -27,6 +27,7 @@ struct Outcome {
 struct RunOptions {
   std::uint64_t seed = 1;
   double seconds = 60;
+  std::string record;  ///< a file to write the world to; empty: none
 };
 
 [[nodiscard]] Plan plan_of(const RunOptions& options, const std::vector<FaultKind>& kinds);

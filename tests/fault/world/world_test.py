@@ -3,8 +3,10 @@
     python3 world_test.py TANDEM_WORLD
 """
 
+import pathlib
 import subprocess
 import sys
+import tempfile
 import unittest
 
 PROGRAM = sys.argv.pop(1)
@@ -21,6 +23,14 @@ class World(unittest.TestCase):
             timeline = [text.rpartition(";")[0] for text in (once, again)]  # without the processor's time
             self.assertEqual(timeline[0], timeline[1])
             self.assertIn("digest", timeline[0])
+
+    def test_recording_a_world_changes_nothing_in_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "world.mcap"
+            plain = run("--seed", "3", "--seconds", "40").stdout.split("digest ")[1][:16]
+            recorded = run("--seed", "3", "--seconds", "40", "--record", str(file)).stdout.split("digest ")[1][:16]
+            self.assertEqual(plain, recorded)
+            self.assertIn(b"foxglove.Log", file.read_bytes())
 
     def test_another_seed_or_another_plan_gives_another_run(self):
         digests = [

@@ -132,6 +132,18 @@ TEST_F(KeeperTest, WithoutACheckpointItStartsAfreshAndSaysSoOrRefuses) {
   EXPECT_EQ(refused.error().message, folder_.string() + ": no checkpoint to go on from");
 }
 
+TEST_F(KeeperTest, AServerThatTookOverRemovesTheOldOnesOfItsWorld) {
+  run({30, 60, 90});
+  auto keeper = Keeper::open(settings(), &clock_ns);
+  ASSERT_TRUE(keeper) << keeper.error().message;
+  Number simulation;
+  const auto newest = (*keeper)->take_over(world(), simulation);
+  ASSERT_TRUE(newest);
+  EXPECT_EQ(*newest, 1000U);
+  (*keeper)->end(clock_ns(), [&](Checkpoint& out) { out = sample(2000, 100); });
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 3);
+}
+
 TEST_F(KeeperTest, AnEngineWithoutSaveStartsWithAWarningOrIsRefused) {
   Number simulation(4, false);
   const auto begun = start(simulation);
@@ -217,7 +229,8 @@ TEST_F(KeeperTest, AFrameIsNotKeptWaitingWhileACheckpointIsUnderWay) {
   ASSERT_TRUE((*keeper)->start(world(), simulation));
   int copies = 0;
   for (std::int64_t now = 0; now < 10'000'000'000; now += 33'333'333)
-    (*keeper)->after_frame(now, false, [&](Checkpoint& out) { out = sample(1000, static_cast<Frame>(++copies)); });
+    (*keeper)->after_frame(now, false,
+                           [&](Checkpoint& out) { out = sample(1000, static_cast<Frame>(++copies)); });
   EXPECT_GE(copies, 1);
   EXPECT_LE(copies, 20) << "two a second, if the disk is slow";
 }

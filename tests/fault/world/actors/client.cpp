@@ -16,7 +16,7 @@ const char* name_of(ClientPhase phase) {
 
 }  // namespace
 
-Client::Client(Stage& stage, std::string name, ClientSettings settings, const Server& server,
+Client::Client(Stage& stage, std::string name, ClientSettings settings, const Service& server,
                std::uint64_t first_id)
     : Actor(stage, std::move(name)),
       settings_(std::move(settings)),

@@ -64,7 +64,7 @@ class Witness : public client::CoreListener {
 
 class Client final : public Actor {
  public:
-  Client(Stage& stage, std::string name, ClientSettings settings, const Server& server,
+  Client(Stage& stage, std::string name, ClientSettings settings, const Service& server,
          std::uint64_t first_id);
   ~Client() override;
 
@@ -87,7 +87,7 @@ class Client final : public Actor {
   void drop();
 
   ClientSettings settings_;
-  const Server& server_;
+  const Service& server_;
   Dice dice_;
   std::uint64_t next_id_;
   std::unique_ptr<transport::ClientPort> port_;

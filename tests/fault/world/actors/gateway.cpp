@@ -5,7 +5,7 @@
 
 namespace tandem::world {
 
-GatewayActor::GatewayActor(Stage& stage, std::string name, const Server& server, std::uint64_t first_id)
+GatewayActor::GatewayActor(Stage& stage, std::string name, const Service& server, std::uint64_t first_id)
     : Actor(stage, std::move(name)),
       server_(server),
       dice_(stage.settings.seed * 977 + first_id),

@@ -33,7 +33,7 @@ struct Connection {
 
 class GatewayActor final : public Actor {
  public:
-  GatewayActor(Stage& stage, std::string name, const Server& server, std::uint64_t first_id);
+  GatewayActor(Stage& stage, std::string name, const Service& server, std::uint64_t first_id);
   ~GatewayActor() override;
 
   /// A browser connects; null: it is turned away, or nobody listens.
@@ -58,7 +58,7 @@ class GatewayActor final : public Actor {
   void close(gateway::ViewerId viewer, const char* why);
   void send(gateway::ViewerId viewer);
 
-  const Server& server_;
+  const Service& server_;
   Dice dice_;
   std::uint64_t next_id_;
   std::unique_ptr<transport::ClientPort> port_;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <deque>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -51,7 +52,10 @@ fs::path folder() {
 class RecorderActor::Both final : public client::CoreListener {
  public:
   Both(Stage& stage, const std::string& who, recording::Recorder& recorder)
-      : witness_(stage, who), capture_(recorder, {&Clock::shown, &Clock::shown_wall}), recorder_(recorder) {}
+      : stage_(stage),
+        witness_(stage, who),
+        capture_(recorder, {&Clock::shown, &Clock::shown_wall}),
+        recorder_(recorder) {}
   void watch(const client::ClientCore& core) {
     witness_.watch(core);
     capture_.watch(core);
@@ -71,19 +75,28 @@ class RecorderActor::Both final : public client::CoreListener {
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
     witness_.on_applied(epoch, delta);
     capture_.on_applied(epoch, delta);
-    if (recorder_.good()) ++frames;
+    if (!recorder_.good()) return;
+    ++frames;
+    added_ns_.push_back(stage_.now_ns);
+    while (stage_.now_ns - added_ns_.front() > kOpenNs) added_ns_.pop_front();
   }
+  /// Frames that have left the open chunk, whatever it holds. Its two seconds are of a wall clock, which may
+  /// go back.
+  [[nodiscard]] std::uint64_t settled() const { return frames - added_ns_.size(); }
   void on_resync(client::ResyncReason reason) override { witness_.on_resync(reason); }
 
   std::uint64_t frames = 0;  ///< that were recorded without an error
 
  private:
+  static constexpr std::int64_t kOpenNs = 4'100 * kMs;
+  Stage& stage_;
+  std::deque<std::int64_t> added_ns_;  // the last frames
   Witness witness_;
   recording::Capture capture_;
   recording::Recorder& recorder_;
 };
 
-RecorderActor::RecorderActor(Stage& stage, std::string name, const Server& server, std::uint64_t first_id)
+RecorderActor::RecorderActor(Stage& stage, std::string name, const Service& server, std::uint64_t first_id)
     : Actor(stage, std::move(name)),
       server_(server),
       next_id_(first_id),
@@ -145,8 +158,7 @@ void RecorderActor::finish() {
   if (!finished) tell(finished.error().message);
   if (!good && finished) blame("recording", "a file that could not be written counts as complete");
   // What could not be written is the chunk that was open.
-  const auto chunk = static_cast<std::uint64_t>(2.5 * stage_.settings.frame_rate_hz);
-  const std::uint64_t least = finished ? frames : frames - std::min(frames, chunk);
+  const std::uint64_t least = finished ? frames : listener_->settled();
   if (recorder_->totals().frames < least || (finished && frames > 0 && recorder_->totals().frames != frames))
     blame("recording", "says that it holds " + std::to_string(recorder_->totals().frames) + " of " +
                            std::to_string(frames) + " frames");
@@ -160,11 +172,10 @@ void RecorderActor::on_leave() {
 }
 
 void RecorderActor::on_crash(bool /*power_fails*/) {
-  // A chunk of two seconds may be open; nothing else may be missing.
-  const auto chunk = static_cast<std::uint64_t>(2.5 * stage_.settings.frame_rate_hz);
-  const std::uint64_t frames = listener_->frames;
+  // A chunk may be open; nothing else may be missing.
+  const std::uint64_t settled = listener_->settled();
   drop();
-  play_back(frames - std::min(frames, chunk));
+  play_back(settled);
 }
 
 void RecorderActor::play_back(std::uint64_t least) {

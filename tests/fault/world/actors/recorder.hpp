@@ -14,7 +14,7 @@ namespace tandem::world {
 
 class RecorderActor final : public Actor {
  public:
-  RecorderActor(Stage& stage, std::string name, const Server& server, std::uint64_t first_id);
+  RecorderActor(Stage& stage, std::string name, const Service& server, std::uint64_t first_id);
   ~RecorderActor() override;
 
   void set_disk_full(bool full) override { full_ = full; }
@@ -36,7 +36,7 @@ class RecorderActor final : public Actor {
   void play_back(std::uint64_t least);
   void drop();
 
-  const Server& server_;
+  const Service& server_;
   std::uint64_t next_id_;
   std::string path_;
   std::unique_ptr<transport::ClientPort> port_;

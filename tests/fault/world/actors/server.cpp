@@ -7,6 +7,7 @@
 
 #include "services/checkpoint/format.hpp"
 #include "services/host/frames/going_on.hpp"
+#include "services/host/frames/roll_forward.hpp"
 #include "tests/support/dice/dice.hpp"
 
 namespace tandem::world {
@@ -42,8 +43,11 @@ constexpr std::int64_t kServiceRestartNs = kSecond;  // as systemd does with a s
 
 }  // namespace
 
-Server::Server(Stage& stage, std::string name)
-    : Actor(stage, std::move(name)), disk_(std::make_shared<checkpoint::SimulatedDisk>()) {}
+Server::Server(Stage& stage, std::string name, transport::ClientId standby_id, bool stands_by)
+    : Actor(stage, std::move(name)),
+      disk_(std::make_shared<checkpoint::SimulatedDisk>()),
+      stands_by_(stands_by),
+      standby_id_(standby_id) {}
 
 Server::~Server() = default;
 
@@ -52,21 +56,38 @@ std::vector<transport::ParticipantId> Server::participants() const {
   return {port_->self()};
 }
 
-std::int64_t Server::serves_for_ns() const {
-  if (!up() || !host_ || host_->state() == host::Host::State::kClaiming) return 0;
-  return well_for_ns();
+bool Server::runs() const { return up() && host_ && host_->state() == host::Host::State::kRunning; }
+
+void Service::look() {
+  const Server* live = nullptr;
+  int running = 0;
+  for (const Server* server : servers_) {
+    if (!server->runs()) continue;
+    ++running;
+    live = server;
+  }
+  if (running != 1) live = nullptr;
+  const Epoch epoch = live == nullptr ? 0 : live->host()->session().epoch;
+  if (live != live_ || epoch != epoch_) since_ns_ = stage_.now_ns;
+  live_ = live;
+  epoch_ = epoch;
 }
 
-void Server::on_start() { begin(); }
+std::int64_t Service::serves_for_ns() const {
+  return live_ == nullptr ? 0 : std::min(stage_.now_ns - since_ns_, live_->well_for_ns());
+}
+
+void Server::on_start() { stands_by_ ? stand_by() : begin(); }
 
 void Server::begin() {
   port_ = std::move(*stage_.network.make_server("default"));
   engine_ = std::make_unique<WatchedEngine>(stage_.settings.scene);
   host::HostConfig config = host_config(stage_.settings);
   config.epoch = static_cast<Epoch>(wall_ns() / kMs);
-  keeper_ = std::make_unique<checkpoint::Keeper>(checkpoint::Settings{"disk", 1, false},
-                                                 std::make_unique<Mounted>(disk_), &Clock::shown,
-                                                 checkpoint::WritesIn::kWriteNow);
+  made_ = std::make_unique<checkpoint::Keeper>(checkpoint::Settings{"disk", 1, false},
+                                               std::make_unique<Mounted>(disk_), &Clock::shown,
+                                               checkpoint::WritesIn::kWriteNow);
+  keeper_ = made_.get();
   const auto newest = newest_on_disk();
   const auto start = keeper_->start(host::checkpoint_world(config), *engine_);
   if (!start) {
@@ -92,19 +113,81 @@ void Server::begin() {
   if (start->newest_epoch >= epoch_)
     blame("newest checkpoint", "epoch " + std::to_string(epoch_) + " is not above the folder's");
   check_start(*start);
+  tell(start->told);
+  begin_host(std::move(config));
+}
+
+void Server::begin_host(host::HostConfig config) {
+  epoch_ = config.epoch;
   auto made = host::Host::create(std::move(config), *engine_, *port_);
   if (!made) throw std::runtime_error(made.error().message);
   host_ = std::move(*made);
+  keeping_.emplace(
+      std::move(made_), [this](const std::string& line, bool /*warning*/) { tell(line); }, &Clock::shown);
   if (const std::string wrong =
           stage_.truth.begin(epoch_, host_->session().continues_epoch, host_->session().continues_frame);
       !wrong.empty())
     blame("one world", wrong);
-  tell("epoch " + std::to_string(epoch_) + ", " + start->told);
-  acts_seen_ = 0;
+  tell("epoch " + std::to_string(epoch_));
+  acts_seen_ = engine_->acted.size();
   last_frame_ns_ = last_poll_ns_ = stage_.now_ns;
   told_state_ = host::Host::State::kClaiming;
   write_at_ns_.reset();
   static_cast<void>(stage_.truth.hold(epoch_, host_->first_made(), host_->frame(), host_->hash()));
+}
+
+void Server::stand_by() {
+  port_ = std::move(*stage_.network.make_server("default"));
+  engine_ = std::make_unique<WatchedEngine>(stage_.settings.scene);
+  const host::HostConfig config = host_config(stage_.settings);
+  made_ = std::make_unique<checkpoint::Keeper>(checkpoint::Settings{"disk", 1, false},
+                                               std::make_unique<Mounted>(disk_), &Clock::shown,
+                                               checkpoint::WritesIn::kWriteNow);
+  keeper_ = made_.get();
+  const auto accept = [this, world = host::checkpoint_world(config)](
+                          const checkpoint::Checkpoint& checkpoint) -> Result<void> {
+    if (auto good = check_world(checkpoint, world, engine_->capacity()); !good) return good;
+    if (engine_->load(checkpoint.engine_state)) return {};
+    return fail(ErrorCode::kInvalidArgument, "the engine refuses its part");
+  };
+  static_cast<void>(port_->open_streams(static_cast<std::uint32_t>(config.streams.size())));
+  auto made = standby::Standby::create(
+      {.session = "default", .id = standby_id_++, .rank = 1, .epoch = static_cast<Epoch>(wall_ns() / kMs)},
+      *port_, accept);
+  if (!made) throw std::runtime_error(made.error().message);
+  standby_ = std::move(*made);
+  tell("stands by");
+}
+
+void Server::take_over() {
+  const standby::Takeover takeover = standby_->take_over();
+  host::HostConfig config = host_config(stage_.settings);
+  auto continued = host::continue_world(config, *engine_, *takeover.checkpoint, takeover.journal);
+  if (!continued) throw std::runtime_error(continued.error().message);
+  if (!continued->why_not.empty()) blame("one world", "cannot follow the journal: " + continued->why_not);
+  const checkpoint::Checkpoint& world = continued->world;
+  engine_->frame = world.frame;
+  tell("takes over from epoch " + std::to_string(world.epoch) + " at frame " + std::to_string(world.frame) +
+       ", " + std::to_string(world.frame - takeover.checkpoint->frame) + " after its checkpoint");
+  for (const checkpoint::ClientState& client : world.clients) taken_over_.push_back(client.id);
+  // It had the time to receive a checkpoint, and each second another.
+  const Frame last = stage_.truth.lineage(world.epoch)->last;
+  if (stage_.crashed_epoch == world.epoch && well_for_ns() > 8 * kSecond &&
+      static_cast<double>(last - world.frame) > 1 + stage_.settings.frame_rate_hz)
+    blame("at most a second", "takes over from frame " + std::to_string(world.frame) +
+                                  ", and the live server was at frame " + std::to_string(last));
+  standby_.reset();
+  const auto newest = keeper_->take_over(host::checkpoint_world(config), *engine_);
+  if (!newest) throw std::runtime_error(newest.error().message);
+  checkpoint::Start start;
+  start.newest_epoch = *newest;
+  start.goes_on_from = std::make_shared<const checkpoint::Checkpoint>(std::move(continued->world));
+  config.epoch = static_cast<Epoch>(wall_ns() / kMs);
+  host::begin_takeover(std::move(start), takeover.from, config);
+  for (const transport::ClientId id : std::exchange(taken_over_, {})) stage_.known_ids[id] = config.epoch;
+  before_.reset();
+  disturb();
+  begin_host(std::move(config));
 }
 
 // Without the keeper: what a reader of all files finds.
@@ -143,16 +226,20 @@ void Server::check_start(const checkpoint::Start& start) {
 }
 
 void Server::drop() {
+  keeping_.reset();
   host_.reset();
-  keeper_.reset();
+  standby_.reset();
+  made_.reset();
+  keeper_ = nullptr;
   engine_.reset();
   port_.reset();
-  stage_.live_epoch = 0;
+  if (stage_.live_epoch == epoch_) stage_.live_epoch = 0;
   write_at_ns_.reset();
 }
 
 void Server::on_crash(bool power_fails) {
   if (host_) {
+    stage_.crashed_epoch = well_for_ns() > kSoundNs ? epoch_ : 0;
     const bool disk_well = stage_.now_ns - disk_trouble_ns_ > kSoundNs && disk_delay_ns_ < 10 * kMs &&
                            disk_->fails_with.empty() && !disk_->lies;
     before_ = Before{epoch_, host_->frame(), last_frame_ns_, false,
@@ -175,7 +262,7 @@ void Server::lose_power(double kept) {
 void Server::on_leave() {
   if (host_ && host_->state() == host::Host::State::kRunning) {
     const bool disk_well = disk_->fails_with.empty();
-    keeper_->end(steady_ns(), [this](checkpoint::Checkpoint& out) { host_->capture(out); });
+    keeping_->end(*host_);
     static_cast<void>(host::drain(host_->outbox(), *port_));
     before_ = Before{epoch_, host_->frame(), last_frame_ns_, true, disk_well};
   }
@@ -184,6 +271,7 @@ void Server::on_leave() {
 }
 
 std::int64_t Server::due_ns() const {
+  if (standby_) return standby_->next_wake_ns();
   if (!host_) return INT64_MAX;
   std::int64_t due_ns = host_->next_wake_ns();
   if (write_at_ns_) due_ns = std::min(due_ns, clock().steady_ns(*write_at_ns_));
@@ -193,18 +281,25 @@ std::int64_t Server::due_ns() const {
 void Server::on_poll() {
   if (write_at_ns_ && stage_.now_ns >= *write_at_ns_) write_checkpoint();
   if (!up()) return;
+  if (standby_) {
+    const bool is_time = standby_->poll(steady_ns());
+    for (const std::string& notice : standby_->take_notices()) tell(notice);
+    if (!is_time) return;
+    take_over();
+  }
   for (int turns = 0; turns < 8; ++turns) {  // as a loop that catches up
     const bool produced = host_->poll(steady_ns(), wall_ns());
     note_acts();
+    keeping_->after_poll(*host_, produced, steady_ns());
     if (produced) note_frame();
     if (publishing_) static_cast<void>(host::drain(host_->outbox(), *port_));
     if (!produced || host_->next_wake_ns() > steady_ns()) break;
   }
   last_poll_ns_ = stage_.now_ns;
   for (const std::string& notice : host_->take_notices()) tell(notice);
-  for (const std::string& notice : keeper_->take_notices(steady_ns())) tell(notice);
-  if (host_->error()) {
-    tell("ends: " + host_->error()->message);
+  const bool handed_over = host_->state() == host::Host::State::kHandedOver;
+  if (host_->error() || handed_over) {
+    tell(handed_over ? "is handed over" : "ends: " + host_->error()->message);
     if (host_->state() == host::Host::State::kEnded) blame("one world", host_->error()->message);
     drop();
     ended(stage_.now_ns + kServiceRestartNs);
@@ -244,7 +339,6 @@ void Server::note_frame() {
   if (waited_ns > Rules::kStallNs + 2 * period_ns + 120 * kMs && well_for_ns() > waited_ns)
     blame("waiting", "frame " + std::to_string(report.frame) + " came " + std::to_string(waited_ns / kMs) +
                          " ms after the one before");
-  keeper_->after_frame(steady_ns(), false, [this](checkpoint::Checkpoint& out) { host_->capture(out); });
   if (keeper_->writing() && !write_at_ns_) write_at_ns_ = stage_.now_ns + disk_delay_ns_;
 }
 
@@ -252,7 +346,6 @@ void Server::write_checkpoint() {
   write_at_ns_.reset();
   if (!tear_) {
     keeper_->write_now();
-    if (disk_->lies) disk_sound_ = false;
     if (disk_sound_ && disk_->fails_with.empty()) check_folder();
     return;
   }
@@ -285,6 +378,7 @@ void Server::set_disk_full(bool full) {
 
 void Server::set_disk_lies(bool lies) {
   disk_->lies = lies;
+  if (lies) disk_sound_ = false;
   disk_trouble_ns_ = stage_.now_ns;
 }
 

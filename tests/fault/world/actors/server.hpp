@@ -9,6 +9,8 @@
 
 #include "services/checkpoint/keeper.hpp"
 #include "services/host/host.hpp"
+#include "services/host/keeping/keeping.hpp"
+#include "services/standby/standby.hpp"
 #include "tests/fault/world/actors/actor.hpp"
 #include "tests/fault/world/actors/engine.hpp"
 #include "tests/support/disk/simulated_disk.hpp"
@@ -17,7 +19,8 @@ namespace tandem::world {
 
 class Server final : public Actor {
  public:
-  Server(Stage& stage, std::string name);
+  /// `stands_by`: how it is started, each time.
+  Server(Stage& stage, std::string name, transport::ClientId standby_id, bool stands_by = false);
   ~Server() override;
 
   // What the faults do.
@@ -34,8 +37,8 @@ class Server final : public Actor {
   [[nodiscard]] std::vector<transport::ParticipantId> participants() const override;
   [[nodiscard]] const host::Host* host() const { return host_.get(); }
   void check() override;
-  /// How long the host has been announced, and nothing was wrong with it.
-  [[nodiscard]] std::int64_t serves_for_ns() const;
+  /// It makes frames, or would.
+  [[nodiscard]] bool runs() const;
 
  protected:
   void on_start() override;
@@ -46,6 +49,9 @@ class Server final : public Actor {
 
  private:
   void begin();
+  void stand_by();
+  void take_over();
+  void begin_host(host::HostConfig config);
   void check_start(const checkpoint::Start& start);
   void note_frame();
   void note_acts();
@@ -69,15 +75,21 @@ class Server final : public Actor {
 
   std::unique_ptr<transport::ServerPort> port_;
   std::unique_ptr<WatchedEngine> engine_;
-  std::unique_ptr<checkpoint::Keeper> keeper_;
+  std::unique_ptr<standby::Standby> standby_;  ///< while it stands by
+  std::optional<host::Keeping> keeping_;       ///< while there is a host
+  std::unique_ptr<checkpoint::Keeper> made_;   ///< until then
+  checkpoint::Keeper* keeper_ = nullptr;       ///< of either
   std::unique_ptr<host::Host> host_;
   std::optional<std::int64_t> write_at_ns_;
   bool publishing_ = true;
-  std::int64_t starts_ = 0;
+  const bool stands_by_;
+  transport::ClientId standby_id_;
   Epoch epoch_ = 0;
   std::size_t acts_seen_ = 0;
   std::int64_t last_frame_ns_ = 0, last_poll_ns_ = 0;
   host::Host::State told_state_ = host::Host::State::kClaiming;
+
+  std::vector<transport::ClientId> taken_over_;
 
   // Of the life before, for the next start.
   struct Before {
@@ -88,6 +100,26 @@ class Server final : public Actor {
     bool sound = false;  ///< nothing was wrong with server and disk for long enough
   };
   std::optional<Before> before_;
+};
+
+/// What everybody else sees of the servers: the one that is live, if there is only one.
+class Service {
+ public:
+  explicit Service(const Stage& stage) : stage_(stage) {}
+  void add(const Server& server) { servers_.push_back(&server); }
+  /// Call after each turn of the world.
+  void look();
+  /// How long that one has been there, and nothing was wrong with it; 0 while there is none or another.
+  [[nodiscard]] std::int64_t serves_for_ns() const;
+  /// Precondition: serves_for_ns() is above 0.
+  [[nodiscard]] const host::Host* host() const { return live_->host(); }
+
+ private:
+  const Stage& stage_;
+  std::vector<const Server*> servers_;
+  const Server* live_ = nullptr;
+  Epoch epoch_ = 0;
+  std::int64_t since_ns_ = 0;
 };
 
 }  // namespace tandem::world

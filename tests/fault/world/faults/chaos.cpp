@@ -78,7 +78,15 @@ std::size_t Chaos::other_than(const Fault& fault) const {
   return other != whom ? other : (whom + 1) % cast_.size();
 }
 
-Server& Chaos::server() { return static_cast<Server&>(*cast_.front()); }
+Server& Chaos::server(std::uint32_t whom) {
+  auto* const server = dynamic_cast<Server*>(&actor(whom));
+  return server != nullptr ? *server : static_cast<Server&>(*cast_.front());
+}
+
+void Chaos::each_server(const std::function<void(Server&)>& change) {
+  for (const auto& any : cast_)
+    if (auto* const server = dynamic_cast<Server*>(any.get())) change(*server);
+}
 
 std::int64_t Chaos::wake_ns() const {
   std::int64_t wake_ns = healed_ ? INT64_MAX : heal_at_ns_;
@@ -131,11 +139,11 @@ void Chaos::begin(const Fault& fault) {
       whom.leave(until_ns);
       return;
     case FaultKind::kPower:
-      server().set_power_kept(fault.strength);
-      if (server().up()) server().crash(until_ns, true);
+      server(fault.whom).set_power_kept(fault.strength);
+      if (server(fault.whom).up()) server(fault.whom).crash(until_ns, true);
       return;
     case FaultKind::kTornWrite:
-      server().tear_next_write(fault.salt, fault.strength, fault.for_ms * kMs);
+      server(fault.whom).tear_next_write(fault.salt, fault.strength, fault.for_ms * kMs);
       return;
     case FaultKind::kWallJump:
       whom.clock().jump(seconds(fault.strength));
@@ -144,7 +152,7 @@ void Chaos::begin(const Fault& fault) {
       whom.burst(static_cast<std::uint32_t>(fault.strength));
       return;
     case FaultKind::kQuality:
-      server().change_quality(fault.salt);
+      server(fault.whom).change_quality(fault.salt);
       return;
     case FaultKind::kPreference:
       whom.prefer(fault.salt);
@@ -165,17 +173,17 @@ void Chaos::begin(const Fault& fault) {
       whom.set_starved(seconds(fault.strength));
       break;
     case FaultKind::kStarvePublisher:
-      server().set_publishing(false);
+      each_server([&](Server& any) { any.set_publishing(false); });
       active.fault.whom = 0;
       break;
     case FaultKind::kSlowDisk:
-      server().set_disk_delay(seconds(fault.strength));
+      each_server([&](Server& any) { any.set_disk_delay(seconds(fault.strength)); });
       break;
     case FaultKind::kFullDisk:
       for (const auto& any : cast_) any->set_disk_full(true);
       break;
     case FaultKind::kLostFsync:
-      server().set_disk_lies(true);
+      each_server([&](Server& any) { any.set_disk_lies(true); });
       break;
     case FaultKind::kForge:
       active.forger = std::make_unique<Forger>(stage_, fault.salt);
@@ -208,18 +216,18 @@ void Chaos::end(const Active& active) {
   if (fault.kind == FaultKind::kDrift) whom.clock().set_drift(stage_.now_ns, 0);
   if (fault.kind == FaultKind::kStarve) whom.set_starved(0);
   if (fault.kind == FaultKind::kNewcomer) whom.leave(INT64_MAX);
-  if (fault.kind == FaultKind::kStarvePublisher) server().set_publishing(true);
-  if (fault.kind == FaultKind::kSlowDisk) server().set_disk_delay(0);
+  if (fault.kind == FaultKind::kStarvePublisher) each_server([&](Server& any) { any.set_publishing(true); });
+  if (fault.kind == FaultKind::kSlowDisk) each_server([&](Server& any) { any.set_disk_delay(0); });
   if (fault.kind == FaultKind::kFullDisk)
     for (const auto& any : cast_) any->set_disk_full(false);
-  if (fault.kind == FaultKind::kLostFsync) server().set_disk_lies(false);
+  if (fault.kind == FaultKind::kLostFsync) each_server([&](Server& any) { any.set_disk_lies(false); });
 }
 
 void Chaos::heal() {
   healed_ = true;
   stage_.journal.add(stage_.now_ns, "faults", "end");
   for (Active& active : std::exchange(active_, {})) end(active);
-  server().keep_next_write_whole();
+  each_server([&](Server& any) { any.keep_next_write_whole(); });
   set_links();
   for (std::size_t i = 0; i < newcomers_from_; ++i)
     if (!cast_[i]->up()) cast_[i]->start();

@@ -2,6 +2,7 @@
 // Lets the faults of a plan happen, and ends them.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -39,7 +40,9 @@ class Chaos {
   [[nodiscard]] std::size_t index_of(std::uint32_t whom) const;
   [[nodiscard]] Actor& actor(std::uint32_t whom) { return *cast_[index_of(whom)]; }
   [[nodiscard]] std::size_t other_than(const Fault& fault) const;
-  [[nodiscard]] Server& server();
+  /// Whom a fault of servers hits: the first one, if not another.
+  [[nodiscard]] Server& server(std::uint32_t whom);
+  void each_server(const std::function<void(Server&)>& change);
   /// True if a fault of the network changes the way from one to another.
   [[nodiscard]] bool concerns(const Active& active, std::size_t from, std::size_t to) const;
   void set_links();
