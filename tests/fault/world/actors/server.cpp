@@ -145,15 +145,21 @@ void Server::stand_by() {
                                                checkpoint::WritesIn::kWriteNow);
   keeper_ = made_.get();
   const auto accept = [this, world = host::checkpoint_world(config)](
-                          const checkpoint::Checkpoint& checkpoint) -> Result<void> {
+                          const checkpoint::Checkpoint& checkpoint,
+                          const transport::SessionMessage& /*live*/) -> Result<void> {
     if (auto good = check_world(checkpoint, world, engine_->capacity()); !good) return good;
     if (engine_->load(checkpoint.engine_state)) return {};
     return fail(ErrorCode::kInvalidArgument, "the engine refuses its part");
   };
+  const auto follows = [this](const checkpoint::Checkpoint& from,
+                              std::span<const transport::JournalMessage> journal) {
+    return engine_->load(from.engine_state) &&
+           host::roll_forward(host_config(stage_.settings), *engine_, from, journal);
+  };
   static_cast<void>(port_->open_streams(static_cast<std::uint32_t>(config.streams.size())));
   auto made = standby::Standby::create(
       {.session = "default", .id = standby_id_++, .rank = 1, .epoch = static_cast<Epoch>(wall_ns() / kMs)},
-      *port_, accept);
+      *port_, accept, follows);
   if (!made) throw std::runtime_error(made.error().message);
   standby_ = std::move(*made);
   tell("stands by");
