@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace tandem::host {
 
 void Handover::ask(const Standbys& standbys, Frame frame, Notices& notices, std::int64_t now_ns) {
@@ -14,6 +16,7 @@ void Handover::ask(const Standbys& standbys, Frame frame, Notices& notices, std:
   step_ = Step::kPreparing;
   to_ = to->id;
   asked_ = frame;
+  told_ = false;
   since_ns_ = now_ns;
   notices.add(fmt::format("hands over to server {:016x} of rank {}", to->id, to->rank), now_ns);
 }
@@ -22,6 +25,7 @@ void Handover::look(const Standbys& standbys, Notices& notices, std::int64_t now
   if (step_ == Step::kNone) return;
   const Standbys::Standby* const to = standbys.find(to_);
   const bool stopped = step_ == Step::kStopped;
+  if (stopped && !std::exchange(told_, true)) notices.add("made the last frame before the handover", now_ns);
   if (to == nullptr && !stopped) return give_up("it stands by no longer", notices, now_ns);
   if (now_ns - since_ns_ >= (stopped ? kWaitsNs : kPreparesNs))
     return give_up(stopped ? "it does not take over" : "it is too far behind", notices, now_ns);

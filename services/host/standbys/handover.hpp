@@ -40,6 +40,7 @@ class Handover {
   transport::ClientId to_ = 0;
   Frame asked_ = 0;
   std::int64_t since_ns_ = 0;
+  bool told_ = false;  // that the last frame was made
 };
 
 }  // namespace tandem::host

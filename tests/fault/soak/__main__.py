@@ -26,6 +26,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 import crowds  # noqa: E402
 import restarts  # noqa: E402
+import standbys  # noqa: E402
 from clients import SoakStage  # noqa: E402
 from stage import NOT_RUN, Failed, enter_namespace, shell  # noqa: E402
 from watching import Machine  # noqa: E402
@@ -39,10 +40,11 @@ class Case:
     minutes: float  # in full length
 
 
-# The cases of a standby belong here: takeover, planned handover, Mbit/s to a standby.
 CASES = {
     "checkpoint": Case(restarts.checkpoint, 3),
     "killed": Case(restarts.killed, 5),
+    "takeover": Case(standbys.takeover, 5),
+    "handover": Case(standbys.handover, 5),
     "power": Case(restarts.power, 0.1),
     "crowd": Case(crowds.crowd, 10),
     "largest": Case(crowds.largest, 8),
