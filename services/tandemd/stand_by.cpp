@@ -76,7 +76,8 @@ Result<bool> stand_by(const Options& options, engine::Simulation& simulation, tr
                  continued->why_not);
   const Frame frame = continued->world.frame;
   auto taken = keeping.take_over(std::make_shared<const checkpoint::Checkpoint>(std::move(continued->world)),
-                                 takeover.from, transport::wall_ns() / kMillisecond, simulation, config);
+                                 takeover.from, (*standby)->epoch_at(transport::wall_ns() / kMillisecond),
+                                 simulation, config);
   if (!taken) return tl::unexpected(taken.error());
   spdlog::info(
       "standby: takes over from epoch {} at frame {}, {} frames after its checkpoint, {} behind the live server, "

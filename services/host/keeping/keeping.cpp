@@ -29,14 +29,14 @@ Result<Keeping> Keeping::begin(const checkpoint::Settings& settings, engine::Sim
 }
 
 Result<void> Keeping::take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
-                                const transport::ParticipantId& from, std::int64_t wall_ms,
+                                const transport::ParticipantId& from, Epoch epoch,
                                 const engine::Simulation& simulation, HostConfig& config) {
   const auto newest = keeper_->take_over(checkpoint_world(config), simulation);
   if (!newest) return tl::unexpected(newest.error());
   checkpoint::Start start;
   start.newest_epoch = *newest;
   start.goes_on_from = std::move(world);
-  config.epoch = static_cast<Epoch>(wall_ms);
+  config.epoch = epoch;
   begin_takeover(start, from, config);
   return {};
 }

@@ -25,10 +25,10 @@ class Keeping {
   static Result<Keeping> stand_by(const checkpoint::Settings& settings, Log log, std::int64_t (*clock_ns)());
   /// With a keeper that was started by the caller.
   Keeping(std::unique_ptr<checkpoint::Keeper> keeper, Log log, std::int64_t (*clock_ns)());
-  /// The session continues `world` of the server `from`, and `simulation` holds its state. `wall_ms`: the
-  /// time of day, from which the epoch comes. Errors: kIo.
+  /// The session continues `world` of the server `from`, and `simulation` holds its state. `epoch`: the
+  /// wanted one. Errors: kIo.
   [[nodiscard]] Result<void> take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
-                                       const transport::ParticipantId& from, std::int64_t wall_ms,
+                                       const transport::ParticipantId& from, Epoch epoch,
                                        const engine::Simulation& simulation, HostConfig& config);
 
   /// Call after every poll of the session's host, with what it returned.

@@ -182,13 +182,13 @@ void Server::take_over() {
       static_cast<double>(last - world.frame) > 1 + stage_.settings.frame_rate_hz)
     blame("at most a second", "takes over from frame " + std::to_string(world.frame) +
                                   ", and the live server was at frame " + std::to_string(last));
+  config.epoch = standby_->epoch_at(wall_ns() / kMs);
   standby_.reset();
   const auto newest = keeper_->take_over(host::checkpoint_world(config), *engine_);
   if (!newest) throw std::runtime_error(newest.error().message);
   checkpoint::Start start;
   start.newest_epoch = *newest;
   start.goes_on_from = std::make_shared<const checkpoint::Checkpoint>(std::move(continued->world));
-  config.epoch = static_cast<Epoch>(wall_ns() / kMs);
   host::begin_takeover(std::move(start), takeover.from, config);
   for (const transport::ClientId id : std::exchange(taken_over_, {})) stage_.known_ids[id] = config.epoch;
   before_.reset();

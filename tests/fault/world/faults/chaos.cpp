@@ -119,6 +119,7 @@ void Chaos::turn() {
 
 void Chaos::disturb(const Active& active) {
   if (harmless(active.fault.kind)) return;
+  if (of_the_server(active.fault.kind)) each_server([](Server& any) { any.disturb(); });
   actor(active.fault.whom).disturb();
   // One that is cut off from others disturbs nobody but itself.
   if (active.fault.kind == FaultKind::kPartition || active.fault.kind == FaultKind::kOneWay)
