@@ -99,8 +99,9 @@ void GatewayActor::on_poll() {
   due_ns_ = std::min(client_->poll(*gateway_, {steady_ns(), wall_ns()}), steady_ns() + 100 * kMs);
   if (client_->core().phase() != ClientPhase::kPlaying) {
     plays_since_ns_ = INT64_MAX;
-  } else if (plays_since_ns_ == INT64_MAX) {
-    plays_since_ns_ = stage_.now_ns;
+  } else if (plays_since_ns_ == INT64_MAX || stream_ != client_->core().stream()->id.id) {
+    plays_since_ns_ = stage_.now_ns;  // with another stream, its viewers join anew
+    stream_ = client_->core().stream()->id.id;
   }
   std::vector<gateway::ViewerId> gone;
   for (const auto& [viewer, connection] : connections_) {

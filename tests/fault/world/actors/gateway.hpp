@@ -68,6 +68,7 @@ class GatewayActor final : public Actor {
   std::vector<gateway::ViewerId> ready_;
   std::int64_t due_ns_ = 0;
   std::int64_t plays_since_ns_ = INT64_MAX;
+  std::uint32_t stream_ = 0;  // that it plays since then
 };
 
 /// A browser: the client of the WebAssembly module over a connection.
