@@ -54,10 +54,11 @@ Result<std::unique_ptr<Standby>> Standby::create(Options options, transport::Ser
 }
 
 bool Standby::poll(std::int64_t now_ns) {
-  if (started_ns_ == 0) started_ns_ = now_ns;
+  if (started_ns_ == 0) started_ns_ = newest_ns_ = now_ns;
   if (now_ns - looked_ns_ >= kLookNs || due_since_ns_) look_around(now_ns);
   take_journal();
   take_checkpoints(now_ns);
+  note_if_slow(now_ns);
   if (now_ns - told_ns_ >= kTellNs || (news_ && now_ns - told_ns_ >= kTellSoonNs)) tell(now_ns);
   if (now_ns - status_ns_ >= kSecond) publish_status(now_ns);
   wake_ns_ = now_ns + (news_ ? kTellSoonNs : kLongestWakeNs);
@@ -148,10 +149,26 @@ void Standby::hold(const Assembly::Whole& whole, std::int64_t now_ns) {
   }
   journal_.forget_to(whole.journal);
   checkpoint_ = std::make_shared<const checkpoint::Checkpoint>(std::move(*checkpoint));
+  newest_ns_ = now_ns;
   told_ns_ = INT64_MIN / 2;  // the live server may wait for it
 }
 
+// The world goes on; only less of it could be continued.
+void Standby::note_if_slow(std::int64_t now_ns) {
+  if (!live_is_there_) newest_ns_ = now_ns;
+  if (now_ns - newest_ns_ < kSlowNs) return;
+  newest_ns_ = now_ns;
+  notices_.push_back(
+      holds_the_live()
+          ? fmt::format(
+                "falls behind: no checkpoint came for {} s, it holds frame {}, and the live server is at {}",
+                kSlowNs / kSecond, holds(), live_frame())
+          : fmt::format("holds nothing of epoch {} yet: no checkpoint came for {} s", live_->message.epoch,
+                        kSlowNs / kSecond));
+}
+
 void Standby::refuse(const std::string& why, std::int64_t now_ns) {
+  newest_ns_ = now_ns;  // it came
   if (now_ns - refused_ns_ < kRefusedNs) return;
   refused_ns_ = now_ns;
   notices_.push_back(fmt::format("cannot stand by with the live server's checkpoint: {}", why));

@@ -49,6 +49,8 @@ class Standby {
 
   /// A server takes over this much later for each living one that comes before it.
   static constexpr std::int64_t kRankNs = kSecond;
+  /// The log says so, as often, if no checkpoint arrived for this long while the live server is there.
+  static constexpr std::int64_t kSlowNs = 10 * kSecond;
   /// Limits of the journal behind the last checkpoint. Entries beyond them are dropped.
   static constexpr std::size_t kMostEntries = 65'536;
   static constexpr std::size_t kMostJournalBytes = std::size_t{64} << 20U;
@@ -91,6 +93,7 @@ class Standby {
   void take_checkpoints(std::int64_t now_ns);
   void hold(const Assembly::Whole& whole, std::int64_t now_ns);
   void refuse(const std::string& why, std::int64_t now_ns);
+  void note_if_slow(std::int64_t now_ns);
   void tell(std::int64_t now_ns);
   void announce();
   void publish_status(std::int64_t now_ns);
@@ -138,7 +141,8 @@ class Standby {
   std::optional<std::int64_t> due_since_ns_;  // since when there is a cause to take over
   std::int64_t told_ns_ = INT64_MIN / 2, status_ns_ = INT64_MIN / 2, refused_ns_ = INT64_MIN / 2;
   std::int64_t started_ns_ = 0;
-  bool news_ = false;  // something arrived that the live server should know
+  std::int64_t newest_ns_ = 0;  // when the newest checkpoint came, or was last missed in the log
+  bool news_ = false;           // something arrived that the live server should know
   std::int64_t wake_ns_ = 0;
   std::vector<std::string> notices_;
 };

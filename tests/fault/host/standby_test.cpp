@@ -608,6 +608,26 @@ TEST(Standby, AStrangersCheckpointsAndJournalAreNotTaken) {
   EXPECT_EQ(other.host->session().continues_frame, last);
 }
 
+TEST(Standby, OneThatFallsBehindSaysSoAndTheWorldGoesOn) {
+  Cast cast(15);
+  Server& live = cast.add_live();
+  Server& other = cast.add_standby();
+  cast.add_client();
+  cast.run_ms(3000);
+  static_cast<void>(other.standby->take_notices());
+  transport::simulated::LinkModel thin;
+  thin.bottleneck = std::make_shared<transport::simulated::Bottleneck>(
+      transport::simulated::BottleneckOptions{.bits_per_s = 1'000});
+  cast.network.set_link(live.port->self(), other.port->self(), thin);
+  const Frame before = live.host->frame();
+  cast.run_ms(25'000);
+  const auto lines = other.standby->take_notices();
+  const auto falls_behind = [](const std::string& line) { return line.starts_with("falls behind"); };
+  EXPECT_TRUE(std::ranges::any_of(lines, falls_behind));
+  EXPECT_LE(lines.size(), 3U);
+  EXPECT_GE(live.host->frame(), before + 740) << "the live server does not wait for it";
+}
+
 TEST(Standby, OverALossyLinkTheWorldIsAtMostASecondOlder) {
   for_seeds(10, [](std::uint64_t seed) {
     Cast cast(seed, {.delay_ns = 20'000'000, .jitter_ns = 10'000'000, .loss = 0.05});
