@@ -3,7 +3,6 @@
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <mutex>
@@ -101,11 +100,9 @@ using WriteLine = void (*)(std::string_view line, bool error);
 WriteLine write_line = nullptr;
 
 void on_line(void* /*argument*/, const dds_log_data_t* data) {
-  // In front of the message is a time and a thread, which the log has in its own way.
-  std::string_view line(data->message, data->size);
-  line.remove_prefix(std::min(data->hdrsize, line.size()));
+  std::string_view line(data->message);
   while (!line.empty() && line.back() == '\n') line.remove_suffix(1);
-  write_line(line, (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0);
+  write_line(line, (data->priority & DDS_LC_FATAL) != 0);
 }
 
 }  // namespace
