@@ -317,6 +317,11 @@ void Host::Impl::look_around() {
   roster.look_for_dead(*port, moment());
   error = claim.check(*port, roster.notices(), now_ns);
   if (error) state = State::kRefused;
+  // One of two may not have heard the other, and announcements are made once.
+  if (!error && claim.has_rival() && now_ns - names_announced_ns >= kNamesNs && outbox.has_control_room()) {
+    names_announced_ns = now_ns;
+    static_cast<void>(outbox.push(source->session()));  // there is room
+  }
   if (succession.stopped() && claim.has_successor()) state = State::kHandedOver;
 }
 

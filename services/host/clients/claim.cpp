@@ -76,10 +76,12 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
     return std::ranges::none_of(others_, [&](const Other& o) { return o.from == entry.first; });
   });
   has_successor_ = std::ranges::any_of(others_, [this](const Other& other) { return continues_ours(other); });
+  has_rival_ = false;
   for (const Other& other : others_) {
     if (other.from == self_ || other.message.server_role != transport::ServerRole::kLive) continue;
     if (other.from == ignored_ && (!announced_ns_ || now_ns - *announced_ns_ < kIgnoredNs)) continue;
     if (!gives_way(other, now_ns)) {
+      has_rival_ = true;
       note(other, notices, now_ns);
       continue;
     }

@@ -45,6 +45,8 @@ class Claim {
   void set_successors(std::function<bool(const transport::ParticipantId&)> may_succeed) {
     may_succeed_ = std::move(may_succeed);
   }
+  /// True if, at the last check(), there was another live server that this one does not give way to.
+  [[nodiscard]] bool has_rival() const { return has_rival_; }
   /// True if, at the last check(), a live server that may do so continued this server's epoch.
   [[nodiscard]] bool has_successor() const { return has_successor_; }
   /// Notes an acknowledgement, whatever its content.
@@ -71,7 +73,7 @@ class Claim {
   std::optional<std::int64_t> announced_ns_;
   std::optional<transport::ParticipantId> ignored_;
   std::function<bool(const transport::ParticipantId&)> may_succeed_;
-  bool has_successor_ = false;
+  bool has_successor_ = false, has_rival_ = false;
   std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
                                                                 // kFollowedNs
   std::map<transport::ParticipantId, std::int64_t> behind_since_;

@@ -54,6 +54,20 @@ TEST(Claim, AServerThatStandsByHasNoClaim) {
   EXPECT_EQ(bench.host->state(), Host::State::kRunning);
 }
 
+TEST(Claim, AServerThatHearsAnotherAnnouncesItselfAgainOnceASecond) {
+  Bench bench;
+  bench.poll();
+  bench.run_ms(3000);
+  const std::size_t before = bench.port.sessions.size();
+  bench.port.rivals.push_back(rival(-60'000, 0x0B));
+  bench.run_ms(3500);
+  ASSERT_EQ(bench.host->state(), Host::State::kRunning);
+  EXPECT_EQ(bench.port.sessions.size(), before + 4);
+  bench.port.rivals.clear();
+  bench.run_ms(3000);
+  EXPECT_LE(bench.port.sessions.size(), before + 5);
+}
+
 TEST(Claim, BeforeAnnouncingEvenAHigherGuidWins) {
   Bench bench(claiming_config());
   bench.port.rivals.push_back(rival(10, 0xFF));
