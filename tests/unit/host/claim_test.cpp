@@ -159,6 +159,25 @@ TEST(Claim, OfTwoFollowedAlikeExactlyOneStays) {
   EXPECT_EQ(after_ten_seconds({2, 2}, rival(60'000, 0x01)), Host::State::kRunning);
 }
 
+// Observers acknowledge every two seconds, and not at the same time.
+TEST(Claim, OfTwoFollowedByObserversExactlyOneStays) {
+  const auto ends = [](const transport::Received<transport::SessionMessage>& other) {
+    Bench bench;
+    bench.poll();
+    bench.run_ms(3000);
+    bench.port.rivals.push_back(other);
+    for (int i = 0; i < 5; ++i) {
+      follow(bench, test_config().epoch, 1, 1);
+      bench.run_ms(1000);
+      follow(bench, other.message.epoch, 100, 1);
+      bench.run_ms(1000);
+    }
+    return bench.host->state();
+  };
+  EXPECT_EQ(ends(rival(-60'000, 0xFF)), Host::State::kRefused);
+  EXPECT_EQ(ends(rival(60'000, 0x01)), Host::State::kRunning);
+}
+
 TEST(Claim, ARefusedServerProducesNothingMore) {
   Bench bench(claiming_config());
   bench.port.rivals.push_back(rival(-60'000, 0x0B));
