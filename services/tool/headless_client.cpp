@@ -54,7 +54,7 @@ Result<void> HeadlessClient::open() {
   core.lead = options_.lead;
   core.prefer = options_.prefer;
   core.measure_ns = transport::steady_ns;
-  core.log = [this](LogLevel, std::string_view line) { tell(std::string(line)); };
+  core.log = [this](LogLevel level, std::string_view line) { tell(level, std::string(line)); };
   transport::DdsOptions dds;
   dds.domain = options_.domain;
   dds.session = options_.session;
@@ -126,8 +126,7 @@ void HeadlessClient::finish() {
   if (recorder_) {
     if (auto finished = recorder_->finish(); !finished) failure_ = finished.error().message;
   }
-  if (!failure_.empty())
-    print_error(fmt::format("tandem {}: {}{}\n", options_.command, options_.name, failure_));
+  if (!failure_.empty()) tell(LogLevel::kError, failure_);
 }
 
 void HeadlessClient::on_session(const transport::SessionMessage& session) {
@@ -176,7 +175,7 @@ void HeadlessClient::send_script(client::Now now) {
          core_->statistics().frames_applied >= script_[script_at_].after) {
     ScriptEntry& entry = script_[script_at_++];
     const auto sent = core_->send(entry.kind, std::move(entry.values), std::move(entry.bytes), now);
-    if (!sent) tell("input not sent: " + sent.error().message);
+    if (!sent) tell(LogLevel::kWarning, "input not sent: " + sent.error().message);
   }
 }
 
@@ -186,10 +185,10 @@ void HeadlessClient::tell_waiting(client::Now now) {
   told_ns_ = now.steady_ns;
   const double waited_s = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
   if (phase == ClientPhase::kSearching) {
-    tell(fmt::format("waiting for a server of session '{}' on domain {} ({:.0f} s)", options_.session,
-                     options_.domain, waited_s));
+    tell(LogLevel::kInfo, fmt::format("waiting for a server of session '{}' on domain {} ({:.0f} s)",
+                                      options_.session, options_.domain, waited_s));
   } else {
-    tell(fmt::format("waiting to join session '{}' ({:.0f} s)", options_.session, waited_s));
+    tell(LogLevel::kInfo, fmt::format("waiting to join session '{}' ({:.0f} s)", options_.session, waited_s));
   }
 }
 
@@ -215,8 +214,9 @@ void HeadlessClient::tell_live(client::Now now) {
   live_frames_ = figures.frames_applied;
 }
 
-void HeadlessClient::tell(const std::string& line) const {
-  if (!options_.quiet) print_error(fmt::format("tandem {}: {}{}\n", options_.command, options_.name, line));
+void HeadlessClient::tell(LogLevel level, const std::string& line) const {
+  if (options_.log) return options_.log(level, line);
+  print_error(fmt::format("tandem join: {}{}\n", options_.name, line));
 }
 
 bool HeadlessClient::succeeded() const {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,12 +27,12 @@ struct HeadlessOptions {
   std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
-  const char* command = "join";                                        ///< in front of lines for humans
   std::string prefer = "auto";  ///< which stream to play; see CoreOptions
   bool live = false;            ///< a JSON line a second on stderr
-  bool quiet = false;           ///< no lines for humans on stderr
-  std::uint32_t index = 0;      ///< index of this client in live lines
-  std::string name;             ///< in front of lines for humans; may be empty
+  /// Takes lines for humans; empty: they go to stderr, as those of `tandem join`.
+  std::function<void(LogLevel level, const std::string& line)> log;
+  std::uint32_t index = 0;  ///< index of this client in live lines
+  std::string name;         ///< in front of lines for humans; may be empty
 };
 
 /// Sees a client and its recorder, null without one, after every turn of the client's loop.
@@ -89,7 +90,7 @@ class HeadlessClient final : public client::CoreListener {
   void record(client::Now now);
   void tell_waiting(client::Now now);
   void tell_live(client::Now now);
-  void tell(const std::string& line) const;
+  void tell(LogLevel level, const std::string& line) const;
   void finish();
 
   HeadlessOptions options_;

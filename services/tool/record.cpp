@@ -1,6 +1,7 @@
 // `tandem record`: an observer that writes what it receives into a file.
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <memory>
 
@@ -9,7 +10,7 @@
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
-#include "services/tool/print_error.hpp"
+#include "services/tool/log_options.hpp"
 #include "services/tool/record_metrics.hpp"
 
 namespace tandem::tool {
@@ -20,6 +21,7 @@ struct RecordOptions {
   bool plain = false;
   bool json = false;
   std::string metrics;  ///< empty: none are served
+  logging::Options log;
 };
 
 Json report(const HeadlessClient& client) {
@@ -38,28 +40,48 @@ Json report(const HeadlessClient& client) {
   return out;
 }
 
+/// Has the log name the epoch that is recorded, and the metrics follow the client.
+class Watch final : public TurnListener {
+ public:
+  explicit Watch(RecordMetrics& metrics) : metrics_(metrics) {}
+  void turned(const client::ClientCore& core, const recording::Recorder* recorder,
+              std::int64_t now_ns) override {
+    if (const auto* const session = core.session(); session != nullptr && session->epoch != epoch_) {
+      epoch_ = session->epoch;
+      logging::set_context(session->session, epoch_);
+    }
+    metrics_.turned(core, recorder, now_ns);
+  }
+
+ private:
+  RecordMetrics& metrics_;
+  std::uint64_t epoch_ = 0;
+};
+
 int run_record(RecordOptions options) {
+  begin_log("tandem record", options.log, options.client.session);
   SignalWatch signals("tandem record");
   const HeapTrimmer trimmer;
   options.client.observe = true;
   options.client.lead = 0;  // nothing is drawn
-  options.client.command = "record";
+  options.client.log = &log_line;
   if (!options.plain) options.client.compression = recording::Compression::kZstd;
   RecordMetrics metrics;
   if (!options.metrics.empty()) {
     const auto served = metrics.serve(*metrics::read_address(options.metrics), options.client.session,
                                       options.client.capture);
     if (!served) {
-      print_error(fmt::format("tandem record: {}\n", served.error().message));
+      spdlog::error(served.error().message);
       return 1;
     }
   }
   auto client = HeadlessClient::create(options.client);
   if (!client) {
-    print_error(fmt::format("tandem record: {}\n", client.error().message));
+    spdlog::error(client.error().message);
     return 1;
   }
-  (*client)->run(signals.stop(), &metrics);
+  Watch watch(metrics);
+  (*client)->run(signals.stop(), &watch);
   if (options.json) {
     fmt::print("{}\n", report(**client).dump());
   } else {
@@ -98,6 +120,7 @@ void add_record(commandline::Command app, Run& run) {
         const auto address = metrics::read_address(text);
         return address ? std::string() : address.error().message;
       });
+  add_log_options(command, options->log);
   command.add_flag("--json", options->json, "Print the result as one JSON object");
   command.footer(
       "The file holds all that a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, "

@@ -1,12 +1,10 @@
 #include "services/tool/record_metrics.hpp"
 
-#include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <sys/statvfs.h>
 
 #include <filesystem>
 #include <system_error>
-
-#include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -28,7 +26,7 @@ Result<void> RecordMetrics::serve(const metrics::Address& address, const std::st
       metrics::Endpoint::create(address, health_, [this](metrics::Page& page) { describe(page); });
   if (!endpoint) return tl::unexpected(endpoint.error());
   endpoint_ = std::move(*endpoint);
-  print_error(fmt::format("tandem record: {}\n", endpoint_->notice()));
+  spdlog::info(endpoint_->notice());
   return {};
 }
 

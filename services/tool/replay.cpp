@@ -1,6 +1,7 @@
 // `tandem replay`: publishes a recorded session again, as a server that computes nothing new.
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <atomic>
@@ -20,7 +21,7 @@
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
-#include "services/tool/print_error.hpp"
+#include "services/tool/log_options.hpp"
 #include "services/tool/recorded_source.hpp"
 
 namespace tandem::tool {
@@ -39,6 +40,7 @@ struct ReplayOptions {
   double from_s = 0;
   bool loop = false;
   std::uint32_t wait_for = 0;
+  logging::Options log;
 };
 
 // Readers get this time to take what was written last.
@@ -99,10 +101,10 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   const RecordedSource& source = *frames;
   const auto host = host::Host::create(config, std::move(frames), *state.port);
   if (!host) return tl::unexpected(host.error());
-  print_error(
-      fmt::format("tandem replay: session '{}' on domain {}, epoch {}, {} slots, {} frame {} ({:.1f} s)\n",
-                  options.session, options.domain, config.epoch, playback.session().capacity,
-                  hold ? "at its end," : "from", source.frame(), playback.time_s()));
+  logging::set_context(options.session, config.epoch);
+  spdlog::info("session '{}' on domain {}, epoch {}, {} slots, {} frame {} ({:.1f} s)", options.session,
+               options.domain, config.epoch, playback.session().capacity, hold ? "at its end," : "from",
+               source.frame(), playback.time_s());
   host::Publisher publisher((*host)->outbox(), *state.port);
   while (!stop && (*host)->state() != host::Host::State::kEnded) {
     (*host)->poll(steady_ns(), wall_ns());
@@ -110,8 +112,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
     if (publisher.gave_up())
       return fail(ErrorCode::kTransport,
                   "a frame could not be written for 10 s: " + publisher.last_failure());
-    for (const std::string& notice : (*host)->take_notices())
-      print_error(fmt::format("tandem replay: {}\n", notice));
+    for (const std::string& notice : (*host)->take_notices()) spdlog::info(notice);
     const std::int64_t wait_ns = (*host)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) state.port->wait(std::chrono::nanoseconds(wait_ns));
   }
@@ -158,8 +159,7 @@ Result<void> replay(const ReplayOptions& options, ReplayState& state, const std:
   auto playback = Playback::open(options.file);
   if (!playback) return tl::unexpected(playback.error());
   if (const auto torn = (*playback)->torn_at())
-    print_error(fmt::format("tandem replay: {} is cut short at byte {}; replayed up to there\n", options.file,
-                            *torn));
+    spdlog::warn("{} is cut short at byte {}; replayed up to there", options.file, *torn);
   do {
     end_port(state, stop);
     if (auto played = play(**playback, options, state, stop); !played)
@@ -169,11 +169,12 @@ Result<void> replay(const ReplayOptions& options, ReplayState& state, const std:
 }
 
 int run_replay(const ReplayOptions& options) {
+  begin_log("tandem replay", options.log, options.session);
   SignalWatch signals("tandem replay");
   const HeapTrimmer trimmer;
   ReplayState state;
   const auto done = replay(options, state, signals.stop());
-  if (!done) print_error(fmt::format("tandem replay: {}\n", done.error().message));
+  if (!done) spdlog::error(done.error().message);
   return signals.finish(done ? 0 : 1);
 }
 
@@ -197,6 +198,7 @@ void add_replay(commandline::Command app, Run& run) {
       .add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
       .range(0U, 256U)
       .show_default();
+  add_log_options(command, options->log);
   command.footer(
       "Clients can join at any frame. Each run of the recording becomes an epoch of its own; a gap in the\n"
       "recording, a restart of its server and a participant that seeks each begin another run. All inputs "

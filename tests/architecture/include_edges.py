@@ -115,7 +115,7 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
+    + ["services/logging", "services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
@@ -127,6 +127,7 @@ EDGES = {
 # Headers from outside the project, and the only folders that may include them.
 OWNERS = [
     (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
+    (re.compile(r"^(fastdds|fastrtps)/|^tandemPubSubTypes"), "Fast DDS", ["tests/integration/fastdds"]),
     (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),

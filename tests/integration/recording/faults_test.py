@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Faults that recordings meet with in operation: two writers, signals, a full disk, files that shrink or are not regular.
+"""Faults that recordings meet with in operation: two writers, signals, a full disk, files that shrink or are not regular; the log.
 
 faults_test.py --tandemd PATH --tandem PATH
 
@@ -157,6 +157,31 @@ def check_full_disk(programs):
     assert "no regular file" in said, said
 
 
+def check_logs(programs):
+    """Recorder and replay log as the daemons do: one object a line, with the session and the epoch that they learn."""
+    keys = {"time", "level", "program", "session", "epoch", "message"}
+
+    def lines(process, what, code=0):
+        return [json.loads(line) for line in finish(process, what, code)[1].splitlines()]
+
+    file, json_log = programs.folder / "logged.mcap", ("--log-format", "json")
+    recorded = lines(programs.tool("record", file, "--timeout", LIMIT_S, "--seconds", 1, *json_log), "a recorder")
+    assert recorded and all(set(line) == keys for line in recorded), recorded
+    assert {(line["program"], line["session"], line["level"]) for line in recorded} == {("tandem record", "default", "info")}, recorded
+    assert recorded[-1]["epoch"] > 0, recorded
+    quiet = programs.tool("record", file, "--timeout", LIMIT_S, "--seconds", 0.1, "--log-level", "warning")
+    assert finish(quiet, "a quiet recorder")[1] == ""
+    refused = lines(programs.tool("record", programs.folder, *json_log), "a recorder of a folder", 1)
+    assert [line["level"] for line in refused] == ["error"], refused
+    torn = programs.folder / "torn.mcap"
+    torn.write_bytes(file.read_bytes()[:-200])
+    replayed = lines(programs.tool("replay", torn, "--session", "again", "--rate", 10, *json_log), "a replay")
+    assert all(set(line) == keys and line["program"] == "tandem replay" and line["session"] == "again" for line in replayed), replayed
+    assert replayed[0]["level"] == "warning" and "cut short" in replayed[0]["message"], replayed
+    assert any(line["epoch"] > 0 for line in replayed), replayed
+    print(f"logs: {len(recorded)} lines of a recorder, {len(replayed)} of a replay", flush=True)
+
+
 def check_no_files(programs):
     """A file that is not a regular one is refused at once, and not waited for."""
     fifo, bound = programs.folder / "fifo", programs.folder / "socket"
@@ -197,6 +222,7 @@ def main():
             check_starting_writers(programs)
             check_signals(programs)
             check_full_disk(programs)
+            check_logs(programs)
             check_no_files(programs)
         except (AssertionError, subprocess.SubprocessError) as failure:
             print(f"FAILED: {failure}", file=sys.stderr)
