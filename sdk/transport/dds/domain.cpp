@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/dds/profile.hpp"
 #include "sdk/transport/limits.hpp"
 
 namespace tandem::transport::dds {
@@ -19,6 +20,8 @@ struct Domains {
   struct Use {
     dds_entity_t handle = 0;  // 0: created by others, so not deleted here
     unsigned users = 0;
+    std::string profile = {};
+    Side side = Side::kClient;
   };
   std::mutex mutex;
   std::map<std::uint32_t, Use> uses;
@@ -48,10 +51,52 @@ std::string defaults(Repeat repeat) {
          " B</MaxSampleSize></Internal></Domain></CycloneDDS>";
 }
 
+Side side_of(Repeat repeat) { return repeat == Repeat::kSoon ? Side::kServer : Side::kClient; }
+
+Result<Profile> profile_here(std::uint32_t domain, Side side, const std::string& text) {
+  auto profile = parse_profile(text, side);
+  if (!profile) return fail(profile.error().code, "profile: " + profile.error().message);
+  return resolve_profile(std::move(*profile), side, domain, surroundings());
+}
+
+/// Whether a further port may use a domain that this process has opened before.
+Result<void> check_same(const Domains::Use& before, const std::string& profile, Side side,
+                        std::uint32_t domain) {
+  const std::string opened = "this process has opened DDS domain " + std::to_string(domain);
+  if (before.profile != profile) {
+    return fail(ErrorCode::kInvalidArgument,
+                opened + " with " +
+                    (before.profile.empty() ? "no profile" : "the profile " + before.profile) +
+                    "; it can have one only");
+  }
+  if (!profile.empty() && side == Side::kServer && before.side == Side::kClient) {
+    return fail(ErrorCode::kInvalidArgument,
+                opened + " for a client, with the profile " + profile + ": start its server first");
+  }
+  return {};
+}
+
+std::string cannot_open(std::uint32_t domain, dds_return_t why, const std::string& profile, Side side) {
+  std::string text =
+      "DDS domain " + std::to_string(domain) + " cannot be opened (" + dds_strretcode(why) + "): ";
+  if (profile.empty()) return text + "check CYCLONEDDS_URI, the interfaces it names and the number";
+  const auto parsed = parse_profile(profile, side);
+  if (parsed && parsed->name == "wan" && side == Side::kServer) {
+    return text + "UDP port " + std::to_string(server_port(domain, parsed->index)) +
+           " may be in use by another server here; give one of them another --domain, or wan:index=N";
+  }
+  return text + "Cyclone DDS refuses the profile " + profile;
+}
+
 }  // namespace
 
-std::string domain_configuration(Repeat repeat) {
+Result<std::string> domain_configuration(std::uint32_t domain, Repeat repeat, const std::string& profile) {
   std::string configuration = defaults(repeat);
+  if (!profile.empty()) {
+    const auto here = profile_here(domain, side_of(repeat), profile);
+    if (!here) return tl::unexpected(here.error());
+    return configuration + ',' + profile_xml(*here, side_of(repeat));
+  }
   if (const char* theirs = std::getenv("CYCLONEDDS_URI"); theirs != nullptr && *theirs != '\0') {
     configuration += ',';
     configuration += theirs;
@@ -59,19 +104,28 @@ std::string domain_configuration(Repeat repeat) {
   return configuration;
 }
 
-Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat) {
+Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat, const std::string& profile) {
+  const Side side = side_of(repeat);
   const std::lock_guard lock(domains().mutex);
   if (const auto known = domains().uses.find(domain); known != domains().uses.end()) {
+    if (auto same = check_same(known->second, profile, side, domain); !same)
+      return tl::unexpected(same.error());
     ++known->second.users;
     return DomainUse(domain);
   }
-  const dds_entity_t handle = dds_create_domain(domain, domain_configuration(repeat).c_str());
-  if (handle < 0 && handle != DDS_RETCODE_PRECONDITION_NOT_MET) {
-    return fail(ErrorCode::kTransport, "DDS domain " + std::to_string(domain) + " cannot be opened (" +
-                                           dds_strretcode(handle) +
-                                           "): check CYCLONEDDS_URI, the interfaces it names and the number");
+  const auto configuration = domain_configuration(domain, repeat, profile);
+  if (!configuration) return tl::unexpected(configuration.error());
+  const dds_entity_t handle = dds_create_domain(domain, configuration->c_str());
+  const bool of_others = handle == DDS_RETCODE_PRECONDITION_NOT_MET;
+  if (handle < 0 && !of_others) {
+    return fail(ErrorCode::kTransport, cannot_open(domain, handle, profile, side));
   }
-  domains().uses.emplace(domain, Domains::Use{handle > 0 ? handle : 0, 1});
+  if (of_others && !profile.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "profile: this process has DDS domain " + std::to_string(domain) +
+                    " open already, not by Tandem, so that the profile " + profile + " would have no effect");
+  }
+  domains().uses.emplace(domain, Domains::Use{of_others ? 0 : handle, 1, profile, side});
   return DomainUse(domain);
 }
 
@@ -112,8 +166,26 @@ void set_dds_log(WriteLine write) {
   dds_set_log_sink(&on_line, nullptr);
 }
 
-Result<void> check_dds_domain(std::uint32_t domain) {
-  return dds::DomainUse::acquire(domain, dds::Repeat::kSeldom).map([](const dds::DomainUse&) {});
+Result<void> check_dds_domain(std::uint32_t domain, const std::string& profile, Side side) {
+  const dds::Repeat repeat = side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom;
+  return dds::DomainUse::acquire(domain, repeat, profile).map([](const dds::DomainUse&) {});
+}
+
+std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side) {
+  if (profile.empty()) return {};
+  const auto here = dds::profile_here(domain, side, profile);
+  if (!here) return {};
+  std::string text = "profile " + here->name;
+  for (std::size_t i = 0; i < here->interfaces.size(); ++i)
+    text += (i == 0 ? " on " : ", ") + here->interfaces[i];
+  if (here->name == "wan" && side == Side::kServer)
+    text += ", UDP port " + std::to_string(server_port(domain, here->index));
+  for (std::size_t i = 0; i < here->servers.size(); ++i)
+    text += (i == 0 ? ", servers " : ", ") + here->servers[i];
+  if (!here->external.empty()) text += ", seen as " + here->external;
+  const char* const theirs = std::getenv("CYCLONEDDS_URI");
+  if (theirs != nullptr && *theirs != '\0') text += "; CYCLONEDDS_URI is set too, and not used";
+  return text;
 }
 
 }  // namespace tandem::transport

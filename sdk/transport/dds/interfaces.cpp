@@ -1,0 +1,120 @@
+#include "sdk/transport/dds/interfaces.hpp"
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <sstream>
+
+namespace tandem::transport {
+namespace {
+
+class Socket {
+ public:
+  Socket() : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  ~Socket() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  [[nodiscard]] int get() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+int mtu_of(const Socket& socket, const std::string& name) {
+  ifreq request{};
+  name.copy(request.ifr_name, sizeof request.ifr_name - 1);
+  return ::ioctl(socket.get(), SIOCGIFMTU, &request) == 0 ? request.ifr_mtu : 0;
+}
+
+std::string dotted(const sockaddr_in& address) {
+  char text[INET_ADDRSTRLEN] = {};
+  return ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text) != nullptr ? text : "";
+}
+
+}  // namespace
+
+std::vector<Interface> interfaces() {
+  std::vector<Interface> found, without;
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return found;
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
+  const Socket socket;
+  for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+    Interface interface {
+      entry->ifa_name, {}, (entry->ifa_flags & IFF_UP) != 0, (entry->ifa_flags & IFF_LOOPBACK) != 0,
+          (entry->ifa_flags & IFF_MULTICAST) != 0, mtu_of(socket, entry->ifa_name)
+    };
+    if (entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET) {
+      sockaddr_in address{};
+      std::memcpy(&address, entry->ifa_addr, sizeof address);
+      interface.address = dotted(address);
+      found.push_back(std::move(interface));
+    } else {
+      without.push_back(std::move(interface));
+    }
+  }
+  for (Interface& interface : without) {
+    if (std::ranges::find(found, interface.name, &Interface::name) == found.end())
+      found.push_back(std::move(interface));
+  }
+  return found;
+}
+
+std::string default_route_interface() {
+  std::ifstream routes("/proc/net/route");
+  std::string line, best;
+  std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
+  std::getline(routes, line);  // the names of the columns
+  while (std::getline(routes, line)) {
+    std::istringstream fields(line);
+    std::string name, destination, gateway, flags, uses, references, mask;
+    std::uint64_t metric = 0;
+    fields >> name >> destination >> gateway >> flags >> references >> uses >> metric >> mask;
+    if (fields && destination == "00000000" && mask == "00000000" && metric < least) {
+      least = metric;
+      best = name;
+    }
+  }
+  return best;
+}
+
+std::optional<std::string> source_address_to(const std::string& address) {
+  const Socket socket;
+  sockaddr_in there{};
+  there.sin_family = AF_INET;
+  there.sin_port = htons(9);  // nothing is sent
+  if (::inet_pton(AF_INET, address.c_str(), &there.sin_addr) != 1) return std::nullopt;
+  // The sockets API wants its own address types seen as sockaddr.
+  if (::connect(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&there)), sizeof there) != 0)
+    return std::nullopt;
+  sockaddr_in here{};
+  socklen_t length = sizeof here;
+  if (::getsockname(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&here)), &length) != 0)
+    return std::nullopt;
+  return dotted(here);
+}
+
+std::string list_of(const std::vector<Interface>& all) {
+  std::string list;
+  for (const Interface& interface : all) {
+    if (!list.empty()) list += ", ";
+    list += interface.name;
+    if (!interface.address.empty()) list += " " + interface.address;
+  }
+  return list.empty() ? "none" : list;
+}
+
+}  // namespace tandem::transport
