@@ -4,12 +4,13 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/dds/profile.hpp"
+#include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/result.hpp"
 
@@ -72,6 +73,27 @@ void set_dds_log(void (*write)(std::string_view line, bool error));
 /// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
 /// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr; of a profile as above.
 [[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain, const std::string& profile, Side side);
+
+/// A participant of a domain, in its own words.
+struct HeardParticipant {
+  std::string name;                    ///< "tandemd SESSION", "tandem client ID"; other text for strangers
+  std::string host;                    ///< empty unless it uses Cyclone DDS
+  std::vector<std::string> addresses;  ///< as host
+  bool own = false;                    ///< the one that listens
+};
+
+/// Joins the domain as "tandem doctor", without a topic of ours, and listens until `enough` says so or for
+/// `patience`. Returns the participants there are then, itself included; at most 256. Errors: as a port's.
+[[nodiscard]] Result<std::vector<HeardParticipant>> listen_for_participants(
+    std::uint32_t domain, const std::string& profile, Side side, std::chrono::nanoseconds patience,
+    const std::function<bool(const std::vector<HeardParticipant>&)>& enough);
+
+/// What --help says of --profile.
+inline constexpr const char* kProfileHelp =
+    "The kind of network, with which CYCLONEDDS_URI is not used: loopback, lan, wifi, wan or multihomed, with parameters "
+    "behind a colon, as in lan:interface=eth0 or wan:server=203.0.113.5 (deploy/dds)";
+/// Why the text is no profile; empty: it is one.
+[[nodiscard]] std::string refusal_of_profile(const std::string& text, Side side);
 
 /// A line for people about a profile: what it uses of this machine, and that it stands above CYCLONEDDS_URI.
 /// Empty without a profile, or if it cannot be used here.

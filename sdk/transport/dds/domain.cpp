@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/dds/profile.hpp"
+#include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/limits.hpp"
 
 namespace tandem::transport::dds {
@@ -169,6 +169,11 @@ void set_dds_log(WriteLine write) {
 Result<void> check_dds_domain(std::uint32_t domain, const std::string& profile, Side side) {
   const dds::Repeat repeat = side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom;
   return dds::DomainUse::acquire(domain, repeat, profile).map([](const dds::DomainUse&) {});
+}
+
+std::string refusal_of_profile(const std::string& text, Side side) {
+  const auto profile = parse_profile(text, side);
+  return profile ? std::string() : profile.error().message;
 }
 
 std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side) {

@@ -1,4 +1,4 @@
-#include "sdk/transport/dds/interfaces.hpp"
+#include "sdk/transport/network/interfaces.hpp"
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>

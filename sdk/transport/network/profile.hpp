@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/dds/interfaces.hpp"
+#include "sdk/transport/network/interfaces.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {

@@ -1,4 +1,4 @@
-#include "sdk/transport/dds/profile.hpp"
+#include "sdk/transport/network/profile.hpp"
 
 #include <arpa/inet.h>
 #include <netdb.h>
