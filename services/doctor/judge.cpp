@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <string_view>
 
 #include "services/doctor/doctor.hpp"
@@ -226,14 +224,6 @@ std::string describe(const HeardParticipant& participant) {
   return text;
 }
 
-/// An address that routers on the Internet do not know.
-bool is_private(const std::string& address) {
-  unsigned a = 0, b = 0, c = 0, d = 0;
-  if (std::sscanf(address.c_str(), "%u.%u.%u.%u", &a, &b, &c, &d) != 4) return false;
-  return a == 10 || a == 127 || (a == 172 && b >= 16 && b < 32) || (a == 192 && b == 168) ||
-         (a == 100 && b >= 64 && b < 128) || (a == 169 && b == 254);
-}
-
 Check silent(const MachineFacts& facts, const std::string& server, std::string detail) {
   const auto path = std::ranges::find(facts.paths, server, &Path::server);
   const std::string address = server.substr(0, server.find(':'));
@@ -243,11 +233,12 @@ Check silent(const MachineFacts& facts, const std::string& server, std::string d
             "start the server there with --profile wan, on the same --domain"};
   }
   const bool masked =
-      path != facts.paths.end() && facts.profile->external.empty() && is_private(path->source);
-  if (masked && !is_private(address)) {
-    return {"peers", Verdict::kFailure,
-            fmt::format("{}; {} is private and {} is not, so NAT is between", detail, path->source, address),
-            fmt::format("give the address that others see: --profile wan:server={},external=ADDRESS", address)};
+      path != facts.paths.end() && facts.profile->external.empty() && transport::is_private(path->source);
+  if (masked && !transport::is_private(address)) {
+    return {
+        "peers", Verdict::kFailure,
+        fmt::format("{}; {} is private and {} is not, so NAT is between", detail, path->source, address),
+        fmt::format("give the address that others see: --profile wan:server={},external=ADDRESS", address)};
   }
   return {"peers", Verdict::kFailure, detail,
           fmt::format("start the server there with --profile wan, let firewalls pass that UDP port{}",

@@ -90,17 +90,6 @@ std::int64_t number_in(const char* path) {
   return file >> value ? value : -1;
 }
 
-/// Whether another program has the port for itself. With `shared`, programs that share it are none.
-bool port_taken(std::uint32_t port, bool shared) {
-  const system::Descriptor socket = udp_socket();
-  if (!socket.is_open()) return false;
-  if (shared) set_option(socket, SOL_SOCKET, SO_REUSEADDR, 1);
-  sockaddr_in local{};
-  local.sin_family = AF_INET;
-  local.sin_port = htons(static_cast<std::uint16_t>(port));
-  return ::bind(socket.get(), as_sockaddr(&local), sizeof local) != 0 && errno == EADDRINUSE;
-}
-
 /// An RTPS message of that size which says nothing: a header and padding.
 std::vector<std::uint8_t> empty_message(std::size_t size) {
   constexpr std::array<std::uint8_t, 8> kStart{'R', 'T', 'P', 'S', 2, 1, 1, 16};
@@ -164,7 +153,9 @@ void look_at_profile(MachineFacts& facts, const std::string& text) {
   auto parsed = transport::parse_profile(text, Side::kServer);
   if (!parsed) return;
   facts.side = parsed->name == "wan" && parsed->servers.empty() ? Side::kServer : Side::kClient;
-  auto resolved = transport::resolve_profile(*parsed, facts.side, facts.domain, transport::surroundings());
+  transport::Surroundings machine = transport::surroundings();
+  machine.port_taken = [](std::uint32_t /*port*/) { return false; };  // look_at_ports() says that
+  auto resolved = transport::resolve_profile(*parsed, facts.side, facts.domain, machine);
   if (!resolved) {
     facts.domain_fault = resolved.error().message;
     return;
@@ -184,7 +175,7 @@ void look_at_ports(MachineFacts& facts) {
                              : facts.side == Side::kServer
                                  ? transport::server_port(facts.domain, facts.profile->index)
                                  : 0;
-  if (port != 0 && port_taken(port, !wan)) facts.port_in_use = port;
+  if (port != 0 && transport::udp_port_taken(port, !wan)) facts.port_in_use = port;
 }
 
 void look_at_domain(MachineFacts& facts, const std::string& profile) {

@@ -27,6 +27,7 @@ std::vector<std::string> addresses_in(const std::string& text) {
     std::string one = text.substr(at, comma - at);
     if (const std::size_t slash = one.find('/'); slash != std::string::npos) one.erase(0, slash + 1);
     one = one.substr(0, one.find_first_of(":@"));
+    if (one.starts_with("239.")) one.clear();  // groups, which say nothing of the machine
     if (!one.empty() && std::ranges::find(addresses, one) == addresses.end())
       addresses.push_back(std::move(one));
     at = comma + 1;

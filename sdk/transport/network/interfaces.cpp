@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -105,6 +106,28 @@ std::optional<std::string> source_address_to(const std::string& address) {
   if (::getsockname(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&here)), &length) != 0)
     return std::nullopt;
   return dotted(here);
+}
+
+bool is_private(const std::string& address) {
+  in_addr found{};
+  if (::inet_pton(AF_INET, address.c_str(), &found) != 1) return false;
+  const std::uint32_t number = ntohl(found.s_addr);
+  const auto within = [number](std::uint32_t network, unsigned bits) {
+    return (number ^ network) >> (32U - bits) == 0;
+  };
+  return within(0x0A000000, 8) || within(0xAC100000, 12) || within(0xC0A80000, 16) ||
+         within(0x64400000, 10) || within(0xA9FE0000, 16) || within(0x7F000000, 8);
+}
+
+bool udp_port_taken(std::uint32_t port, bool shared) {
+  const Socket socket;
+  const int yes = 1;
+  if (shared) ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  sockaddr_in local{};
+  local.sin_family = AF_INET;
+  local.sin_port = htons(static_cast<std::uint16_t>(port));
+  return ::bind(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&local)), sizeof local) != 0 &&
+         errno == EADDRINUSE;
 }
 
 std::string list_of(const std::vector<Interface>& all) {

@@ -1,6 +1,7 @@
 #pragma once
 // The network interfaces of this machine, and which of them leads to an address.
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,12 @@ struct Interface {
 
 /// The local address from which datagrams to an IPv4 address (dotted) leave; empty: there is no route.
 [[nodiscard]] std::optional<std::string> source_address_to(const std::string& address);
+
+/// Whether an IPv4 address (dotted) is one that routers on the Internet do not know.
+[[nodiscard]] bool is_private(const std::string& address);
+
+/// Whether another program of this machine has the UDP port. `shared`: those that share it do not count.
+[[nodiscard]] bool udp_port_taken(std::uint32_t port, bool shared);
 
 /// "eth0 10.0.0.1, lo 127.0.0.1".
 [[nodiscard]] std::string list_of(const std::vector<Interface>& all);

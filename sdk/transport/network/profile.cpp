@@ -225,6 +225,7 @@ Surroundings surroundings() {
   machine.interfaces = interfaces();
   machine.default_route = default_route_interface();
   machine.source_address_to = &source_address_to;
+  machine.port_taken = [](std::uint32_t port) { return udp_port_taken(port, false); };
   machine.look_up = [](const std::string& host) -> std::optional<std::string> {
     if (is_address(host)) return host;
     addrinfo wanted{};
@@ -244,6 +245,13 @@ Surroundings surroundings() {
 
 Result<Profile> resolve_profile(Profile profile, Side side, std::uint32_t domain,
                                 const Surroundings& machine) {
+  const std::uint32_t port = server_port(domain, profile.index);
+  if (profile.name == "wan" && side == Side::kServer && machine.port_taken(port)) {
+    return failed(profile,
+                  "UDP port " + std::to_string(port) +
+                      " is in use here; if that is another server, give one of them another --domain, or "
+                      "wan:index=N");
+  }
   if (auto looked_up = look_up_servers(profile, domain, machine); !looked_up)
     return tl::unexpected(looked_up.error());
   for (const std::string& name : profile.interfaces) {
@@ -257,6 +265,25 @@ Result<Profile> resolve_profile(Profile profile, Side side, std::uint32_t domain
   if (!chosen) return tl::unexpected(chosen.error());
   profile.interfaces = {std::move(*chosen)};
   return profile;
+}
+
+std::string describe(const Profile& resolved, Side side, std::uint32_t domain, const Surroundings& machine) {
+  std::string text = "profile " + resolved.name;
+  for (std::size_t i = 0; i < resolved.interfaces.size(); ++i)
+    text += (i == 0 ? " on " : ", ") + resolved.interfaces[i];
+  if (resolved.name == "wan" && side == Side::kServer)
+    text += ", UDP port " + std::to_string(server_port(domain, resolved.index));
+  for (std::size_t i = 0; i < resolved.servers.size(); ++i)
+    text += (i == 0 ? ", servers " : ", ") + resolved.servers[i];
+  if (!resolved.external.empty()) return text + ", seen as " + resolved.external;
+  for (const std::string& server : resolved.servers) {
+    const std::string address = server.substr(0, server.find(':'));
+    const auto source = machine.source_address_to(address);
+    if (!source || !is_private(*source) || is_private(address)) continue;
+    return text + "; " + *source + " is private and " + address +
+           " is not: if NAT is between, the server cannot answer without external=ADDRESS, the address that it sees";
+  }
+  return text;
 }
 
 std::string profile_xml(const Profile& resolved, Side side) {

@@ -48,6 +48,8 @@ struct Surroundings {
   std::function<std::optional<std::string>(const std::string& host)> look_up;
   /// As transport::source_address_to().
   std::function<std::optional<std::string>(const std::string& address)> source_address_to;
+  /// Whether another program has that UDP port.
+  std::function<bool(std::uint32_t port)> port_taken;
 };
 [[nodiscard]] Surroundings surroundings();
 
@@ -61,6 +63,10 @@ struct Surroundings {
 /// parameter and ${TANDEM_X:-VALUE} for one that may be missing. A line is repeated for each value, and left
 /// out if it has none.
 [[nodiscard]] std::string profile_xml(const Profile& resolved, Side side);
+
+/// What people should know of a resolved profile: "profile wan on eth0, UDP port 7410".
+[[nodiscard]] std::string describe(const Profile& resolved, Side side, std::uint32_t domain,
+                                   const Surroundings& surroundings);
 
 /// The UDP port at which a server with that index is found.
 [[nodiscard]] std::uint32_t server_port(std::uint32_t domain, std::uint32_t index);
