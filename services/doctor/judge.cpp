@@ -110,7 +110,9 @@ Check judge_multicast(const MachineFacts& facts) {
   bool used_works = chosen.empty();
   for (const Interface& interface : chosen.empty() ? facts.interfaces : chosen) {
     if (!interface.up || interface.address.empty()) continue;
-    const bool good = std::ranges::find(facts.multicast_works, interface.name) != facts.multicast_works.end();
+    // The system loops back what an interface cannot send.
+    const bool good = (interface.multicast || interface.loopback) &&
+                      std::ranges::find(facts.multicast_works, interface.name) != facts.multicast_works.end();
     std::string& list = good ? works : fails;
     list += (list.empty() ? "" : ", ") + interface.name;
     used_works = used_works || good;

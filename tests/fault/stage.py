@@ -197,11 +197,16 @@ class Stage:
     def client(self, *more, namespace=None):
         return self.start(self.options.tandem, "join", "--json", "--live", *more, namespace=namespace)
 
-    def end(self):
+    def end_all(self):
+        """End all programs that run."""
         for each in self.running:
             if each.process.poll() is None:
                 each.process.kill()
             each.process.wait()
+        self.running.clear()
+
+    def end(self):
+        self.end_all()
         shutil.rmtree(self.folder)
 
 

@@ -57,6 +57,9 @@ std::vector<HeardParticipant> read_all(dds_entity_t reader, const dds_guid_t& se
     const auto& participant = *static_cast<const dds_builtintopic_participant_t*>(samples[at]);
     heard.push_back(describe(participant));
     heard.back().own = std::ranges::equal(participant.key.v, self.v);
+    // Of participants here Cyclone DDS says "localprocess". It sends from sockets that are bound to its
+    // interfaces.
+    if (heard.back().own) heard.back().addresses = own_udp_addresses();
   }
   if (count > 0) dds_return_loan(reader, samples.data(), count);
   return heard;

@@ -11,11 +11,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <memory>
 #include <sstream>
+#include <system_error>
 
 namespace tandem::transport {
 namespace {
@@ -128,6 +131,25 @@ bool udp_port_taken(std::uint32_t port, bool shared) {
   local.sin_port = htons(static_cast<std::uint16_t>(port));
   return ::bind(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&local)), sizeof local) != 0 &&
          errno == EADDRINUSE;
+}
+
+std::vector<std::string> own_udp_addresses() {
+  std::vector<std::string> addresses;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", none)) {
+    const int descriptor = std::atoi(entry.path().filename().c_str());
+    sockaddr_in local{};
+    socklen_t length = sizeof local;
+    int type = 0;
+    socklen_t type_length = sizeof type;
+    if (::getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &type_length) != 0 || type != SOCK_DGRAM ||
+        ::getsockname(descriptor, static_cast<sockaddr*>(static_cast<void*>(&local)), &length) != 0 ||
+        local.sin_family != AF_INET || local.sin_addr.s_addr == htonl(INADDR_ANY)) {
+      continue;
+    }
+    addresses.push_back(dotted(local));
+  }
+  return addresses;
 }
 
 std::string list_of(const std::vector<Interface>& all) {

@@ -31,6 +31,9 @@ struct Interface {
 /// Whether another program of this machine has the UDP port. `shared`: those that share it do not count.
 [[nodiscard]] bool udp_port_taken(std::uint32_t port, bool shared);
 
+/// The addresses to which the UDP sockets of this process are bound, besides "any".
+[[nodiscard]] std::vector<std::string> own_udp_addresses();
+
 /// "eth0 10.0.0.1, lo 127.0.0.1".
 [[nodiscard]] std::string list_of(const std::vector<Interface>& all);
 
