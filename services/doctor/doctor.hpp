@@ -39,6 +39,8 @@ struct MachineFacts {
   std::uint64_t open_files_limit = 0;
 
   std::string cyclonedds_uri;  ///< empty: unset
+  std::string xml_fault;       ///< why its text is no XML; empty: it is
+  bool uri_names_interface = false;
   std::optional<transport::Profile>
       profile;               ///< as it is on this machine; empty: none, or domain_fault says why
   std::string profile_text;  ///< as it was given; empty: none

@@ -60,6 +60,10 @@ Check judge_configuration(const MachineFacts& facts) {
   } else if (!facts.cyclonedds_uri.empty()) {
     check.detail += "; CYCLONEDDS_URI is set too, and not used";
   }
+  if (!profile && !facts.xml_fault.empty()) {
+    return {check.name, Verdict::kFailure, check.detail + ": this is no XML: " + facts.xml_fault,
+            "correct it; Cyclone DDS takes the part before the fault without a word"};
+  }
   if (facts.domain_fault.empty()) return check;
   check.verdict = Verdict::kFailure;
   check.detail += ": " + facts.domain_fault;
@@ -87,7 +91,7 @@ Check judge_interfaces(const MachineFacts& facts) {
   }
   const std::vector<Interface> chosen = used(facts);
   if (!chosen.empty()) list += fmt::format("; DDS uses {}", names_of(chosen));
-  const bool decided = !facts.profile_text.empty() || !facts.cyclonedds_uri.empty();
+  const bool decided = !facts.profile_text.empty() || facts.uri_names_interface;
   if (networks.empty() && !decided) {
     return {
         "interfaces", Verdict::kWarning, list,

@@ -17,6 +17,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "services/doctor/configuration.hpp"
 #include "services/doctor/doctor.hpp"
 #include "services/system/descriptor.hpp"
 
@@ -206,7 +207,12 @@ MachineFacts machine_facts(std::uint32_t domain, const std::string& profile) {
   facts.send_buffer_max_bytes = number_in("/proc/sys/net/core/wmem_max");
   rlimit files{};
   if (::getrlimit(RLIMIT_NOFILE, &files) == 0) facts.open_files_limit = files.rlim_cur;
-  if (const char* uri = std::getenv("CYCLONEDDS_URI")) facts.cyclonedds_uri = uri;
+  if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri != nullptr && *uri != '\0') {
+    facts.cyclonedds_uri = uri;
+    const std::string text = configuration_text(uri);
+    facts.xml_fault = fault_of_xml(text);
+    facts.uri_names_interface = text.find("NetworkInterface") != std::string::npos;
+  }
   timex clock{};
   facts.clock_synchronised = ::adjtimex(&clock) != TIME_ERROR && (clock.status & STA_UNSYNC) == 0;
   facts.clock_s = std::time(nullptr);

@@ -78,7 +78,7 @@ std::vector<Interface> interfaces() {
 }
 
 std::string default_route_interface() {
-  std::ifstream routes("/proc/net/route");
+  std::ifstream routes("/proc/self/net/route");  // systemd may hide /proc/net
   std::string line, best;
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   std::getline(routes, line);  // the names of the columns

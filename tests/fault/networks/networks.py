@@ -375,10 +375,35 @@ def measure_cuts(stage):
                 stage.end_all()
 
 
+def measure_profiles(stage):
+    """Latency of two clients over a radio and over a long way, with and without a profile."""
+    radio = {"delay_ms": 1, "jitter_ms": 5, "burst_loss": 0.02, "burst_packets": 3}
+    far = {"delay_ms": 20, "jitter_ms": 4, "loss": 0.02}
+    for name, link, profiles in (("radio", radio, ("", "lan", "wifi")), ("far", far, ("", "wan"))):
+        for profile in profiles * 3:
+            with Network("one", "two", seed=1) as network:
+                network.set_all(**link)
+                more = ["--profile", profile] if profile else []
+                if profile:
+                    for machine in [network.server, *network.clients.values()]:
+                        machine.interface = None
+                server(stage, network.server, *more, "--scripted", bodies=10_000)
+                if profile == "wan":
+                    more = ["--profile", "wan:server=10.78.0.1"]
+                clients = [stage.client(*more, "--observe", namespace=machine) for machine in network.clients.values()]
+                joined = max(plays(each) for each in clients)
+                time.sleep(10)
+                reports = [each.stop() for each in clients]
+                stage.end_all()
+                p50, p99 = (max(report["latency_ms"][part] for report in reports) for part in ("p50", "p99"))
+                print(f"  {name}, {profile or 'no profile'}: playing after {joined:.2f} s, latency p50 {p50:.1f} ms, p99 {p99:.1f} ms, "
+                      f"{reports[0]['mbit_per_s']:.2f} Mbit/s, {sum(report['resyncs'] for report in reports)} rejoins", flush=True)  # fmt: skip
+
+
 SHORT = {"lan": lan, "wan": wan, "standby": standby, "mtu": mtu, "nat": nat, "forwarded": forwarded, "choice": choice,
          "multihomed": multihomed, "bad_input": bad_input, "doctor_finds": doctor_finds}  # fmt: skip
 CASES = {**SHORT, "wifi": wifi, "cut_wan": cut_wan, "cut_beyond_the_lease": cut_beyond_the_lease}
-MEASUREMENTS = {"measure_cuts": measure_cuts}
+MEASUREMENTS = {"measure_cuts": measure_cuts, "measure_profiles": measure_profiles}
 
 
 def main():
