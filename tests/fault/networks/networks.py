@@ -400,10 +400,32 @@ def measure_profiles(stage):
                       f"{reports[0]['mbit_per_s']:.2f} Mbit/s, {sum(report['resyncs'] for report in reports)} rejoins", flush=True)  # fmt: skip
 
 
+def measure_datagrams(stage):
+    """Latency of two clients on a switch and the server's processor time, by profile, with deltas of 240 KB."""
+    for profile in ("", "lan", "wifi", "wan") * 3:
+        with machines(3) as (one, two, three):
+            switch((one, "eth0", "10.1.0.1/24"), (two, "eth0", "10.1.0.2/24"), (three, "eth0", "10.1.0.3/24"))
+            more = ["--profile", profile] if profile else []
+            serving = server(stage, one, *more, "--scripted", "--codec", "none", "--predictor", "ballistic", bodies=10_000)
+            if profile == "wan":
+                more = ["--profile", "wan:server=10.1.0.1"]
+            clients = [stage.client(*more, "--observe", namespace=machine) for machine in (two, three)]
+            for each in clients:
+                plays(each)
+            before = serving.cpu_seconds()
+            time.sleep(8)
+            busy = (serving.cpu_seconds() - before) / 8
+            reports = [each.stop() for each in clients]
+            stage.end_all()
+            p50, p99 = (max(report["latency_ms"][part] for report in reports) for part in ("p50", "p99"))
+            print(f"  {profile or 'no profile'}: latency p50 {p50:.1f} ms, p99 {p99:.1f} ms, {reports[0]['mbit_per_s']:.0f} Mbit/s, "
+                  f"server {busy:.0%} of a core, {sum(report['resyncs'] for report in reports)} rejoins", flush=True)  # fmt: skip
+
+
 SHORT = {"lan": lan, "wan": wan, "standby": standby, "mtu": mtu, "nat": nat, "forwarded": forwarded, "choice": choice,
          "multihomed": multihomed, "bad_input": bad_input, "doctor_finds": doctor_finds}  # fmt: skip
 CASES = {**SHORT, "wifi": wifi, "cut_wan": cut_wan, "cut_beyond_the_lease": cut_beyond_the_lease}
-MEASUREMENTS = {"measure_cuts": measure_cuts, "measure_profiles": measure_profiles}
+MEASUREMENTS = {"measure_cuts": measure_cuts, "measure_profiles": measure_profiles, "measure_datagrams": measure_datagrams}
 
 
 def main():
