@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Sessions on networks of all kinds, with the profiles of deploy/dds: switches, routers, NAT, narrow and lossy links.
 
-networks.py --tandemd PATH --tandem PATH [--list | --short | CASE ...]
+networks.py --tandemd PATH --tandem PATH [--gateway PATH] [--list | --short | CASE ...]
 
 Machines are network namespaces of this test's own. Without CASE all run, in some five minutes; with --short those that
 need no waiting, in one and a half. Cases with NAT need iptables, and are left out without. Exit 0 passed, 1 failed, 77 not
@@ -104,6 +104,9 @@ def wan(stage):
         check(recorder.output(30).get("frames_recorded", 0) > 30, f"the recorder recorded nothing: {recorder.lines}")
         top = stage.start(stage.options.tandem, "top", "--once", "--json", "--profile", profile, namespace=three)
         check(len(top.output(30)["sessions"]) == 1, "top does not see the session")
+        if stage.options.gateway:
+            stage.start(stage.options.gateway, "--port", 0, "--profile", profile,
+                        namespace=two).wait_for("playing from frame", 20)  # fmt: skip
         for each in clients:
             played_well(each)
         lost.process.wait(10)
@@ -236,8 +239,9 @@ def bad_input(stage):
         router((one, "eth0", SERVER, 1500), (two, "eth0", OUTSIDE, 1500))
         tandemd = [str(stage.options.tandemd), "--scene", "cube", "--bodies", "5", "--profile"]
         join = [str(stage.options.tandem), "join", "--timeout", "1", "--profile"]
+        gateway = [str(stage.options.gateway), "--port", "0", "--profile"]
         known = ("loopback, lan, wifi, wan or multihomed", "'moon'")
-        for program in (tandemd, join):
+        for program in (tandemd, join, gateway) if stage.options.gateway else (tandemd, join):
             refused(stage, one, 2, known, *program, "moon")
             refused(stage, one, 2, ("lan takes interface", "'server'"), *program, "lan:server=10.0.0.1")
             refused(stage, one, 2, ("KEY=VALUE", "'eth0'"), *program, "lan:eth0")
@@ -430,6 +434,7 @@ MEASUREMENTS = {"measure_cuts": measure_cuts, "measure_profiles": measure_profil
 
 def main():
     parser = arguments(__doc__, "the cases that need no waiting")
+    parser.add_argument("--gateway", type=pathlib.Path)
     options = parser.parse_args()
     try:
         return run({**CASES, **MEASUREMENTS}, options.cases or list(SHORT if options.short else CASES), parser, options)
