@@ -11,6 +11,7 @@ run: namespaces or virtual interfaces are not allowed here.
 import json
 import os
 import pathlib
+import resource
 import signal
 import subprocess
 import sys
@@ -44,11 +45,11 @@ def played_well(client):
     return report
 
 
-def doctor(stage, machine, *more, code=0):
-    """Return the checks of `tandem doctor` by name."""
+def doctor(stage, machine, *more, code=0, prepare=None):
+    """Return the checks of `tandem doctor` by name. `prepare` is called in its process."""
     with machine.entered():
         done = subprocess.run([stage.options.tandem, "doctor", "--json", *more], capture_output=True, text=True, timeout=60,
-                              env=environment(None), check=False)  # fmt: skip
+                              env=environment(None), check=False, preexec_fn=prepare)  # fmt: skip
     check(done.returncode == code, f"doctor {more} exits with {done.returncode}, not {code}: {done.stdout}{done.stderr}")
     return {check["name"]: check for check in json.loads(done.stdout)["checks"]}
 
@@ -233,6 +234,25 @@ def multihomed(stage):
             played_well(each)
 
 
+def together(stage):
+    """Server and client on one machine, with each profile; and with a client on another one on the same two networks."""
+    both = "multihomed:interface=eth0,interface=eth1"
+    for for_server, for_client in (("lan", "lan"), ("wifi", "wifi"), ("wan", "wan:server=10.1.0.1"), (both, both), ("loopback",) * 2):
+        with machines(2) as (one, two):
+            switch((one, "eth0", "10.1.0.1/24"), (two, "eth0", "10.1.0.2/24"))
+            clients = []
+            if for_server == both:
+                switch((one, "eth1", "10.2.0.1/24"), (two, "eth1", "10.2.0.2/24"))
+                clients.append(client(stage, two, both))
+            server(stage, one, "--profile", for_server)
+            clients.append(client(stage, one, for_client))
+            for each in clients:
+                plays(each)
+            for each in clients:
+                played_well(each)
+            stage.end_all()
+
+
 def bad_input(stage):
     """What is wrong with a profile is one line, and nobody gets in."""
     with machines(2) as (one, two):
@@ -282,6 +302,8 @@ def doctor_finds(stage):
         check(deaf["verdict"] == "warning" and "--profile wan" in deaf["advice"], f"no multicast: {deaf}")
         gone = doctor(stage, two, "--profile", "lan:interface=eth9", code=1)["profile"]
         check(gone["verdict"] == "failure" and "no interface 'eth9'" in gone["detail"], f"no interface: {gone}")
+        few = doctor(stage, one, prepare=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (100, 100)))["open files"]
+        check(few["verdict"] == "warning" and "ulimit -n" in few["advice"], f"few open files: {few}")
         ports = doctor(stage, one, "--domain", "120")["ports"]
         check(ports["verdict"] == "warning" and "0 to 100" in ports["advice"], f"ephemeral ports: {ports}")
         with one.entered():
@@ -427,7 +449,7 @@ def measure_datagrams(stage):
 
 
 SHORT = {"lan": lan, "wan": wan, "standby": standby, "mtu": mtu, "nat": nat, "forwarded": forwarded, "choice": choice,
-         "multihomed": multihomed, "bad_input": bad_input, "doctor_finds": doctor_finds}  # fmt: skip
+         "multihomed": multihomed, "together": together, "bad_input": bad_input, "doctor_finds": doctor_finds}  # fmt: skip
 CASES = {**SHORT, "wifi": wifi, "cut_wan": cut_wan, "cut_beyond_the_lease": cut_beyond_the_lease}
 MEASUREMENTS = {"measure_cuts": measure_cuts, "measure_profiles": measure_profiles, "measure_datagrams": measure_datagrams}
 
