@@ -70,10 +70,6 @@ class Monitor {
 /// the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
-/// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
-/// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr; of a profile as above.
-[[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain, const std::string& profile, Side side);
-
 /// A participant of a domain, in its own words.
 struct HeardParticipant {
   std::string name;                    ///< "tandemd SESSION", "tandem client ID"; other text for strangers

@@ -165,9 +165,10 @@ class Unsendable {
     if (const auto told = told_.find(to); told != told_.end() && now - told->second < kInterval) return {};
     if (told_.size() >= kMostAddresses) told_.clear();
     told_[to] = now;
-    return "datagrams to " + to +
-           " cannot be sent; if that is a client behind NAT, it needs external=ADDRESS in its "
-           "--profile wan";
+    std::string text = "datagrams to " + to + " cannot be sent";
+    if (is_private(to.substr(0, to.find(':'))))
+      text += "; if that is a client behind NAT, it needs external=ADDRESS in its --profile wan";
+    return text;
   }
 
  private:
@@ -191,11 +192,6 @@ void on_line(void* unsendable, const dds_log_data_t* data) {
 void set_dds_log(WriteLine write) {
   write_line = write;
   dds_set_log_sink(&on_line, new Unsendable);  // for as long as the process lives, as the sink
-}
-
-Result<void> check_dds_domain(std::uint32_t domain, const std::string& profile, Side side) {
-  const dds::Repeat repeat = side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom;
-  return dds::DomainUse::acquire(domain, repeat, profile).map([](const dds::DomainUse&) {});
 }
 
 std::string refusal_of_profile(const std::string& text, Side side) {
