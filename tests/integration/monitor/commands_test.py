@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Runs every command of deploy/monitor/README.md, as it stands there, on a live session, and compares what they show with the page.
+"""Runs every command of deploy/monitor/README.md, as it stands there, on a live session, and compares what they show with the page;
+and the command with ddsperf of deploy/dds/README.md, with addresses of this machine.
 
 commands_test.py --tandemd PATH --tandem PATH
 
@@ -24,6 +25,7 @@ sys.path.insert(0, str(ROOT / "tests" / "fault"))
 from stage import NOT_RUN, URI, enter_namespace  # noqa: E402
 
 PAGE = ROOT / "deploy" / "monitor" / "README.md"
+PROFILES = ROOT / "deploy" / "dds"
 LIMIT_S = 60  # of any one wait; a busy machine is slow
 
 
@@ -143,6 +145,19 @@ def check_ddsperf(session, commands):
     assert wanted and wanted <= trips, f"{wanted} is not in {got}"
 
 
+def check_ddsperf_with_a_profile(session):
+    """One program of the profile `wan` finds another at the server's port, and only there."""
+    page = re.search(r"(?m)^TANDEM_INTERFACE=.* ddsperf sanity$", (PROFILES / "README.md").read_text(encoding="utf-8"))
+    assert page, "deploy/dds/README.md shows no command with ddsperf"
+    command = page[0]
+    places = (("=eth0", "=lo"), ("=203.0.113.5:", "=127.0.0.1:"), ("/usr/share/tandem/dds/", f"{PROFILES}/"), ("ddsperf", "ddsperf -D 5"))
+    for shown_there, here in places:
+        assert shown_there in command, command
+        command = command.replace(shown_there, here)
+    session.start("TANDEM_INDEX=0 " + command.replace("-D 5 sanity", "pong"))
+    assert any("size 12 mean" in line for line in session.run(command)), "no round trip"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for option in ("--tandemd", "--tandem"):
@@ -166,6 +181,8 @@ def main():
             check_top(session, commands)
             session.end()
             check_ddsperf(session, commands)
+            session.end()
+            check_ddsperf_with_a_profile(session)
             assert not commands, f"commands of the page that no test runs: {list(commands)}"
         except (AssertionError, subprocess.SubprocessError) as failure:
             print(f"FAILED: {failure}", file=sys.stderr)
