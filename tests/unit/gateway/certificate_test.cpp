@@ -6,8 +6,10 @@
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <iterator>
 
@@ -39,8 +41,8 @@ class CertificateTest : public ::testing::Test {
     X509_free(made);
     EVP_PKEY_free(pair);
   }
-  [[nodiscard]] std::string refusal(std::int64_t now_s) const {
-    const auto read = Certificate::read(cert, key, now_s);
+  [[nodiscard]] std::string refusal(std::int64_t at_s) const {
+    const auto read = Certificate::read(cert, key, at_s);
     EXPECT_FALSE(read);
     return read ? "" : read.error().message;
   }
