@@ -9,7 +9,7 @@ namespace tandem::tool {
 /// Adds one subcommand to `tandem pki`; when the command line chooses it, its callback sets `run`.
 using AddPkiCommand = void (*)(commandline::Command pki, Run& run);
 
-// pki_token.cpp
+// token.cpp
 void add_pki_token_key(commandline::Command pki, Run& run);
 void add_pki_token(commandline::Command pki, Run& run);
 

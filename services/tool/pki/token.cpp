@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "services/tokens/token.hpp"
-#include "services/tool/pki.hpp"
+#include "services/tool/pki/pki.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
