@@ -20,8 +20,9 @@ struct Options {
   std::string prefer = "computing";  ///< chooses the stream that all viewers play; see CoreOptions
   WebOptions web;
   Limits limits;
-  std::string viewer;      ///< folder of its files; empty: none
-  std::string token_file;  ///< empty: no token
+  std::string viewer;                   ///< folder of its files; empty: none
+  std::string token_file;               ///< a text that lets viewers act; empty: none
+  std::vector<std::string> token_keys;  ///< files with public keys of signed tokens
   std::vector<std::string> origins;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
   logging::Options log;
