@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/client/session/history.hpp"
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/client/session/session_check.hpp"
 #include "sdk/transport/limits.hpp"
@@ -49,16 +50,6 @@ SampleColumns make_room(const Drawable& drawable, Sample& out) {
   columns.types = packed(out.types.data());
   columns.changes = packed(reinterpret_cast<std::uint8_t*>(out.changes.data()));  // of that type
   return columns;
-}
-
-// The last frame that the worlds of two epochs have in common; empty if they are not known to have any.
-std::optional<Frame> shared_history(const transport::SessionMessage& left,
-                                    const transport::SessionMessage& entered) {
-  if (entered.continues_epoch == left.epoch) return entered.continues_frame;
-  if (left.continues_epoch == entered.epoch) return left.continues_frame;
-  if (left.continues_epoch != 0 && left.continues_epoch == entered.continues_epoch)
-    return std::min(left.continues_frame, entered.continues_frame);
-  return std::nullopt;
 }
 
 }  // namespace

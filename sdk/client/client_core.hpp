@@ -109,6 +109,8 @@ class ClientCore {
   [[nodiscard]] std::uint32_t join_attempt() const;
   /// The name of the body that is in a slot now; empty if it has none or the client does not play.
   [[nodiscard]] std::string_view body_name(Slot slot) const;
+  /// True if the outcome of every input of earlier epochs is known.
+  [[nodiscard]] bool inputs_settled() const { return sent_.settled(); }
   /// The newest reply of this epoch; null before the first.
   [[nodiscard]] const transport::ReplyMessage* reply() const;
 

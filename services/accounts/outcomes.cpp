@@ -17,6 +17,14 @@ bool Outcomes::has(std::uint64_t number) const {
                              [number](const Outcome& outcome) { return outcome.entry.number == number; });
 }
 
+void Outcomes::take_back(std::uint64_t number) {
+  std::erase_if(outcomes_, [number](const Outcome& outcome) { return outcome.entry.number == number; });
+}
+
+void Outcomes::renew(std::int64_t now_ns) {
+  for (Outcome& outcome : outcomes_) outcome.at_ns = now_ns;
+}
+
 std::vector<transport::ReplyEntry> Outcomes::entries() const {
   std::vector<transport::ReplyEntry> entries;
   for (const Outcome& outcome : outcomes_) entries.push_back(outcome.entry);

@@ -20,6 +20,10 @@ class Outcomes {
   /// `text`: the words of the simulation that refused the input; empty if there are none.
   void add(const transport::ReplyEntry& entry, std::int64_t now_ns, std::string text = {});
   [[nodiscard]] bool has(std::uint64_t number) const;
+  /// Forgets what was said of that input.
+  void take_back(std::uint64_t number);
+  /// All that are kept are told again, as if they were known from now on.
+  void renew(std::int64_t now_ns);
   /// All that are kept, oldest first.
   [[nodiscard]] std::vector<transport::ReplyEntry> entries() const;
   /// Fills in the entries and texts of a reply that is made now. Of more than kMaxReplyTexts texts the newest

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/client/session/history.hpp"
 #include "sdk/transport/envelope.hpp"
 
 namespace tandem::gateway {
@@ -23,6 +24,7 @@ void Gateway::announce(OutgoingPtr announcement) {
 // The same epoch with another stream: inputs and their outcomes continue.
 void Gateway::on_session(const transport::SessionMessage& session) {
   const bool same_epoch = session_ && session_->epoch == session.epoch;
+  const bool continues = session_ && client::shared_history(*session_, session).has_value();
   session_ = session;
   alive_ = true;
   announce(make_outgoing(session));
@@ -37,13 +39,17 @@ void Gateway::on_session(const transport::SessionMessage& session) {
       viewer.now.flow = Viewer::Flow::kSilent;
       viewer.now.served_attempt.reset();
       viewer.now.passage = {};
+    } else if (continues) {
+      viewer.now = std::move(viewer.now).carried_over();
     } else {
       viewer.now = {};
     }
   }
   if (same_epoch) return;
   coming_inputs_.clear();
-  merger_.clear();
+  settling_ = continues;
+  if (!continues) return merger_.clear();
+  merger_.carry_over(verdicts_);  // told in poll()
 }
 
 void Gateway::on_names(const std::vector<transport::BodyName>& names) {
@@ -103,7 +109,7 @@ InputTally Gateway::take_tally(ViewerId id) {
 void Gateway::leave(ViewerId id) { counts_.left += viewers_.erase(id); }
 
 bool Gateway::reply_due(Viewer& viewer, std::int64_t now_ns) const {
-  return viewer.now.heard && viewer.now.reply.due(role_of(viewer), now_ns);
+  return viewer.now.heard && !settling_ && viewer.now.reply.due(role_of(viewer), now_ns);
 }
 
 // A snapshot on its way is in front of the queue, so it alone does not make a viewer slow.
@@ -211,7 +217,11 @@ OutgoingPtr Gateway::reply(Viewer& viewer, std::int64_t now_ns) const {
   }
   state.outcomes.tell(reply, now_ns);
   state.reply.sent(reply.role, now_ns);
-  state.once = Reason::kNone;
+  if (std::exchange(state.once, Reason::kNone) ==
+      Reason::kNone) {  // otherwise a viewer takes it for nothing else
+    state.lost.clear();
+    state.before.reset();
+  }
   return make_outgoing(reply);
 }
 
@@ -255,6 +265,10 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
                                  now_ns - passage.began_ns() > accounts::kGatewayTransfers.longest_ns))
       viewer.now.passage = {};
     if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
+  }
+  if (settling_ && world_.inputs_settled()) {
+    settling_ = false;
+    for (auto& [id, viewer] : viewers_) viewer.now.outcomes.renew(now_ns);
   }
   merger_.flush(world_, now_ns, verdicts_);
   tell(verdicts_, now_ns);

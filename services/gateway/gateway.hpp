@@ -75,7 +75,7 @@ class Gateway {
 
   // What happens in the session.
   /// The session that is followed, with the stream that is played. All that belongs to another epoch is
-  /// dropped.
+  /// dropped, but for inputs and their outcomes where the two share a history.
   void on_session(const transport::SessionMessage& session);
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns);
   /// A delta that was applied, so that a snapshot cut now contains it.
@@ -152,7 +152,8 @@ class Gateway {
   std::size_t snapshot_bytes_ = 0;  // of the last one
 
   InputMerger merger_;
-  std::vector<InputMerger::Verdict> verdicts_;            // kept to reuse its memory
+  std::vector<InputMerger::Verdict> verdicts_;  // kept to reuse its memory
+  bool settling_ = false;  // outcomes of an earlier epoch's inputs are awaited, before viewers get a reply
   transport::Role granted_ = transport::Role::kObserver;  // to the gateway, by the last reply
 };
 

@@ -25,6 +25,7 @@ class SessionClient final : public World, private client::CoreListener {
 
   [[nodiscard]] bool playing() const override { return core_.timeline() != nullptr; }
   [[nodiscard]] transport::Role role() const override;
+  [[nodiscard]] bool inputs_settled() const override { return core_.inputs_settled(); }
   [[nodiscard]] std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const override;
   [[nodiscard]] std::optional<Cut> cut() override;
   Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,

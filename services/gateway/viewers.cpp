@@ -180,7 +180,11 @@ void Gateway::tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now
     Viewer& viewer = found->second;
     std::erase(viewer.now.undecided, verdict.claim.number);
     viewer.now.reply.on_outcome();
-    if (!verdict.known) continue;
+    if (verdict.lost) {
+      viewer.now.outcomes.take_back(verdict.claim.number);
+      viewer.now.lost.push_back(verdict.claim.number);
+    }
+    if (!verdict.known || verdict.lost) continue;
     if (verdict.reason != Reason::kNone) {
       refuse_input(viewer, verdict.claim, verdict.reason, now_ns, verdict.text);
     } else {

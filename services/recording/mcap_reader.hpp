@@ -58,6 +58,8 @@ class McapReader {
   [[nodiscard]] std::vector<Place> chunks_with(std::string_view topic) const;
   void go_to(const Place& place);
   void rewind();
+  /// True if the next message is of another chunk than the last one.
+  [[nodiscard]] bool at_chunk_end() const { return chunk_at_ >= chunk_.size(); }
 
   /// The first and the last log time of all chunks, by their heads; 0 without any.
   [[nodiscard]] std::uint64_t first_ns() const { return first_ns_; }

@@ -12,6 +12,7 @@
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/client/following/snapshot_assembly.hpp"
 #include "sdk/client/session/session_check.hpp"
+#include "services/recording/events.hpp"
 #include "services/recording/input_file.hpp"
 #include "services/recording/mcap_reader.hpp"
 
@@ -49,6 +50,10 @@ class Playback {
   /// The times of the current and of the last message, in seconds since the first.
   [[nodiscard]] double time_s() const { return seconds_since_first(time_ns_); }
   [[nodiscard]] double length_s() const { return seconds_since_first(reader_.last_ns()); }
+  /// What the file says that happened: see read_events().
+  [[nodiscard]] const std::vector<RecordedEvent>& events() const { return events_; }
+  /// The time of an event, in seconds since the first message.
+  [[nodiscard]] double time_s(const RecordedEvent& event) const { return seconds_since_first(event.time_ns); }
   /// The place where the file is cut short, if it is.
   [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return reader_.torn_at(); }
 
@@ -78,7 +83,7 @@ class Playback {
     std::map<std::uint64_t, transport::ScheduledInputMessage> inputs;  // beyond those of the last frame
   };
 
-  explicit Playback(McapReader reader) : reader_(std::move(reader)) {}
+  explicit Playback(McapReader reader) : reader_(std::move(reader)), events_(read_events(reader_)) {}
   static Result<std::unique_ptr<Playback>> open(InputFile file);
   [[nodiscard]] double seconds_since_first(std::uint64_t ns) const;
   void rewind();
@@ -92,6 +97,7 @@ class Playback {
   [[nodiscard]] Result<std::optional<Step>> apply_next();
 
   McapReader reader_;
+  std::vector<RecordedEvent> events_;
   std::uint64_t time_ns_ = 0;
   std::unique_ptr<Run> run_;
   client::CompleteDelta delta_;

@@ -16,6 +16,11 @@ std::string replayed(const std::string& text, const Recording& recording) {
   told.set_from_s(recording.from_s);
   told.set_from_frame(recording.from_frame);
   told.set_frame_rate_hz(recording.frame_rate_hz);
+  for (const Recording::Event& event : recording.events) {
+    idl::Recording::Event& added = *told.add_events();
+    added.set_at_s(event.at_s);
+    added.set_text(event.text);
+  }
   if (scene.dt_s() == 0) scene.set_dt_s(1 / recording.frame_rate_hz);
   std::string out;
   google::protobuf::TextFormat::PrintToString(scene, &out);

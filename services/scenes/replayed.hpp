@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace tandem::scenes {
 
@@ -12,6 +13,11 @@ struct Recording {
   double length_s = 0, from_s = 0;
   std::uint64_t from_frame = 0;
   double frame_rate_hz = 0;  ///< > 0
+  struct Event {
+    double at_s = 0;
+    std::string text;
+  };
+  std::vector<Event> events = {};
 };
 
 /// Puts `recording` into a scene's text. If the text has no dt_s, adds that of the recorded frame rate, so

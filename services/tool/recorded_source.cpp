@@ -37,12 +37,14 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
   session_.session = config.session;
   session_.epoch = config.epoch;
   session_.frame_rate_hz = config.frame_rate_hz;
-  session_.scene_description =
-      scenes::replayed(session_.scene_description, {.started_unix_ms = playback.first_ns() / kMillisecond,
-                                                    .length_s = playback.length_s(),
-                                                    .from_s = playback.time_s(),
-                                                    .from_frame = frame(),
-                                                    .frame_rate_hz = playback.session().frame_rate_hz});
+  scenes::Recording recording{.started_unix_ms = playback.first_ns() / kMillisecond,
+                              .length_s = playback.length_s(),
+                              .from_s = playback.time_s(),
+                              .from_frame = frame(),
+                              .frame_rate_hz = playback.session().frame_rate_hz};
+  for (const recording::RecordedEvent& event : playback.events())
+    recording.events.push_back({.at_s = playback.time_s(event), .text = event.text});
+  session_.scene_description = scenes::replayed(session_.scene_description, recording);
   session_.window_ceiling = config.window_ceiling;
   session_.gravity = gravity_now(session_, timeline().drive());
   session_.continues_epoch = session_.continues_frame = 0;

@@ -103,6 +103,11 @@ void SentInputs::settle(std::vector<InputOutcome>& outcomes) {
   });
 }
 
+bool SentInputs::settled() const {
+  const auto is_earlier = [this](const Pending& input) { return input.number < first_number_; };
+  return doubts_.empty() && std::none_of(pending_.begin(), pending_.end(), is_earlier);
+}
+
 void SentInputs::clear(std::vector<InputOutcome>& outcomes) {
   for (const Pending& input : pending_) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});

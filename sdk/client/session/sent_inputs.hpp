@@ -42,12 +42,15 @@ class SentInputs {
   void on_reply(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
   void on_applied(Frame frame, std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
   /// An epoch begins whose world is that of the one before up to `frame`. What acted later, or was not
-  /// answered, is in doubt until the first reply that comes from an account: it says what the server had decided by then.
+  /// answered, is in doubt until the first reply that comes from an account: it says what the server had
+  /// decided by then.
   void carry_over(Frame frame);
   /// A new epoch begins: unanswered inputs count as unknown. The numbers continue, because an earlier server
   /// that comes back remembers the outcomes of the numbers it knows.
   void clear(std::vector<InputOutcome>& outcomes);
   [[nodiscard]] std::size_t pending() const { return pending_.size(); }
+  /// True if the outcome of every input of earlier epochs is known.
+  [[nodiscard]] bool settled() const;
 
  private:
   struct Pending {

@@ -139,6 +139,14 @@ export interface Recording {
   fromFrame: number;
   /** Frames a second of the recorded session. */
   rate: number;
+  /** What happened, by time. */
+  events: RecordedEvent[];
+}
+
+/** `at` seconds after the first message. */
+export interface RecordedEvent {
+  at: number;
+  text: string;
 }
 
 /** The parts of a scene that are drawn, and the scales of inputs. Metres, seconds. */
@@ -172,6 +180,7 @@ export const emptyScene: Scene = {
 };
 
 const maxSolids = 4096;
+const maxEvents = 500;
 
 /** Reads the parts of a scene's text that the viewer needs. Ignores fields of a wrong type. Throws SceneTextError. */
 export function readScene(text: string): Scene {
@@ -215,6 +224,9 @@ function readRecording(message: Message | null): Recording | null {
     from: number(message, 'from_s'),
     fromFrame: number(message, 'from_frame'),
     rate: number(message, 'frame_rate_hz'),
+    events: children(message, 'events')
+      .slice(0, maxEvents)
+      .map((event) => ({ at: number(event, 'at_s'), text: string(event, 'text') })),
   };
   return recording.length > 0 && recording.rate > 0 ? recording : null;
 }

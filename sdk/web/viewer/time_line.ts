@@ -21,6 +21,41 @@ export function clock(seconds: number): string {
   return hours > 0 ? `${hours}:${two(minutes)}:${two(whole % 60)}` : `${minutes}:${two(whole % 60)}`;
 }
 
+/** A mark on the time line. */
+export interface Mark {
+  /** Of the line's length, 0 to 1. */
+  place: number;
+  /** Seconds of the recording at its first event. */
+  at: number;
+  /** Its events, one a line. */
+  title: string;
+}
+
+/** Marks that are closer than this part of the line are one. */
+const closest = 1 / 150;
+const mostLines = 12;
+
+/** The marks of a recording's events. Events outside of it are at its ends. */
+export function marksOf(recording: Recording): Mark[] {
+  const marks: (Mark & { lines: number })[] = [];
+  for (const event of [...recording.events].sort((a, b) => a.at - b.at)) {
+    const at = Math.min(Math.max(event.at, 0), recording.length);
+    const place = at / recording.length;
+    const line = `${clock(at)} ${event.text}`;
+    const last = marks.at(-1);
+    if (!last || place - last.place >= closest) {
+      marks.push({ place, at, title: line, lines: 1 });
+    } else if (++last.lines <= mostLines) {
+      last.title += `\n${line}`;
+    }
+  }
+  return marks.map(({ place, at, title, lines }) => ({
+    place,
+    at,
+    title: lines > mostLines ? `${title}\n… and ${lines - mostLines} more` : title,
+  }));
+}
+
 export class TimeLine {
   private readonly line = element('timeLine');
   private readonly slider = element<HTMLInputElement>('time');
@@ -29,15 +64,14 @@ export class TimeLine {
   private soughtAt = -Infinity;
 
   /** `seek` is called once a choice is made. */
-  constructor(seek: (seconds: number) => void) {
+  constructor(private readonly seek: (seconds: number) => void) {
     this.slider.addEventListener('input', () => {
       this.held = true;
       this.say(this.slider.valueAsNumber);
     });
     this.slider.addEventListener('change', () => {
       this.held = false;
-      this.soughtAt = performance.now();
-      seek(this.slider.valueAsNumber);
+      this.choose(this.slider.valueAsNumber);
     });
   }
 
@@ -48,6 +82,7 @@ export class TimeLine {
     this.line.hidden = recording === null;
     if (!recording) return;
     this.slider.max = String(recording.length);
+    element('marks').replaceChildren(...marksOf(recording).map((mark) => this.markAt(mark)));
     this.line.title = `Recorded on ${new Date(recording.started).toLocaleString()}`;
   }
 
@@ -57,6 +92,26 @@ export class TimeLine {
     const seconds = secondsOf(this.recording, frame);
     this.slider.value = String(seconds);
     this.say(seconds);
+  }
+
+  private choose(seconds: number): void {
+    this.soughtAt = performance.now();
+    this.seek(seconds);
+  }
+
+  private markAt(mark: Mark): HTMLElement {
+    const button = document.createElement('button');
+    button.className = 'mark';
+    button.style.left = `${mark.place * 100}%`;
+    button.title = mark.title;
+    button.setAttribute('aria-label', mark.title);
+    button.addEventListener('click', () => {
+      if (this.slider.disabled) return;
+      this.slider.value = String(mark.at);
+      this.say(mark.at);
+      this.choose(mark.at);
+    });
+    return button;
   }
 
   private say(seconds: number): void {

@@ -45,23 +45,38 @@ void InputMerger::send(const transport::InputMessage& input, std::vector<Claim> 
 }
 
 void InputMerger::on_outcome(const client::InputOutcome& outcome, std::vector<Verdict>& out) {
+  using Kind = client::InputOutcome::Kind;
+  if (outcome.kind == Kind::kLost) {
+    std::erase_if(acted_, [&](const Acted& acted) {
+      if (acted.number != outcome.number) return false;
+      out.push_back({.claim = acted.claim, .lost = true});
+      return true;
+    });
+  }
   const auto claims = unanswered_.extract(outcome.number);
   if (claims.empty()) return;
-  using Kind = client::InputOutcome::Kind;
   const auto reason =
       outcome.kind == Kind::kRefused ? static_cast<Reason>(outcome.reason) : transport::Reason::kNone;
   for (const Claim& claim : claims.mapped()) {
     out.push_back({.claim = claim,
                    .known = outcome.kind == Kind::kActed || outcome.kind == Kind::kRefused,
+                   .lost = outcome.kind == Kind::kLost,
                    .reason = reason,
                    .frame = outcome.frame,
                    .text = outcome.text});
+    if (outcome.kind == Kind::kActed) acted_.push_back({outcome.number, claim});
   }
+  while (acted_.size() > kMostActed) acted_.pop_front();
+}
+
+void InputMerger::carry_over(std::vector<Verdict>& out) {
+  for (const Claim& claim : std::exchange(gravity_claims_, {})) out.push_back({.claim = claim, .lost = true});
 }
 
 void InputMerger::clear() {
   gravity_claims_.clear();
   unanswered_.clear();
+  acted_.clear();
 }
 
 }  // namespace tandem::gateway

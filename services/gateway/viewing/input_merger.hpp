@@ -2,6 +2,7 @@
 // Merges the inputs of all viewers into those of one client.
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -30,10 +31,15 @@ class InputMerger {
     std::uint64_t number = 0;
     std::uint32_t kind = 0;  ///< as in the message
   };
-  /// The outcome of an input. `known` is false if it cannot be known.
+  /// Maximum number of inputs that acted and that a server which goes back can still take back.
+  static constexpr std::size_t kMostActed = 16'384;
+
+  /// The outcome of an input. `known` is false if it cannot be known. `lost`: it did not act, even if it was
+  /// told that it did.
   struct Verdict {
     Claim claim;
     bool known = true;
+    bool lost = false;
     transport::Reason reason = transport::Reason::kNone;
     Frame frame = 0;
     std::string text = {};  ///< the words of a simulation that refuses it
@@ -47,6 +53,9 @@ class InputMerger {
   void on_outcome(const client::InputOutcome& outcome, std::vector<Verdict>& out);
   /// Begins a new epoch: outcomes of the old epoch's inputs are not reported.
   void clear();
+  /// Begins a new epoch that shares a history with the one before: outcomes go on. What was not sent yet is
+  /// lost.
+  void carry_over(std::vector<Verdict>& out);
 
   [[nodiscard]] bool waiting() const { return !gravity_claims_.empty(); }
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
@@ -60,6 +69,11 @@ class InputMerger {
   accounts::TokenBucket gravities_{kGravitiesPerSecond, 1};
   accounts::TokenBucket others_{kOthersPerSecond, kOthersPerSecond};
   std::map<std::uint64_t, std::vector<Claim>> unanswered_;  // by the gateway's number
+  struct Acted {
+    std::uint64_t number = 0;
+    Claim claim;
+  };
+  std::deque<Acted> acted_;  // the latest
   std::uint64_t sent_ = 0;
 };
 

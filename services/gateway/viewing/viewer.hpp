@@ -1,9 +1,11 @@
 #pragma once
 // The data that a gateway keeps for one connection.
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "sdk/transport/messages.hpp"
@@ -46,7 +48,7 @@ struct Viewer {
 
   InputTally tally;  ///< since it was taken last
 
-  /// The data of one epoch; a new epoch starts with a new object.
+  /// The data of one epoch; a new epoch starts with a new object, or with carried_over().
   struct InEpoch {
     bool heard = false;  ///< an acknowledgement of this epoch came
     transport::Phase phase = transport::Phase::kJoining;
@@ -65,9 +67,28 @@ struct Viewer {
     accounts::ReplySchedule reply;
     transport::Reason once = transport::Reason::kNone;  ///< goes out with the next reply only
 
-    /// All inputs up to this number have their outcome.
+    /// Inputs of earlier epochs that did not act. The first reply says so, by its `highest_input` and its
+    /// entries.
+    std::vector<std::uint64_t> lost;
+    /// The highest input of earlier epochs, until that reply.
+    std::optional<std::uint64_t> before;
+
+    /// All inputs up to this number have their outcome, and are not lost.
     [[nodiscard]] std::uint64_t decided() const {
-      return undecided.empty() ? highest : undecided.front() - 1;
+      std::uint64_t up_to = undecided.empty() ? highest : undecided.front() - 1;
+      if (before) up_to = std::min(up_to, *before);
+      for (const std::uint64_t number : lost) up_to = std::min(up_to, number - 1);
+      return up_to;
+    }
+    /// The data of an epoch that shares a history with this one: inputs and their outcomes go on.
+    [[nodiscard]] InEpoch carried_over() && {
+      InEpoch next;
+      next.highest = highest;
+      next.before = highest;
+      next.undecided = std::move(undecided);
+      next.outcomes = std::move(outcomes);
+      next.lost = std::move(lost);
+      return next;
     }
   } now;
 };

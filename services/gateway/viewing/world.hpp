@@ -18,6 +18,8 @@ class World {
   [[nodiscard]] virtual bool playing() const = 0;
   /// The role that the server granted; an observer's inputs are refused.
   [[nodiscard]] virtual transport::Role role() const = 0;
+  /// True if the outcome of every input that was sent in an earlier epoch was reported.
+  [[nodiscard]] virtual bool inputs_settled() const = 0;
   /// The wall clock of the server's host at `now_ns`; empty while it is unknown.
   [[nodiscard]] virtual std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const = 0;
 

@@ -78,6 +78,27 @@ def server_restart(stage):
             raise Failed(f"{name} applied {frames} frames of the new run")
 
 
+def killed_server_starts_again_at_once(stage):
+    """The announcement of a server that was killed keeps nobody out, not even while DDS still counts its writer as alive."""
+    dice = random.Random(os.getpid())
+    print(f"seed {os.getpid()}", flush=True)
+    stage.client("watcher", "--observe")  # knows the dead ones
+    for i in range(8):
+        name = f"life{i}"
+        stage.server(name)
+        stage.wait(lambda: stage.hashes(name) or stage.processes[name].poll() is not None, "a frame")  # noqa: B023
+        if stage.processes[name].poll() is not None:
+            raise Failed(f"server {i} ended with {stage.processes[name].returncode}")
+        time.sleep(dice.uniform(0, 1.5))
+        stage.kill(name)
+        time.sleep(dice.choice((0, 0.1, 0.3, 0.6)))
+    stage.server("last")
+    stage.wait_live(["watcher"], lambda live: live.get("frame", 0) > 30, "frame 30")
+    stage.wait(lambda: stage.hashes("last"), "a frame of the last server")
+    check_report(stage.stop("watcher"))
+    stage.stop("last")
+
+
 def killed_server_goes_on(stage):
     """The server is killed and goes on from its checkpoint: at most 1 s of the world is lost, and all play within 3 s."""
     folder = stage.folder / "checkpoints"
@@ -335,7 +356,7 @@ def reference(stage):
 MEMORY_SLACK_KB = 4096
 SCENARIOS = {
     f.__name__: f
-    for f in (two_thousand_frames, server_restart, killed_server_goes_on, standby_takes_over, hung_server_is_replaced, checkpoint_refusals, rigid, rigid_codecs,
+    for f in (two_thousand_frames, server_restart, killed_server_starts_again_at_once, killed_server_goes_on, standby_takes_over, hung_server_is_replaced, checkpoint_refusals, rigid, rigid_codecs,
               no_server, endings, emitter, reference)  # fmt: skip
 }
 

@@ -15,7 +15,13 @@ class FakePort : public transport::ClientPort {
   void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
     move(sessions, out);
   }
-  void pass_over_session(transport::PassOver until) override { passed_over.push_back(until); }
+  void pass_over_session(transport::PassOver until) override {
+    if (until == transport::PassOver::kForItsSuccessor) {
+      successor_wanted = true;
+    } else {
+      passed_over.push_back(until);
+    }
+  }
   [[nodiscard]] bool server_alive() override { return alive; }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId /*client*/) override {
@@ -69,6 +75,7 @@ class FakePort : public transport::ClientPort {
   bool alive = true;
   std::set<std::uint32_t> streams_open, snapshots_open;  ///< ids
   std::vector<transport::PassOver> passed_over;
+  bool successor_wanted = false;  ///< kForItsSuccessor was asked for
   std::vector<Epoch> opened_epochs;
   std::vector<transport::Received<transport::SessionMessage>> sessions;
   std::vector<transport::Received<transport::DeltaMessage>> deltas;

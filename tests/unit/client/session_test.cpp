@@ -371,6 +371,19 @@ TEST_F(SessionTest, AServerFromWhichNothingComesMakesRoomForAnother) {
   EXPECT_EQ(core->phase(), ClientPhase::kJoining);
 }
 
+TEST_F(SessionTest, AServerThatFallsSilentMakesRoomForItsSuccessorAlone) {
+  join();
+  for (int i = 0; i < 20; ++i) {
+    poll(40 * kMs);
+    deliver(server.advance());
+  }
+  EXPECT_FALSE(port.successor_wanted);
+  for (int i = 0; i < 45; ++i) poll(40 * kMs);
+  EXPECT_TRUE(port.successor_wanted);
+  EXPECT_TRUE(port.passed_over.empty());
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+}
+
 TEST_F(SessionTest, JoinAttemptsGoOnOverServersSoThatNoneTakesOneForServed) {
   join();
   EXPECT_EQ(core->join_attempt(), 1U);

@@ -25,6 +25,7 @@ class FakeWorld final : public World {
 
   [[nodiscard]] bool playing() const override { return plays; }
   [[nodiscard]] transport::Role role() const override { return granted; }
+  [[nodiscard]] bool inputs_settled() const override { return settled; }
   [[nodiscard]] std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const override {
     return now_ns + kSecond;
   }
@@ -41,6 +42,7 @@ class FakeWorld final : public World {
   }
 
   bool plays = true;
+  bool settled = true;
   transport::Role granted = transport::Role::kParticipant;
   Frame frame = 0;
   std::uint64_t last_input = 0;

@@ -1,5 +1,8 @@
 // Tests messages of viewers, good and bad.
+#include <map>
+
 #include "fake_world.hpp"
+#include "sdk/client/session/sent_inputs.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -161,6 +164,104 @@ TEST_F(ViewerInputs, NoMoreWaitThanCanBeToldOf) {
   const auto told = reply(id);
   EXPECT_EQ(told.entries.size(), 50U - Gateway::kMostUndecided);
   EXPECT_EQ(told.entries.front().number, Gateway::kMostUndecided + 1);
+}
+
+// What a viewer's client makes of the replies: outcome by number, the last word.
+class ViewersWord {
+ public:
+  void send(std::uint64_t count) {
+    for (std::uint64_t i = 0; i < count; ++i) inputs_.on_sent(kStart, out_);
+  }
+  void hear(const ReplyMessage& reply) { inputs_.on_reply(reply, out_); }
+  void plays(Frame frame) { inputs_.on_applied(frame, kStart, out_); }
+  void enters(Frame shared) { inputs_.carry_over(shared); }
+  [[nodiscard]] std::map<std::uint64_t, client::InputOutcome::Kind> words() const {
+    std::map<std::uint64_t, client::InputOutcome::Kind> words;
+    for (const auto& outcome : out_) words[outcome.number] = outcome.kind;
+    return words;
+  }
+
+ private:
+  client::SentInputs inputs_;
+  std::vector<client::InputOutcome> out_;
+};
+
+TEST_F(ViewerInputs, AfterATakeoverAViewerHearsWhatTheServerSaysOfItsInputs) {
+  using Kind = client::InputOutcome::Kind;
+  const ViewerId id = join(1);
+  ViewersWord viewer;
+  for (std::uint64_t number = 1; number <= 5; ++number) EXPECT_FALSE(say(id, input(1, number, push())));
+  viewer.send(5);
+  acts(1, 20);
+  acts(2, 40);
+  viewer.hear(reply(id));
+  viewer.plays(40);
+  // A server continues from frame 30: it has 3 and 5, and neither 2 nor 4.
+  auto session = fake_session(kEpoch + 1);
+  session.continues_epoch = kEpoch;
+  session.continues_frame = 30;
+  world.settled = false;
+  gateway.on_session(session);
+  viewer.enters(30);
+  auto joining = ack(1, Phase::kJoining);
+  joining.epoch = kEpoch + 1;
+  EXPECT_FALSE(say(id, joining));
+  later(kSecond);
+  EXPECT_TRUE(only<ReplyMessage>(read(id)).empty()) << "the gateway itself does not know yet";
+  gateway.on_outcome({Kind::kLost, 2, 0, 0, 0}, now_ns);
+  gateway.on_outcome({Kind::kLost, 4, 0, 0, 0}, now_ns);
+  acts(3, 31);
+  acts(5, 32);
+  world.settled = true;
+  later(kSecond);
+  const ReplyMessage first = reply(id);
+  EXPECT_EQ(first.highest_input, 1U) << "beyond it only what is listed acted";
+  viewer.hear(first);
+  viewer.plays(50);
+  EXPECT_EQ(
+      viewer.words(),
+      (std::map<std::uint64_t, Kind>{
+          {1, Kind::kActed}, {2, Kind::kLost}, {3, Kind::kActed}, {4, Kind::kLost}, {5, Kind::kActed}}));
+  EXPECT_FALSE(say(id, joining));
+  later(2 * kSecond);
+  EXPECT_EQ(reply(id).highest_input, 5U) << "from the second reply on";
+}
+
+TEST_F(ViewerInputs, AGravityThatWaitsInTheGatewayIsLostWithTheServer) {
+  const ViewerId id = join(1);
+  ViewersWord viewer;
+  for (std::uint64_t number = 1; number <= 2; ++number) EXPECT_FALSE(say(id, input(1, number)));
+  viewer.send(2);
+  ASSERT_EQ(world.sent.size(), 1U) << "the second one waits";
+  auto session = fake_session(kEpoch + 1);
+  session.continues_epoch = kEpoch;
+  session.continues_frame = 30;
+  gateway.on_session(session);
+  viewer.enters(30);
+  acts(1, 30);
+  auto joining = ack(1, Phase::kJoining);
+  joining.epoch = kEpoch + 1;
+  EXPECT_FALSE(say(id, joining));
+  later(kSecond);
+  viewer.hear(reply(id));
+  viewer.plays(50);
+  using Kind = client::InputOutcome::Kind;
+  EXPECT_EQ(viewer.words(), (std::map<std::uint64_t, Kind>{{1, Kind::kActed}, {2, Kind::kLost}}));
+  EXPECT_EQ(world.sent.size(), 1U);
+}
+
+TEST_F(ViewerInputs, OfAWorldThatBeginsAnewNothingIsCarriedOver) {
+  const ViewerId id = join(1);
+  EXPECT_FALSE(say(id, input(1, 1, push())));
+  gateway.on_session(fake_session(kEpoch + 1));
+  acts(1, 5);
+  auto joining = ack(1, Phase::kJoining);
+  joining.epoch = kEpoch + 1;
+  EXPECT_FALSE(say(id, joining));
+  later(kSecond);
+  const ReplyMessage told = reply(id);
+  EXPECT_EQ(told.highest_input, 0U);
+  EXPECT_TRUE(told.entries.empty());
 }
 
 TEST_F(ViewerInputs, OutcomesOfThoseWhoLeftAreForgotten) {

@@ -325,5 +325,28 @@ TEST_F(PlaybackTest, AFrameOfAnotherHashIsAnError) {
   EXPECT_EQ(step.error().message.substr(0, 9), "frame 4: ");
 }
 
+TEST_F(PlaybackTest, HoldsTheEventsOfTheFileByTimeAndPlaysAsWithoutThem) {
+  begin();
+  frames(3);
+  recorder->add_event("door", "it said \"no\\yes\"\nand closed", wall_ns);
+  recorder->add_event("", "nobody", wall_ns - 2 * kSecond);
+  recorder->add_event("silent", "", wall_ns);
+  frames(100);
+  recorder->add_event("late", std::string(1000, 'x'), wall_ns);
+  ASSERT_TRUE(recorder->finish());
+  const auto playback = Playback::open(path);
+  ASSERT_TRUE(playback) << playback.error().message;
+  const auto& events = (*playback)->events();
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(events[0].text, "nobody");
+  EXPECT_EQ(events[1].text, "door: it said \"no\\yes\" and closed");
+  EXPECT_EQ(events[2].text.size(), kMostEventBytes);
+  EXPECT_EQ((*playback)->time_s(events[1]), 3);
+  int played = 0;
+  ASSERT_EQ((*playback)->next(), Step::kStarted);
+  while ((*playback)->next() == Step::kFrame) ++played;
+  EXPECT_EQ(played, 103);
+}
+
 }  // namespace
 }  // namespace tandem::recording

@@ -49,6 +49,8 @@ class RecordedSourceTest : public ::testing::Test {
       wall_ns += kSecond;
       if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, {wall_ns, wall_ns});
     }
+    recorder->add_event("clock", "it is \"late\"", wall_ns - kSecond);
+    recorder->add_event("door", "closes", wall_ns - 150 * kSecond);
     EXPECT_TRUE(recorder->finish());
     fixed_bytes = recorder->totals().fixed_bytes;
   }
@@ -103,6 +105,17 @@ TEST_F(RecordedSourceTest, TellsTheGravityInForceWhereItBegins) {
   EXPECT_NE(session.gravity[1], 0) << "the recording has a drive by then";
   EXPECT_EQ(session.dt_s, playback->session().dt_s);
   EXPECT_EQ(session.continues_epoch, 0U);
+}
+
+TEST_F(RecordedSourceTest, TellsTheEventsOfTheRecordingByTime) {
+  open(60);
+  const std::string& told = source->session().scene_description;
+  const auto first = told.find("at_s: 50"), second = told.find("at_s: 199");
+  ASSERT_NE(first, std::string::npos) << told;
+  ASSERT_NE(second, std::string::npos) << told;
+  EXPECT_LT(first, second);
+  EXPECT_NE(told.find("text: \"door: closes\""), std::string::npos) << told;
+  EXPECT_NE(told.find("text: \"clock: it is \\\"late\\\"\""), std::string::npos) << told;
 }
 
 TEST_F(RecordedSourceTest, PublishesEveryFrameUnderItsOwnEpoch) {

@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { describe, expect, it } from 'vitest';
 import { parseText, readScene, SceneTextError } from '../scene_text';
-import { clock, secondsOf } from '../time_line';
+import { clock, marksOf, secondsOf } from '../time_line';
 
 const scenes = process.env.TANDEM_SCENES ?? fileURLToPath(new URL('../../../../services/scenes', import.meta.url));
 
@@ -94,6 +94,7 @@ describe('the recording of a replay', () => {
       from: 62,
       fromFrame: 1900,
       rate: 30,
+      events: [],
     });
   });
 
@@ -101,6 +102,26 @@ describe('the recording of a replay', () => {
     expect(readScene('dt_s: 0.02').recording).toBeNull();
     expect(readScene('recording { from_s: 1 frame_rate_hz: 30 }').recording).toBeNull();
     expect(readScene('recording { length_s: 1 frame_rate_hz: 0 }').recording).toBeNull();
+  });
+
+  it('has events, which are marks on the time line', () => {
+    const events = 'events { at_s: 13.05 text: "server: crashes" } events { at_s: 13.2 text: "again" } events { at_s: 500 text: "<b>" }';
+    const recording = readScene(told.replace('}', `${events} }`)).recording!;
+    expect(recording.events[0]).toEqual({ at: 13.05, text: 'server: crashes' });
+    expect(marksOf(recording)).toEqual([
+      { place: 0.1, at: 13.05, title: '0:13 server: crashes\n0:13 again' },
+      { place: 1, at: 130.5, title: '2:10 <b>' },
+    ]);
+  });
+
+  it('keeps a mark short, and the number of events bounded', () => {
+    const many = Array.from({ length: 600 }, (_, i) => `events { at_s: 1 text: "e${i}" }`).join(' ');
+    const recording = readScene(told.replace('}', `${many} }`)).recording!;
+    expect(recording.events.length).toBe(500);
+    const [mark, ...others] = marksOf(recording);
+    expect(others).toEqual([]);
+    expect(mark!.title.split('\n').length).toBe(13);
+    expect(mark!.title).toContain('… and 488 more');
   });
 
   it('tells the second of a frame', () => {
