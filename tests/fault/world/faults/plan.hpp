@@ -39,8 +39,12 @@ enum class FaultKind : std::uint8_t {
   kQuality,      ///< the operator sets other parameters
   kPreference,   ///< a client prefers another stream
   kLostForGood,  ///< what is lost is not repaired, `strength`: share; in worlds where nobody starts anew
+  kHandover,     ///< an operator asks the live server to hand over, until it has heard it
+  kHang,         ///< a server's thread stands still, and its network goes on
+  kRepeat,       ///< a client sends its last input again
+  kLastWords,    ///< a burst of inputs, and after the duration the live server is killed
 };
-inline constexpr std::size_t kFaultKinds = 28;
+inline constexpr std::size_t kFaultKinds = 32;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
