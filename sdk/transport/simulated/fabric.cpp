@@ -353,9 +353,7 @@ std::shared_ptr<const AnyMessage> Fabric::arriving(const LinkModel& model, const
   if (auto* delta = std::get_if<DeltaMessage>(&message)) bytes = &delta->payload;
   if (auto* snapshot = std::get_if<SnapshotMessage>(&message)) bytes = &snapshot->bytes;
   if (bytes == nullptr || bytes->empty()) return sample.message;
-  const std::uint64_t drawn = random_.next();
-  const bool all = truncates && (drawn >> 32U) % 4 == 0;
-  const std::size_t at = all ? 0 : drawn % bytes->size();
+  const std::size_t at = random_.next() % bytes->size();
   if (flips) (*bytes)[at] ^= std::byte{1} << (random_.next() % 8);
   if (truncates) bytes->resize(at);
   ++counts_.damaged;

@@ -25,15 +25,14 @@ T must(Result<T> result) {
 /// Bodies that appear, fall and are removed, so that slots are used again.
 engine::World fountain(Dice& dice) {
   engine::World world;
-  // Some have snapshots of several parts.
-  world.capacity =
-      40 + static_cast<std::uint32_t>(dice.chance(0.2) ? 300 + dice.below(1200) : dice.below(60));
+  const bool large = dice.chance(0.12);  // snapshots have several parts
+  world.capacity = static_cast<std::uint32_t>(large ? 400 + dice.below(600) : 40 + dice.below(60));
   world.seed = dice.next();
   world.types = {{0.3F, 1}};
   world.low = {-20, -20, -20};
   world.high = {20, 20, 20};
   world.planes = {{{0, 1, 0}, -2}};
-  world.emitters = {{{-3, 3, -3}, {3, 4, 3}, {0, 2, 0}, dice.uniform(5, 25), 0}};
+  world.emitters = {{{-3, 3, -3}, {3, 4, 3}, {0, 2, 0}, dice.uniform(5, 25) * (large ? 20 : 1), 0}};
   world.regions = {{{-20, -3, -20}, {20, -1.2F, 20}, engine::Region::Action::kRemove, {}, 0}};
   return world;
 }

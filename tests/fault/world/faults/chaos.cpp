@@ -32,7 +32,7 @@ bool harmless(FaultKind kind) {
   return kind == FaultKind::kForge || kind == FaultKind::kBurst || kind == FaultKind::kNewcomer ||
          kind == FaultKind::kQuality || kind == FaultKind::kSlowDisk || kind == FaultKind::kFullDisk ||
          kind == FaultKind::kLostFsync || kind == FaultKind::kTornWrite || kind == FaultKind::kHandover ||
-         kind == FaultKind::kRepeat;
+         kind == FaultKind::kRepeat || kind == FaultKind::kSquat;
 }
 
 void worsen(LinkModel& link, const Fault& fault, const std::shared_ptr<Bottleneck>& bottleneck) {
@@ -57,6 +57,10 @@ void worsen(LinkModel& link, const Fault& fault, const std::shared_ptr<Bottlenec
       break;
     case FaultKind::kTruncate:
       link.truncated = std::max(link.truncated, fault.strength);
+      if (fault.salt % 4 != 0) {  // so that parts come one by one, and twice
+        link.loss = std::max(link.loss, 0.3);
+        link.delay_ns += 150 * kMs;
+      }
       break;
     case FaultKind::kLostForGood:
       link.loss = std::max(link.loss, 0.1);
@@ -128,6 +132,11 @@ void Chaos::turn() {
 }
 
 void Chaos::speak(Active& active) {
+  if (active.fault.kind == FaultKind::kSquat) {
+    active.forger->squat();
+    active.speaks_at_ns = stage_.now_ns + 10 * kMs;
+    return;
+  }
   if (active.forger != nullptr) {
     active.forger->speak();
     active.speaks_at_ns = stage_.now_ns + seconds(1 / std::max(1.0, active.fault.strength * 10));
@@ -226,6 +235,9 @@ void Chaos::begin(const Fault& fault) {
     case FaultKind::kLastWords:
       whom.burst(static_cast<std::uint32_t>(fault.strength));
       break;
+    case FaultKind::kSquat:
+      active.until_ns = INT64_MAX;
+      [[fallthrough]];
     case FaultKind::kForge:
       active.forger = std::make_unique<Forger>(stage_, fault.salt);
       active.speaks_at_ns = stage_.now_ns;
@@ -273,7 +285,13 @@ void Chaos::end(const Active& active) {
 void Chaos::heal() {
   healed_ = true;
   stage_.journal.add(stage_.now_ns, "faults", "end");
-  for (Active& active : std::exchange(active_, {})) end(active);
+  for (Active& active : std::exchange(active_, {})) {
+    if (active.until_ns == INT64_MAX) {
+      active_.push_back(std::move(active));
+    } else {
+      end(active);
+    }
+  }
   each_server([&](Server& any) { any.keep_next_write_whole(); });
   set_links();
   for (std::size_t i = 0; i < newcomers_from_; ++i)

@@ -34,8 +34,8 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"duplicate", 0.5, 0.2, 6, 0.05, 1},
     {"thin", 0.7, 0.5, 8, 100, 1000},
     {"flip", 0.7, 0.2, 4, 0.001, 0.2},
-    {"truncate", 0.7, 0.2, 4, 0.001, 0.2},
-    {"forge", 0.7, 0.2, 25, 1, 40},
+    {"truncate", 2, 0.5, 8, 0.001, 0.3},
+    {"forge", 0.7, 0.2, 10, 1, 40},
     {"slow-disk", 0.7, 0.5, 8, 0.02, 3},
     {"full-disk", 0.7, 0.2, 6, 0, 0},
     {"lost-fsync", 0.7, 0.2, 6, 0, 0},
@@ -52,6 +52,7 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"hang", 0.7, 0.3, 6, 0, 0},
     {"repeat", 0.7, 0, 0, 0, 0},
     {"last-words", 0.5, 0.002, 0.1, 30, 120},
+    {"squat", 0.4, 0, 0, 0, 0},
 }};
 
 /// Somebody starts anew: then an announcement must not be lost for good, as nobody repeats it.

@@ -25,7 +25,7 @@ enum class FaultKind : std::uint8_t {
   kDuplicate,
   kThin,      ///< a bottleneck of 100 to 1000 kbit/s
   kFlip,      ///< bits of deltas and snapshots
-  kTruncate,  ///< deltas and snapshots
+  kTruncate,  ///< deltas and snapshots; mostly on a long link that loses
   kForge,     ///< a participant of the session sends arbitrary samples under all names
   kSlowDisk,  ///< `strength`: seconds for a checkpoint
   kFullDisk,
@@ -43,8 +43,9 @@ enum class FaultKind : std::uint8_t {
   kHang,         ///< a server's thread stands still, and its network goes on
   kRepeat,       ///< a client sends its last input again
   kLastWords,    ///< a burst of inputs, and after the duration the live server is killed
+  kSquat,        ///< until the world ends, a participant says it is each client that a server knows
 };
-inline constexpr std::size_t kFaultKinds = 32;
+inline constexpr std::size_t kFaultKinds = 33;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
