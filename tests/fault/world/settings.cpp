@@ -106,7 +106,7 @@ std::string text_of(const Settings& settings) {
   for (const std::string& codec : settings.codecs) codecs += (codecs.empty() ? "" : ", ") + codec;
   std::string standbys;
   for (const std::uint32_t rank : settings.ranks) standbys += ", a standby of rank " + std::to_string(rank);
-  if (settings.swaps) standbys += " (the others after them)";
+  if (settings.swaps) standbys += " (who is replaced stands by)";
   char text[320];
   std::snprintf(
       text, sizeof text,

@@ -28,7 +28,7 @@ struct Stage {
   transport::simulated::Network network;
   Truth truth;
   Journal journal;
-  std::vector<const Server*> servers;
+  std::vector<const Server*> servers;  ///< live or not
   std::int64_t now_ns = 0;
   std::optional<Finding> finding;
   std::uint64_t changes = 0;  ///< processes that were started or ended: links have to be set anew

@@ -69,7 +69,6 @@ class World {
     const auto first_id = [&] { return dice.next() | 1U; };
     const auto add_server = [&](const std::string& name, std::uint32_t rank) {
       auto server = std::make_unique<Server>(stage_, name, first_id(), rank);
-      service_.add(*server);
       stage_.servers.push_back(server.get());
       cast_.push_back(std::move(server));
     };

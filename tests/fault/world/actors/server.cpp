@@ -62,7 +62,7 @@ bool Server::runs() const { return up() && host_ && host_->state() == host::Host
 void Service::look() {
   const Server* live = nullptr;
   int running = 0;
-  for (const Server* server : servers_) {
+  for (const Server* server : stage_.servers) {
     if (!server->runs()) continue;
     ++running;
     live = server;
@@ -390,8 +390,7 @@ void Server::note_frame() {
   if (keeper_->writing() && !write_at_ns_) write_at_ns_ = stage_.now_ns + disk_delay_ns_;
 }
 
-// One that prepares a handover goes on after 10 s at the latest, and one that waits for its successor after 3
-// s.
+// One that prepares a handover gives up after 10 s, and one that waits for its successor after 3 s.
 std::int64_t Server::longest_wait_ns() const {
   const bool may_wait = stage_.now_ns - stage_.handover_ns < 14 * kSecond;
   return may_wait ? Rules::kHandoverNs + Rules::kStallNs : Rules::kStallNs;

@@ -114,7 +114,6 @@ class Server final : public Actor {
 class Service {
  public:
   explicit Service(const Stage& stage) : stage_(stage) {}
-  void add(const Server& server) { servers_.push_back(&server); }
   /// Call after each turn of the world.
   void look();
   /// How long that one has been there, and nothing was wrong with it; 0 while there is none or another.
@@ -124,7 +123,6 @@ class Service {
 
  private:
   const Stage& stage_;
-  std::vector<const Server*> servers_;
   const Server* live_ = nullptr;
   Epoch epoch_ = 0;
   std::int64_t since_ns_ = 0;

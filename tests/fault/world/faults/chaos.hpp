@@ -18,7 +18,7 @@ using Cast = std::vector<std::unique_ptr<Actor>>;
 
 class Chaos {
  public:
-  /// Faults end at `heal_at_ns`, the latest. All must outlive it.
+  /// Faults end at `heal_at_ns`, the latest, but for squatters. All must outlive it.
   Chaos(Stage& stage, Cast& cast, std::size_t newcomers_from, const Plan& plan, std::int64_t heal_at_ns);
 
   /// The time at which turn() has something to do.
