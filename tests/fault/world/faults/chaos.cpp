@@ -32,7 +32,7 @@ bool harmless(FaultKind kind) {
   return kind == FaultKind::kForge || kind == FaultKind::kBurst || kind == FaultKind::kNewcomer ||
          kind == FaultKind::kQuality || kind == FaultKind::kSlowDisk || kind == FaultKind::kFullDisk ||
          kind == FaultKind::kLostFsync || kind == FaultKind::kTornWrite || kind == FaultKind::kHandover ||
-         kind == FaultKind::kRepeat || kind == FaultKind::kSquat;
+         kind == FaultKind::kRepeat || kind == FaultKind::kSquat || kind == FaultKind::kLastWords;
 }
 
 void worsen(LinkModel& link, const Fault& fault, const std::shared_ptr<Bottleneck>& bottleneck) {
@@ -233,7 +233,7 @@ void Chaos::begin(const Fault& fault) {
       active.speaks_at_ns = stage_.now_ns + 100 * kMs;
       break;
     case FaultKind::kLastWords:
-      whom.burst(static_cast<std::uint32_t>(fault.strength));
+      for (const auto& any : cast_) any->burst(static_cast<std::uint32_t>(fault.strength));
       break;
     case FaultKind::kSquat:
       active.until_ns = INT64_MAX;

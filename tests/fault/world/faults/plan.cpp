@@ -51,7 +51,7 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"handover", 0.7, 0.3, 2, 0, 0},
     {"hang", 0.7, 0.3, 6, 0, 0},
     {"repeat", 0.7, 0, 0, 0, 0},
-    {"last-words", 0.5, 0.002, 0.1, 30, 120},
+    {"last-words", 1, 0.005, 0.12, 10, 120},
     {"squat", 0.4, 0, 0, 0, 0},
 }};
 

@@ -42,7 +42,7 @@ enum class FaultKind : std::uint8_t {
   kHandover,     ///< an operator asks the live server to hand over, until it has heard it
   kHang,         ///< a server's thread stands still, and its network goes on
   kRepeat,       ///< a client sends its last input again
-  kLastWords,    ///< a burst of inputs, and after the duration the live server is killed
+  kLastWords,    ///< a burst of inputs of everybody, and after the duration the live server is killed
   kSquat,        ///< until the world ends, a participant says it is each client that a server knows
 };
 inline constexpr std::size_t kFaultKinds = 33;
