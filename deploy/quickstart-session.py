@@ -222,7 +222,7 @@ class View(Session):
         """The address to open in a browser."""
         if not self.options.lan:
             return f"http://localhost:{self.options.port}/"
-        return f"https://{lan_address()}:{self.options.port}/?token={self.token}"
+        return f"https://{lan_address()}:{self.options.port}/#token={self.token}"
 
     def plays(self):
         """Whether the gateway follows the session."""

@@ -85,11 +85,15 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   commandline::Program app{"Serves a session to browsers, over HTTP and WebSocket.", "tandem-gateway"};
   app.version("tandem-gateway " TANDEM_VERSION);
   app.footer(
-      "Paths: / the viewer, /tandem the WebSocket, /healthz the state as JSON. Exit codes: 0 done, 1 failed, "
-      "2 wrong usage. SIGINT and SIGTERM stop the gateway cleanly.");
+      "Paths: / the viewer, /tandem the WebSocket, /login takes a token, /healthz the state as JSON. Exit codes: "
+      "0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop the gateway cleanly; SIGHUP makes it read tokens, "
+      "keys and certificate again.");
   Options options;
   app.add_option("--session", options.session, "Name of the session").show_default();
   app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
+  app.add_option("--profile", options.profile, transport::kProfileHelp).check([](const std::string& text) {
+    return transport::refusal_of_profile(text, transport::Side::kClient);
+  });
   app.add_option(
          "--prefer", options.prefer,
          "The stream that all viewers play: a stream's name, or auto, bandwidth, computing or error, as in "
@@ -105,8 +109,12 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "Folder with the viewer's files, which are read once at the start [" TANDEM_VIEWER_INSTALL_DIR
       " if it is installed]");
   app.add_option(
+      "--token-key", options.token_keys,
+      "File with the public key of tokens that viewers must give, which `tandem pki token` makes with "
+      "a role and an expiry. Repeatable [the systemd credential token-key, if there is one]");
+  app.add_option(
       "--token-file", options.token_file,
-      "File whose first line is a token that viewers must give: ?token=TOKEN [the systemd credential "
+      "File whose first line is a token that lets viewers act, without expiry [the systemd credential "
       "token, if there is one]");
   app.add_option("--tls-cert", options.web.tls_cert,
                  "Certificate chain, PEM [the systemd credential tls-cert]");
@@ -114,7 +122,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option(
       "--origin", options.origins,
       "Origin whose pages may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that this "
-      "gateway served at an IP address may always connect");
+      "gateway served at an IP address may always connect. Listed origins may also show the viewer in a frame");
   std::string metrics;
   app.add_option("--metrics", metrics,
                  "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and "
@@ -144,6 +152,9 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   add_doors(app, options.web);
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
   if (options.token_file.empty()) options.token_file = credential("token");
+  if (const std::string key = credential("token-key"); options.token_keys.empty() && !key.empty())
+    options.token_keys = {key};
+  options.web.origins = options.origins;
   if (options.web.tls_cert.empty() && options.web.tls_key.empty()) {
     options.web.tls_cert = credential("tls-cert");
     options.web.tls_key = credential("tls-key");

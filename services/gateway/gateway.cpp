@@ -85,13 +85,19 @@ void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_n
   tell(verdicts_, now_ns);
 }
 
-std::optional<ViewerId> Gateway::admit(std::shared_ptr<accounts::TokenBucket> inputs) {
+std::optional<ViewerId> Gateway::admit(std::shared_ptr<accounts::TokenBucket> inputs, bool may_act) {
   if (viewers_.size() >= limits_.viewers) return std::nullopt;
-  ++last_id_;
-  viewers_[last_id_].id = last_id_;
-  viewers_[last_id_].address_inputs = std::move(inputs);
+  Viewer& viewer = viewers_[++last_id_];
+  viewer.id = last_id_;
+  viewer.may_act = may_act;
+  viewer.address_inputs = std::move(inputs);
   ++counts_.joined;
   return last_id_;
+}
+
+InputTally Gateway::take_tally(ViewerId id) {
+  const auto found = viewers_.find(id);
+  return found == viewers_.end() ? InputTally() : std::exchange(found->second.tally, {});
 }
 
 void Gateway::leave(ViewerId id) { counts_.left += viewers_.erase(id); }
@@ -193,7 +199,8 @@ OutgoingPtr Gateway::reply(Viewer& viewer, std::int64_t now_ns) const {
   reply.epoch = session_->epoch;
   reply.role = role_of(viewer);
   reply.phase = state.phase;
-  const bool demoted = reply.role != state.wanted && state.phase == transport::Phase::kPlaying;
+  const bool demoted =
+      viewer.may_act && reply.role != state.wanted && state.phase == transport::Phase::kPlaying;
   const Reason standing = demoted ? Reason::kDemoted : Reason::kNone;
   reply.reason = static_cast<std::uint32_t>(state.once != Reason::kNone ? state.once : standing);
   reply.highest_input = state.decided();

@@ -50,8 +50,9 @@ class Gateway {
 
   // What viewers do.
   /// Adds a connection; returns nothing if there are too many. `inputs` limits the inputs of all viewers that
-  /// share it.
-  [[nodiscard]] std::optional<ViewerId> admit(std::shared_ptr<accounts::TokenBucket> inputs = nullptr);
+  /// share it. A viewer that may not act is an observer.
+  [[nodiscard]] std::optional<ViewerId> admit(std::shared_ptr<accounts::TokenBucket> inputs = nullptr,
+                                              bool may_act = true);
   void leave(ViewerId id);
   /// Takes one message. Untrusted. Returns why the connection has to end, if it has to.
   [[nodiscard]] std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message,
@@ -68,6 +69,9 @@ class Gateway {
   void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
   /// Lists the viewers that have to be disconnected because they acknowledge nothing. Replaces `out`.
   void list_silent(std::int64_t now_ns, std::vector<ViewerId>& out);
+
+  /// What a viewer's inputs became since the last call; empty without such a viewer.
+  [[nodiscard]] InputTally take_tally(ViewerId id);
 
   // What happens in the session.
   /// The session that is followed, with the stream that is played. All that belongs to another epoch is
@@ -116,8 +120,8 @@ class Gateway {
                                         std::int64_t now_ns) const;
   [[nodiscard]] transport::Role role_of(const Viewer& viewer) const;
   void tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now_ns);
-  void refuse_input(Viewer& viewer, std::uint64_t number, transport::Reason reason, std::int64_t now_ns,
-                    const std::string& text = {});
+  void refuse_input(Viewer& viewer, const InputMerger::Claim& claim, transport::Reason reason,
+                    std::int64_t now_ns, const std::string& text = {});
 
   Limits limits_;
   World& world_;

@@ -14,6 +14,11 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
     page.count("tandem_gateway_refusals_total", "Connections that were refused or ended, by reason",
                static_cast<double>(counts.refused[i]), {{"reason", std::string(kClosings[i].label)}});
   }
+  for (std::size_t i = 0; i < kTurnedAwayLabels.size(); ++i) {
+    page.count("tandem_gateway_turned_away_total",
+               "Connections and requests that were turned away before they were a viewer's, by reason",
+               static_cast<double>(counts.turned_away[i]), {{"reason", std::string(kTurnedAwayLabels[i])}});
+  }
   count("tandem_gateway_sent_messages_total", "Messages to viewers", counts.messages);
   count("tandem_gateway_sent_bytes_total", "Bytes of messages to viewers", counts.bytes);
   count("tandem_gateway_snapshots_total", "Snapshots made for viewers", counts.snapshots);

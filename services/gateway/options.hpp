@@ -15,12 +15,14 @@ namespace tandem::gateway {
 
 struct Options {
   std::uint32_t domain = 0;
+  std::string profile = {};  ///< of the network (deploy/dds); empty: CYCLONEDDS_URI decides
   std::string session = "default";
   std::string prefer = "computing";  ///< chooses the stream that all viewers play; see CoreOptions
   WebOptions web;
   Limits limits;
-  std::string viewer;      ///< folder of its files; empty: none
-  std::string token_file;  ///< empty: no token
+  std::string viewer;                   ///< folder of its files; empty: none
+  std::string token_file;               ///< a text that lets viewers act; empty: none
+  std::vector<std::string> token_keys;  ///< files with public keys of signed tokens
   std::vector<std::string> origins;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
   logging::Options log;

@@ -21,6 +21,10 @@ enum class Refusal : std::uint8_t {
   kSilent,
   kAddressJoins,
   kAddressBytes,
+  kTokenExpired,
+  kTokenEarly,
+  kTokenRole,
+  kTokenSession,
 };
 
 struct Closing {
@@ -29,7 +33,7 @@ struct Closing {
   std::string_view label;   ///< of its count in metrics
 };
 
-inline constexpr std::array<Closing, 12> kClosings{{
+inline constexpr std::array<Closing, 16> kClosings{{
     {4001, "token missing or wrong", "token"},
     {4002, "origin not allowed", "origin"},
     {4003, "too many viewers", "full"},
@@ -42,6 +46,10 @@ inline constexpr std::array<Closing, 12> kClosings{{
     {4009, "nothing was acknowledged for too long", "silent"},
     {4010, "too many connections or joins from this address", "address_connections"},
     {4011, "too many bytes from this address", "address_bytes"},
+    {4001, "token expired", "token_expired"},
+    {4001, "token not valid yet: is a clock wrong?", "token_early"},
+    {4001, "token of a role that does not exist", "token_role"},
+    {4001, "token of another session", "token_session"},
 }};
 
 [[nodiscard]] constexpr const Closing& closing(Refusal refusal) {

@@ -116,6 +116,7 @@ void Gateway::on_joining(Viewer& viewer, const transport::AckMessage& ack, std::
 void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t now_ns) {
   ++counts_.inputs;
   Viewer::InEpoch& state = viewer.now;
+  const InputMerger::Claim claim{viewer.id, input.number, input.kind};
   if (!session_ || input.epoch != session_->epoch) {
     ++counts_.inputs_refused;
     state.once = Reason::kStaleEpoch;
@@ -126,16 +127,19 @@ void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t
     // The first outcome of a number is the one that counts.
     const bool first =
         !state.outcomes.has(input.number) && !std::ranges::binary_search(state.undecided, input.number);
-    if (first) refuse_input(viewer, input.number, Reason::kDuplicate, now_ns);
+    if (first) refuse_input(viewer, claim, Reason::kDuplicate, now_ns);
     return;
   }
   state.highest = input.number;
   if (const Reason reason = check(viewer, input, now_ns); reason != Reason::kNone) {
-    refuse_input(viewer, input.number, reason, now_ns);
+    const bool by_token = reason == Reason::kObserver && !viewer.may_act;
+    refuse_input(viewer, claim, reason, now_ns,
+                 by_token ? "the token's role is watch, so no " + std::string(input_kind_name(input.kind)) +
+                                " is taken"
+                          : std::string());
     return;
   }
   state.undecided.push_back(input.number);
-  const InputMerger::Claim claim{viewer.id, input.number};
   merger_.add(claim, std::move(input), world_, now_ns, verdicts_);
   tell(verdicts_, now_ns);
 }
@@ -144,6 +148,7 @@ Reason Gateway::check(Viewer& viewer, const transport::InputMessage& input, std:
   const Viewer::InEpoch& state = viewer.now;
   if (!viewer.inputs.take(now_ns)) return Reason::kRateLimited;
   if (viewer.address_inputs && !viewer.address_inputs->take(now_ns)) return Reason::kRateLimited;
+  if (!viewer.may_act) return Reason::kObserver;
   if (state.phase != Phase::kPlaying || !world_.playing()) return Reason::kNotPlaying;
   if (state.wanted == Role::kObserver) return Reason::kObserver;
   if (world_.role() == Role::kObserver) return Reason::kDemoted;
@@ -154,14 +159,17 @@ Reason Gateway::check(Viewer& viewer, const transport::InputMessage& input, std:
 }
 
 Role Gateway::role_of(const Viewer& viewer) const {
-  return world_.role() == Role::kObserver ? Role::kObserver : viewer.now.wanted;
+  return world_.role() == Role::kObserver || !viewer.may_act ? Role::kObserver : viewer.now.wanted;
 }
 
-void Gateway::refuse_input(Viewer& viewer, std::uint64_t number, Reason reason, std::int64_t now_ns,
-                           const std::string& text) {
+void Gateway::refuse_input(Viewer& viewer, const InputMerger::Claim& claim, Reason reason,
+                           std::int64_t now_ns, const std::string& text) {
   ++counts_.inputs_refused;
-  viewer.now.outcomes.add({.number = number, .frame = 0, .code = static_cast<std::uint32_t>(reason)}, now_ns,
-                          text);
+  InputCount& count = viewer.tally[input_kind_name(claim.kind)];
+  ++count.refused;
+  count.reason = reason;
+  viewer.now.outcomes.add({.number = claim.number, .frame = 0, .code = static_cast<std::uint32_t>(reason)},
+                          now_ns, text);
   viewer.now.reply.on_outcome();
 }
 
@@ -174,8 +182,9 @@ void Gateway::tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now
     viewer.now.reply.on_outcome();
     if (!verdict.known) continue;
     if (verdict.reason != Reason::kNone) {
-      refuse_input(viewer, verdict.claim.number, verdict.reason, now_ns, verdict.text);
+      refuse_input(viewer, verdict.claim, verdict.reason, now_ns, verdict.text);
     } else {
+      ++viewer.tally[input_kind_name(verdict.claim.kind)].acted;
       viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.frame, .code = 0}, now_ns);
     }
   }

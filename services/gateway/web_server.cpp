@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <map>
 #include <unordered_map>
@@ -13,7 +14,9 @@
 
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/gateway/doors/certificate.hpp"
 #include "services/gateway/doors/listener.hpp"
+#include "services/gateway/web_request.hpp"
 #include "services/system/descriptor.hpp"
 
 namespace tandem::gateway {
@@ -40,30 +43,18 @@ constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
                                      .secs_since_valid_hangup = 45,
                                      .jitter_percent = 0};
 
-std::string header(lws* wsi, lws_token_indexes token) {
-  std::string text(static_cast<std::size_t>(std::max(lws_hdr_total_length(wsi, token), 0)) + 1, '\0');
-  const int size = lws_hdr_copy(wsi, text.data(), static_cast<int>(text.size()), token);
-  text.resize(static_cast<std::size_t>(std::max(size, 0)));
-  return text;
-}
-
-/// Whether a list of subprotocols, with commas and spaces between them, has this one.
-bool names(std::string_view list, std::string_view wanted) {
-  while (!list.empty()) {
-    const std::size_t size = std::min(list.find_first_of(", \t"), list.size());
-    if (list.substr(0, size) == wanted) return true;
-    list.remove_prefix(std::min(size + 1, list.size()));
-  }
-  return false;
-}
-
 using transport::steady_ns;
+
+std::int64_t wall_s() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
 
 /// One connection from its start on. Handshake: until the headers of the first request are there.
 struct Visit {
   lws* wsi = nullptr;
-  AccountPtr account;  // of the peer, or of the client behind a trusted proxy
-  AddressKey peer{};
+  AccountPtr account;               // of the peer, or of the client behind a trusted proxy
+  AddressKey peer{}, client{};      // the client is another one behind a trusted proxy
   bool counted = false;             // in `account`
   bool greeted = false;             // has shaken hands
   bool waits_for_bytes = false;     // a file goes on when its address may have more
@@ -104,7 +95,10 @@ struct WebServer::Impl {
         listener(std::move(the_listener)),
         doors(options.doors),
         most(options.connections),
-        encrypted(!options.tls_cert.empty()) {
+        encrypted(!options.tls_cert.empty()),
+        tls_cert(options.tls_cert),
+        tls_key(options.tls_key),
+        heads(options.origins) {
     for (const std::string& proxy : options.trusted_proxies) {
       if (const auto key = address_key(proxy)) trusted.push_back(*key);
     }
@@ -138,7 +132,8 @@ struct WebServer::Impl {
   // HTTP
   int respond(lws* wsi, void* user, std::string_view path);
   int send_head(lws* wsi, void* user, unsigned status, std::string_view type, std::string_view cache,
-                bool compressed);
+                bool compressed, std::string_view cookie = {});
+  int log_in(lws* wsi, void* user);
   int send_body(lws* wsi, void* user);
   static int complete(lws* wsi);
   static int confirm_upgrade(lws* wsi);
@@ -151,7 +146,10 @@ struct WebServer::Impl {
   static int end(lws* wsi, Refusal refusal);
   void ask_to_write();
   void let_go();
+  void end_viewer(ViewerId id, Refusal why);
   void end_silent();
+  void end_over();
+  [[nodiscard]] Result<std::string> read_certificate();
 
   struct Tick {
     lws_sorted_usec_list_t sul{};  // first, because libwebsockets hands back its address
@@ -164,6 +162,9 @@ struct WebServer::Impl {
   Doors doors;
   const std::size_t most;  // connections
   const bool encrypted;
+  const std::string tls_cert, tls_key;
+  const SafeHeads heads;
+  ssl_ctx_st* tls = nullptr;  // of libwebsockets
   std::vector<AddressKey> trusted;
   accounts::TokenBucket told = kTold;
   std::map<const Visit*, std::unique_ptr<Visit>> visits;
@@ -196,6 +197,7 @@ void WebServer::Impl::arrive(system::Descriptor connection, const sockaddr_stora
   auto made = std::make_unique<Visit>();
   Visit& by = *made;
   by.peer = address_key(reinterpret_cast<const sockaddr&>(peer)).value_or(AddressKey{});
+  by.client = by.peer;
   by.account = doors.of(by.peer);
   by.due_ns = now_ns + kHandshakeSeconds * kSecond;
   if (visits.size() >= most) return turn_away(connection, TurnedAway::kFull);
@@ -232,7 +234,8 @@ void WebServer::Impl::greet(Visit& visit) {
 void WebServer::Impl::find_account(lws* wsi) {
   Visit& by = visit(wsi);
   if (by.counted) return;
-  by.account = doors.of(client_address(by.peer, header(wsi, WSI_TOKEN_X_FORWARDED_FOR), trusted));
+  by.client = client_address(by.peer, header(wsi, WSI_TOKEN_X_FORWARDED_FOR), trusted);
+  by.account = doors.of(by.client);
 }
 
 void WebServer::Impl::leave(const Visit* visit) {
@@ -258,7 +261,7 @@ int WebServer::Impl::complete(lws* wsi) {
 }
 
 int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::string_view type,
-                               std::string_view cache, bool compressed) {
+                               std::string_view cache, bool compressed, std::string_view cookie) {
   std::array<unsigned char, LWS_PRE + kMostHeaderBytes> buffer{};
   unsigned char* const start = buffer.data() + LWS_PRE;
   unsigned char* const end = buffer.data() + buffer.size() - 1;
@@ -269,16 +272,36 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
                                        static_cast<int>(value.size()), &at, end) == 0;
   };
   const Exchange& exchange = *slot<Exchange>(user);
-  // The address of a page may contain its token.
+  const bool strict = encrypted && !is_address(header(wsi, WSI_TOKEN_HOST));
   const bool good = lws_add_http_common_headers(wsi, status, std::string(type).c_str(), exchange.body.size(),
                                                 &at, end) == 0 &&
-                    add("x-content-type-options:", "nosniff") && add("referrer-policy:", "no-referrer") &&
                     add("cache-control:", cache) && (!compressed || add("content-encoding:", "gzip")) &&
+                    (cookie.empty() || add("set-cookie:", cookie)) &&
+                    (!strict || add("strict-transport-security:", kStrictTransport)) &&
                     lws_finalize_write_http_header(wsi, start, &at, end) == 0;
   if (!good) return -1;
   if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty()) return complete(wsi);
   lws_callback_on_writable(wsi);
   return 0;
+}
+
+// The page hands over the token of its address, and has the browser show it from then on.
+int WebServer::Impl::log_in(lws* wsi, void* user) {
+  Exchange& exchange = *slot<Exchange>(user);
+  const std::string token = token_of(wsi);
+  const auto pass = handler.look_at(token);
+  if (!pass) {
+    handler.refused(pass.error());
+    exchange.own = std::string(closing(pass.error()).reason) + '\n';
+  } else {
+    exchange.own = pass->may_act ? "act\n" : "watch\n";
+  }
+  exchange.body = exchange.own;
+  if (!pass) return send_head(wsi, user, HTTP_STATUS_UNAUTHORIZED, "text/plain", "no-store", false);
+  const bool safe = encrypted || (is_trusted(visit(wsi).peer) && proxy_says_https(wsi));
+  const std::int64_t lasts_s = pass->over_s == 0 ? 0 : std::max<std::int64_t>(pass->over_s - wall_s(), 1);
+  const std::string cookie = pass->key == 0 ? "" : cookie_of(wsi, token, lasts_s, safe);
+  return send_head(wsi, user, HTTP_STATUS_OK, "text/plain", "no-store", false, cookie);
 }
 
 int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
@@ -297,6 +320,7 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
   }
   if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
   if (path == "/healthz") return say(HTTP_STATUS_OK, handler.health(), "application/json");
+  if (path == "/login") return log_in(wsi, user);
   const Site::File* file = site.find(path);
   if (file == nullptr) return say(HTTP_STATUS_NOT_FOUND, "not found\n", "text/plain");
   const bool compressed =
@@ -329,6 +353,9 @@ int WebServer::Impl::send_body(lws* wsi, void* user) {
 
 int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len) {
   switch (reason) {
+    case LWS_CALLBACK_OPENSSL_LOAD_EXTRA_SERVER_VERIFY_CERTS:
+      of(wsi).tls = static_cast<ssl_ctx_st*>(user);
+      return 0;
     case LWS_CALLBACK_RAW_RX_FILE:
       of(wsi).take_arrivals();
       return 0;
@@ -371,11 +398,9 @@ int WebServer::Impl::confirm_upgrade(lws* wsi) {
 int WebServer::Impl::open(lws* wsi, void* user) {
   Handler::Request request{.origin = header(wsi, WSI_TOKEN_ORIGIN),
                            .host = header(wsi, WSI_TOKEN_HOST),
-                           .token = {},
+                           .token = token_of(wsi),
+                           .address = {},
                            .inputs = {}};
-  std::array<char, 256> token{};
-  if (const char* given = lws_get_urlarg_by_name(wsi, "token=", token.data(), static_cast<int>(token.size())))
-    request.token = given;
   auto connection = std::make_unique<Connection>();
   Visit& by = visit(wsi);
   if (!by.counted) {
@@ -384,6 +409,7 @@ int WebServer::Impl::open(lws* wsi, void* user) {
   }
   connection->account = by.account;
   request.inputs = {by.account, &by.account->inputs};
+  request.address = address_text(by.client);
   if (!by.counted || !by.account->joins.take(steady_ns())) {
     connection->refused = Refusal::kAddressJoins;
     handler.refused(*connection->refused);
@@ -464,20 +490,34 @@ void WebServer::Impl::ask_to_write() {
 }
 
 // A viewer that takes nothing takes no close frame either, so its time is limited.
+void WebServer::Impl::end_viewer(ViewerId id, Refusal why) {
+  const auto found = connections.find(id);
+  if (found == connections.end()) return;
+  lws* const wsi = found->second;
+  slot<Connection>(lws_wsi_user(wsi))->refused = why;
+  handler.refused(why);
+  connections.erase(found);
+  handler.closed(id);
+  lws_set_timeout(wsi, PENDING_TIMEOUT_CLOSE_SEND, kRefusedSeconds);
+  lws_callback_on_writable(wsi);
+}
+
 void WebServer::Impl::end_silent() {
   handler.list_silent(ids);
-  for (const ViewerId id : ids) {
-    const auto found = connections.find(id);
-    if (found == connections.end()) continue;
-    lws* const wsi = found->second;
-    Connection& connection = *slot<Connection>(lws_wsi_user(wsi));
-    connection.refused = Refusal::kSilent;
-    handler.refused(Refusal::kSilent);
-    connections.erase(found);
-    handler.closed(id);
-    lws_set_timeout(wsi, PENDING_TIMEOUT_CLOSE_SEND, kRefusedSeconds);
-    lws_callback_on_writable(wsi);
-  }
+  for (const ViewerId id : ids) end_viewer(id, Refusal::kSilent);
+}
+
+void WebServer::Impl::end_over() {
+  std::vector<std::pair<ViewerId, Refusal>> over;
+  handler.list_over(over);
+  for (const auto& [id, why] : over) end_viewer(id, why);
+}
+
+Result<std::string> WebServer::Impl::read_certificate() {
+  if (!encrypted) return std::string();
+  const auto read = Certificate::read(tls_cert, tls_key, wall_s());
+  if (!read) return tl::unexpected(read.error());
+  return read->use(tls).map([&] { return read->until(); });
 }
 
 // They take no close frame either.
@@ -520,13 +560,16 @@ int WebServer::Impl::on_socket(lws* wsi, lws_callback_reasons reason, void* user
 
 void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
   Impl& self = *reinterpret_cast<Tick*>(sul)->self;
-  self.handler.tick();
+  if (self.handler.tick()) self.handler.reloaded(self.read_certificate());
   self.ask_to_write();
   self.let_go();
   self.end_silent();
   const std::int64_t now_ns = steady_ns();
   self.end_slow(now_ns);
-  if (self.ticks++ % 10 == 0) self.doors.forget(now_ns);
+  if (self.ticks++ % 10 == 0) {
+    self.doors.forget(now_ns);
+    self.end_over();
+  }
   lws_rx_flow_control(self.entrance, LWS_RXFLOW_REASON_APPLIES_ENABLE | LWS_RXFLOW_REASON_USER_BOOL |
                                          LWS_RXFLOW_REASON_FLAG_PROCESS_NOW);
   lws_sul_schedule(self.context, 0, sul, on_tick, 100 * LWS_US_PER_MS);
@@ -534,6 +577,11 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
 
 Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, const Site& site,
                                                      Handler& handler) {
+  // Says what is wrong, which libwebsockets would not.
+  if (!options.tls_cert.empty()) {
+    const auto good = Certificate::read(options.tls_cert, options.tls_key, wall_s());
+    if (!good) return tl::unexpected(good.error());
+  }
   auto listener = Listener::open(options.address, options.port);
   if (!listener) return tl::unexpected(listener.error());
   auto impl = std::make_unique<Impl>(options, std::move(*listener), site, handler);
@@ -547,6 +595,7 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
   info.port = CONTEXT_PORT_NO_LISTEN_SERVER;  // the listener is ours, because libwebsockets' stops for all
   info.protocols = impl->protocols.data();
   info.user = impl.get();
+  info.headers = impl->heads.list();
   info.fd_limit_per_thread = static_cast<unsigned>(options.connections + kOwnDescriptors);
   info.retry_and_idle_policy = &kIdlePolicy;
   info.timeout_secs = kHandshakeSeconds;

@@ -9,9 +9,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "services/gateway/doors/admission.hpp"
 #include "services/gateway/doors/doors.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/site.hpp"
@@ -26,6 +28,7 @@ struct WebOptions {
   std::size_t connections = 512;             ///< maximum number of connections of all kinds
   DoorLimits doors;                          ///< of each address
   std::vector<std::string> trusted_proxies;  ///< addresses whose X-Forwarded-For counts
+  std::vector<std::string> origins;  ///< whose pages may show the viewer in a frame; * counts for none
 };
 
 /// Serves the viewer's files and the connections of viewers. Their number is limited; a handler deals with
@@ -37,21 +40,28 @@ class WebServer {
    public:
     struct Request {
       std::string origin, host, token;                ///< empty if missing
+      std::string address;                            ///< of the client, for the log
       std::shared_ptr<accounts::TokenBucket> inputs;  ///< of the viewers of its address
     };
     virtual ~Handler() = default;
     virtual std::variant<ViewerId, Refusal> open(const Request& request) = 0;
+    /// What a token allows now, without an effect.
+    virtual tl::expected<Pass, Refusal> look_at(std::string_view token) = 0;
     virtual std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) = 0;
     virtual Gateway::Next next(ViewerId id) = 0;
     virtual void closed(ViewerId id) = 0;
     virtual void list_ready(std::vector<ViewerId>& out) = 0;
     virtual void list_not_reading(std::vector<ViewerId>& out) = 0;
     virtual void list_silent(std::vector<ViewerId>& out) = 0;
+    /// Viewers whose pass counts no more.
+    virtual void list_over(std::vector<std::pair<ViewerId, Refusal>>& out) = 0;
     /// Counts a refusal that the server itself decided.
     virtual void refused(Refusal refusal) = 0;
     virtual void turned_away(TurnedAway why) = 0;
-    /// Ten times a second.
-    virtual void tick() = 0;
+    /// Ten times a second. True if the certificate has to be read again; reloaded() then follows.
+    virtual bool tick() = 0;
+    /// `certificate`: when the new one ends; empty without TLS. An error: the old one is used further.
+    virtual void reloaded(const Result<std::string>& certificate) = 0;
     /// A JSON object for /healthz.
     virtual std::string health() = 0;
   };

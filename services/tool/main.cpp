@@ -1,5 +1,5 @@
-// The command line tool: join, record, replay, checkpoint, handover, bench, export, top, doctor. Exit 0 done,
-// 1 failed, 2 wrong usage.
+// The command line tool: join, record, replay, checkpoint, handover, bench, export, top, doctor, pki. Exit 0
+// done, 1 failed, 2 wrong usage.
 
 #include <cstdio>
 #include <exception>
@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
 #endif
   tandem::tool::add_top(app, run);
   tandem::tool::add_doctor(app, run);
+  tandem::tool::add_pki(app, run);
 #ifndef TANDEM_LAB
   if (argc > 1 && (argv[1] == std::string("bench") || argv[1] == std::string("export"))) {
     std::fprintf(stderr,

@@ -62,7 +62,8 @@ EDGES = {
     "sdk/core/timeline": TABLES,
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
-    "sdk/transport/dds": LAYOUT + ["sdk/transport"],
+    "sdk/transport/network": ["public/result.hpp"],
+    "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network"],
     "sdk/statistics": [],
     "sdk/client/drawing": OF_CLIENT,
     "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
@@ -76,6 +77,7 @@ EDGES = {
     "services/process": [],
     "services/commandline": [],
     "services/json": [],
+    "services/tokens": ["public/result.hpp", "services/json"],
     "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
@@ -100,22 +102,24 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
+    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
-    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system"],
+    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system", "services/tokens"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/logging", "services/metrics", "services/process", "services/system"],
+    + ["services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
+    + ["services/doctor", "services/metrics", "services/process", "services/recording", "services/scenes", "services/system"]
+    + ["services/tokens"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
@@ -136,6 +140,7 @@ OWNERS = [
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["services/tokens", "services/gateway", "tests"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),

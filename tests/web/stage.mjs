@@ -31,6 +31,7 @@ export class Stage {
   /** Paths of `tandemd`, `gateway`, `site` (the built viewer), `packages` (with node_modules), `chromium`, `pictures`. */
   constructor(options) {
     this.options = options;
+    this.violations = [];
     this.domain = 20 + (process.pid % 70);
     // The tag keeps sessions of tests that run at the same time apart, whatever their domain.
     const loopback =
@@ -79,6 +80,10 @@ export class Stage {
     this.#browser ??= await chromium.launch({ executablePath: this.options.chromium, args: chromiumFlags });
     const context = await this.#browser.newContext({ ...window, ignoreHTTPSErrors: true });
     const page = await context.newPage();
+    // What the gateway's Content-Security-Policy forbids is told on the console only.
+    page.on('console', (message) => {
+      if (message.text().includes('Content Security Policy')) this.violations.push(message.text());
+    });
     page.on('pageerror', (error) => console.error(`page: ${error.message}`));
     page.setDefaultTimeout(limitMs);
     return page;

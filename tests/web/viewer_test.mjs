@@ -173,11 +173,16 @@ const scenarios = {
     const said = await notice(page, 'Refused');
     check(said.includes('token'), `a missing token is called "${said}"`);
     await stage.picture(page, 'refused');
-    await page.goto(`${address}?token=a-token-of-this-test`);
+    await page.goto(`${address}?observe#token=of-another-key`);
+    await notice(page, 'token missing or wrong');
+    await page.goto(`${address}#token=a-token-of-this-test`);
+    await page.reload();
+    check(!page.url().includes('token'), `the token stays in the address: ${page.url()}`);
     await notice(page, 'Waiting for the server');
     await stage.picture(page, 'searching');
     stage.server('mixed', 200);
     await playing(page, 30);
+    check((await page.evaluate(() => document.cookie)) === '', 'a script reads the token');
     await stage.picture(page, 'mixed');
     await page.addInitScript(() => delete globalThis.WebAssembly);
     await page.reload();
@@ -197,6 +202,7 @@ for (const name of positionals) {
   const began = Date.now();
   try {
     await scenarios[name](stage);
+    check(stage.violations.length === 0, `the page breaks the policy: ${stage.violations[0]}`);
     failed = false;
     console.log(`${name}: passed after ${((Date.now() - began) / 1000).toFixed(1)} s`);
   } catch (error) {

@@ -22,12 +22,38 @@ const pushReachRadii = 3;
 /** Radii a second; the server's own limit, where the scene names none, is 100. */
 const pushRadiiPerS = 30;
 
-/** The gateway's address, made of the page's own, with its token. */
+/** The gateway's address, made of the page's own. */
 function gatewayUrl(): string {
-  const url = new URL(`tandem${location.search}`, document.baseURI);
+  const url = new URL('tandem', document.baseURI);
   url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
   return url.href;
 }
+
+/** Takes the token out of the page's address: #token=TOKEN, or ?token=TOKEN. Null if there is none. */
+function takeToken(): string | null {
+  const url = new URL(location.href);
+  const behind = new URLSearchParams(url.hash.slice(1));
+  const token = behind.get('token') ?? url.searchParams.get('token');
+  if (token === null) return null;
+  behind.delete('token');
+  url.searchParams.delete('token');
+  url.hash = behind.toString();
+  history.replaceState(history.state, '', url);
+  return token;
+}
+
+/** Hands the token to the gateway, which has the browser keep it in a cookie that no script reads. */
+async function logIn(token: string): Promise<void> {
+  const login = new URL('login', document.baseURI);
+  for (let waitMs = 250; ; waitMs = Math.min(2 * waitMs, 5000)) {
+    const answer = await fetch(login, { headers: { Authorization: `Bearer ${token}` }, cache: 'no-store' }).catch(() => null);
+    if (answer?.ok) return;
+    if (answer?.status === 401) throw new Refused((await answer.text()).trim());
+    await new Promise((resolve) => setTimeout(resolve, waitMs));
+  }
+}
+
+class Refused extends Error {}
 
 class Page {
   private readonly panel = new Panel();
@@ -242,6 +268,10 @@ async function start(): Promise<void> {
   document.body.classList.toggle('bare', asked.has('bare'));
   const wasm = { plain: new URL('tandem.wasm', document.baseURI), simd: new URL('tandem-simd.wasm', document.baseURI) };
   const log = (level: LogLevel, text: string) => void (level !== 'info' && toast(text, true));
+  // A link with another token, opened in this page, changes only what is behind the #.
+  addEventListener('hashchange', () => location.hash.includes('token=') && location.reload());
+  const token = takeToken();
+  if (token !== null) await logIn(token);
   const client = await Client.connect({ url: gatewayUrl(), role, wasm, log });
   const canvas = element<HTMLCanvasElement>('world');
   const stage = stageOn(canvas); // takes up to a second at first, while the connection is being made
@@ -258,7 +288,8 @@ function stageOn(canvas: HTMLCanvasElement): Stage {
 
 showNotice(noticeOf({ phase: 'connecting', reason: '' }));
 start().catch((error: unknown) => {
-  const notice: Notice = { title: 'This page cannot run', text: error instanceof Error ? error.message : String(error), kind: 'bad' };
+  const title = error instanceof Refused ? 'Refused' : 'This page cannot run';
+  const notice: Notice = { title, text: error instanceof Error ? error.message : String(error), kind: 'bad' };
   showNotice(notice);
   throw error;
 });

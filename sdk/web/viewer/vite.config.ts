@@ -10,5 +10,5 @@ export default defineConfig({
   base: './',
   publicDir: process.env.TANDEM_WASM ?? here('../../../build/release/sdk/web/wasm'),
   build: { target: 'es2022', outDir: here('../dist/viewer'), emptyOutDir: true, chunkSizeWarningLimit: 1000 },
-  server: { proxy: { '/tandem': { target: process.env.TANDEM_GATEWAY ?? 'http://127.0.0.1:8080', ws: true, changeOrigin: true } } },
+  server: { proxy: { '/login': process.env.TANDEM_GATEWAY ?? 'http://127.0.0.1:8080', '/tandem': { target: process.env.TANDEM_GATEWAY ?? 'http://127.0.0.1:8080', ws: true, changeOrigin: true } } },
 });

@@ -58,6 +58,18 @@ std::optional<AddressKey> address_key(const sockaddr& address) {
   return std::nullopt;
 }
 
+std::string address_text(const AddressKey& key) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  in6_addr six{};
+  std::memcpy(&six, key.data(), key.size());
+  if (IN6_IS_ADDR_V4MAPPED(&six) != 0) {
+    inet_ntop(AF_INET, key.data() + 12, text.data(), text.size());
+    return text.data();
+  }
+  inet_ntop(AF_INET6, &six, text.data(), text.size());
+  return std::string(text.data()) + "/64";
+}
+
 AddressKey client_address(const AddressKey& peer, std::string_view forwarded_for,
                           std::span<const AddressKey> trusted) {
   AddressKey at = peer;

@@ -25,6 +25,9 @@ using AddressKey = std::array<std::uint8_t, 16>;
 [[nodiscard]] std::optional<AddressKey> address_key(std::string_view text);
 [[nodiscard]] std::optional<AddressKey> address_key(const sockaddr& address);
 
+/// As people write it; of IPv6 the first 64 bits.
+[[nodiscard]] std::string address_text(const AddressKey& key);
+
 /// The address that a request comes from: `peer`, or behind trusted proxies the last hop of `forwarded_for`
 /// that is none of them. Untrusted. A hop that is no address ends the search: then the proxy before it
 /// counts.
@@ -58,6 +61,10 @@ inline constexpr std::array<std::string_view, 7> kTurnedAway{
     "handshake took too long",
     "too many connections",
     "no file descriptor was free",
+};
+/// The same as values of a label.
+inline constexpr std::array<std::string_view, kTurnedAway.size()> kTurnedAwayLabels{
+    "connections", "handshakes", "arrivals", "requests", "slow", "full", "descriptors",
 };
 
 /// What one address has, and what it may still do.

@@ -28,6 +28,7 @@ class InputMerger {
   struct Claim {
     ViewerId viewer = 0;
     std::uint64_t number = 0;
+    std::uint32_t kind = 0;  ///< as in the message
   };
   /// The outcome of an input. `known` is false if it cannot be known.
   struct Verdict {

@@ -12,6 +12,7 @@
 #include "services/accounts/reply_schedule.hpp"
 #include "services/accounts/token_bucket.hpp"
 #include "services/gateway/viewing/input_merger.hpp"
+#include "services/gateway/viewing/input_tally.hpp"
 #include "services/gateway/viewing/live_log.hpp"
 #include "services/gateway/viewing/snapshot_parts.hpp"
 
@@ -29,6 +30,7 @@ struct Viewer {
   };
 
   ViewerId id = 0;
+  bool may_act = true;                  ///< by its token; if not, it is an observer whatever it wants
   transport::ClientId client = 0;       ///< 0: nothing was received yet
   std::uint64_t told_announcement = 0;  ///< number of the newest announcement it was sent
   std::uint64_t told_status = 0;
@@ -41,6 +43,8 @@ struct Viewer {
   /// The time since which it has acknowledged nothing, although it was told of a session.
   std::optional<std::int64_t> silent_since_ns;
   std::shared_ptr<accounts::TokenBucket> address_inputs;  ///< shared by viewers of an address; null: no limit
+
+  InputTally tally;  ///< since it was taken last
 
   /// The data of one epoch; a new epoch starts with a new object.
   struct InEpoch {

@@ -48,7 +48,9 @@ def one_address(stage):
     print(f"  {away}")
     if not sum(away.values()):
         raise Failed("nobody was counted")
-    if (stage.folder / "gateway.err").read_text().count("\n") > 20:
+    said = (stage.folder / "gateway.err").read_text().splitlines()
+    audit = [line for line in said if "audit:" in line]  # of joins and leaves 100 at once, and 2 a second
+    if len(said) - len(audit) > 20 or len(audit) > 300:
         raise Failed("the log is full of it")
 
 

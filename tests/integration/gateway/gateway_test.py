@@ -198,7 +198,7 @@ def refusals(stage):
     if any(counted[reason] != count for reason, count in wanted.items()):
         raise Failed(f"counted: {counted}")
     said = (stage.folder / "gateway.err").read_text()
-    if said.count("refused") > 2:
+    if said.count("refused") > 15:  # 5 lines of the audit log at once, one in 2 s, and one with all counts a minute
         raise Failed(f"the log is full of it: {said}")
 
     def ends(code, *arguments):

@@ -26,7 +26,7 @@ def flags_of(program, *commands):
     flags = {flag for names in re.findall(r"(?m)^  (-[^ ]*)", shown) for flag in names.split(",")}
     below = re.search(r"(?s)\nSubcommands:\n(.*?)(?:\n\n|$)", shown)
     found = {commands: flags}
-    for name in re.findall(r"(?m)^  ([a-z]+) ", below[1]) if below else []:
+    for name in re.findall(r"(?m)^  ([a-z-]+) ", below[1]) if below else []:
         found.update(flags_of(program, *commands, name))
     return found
 

@@ -90,5 +90,11 @@ TEST(Doors, AFileLargerThanTheBurstIsPaidAfterwards) {
   EXPECT_TRUE(account.bytes.has(3 * kSecond));
 }
 
+TEST(Addresses, AreWrittenAsPeopleDo) {
+  EXPECT_EQ(address_text(*address_key("192.0.2.7:80")), "192.0.2.7");
+  EXPECT_EQ(address_text(*address_key("::ffff:192.0.2.7")), "192.0.2.7");
+  EXPECT_EQ(address_text(*address_key("2001:db8:1:2:3:4:5:6")), "2001:db8:1:2::/64");
+}
+
 }  // namespace
 }  // namespace tandem::gateway

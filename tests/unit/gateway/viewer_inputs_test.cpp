@@ -77,6 +77,42 @@ TEST_F(ViewerInputs, AreRefusedAsAServerWould) {
   EXPECT_TRUE(world.sent.empty());
 }
 
+TEST_F(ViewerInputs, OfAWatcherAreRefusedByName) {
+  const ViewerId id = *gateway.admit(nullptr, false);
+  EXPECT_FALSE(say(id, ack(1, Phase::kJoining)));
+  plays(id, 1);
+  EXPECT_EQ(reply(id).role, transport::Role::kObserver);
+  auto seek = input(1, 3, {1});
+  seek.kind = static_cast<std::uint32_t>(transport::InputKind::kSeek);
+  EXPECT_FALSE(say(id, input(1, 1)));
+  EXPECT_FALSE(say(id, input(1, 2, push())));
+  EXPECT_FALSE(say(id, seek));
+  const ReplyMessage told = reply(id);
+  const std::uint32_t observer = code(Reason::kObserver);
+  EXPECT_EQ(told.entries, (std::vector<ReplyEntry>{{1, 0, observer}, {2, 0, observer}, {3, 0, observer}}));
+  ASSERT_EQ(told.texts.size(), 3U);
+  EXPECT_EQ(told.texts[0].text, "the token's role is watch, so no gravity is taken");
+  EXPECT_EQ(told.texts[1].text, "the token's role is watch, so no push is taken");
+  EXPECT_EQ(told.texts[2].text, "the token's role is watch, so no seek is taken");
+  EXPECT_EQ(told.reason, code(Reason::kNone)) << "it was not demoted";
+  EXPECT_TRUE(world.sent.empty());
+}
+
+TEST_F(ViewerInputs, WhatBecameOfThemIsTallied) {
+  const ViewerId id = join(1);
+  EXPECT_FALSE(say(id, input(1, 1)));
+  EXPECT_FALSE(say(id, input(1, 2, push())));
+  EXPECT_FALSE(say(id, input(1, 3, {1, 2})));
+  acts(1, 20);
+  acts(2, 20);
+  InputTally tally = gateway.take_tally(id);
+  EXPECT_EQ(tally["gravity"].acted, 1U);
+  EXPECT_EQ(tally["push"].acted, 1U);
+  EXPECT_EQ(tally["push"].refused, 1U);
+  EXPECT_EQ(tally["push"].reason, Reason::kInvalid);
+  EXPECT_TRUE(gateway.take_tally(id).empty());
+}
+
 TEST_F(ViewerInputs, ASeekHasOneValueAndGoesOn) {
   const ViewerId id = join(1);
   auto seek = input(1, 1, {1, 2});

@@ -1,0 +1,85 @@
+#pragma once
+// The gateway between its two threads: one for the session, one for the connections.
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "sdk/transport/port.hpp"
+#include "services/gateway/doors/admission.hpp"
+#include "services/gateway/doors/guest_book.hpp"
+#include "services/gateway/gateway.hpp"
+#include "services/gateway/metrics.hpp"
+#include "services/gateway/options.hpp"
+#include "services/gateway/session_client.hpp"
+#include "services/gateway/web_server.hpp"
+#include "services/metrics/address.hpp"
+#include "services/metrics/endpoint.hpp"
+#include "services/metrics/health.hpp"
+#include "services/metrics/latest.hpp"
+#include "services/process/service_notifier.hpp"
+#include "services/process/signal_watch.hpp"
+
+namespace tandem::gateway {
+
+/// The port waits without the lock, so that no viewer waits for the network.
+class Service final : public WebServer::Handler {
+ public:
+  /// `port` and `signals` must outlive it.
+  Service(const Options& options, Secrets secrets, transport::ClientPort& port, SignalWatch& signals);
+
+  /// Follows the session, in a thread of its own.
+  void follow(const std::stop_token& stop, WebServer& server);
+  /// Errors: those of Endpoint::create().
+  [[nodiscard]] Result<void> serve_metrics(const metrics::Address& address, const std::string& session);
+
+  std::variant<ViewerId, Refusal> open(const Request& request) override;
+  tl::expected<Pass, Refusal> look_at(std::string_view token) override;
+  std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) override;
+  Gateway::Next next(ViewerId id) override;
+  void closed(ViewerId id) override;
+  void list_ready(std::vector<ViewerId>& out) override;
+  void list_not_reading(std::vector<ViewerId>& out) override;
+  void list_silent(std::vector<ViewerId>& out) override;
+  void list_over(std::vector<std::pair<ViewerId, Refusal>>& out) override;
+  void refused(Refusal refusal) override;
+  void turned_away(TurnedAway why) override;
+  bool tick() override;
+  void reloaded(const Result<std::string>& certificate) override;
+  std::string health() override;
+
+ private:
+  void watch();
+  void reload();
+  void write_down(const GuestBook::Line& line) const;
+  void write_deeds(ViewerId id, std::int64_t now_ns);
+  Refusal refuse(const Request& request, Refusal why);
+
+  const Options options_;
+  transport::ClientPort& port_;
+  SignalWatch& signals_;
+  // Of the connections' thread alone.
+  Admission admission_;
+  GuestBook guests_;
+  std::int64_t next_deeds_ns_ = 0;
+
+  std::mutex mutex_;  // guards all below; port_.wait() and wake() need no guard
+  SessionClient client_;
+  Gateway gateway_;
+  CountLog log_;
+  ServiceNotifier notifier_;
+  Epoch epoch_ = 0;                  // that the log names
+  std::int64_t quiet_until_ns_ = 0;  // about descriptors
+  std::vector<ViewerId> ready_;      // kept to reuse its memory
+  std::int64_t next_figures_ns_ = 0;
+  metrics::ClientWatch client_watch_;
+  // Not guarded by the lock.
+  metrics::Latest<FiguresNow> latest_;
+  metrics::Health health_;
+  std::unique_ptr<metrics::Endpoint> endpoint_;  // last: ends before what it reads
+};
+
+}  // namespace tandem::gateway

@@ -1,0 +1,18 @@
+#include "services/tool/pki/pki.hpp"
+
+#include <vector>
+
+namespace tandem::tool {
+
+void add_pki(commandline::Command app, Run& run) {
+  static const std::vector<AddPkiCommand> kCommands = {
+      // One line for each, in the order that --help shows.
+      add_pki_token_key,  //
+      add_pki_token,      //
+  };
+  commandline::Command pki = app.add_subcommand("pki", "Makes and shows who may do what in a session.");
+  for (const AddPkiCommand add : kCommands) add(pki, run);
+  pki.require_subcommand();
+}
+
+}  // namespace tandem::tool
