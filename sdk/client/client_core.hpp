@@ -50,7 +50,8 @@ class CoreListener {
   /// The session in the last on_session() gives its bodies other names; nothing else of it changed.
   virtual void on_names(const transport::SessionMessage& /*session*/) {}
   /// A stream of the session in the last on_session(). The client joins it. If the client already plays, it
-  /// now has this stream's state of the frame applied last, and the following calls are for this stream.
+  /// now has this stream's state, and the following calls are for this stream. timeline() says of which
+  /// frame: of the one applied last, or, where more than a second of deltas waited, of a later one.
   virtual void on_stream(const transport::StreamMessage& /*stream*/) {}
   virtual void on_server_status(const transport::ServerStatusMessage& /*status*/) {}
   /// A snapshot was loaded: the client holds the state of `snapshot.frame`.

@@ -13,6 +13,14 @@
 
 namespace tandem::checkpoint {
 
+/// An epoch modulo this says who began it, so that two servers whose clocks agree do not begin the same one:
+/// 0 for a server that started, 1 to 7 by rank for one that took over.
+inline constexpr Epoch kBeginners = 8;
+/// The epoch near `about` that such a server begins.
+[[nodiscard]] constexpr Epoch begun_by(Epoch beginner, Epoch about) {
+  return about / kBeginners * kBeginners + beginner;
+}
+
 /// A scheduled input that was issued and has not acted yet.
 struct Scheduled {
   std::uint64_t number = 0;

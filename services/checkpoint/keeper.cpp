@@ -40,7 +40,8 @@ Result<void> check_world(const Checkpoint& checkpoint, const World& world, std::
 
 // A server may announce an epoch and end before it has written a checkpoint of it.
 Epoch Start::epoch(Epoch wanted) const {
-  return wanted > newest_epoch ? wanted : newest_epoch + 1 + wanted % kEpochsAhead;
+  if (wanted > newest_epoch) return wanted;
+  return begun_by(wanted % kBeginners, newest_epoch + kBeginners + wanted % kEpochsAhead);
 }
 
 Result<std::unique_ptr<Keeper>> Keeper::open(const Settings& settings, std::int64_t (*clock_ns)()) {

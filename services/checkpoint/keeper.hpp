@@ -40,7 +40,7 @@ struct Start {
   std::string told;        ///< one line: what it goes on from, or that it starts afresh
   Epoch newest_epoch = 0;  ///< the server's epoch has to be above this one
   /// The wanted epoch, or one above newest_epoch where a clock went back. Two starts from the same checkpoint
-  /// have different ones, if they wanted different ones.
+  /// have different ones, if they wanted different ones; begun_by() stays what it was.
   [[nodiscard]] Epoch epoch(Epoch wanted) const;
 };
 

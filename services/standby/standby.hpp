@@ -64,10 +64,11 @@ class Standby {
   bool poll(std::int64_t now_ns);
   /// When poll() has something to do even if nothing arrives; at most 50 ms ahead.
   [[nodiscard]] std::int64_t next_wake_ns() const { return wake_ns_; }
-  /// The epoch of a takeover at that time of day: up to a second ahead of it, by the id, so that it differs
-  /// from that of a server which starts in the same millisecond.
+  /// The epoch of a takeover at that time of day: up to a second ahead of it, by the id. It is never that of
+  /// a server which starts, nor that of one of another rank which takes over.
   [[nodiscard]] Epoch epoch_at(std::int64_t wall_ms) const {
-    return static_cast<Epoch>(wall_ms) + 1 + options_.id % 997;
+    const Epoch about = static_cast<Epoch>(wall_ms) + checkpoint::kBeginners + options_.id % 997;
+    return checkpoint::begun_by(1 + (options_.rank - 1) % (checkpoint::kBeginners - 1), about);
   }
   /// Ends standing by, and returns what to go on from. Precondition: poll() returned true.
   [[nodiscard]] Takeover take_over();

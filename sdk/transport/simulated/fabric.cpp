@@ -10,18 +10,23 @@ struct TopicRules {
   bool reliable = true;
   bool transient_local = false;
   std::size_t durable_depth = SIZE_MAX;  // part of each key's history that late readers get
+  bool parts = false;                    // of something large: NetworkOptions::part_lifespan_ns
 };
 // In the order of AnyMessage; the same QoS as in dds/topics.hpp.
 constexpr std::array<TopicRules, std::variant_size_v<AnyMessage>> kRules{{
-    {true, true},       // session
-    {true, false},      // delta
-    {true, true, 256},  // scheduled input
-    {true, false},      // snapshot
-    {true, true},       // reply
-    {true, false},      // input
-    {true, false},      // acknowledgement
-    {false, false},     // server status
-    {false, false},     // client status
+    {true, true},                   // session
+    {true, false},                  // delta
+    {true, true, 256},              // scheduled input
+    {true, false, SIZE_MAX, true},  // snapshot
+    {true, true},                   // reply
+    {true, false},                  // input
+    {true, false},                  // acknowledgement
+    {false, false},                 // server status
+    {false, false},                 // client status
+    {true, false},                  // journal
+    {true, false, SIZE_MAX, true},  // checkpoint
+    {true, false},                  // standby
+    {true, false},                  // command
 }};
 
 // The approximate overhead of DDS for a sample: headers of IP, UDP and RTPS, and fields besides the payload.
@@ -176,7 +181,8 @@ void Fabric::close_participant(Index participant) {
 Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) {
   Writer& from = writers_[writer];
   if (gone(from.participant)) return fail(ErrorCode::kTransport, "this participant was killed");
-  const Sample sample{from.next_sequence++, key, std::make_shared<const AnyMessage>(std::move(message))};
+  const Sample sample{from.next_sequence++, key, now_ns_,
+                      std::make_shared<const AnyMessage>(std::move(message))};
   if (kRules[from.topic].reliable) {
     std::deque<Sample>& kept = from.history[key];
     kept.push_back(sample);
@@ -355,6 +361,7 @@ std::shared_ptr<const AnyMessage> Fabric::arriving(const LinkModel& model, const
 }
 
 bool Fabric::keeps(const Writer& writer, const Sample& sample) const {
+  if (kRules[writer.topic].parts && now_ns_ - sample.written_ns > options_.part_lifespan_ns) return false;
   const auto kept = writer.history.find(sample.key);
   return kept != writer.history.end() && !kept->second.empty() &&
          kept->second.front().sequence <= sample.sequence;

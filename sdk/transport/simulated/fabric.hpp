@@ -108,6 +108,7 @@ class Fabric {
   struct Sample {
     std::uint64_t sequence = 0;
     std::uint64_t key = 0;
+    std::int64_t written_ns = 0;
     std::shared_ptr<const AnyMessage> message;
   };
   struct Writer {

@@ -45,6 +45,8 @@ struct NetworkOptions {
   bool match_over_links = false;
   /// A frozen, killed or cut-off peer counts as dead after this.
   std::int64_t lease_ns = 1'000'000'000;
+  /// Parts of snapshots and checkpoints that are older are not repaired; with DDS it is 0.3 s.
+  std::int64_t part_lifespan_ns = INT64_MAX;
 };
 
 /// Counts of what happened to samples on the way, by which tests check that they tested anything.
@@ -54,7 +56,8 @@ struct NetworkCounts {
   std::uint64_t duplicated = 0;
   std::uint64_t overtaken = 0;    ///< samples of a best-effort topic that were dropped because a newer one
                                   ///< was delivered
-  std::uint64_t overwritten = 0;  ///< samples that left the writer's history before their repair
+  std::uint64_t overwritten = 0;  ///< samples that left the writer's history before their repair, or were
+                                  ///< too old for it
   std::uint64_t lost_for_good = 0;
   std::uint64_t pushed_out = 0;  ///< samples displaced at a reader that did not take them in time
   std::uint64_t damaged = 0;

@@ -1,6 +1,7 @@
 #include "services/host/frames/going_on.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace tandem::host {
 
@@ -15,13 +16,14 @@ checkpoint::World checkpoint_world(const HostConfig& config) {
 }
 
 void begin_from(const checkpoint::Start& start, HostConfig& config) {
-  config.epoch = start.epoch(config.epoch);
+  config.epoch = start.epoch(checkpoint::begun_by(0, config.epoch));
   config.goes_on_from = start.goes_on_from;
 }
 
 void begin_takeover(checkpoint::Start start, const transport::ParticipantId& from, HostConfig& config) {
   start.newest_epoch = std::max(start.newest_epoch, start.goes_on_from->epoch);
-  begin_from(start, config);
+  config.epoch = start.epoch(config.epoch);
+  config.goes_on_from = std::move(start.goes_on_from);
   config.takes_over_from = from;
   config.claim_ns = 0;
 }

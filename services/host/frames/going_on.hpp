@@ -13,6 +13,7 @@ namespace tandem::host {
 void begin_from(const checkpoint::Start& start, HostConfig& config);
 
 /// The same for a server that stood by and takes over from the server `from`: it announces itself at once.
+/// `config`'s epoch is Standby::epoch_at().
 void begin_takeover(checkpoint::Start start, const transport::ParticipantId& from, HostConfig& config);
 
 }  // namespace tandem::host

@@ -35,7 +35,13 @@ class Listening final : public CoreListener {
     core = std::make_unique<ClientCore>(std::move(options), *port, this);
     core->start_sampling();
   }
-  void on_stream(const transport::StreamMessage& stream) override { played.push_back(stream.id.id); }
+  void on_stream(const transport::StreamMessage& stream) override {
+    played.push_back(stream.id.id);
+    if (core->timeline() == nullptr) return;
+    EXPECT_GE(core->timeline()->applied(), last);
+    if (core->timeline()->applied() > last) ++jumps_ahead;
+    last = core->timeline()->applied();
+  }
   void on_snapshot(const transport::SnapshotMessage& snapshot) override {
     ++snapshots;
     last = snapshot.frame;
@@ -56,7 +62,7 @@ class Listening final : public CoreListener {
   const std::map<std::pair<std::uint32_t, Frame>, std::uint64_t>* truth = nullptr;
   std::vector<std::uint32_t> played;
   std::vector<InputOutcome> outcomes;
-  std::size_t snapshots = 0;
+  std::size_t snapshots = 0, jumps_ahead = 0;
   Frame last = 0;
 };
 
@@ -193,6 +199,30 @@ TEST_F(TwoStreams, ALossOnTheWayEndsInTheOtherStream) {
   run(5);
   EXPECT_EQ(client.core->phase(), ClientPhase::kPlaying);
   EXPECT_EQ(client.core->status().stream, "coarse");
+  EXPECT_EQ(client.core->statistics().hash_mismatches, 0U);
+}
+
+// The listener is told no frame of either stream twice, and none out of order.
+TEST_F(TwoStreams, WhoHasManyDeltasWaitingGoesOnFromALaterFrameOfTheOtherStream) {
+  ASSERT_TRUE(host_->set_limits(10, 50'000'000));  // nobody waits for the one that is cut off
+  Listening& client = join("error");
+  Listening& sender = join("fine");
+  run(3);
+  network.set_all_links({.delay_ns = 20'000'000, .jitter_ns = 100'000'000});
+  for (int i = 0; i < 12; ++i) {
+    client.core->prefer(i % 2 == 0 ? "bandwidth" : "error");
+    run(0.02 * (i + 1));
+    network.set_cut_one_way(server_port->self(), client.port->self(), true);
+    for (int j = 0; j < 5; ++j) {
+      ASSERT_TRUE(sender.core->send(transport::InputKind::kGravity, {0, 0, -0.1 * j}, {},
+                                    {now_ns, now_ns + kWallNs}));
+      run(0.4);
+    }
+    network.set_cut_one_way(server_port->self(), client.port->self(), false);
+    run(5);
+    ASSERT_EQ(client.core->phase(), ClientPhase::kPlaying);
+  }
+  EXPECT_GT(client.jumps_ahead, 0U);
   EXPECT_EQ(client.core->statistics().hash_mismatches, 0U);
 }
 

@@ -2,9 +2,32 @@
 #include "tests/fault/host/relay.hpp"
 
 #include <optional>
+#include <set>
 
 namespace tandem::host::relay {
 namespace {
+
+TEST(Standby, ATakeoverNeverHasTheEpochOfAStartOrOfAnotherRank) {
+  Cast cast(1);
+  std::vector<std::set<Epoch>> begun(8);
+  for (std::int64_t wall_ms = 1'700'000'000'000; wall_ms < 1'700'000'000'100; ++wall_ms) {
+    HostConfig config;
+    config.epoch = static_cast<Epoch>(wall_ms);
+    begin_from({}, config);
+    EXPECT_LE(config.epoch, static_cast<Epoch>(wall_ms));
+    begun[0].insert(config.epoch);
+  }
+  for (std::uint32_t rank = 1; rank < begun.size(); ++rank) {
+    const Server& server = cast.add_standby(rank);
+    for (std::int64_t wall_ms = 1'699'999'999'000; wall_ms < 1'700'000'000'100; ++wall_ms) {
+      begun[rank].insert(server.standby->epoch_at(wall_ms));
+      EXPECT_GT(server.standby->epoch_at(wall_ms), static_cast<Epoch>(wall_ms));
+    }
+  }
+  std::set<Epoch> all;
+  for (const std::set<Epoch>& by : begun)
+    for (const Epoch epoch : by) EXPECT_TRUE(all.insert(epoch).second) << epoch << " is begun by two";
+}
 
 TEST(Standby, WhenTheServerDiesNoFrameIsLostAndClientsPlayOnWithin3Seconds) {
   for_seeds(15, [](std::uint64_t seed) {

@@ -25,13 +25,14 @@ T must(Result<T> result) {
 /// Bodies that appear, fall and are removed, so that slots are used again.
 engine::World fountain(Dice& dice) {
   engine::World world;
-  world.capacity = 40 + static_cast<std::uint32_t>(dice.below(60));
+  const bool large = dice.chance(0.12);  // snapshots have several parts
+  world.capacity = static_cast<std::uint32_t>(large ? 400 + dice.below(600) : 40 + dice.below(60));
   world.seed = dice.next();
   world.types = {{0.3F, 1}};
   world.low = {-20, -20, -20};
   world.high = {20, 20, 20};
   world.planes = {{{0, 1, 0}, -2}};
-  world.emitters = {{{-3, 3, -3}, {3, 4, 3}, {0, 2, 0}, dice.uniform(5, 25), 0}};
+  world.emitters = {{{-3, 3, -3}, {3, 4, 3}, {0, 2, 0}, dice.uniform(5, 25) * (large ? 20 : 1), 0}};
   world.regions = {{{-20, -3, -20}, {20, -1.2F, 20}, engine::Region::Action::kRemove, {}, 0}};
   return world;
 }
@@ -88,7 +89,11 @@ Settings draw_settings(std::uint64_t seed, double seconds) {
   for (std::uint64_t i = 1 + dice.below(3); i > 0; --i) settings.clients.push_back(draw_client(dice));
   settings.clients.front().role = transport::Role::kParticipant;
   for (int i = 0; i < 2; ++i) settings.newcomers.push_back(draw_client(dice));
-  settings.stands_by = dice.chance(0.4);
+  if (dice.chance(0.45)) {
+    settings.ranks = {1};
+    if (dice.chance(0.4)) settings.ranks = dice.chance(0.5) ? std::vector{1U, 2U} : std::vector{3U, 1U};
+    settings.swaps = dice.chance(0.5);
+  }
   settings.records = dice.chance(0.5);
   settings.has_gateway = dice.chance(0.5);
   for (std::uint64_t i = settings.has_gateway ? 1 + dice.below(2) : 0; i > 0; --i)
@@ -99,15 +104,17 @@ Settings draw_settings(std::uint64_t seed, double seconds) {
 std::string text_of(const Settings& settings) {
   std::string codecs;
   for (const std::string& codec : settings.codecs) codecs += (codecs.empty() ? "" : ", ") + codec;
-  char text[256];
+  std::string standbys;
+  for (const std::uint32_t rank : settings.ranks) standbys += ", a standby of rank " + std::to_string(rank);
+  if (settings.swaps) standbys += " (who is replaced stands by)";
+  char text[320];
   std::snprintf(
       text, sizeof text,
       "%zu clients, %zu viewers%s%s and a server of %u bodies at %g Hz, %s, lead %u%s; links of %.1f ms, %.1f ms of jitter, %.1f %% lost",
       settings.clients.size(), settings.viewers.size(), settings.records ? ", a recorder" : "",
-      settings.stands_by ? ", a standby" : "", settings.scene.capacity, settings.frame_rate_hz,
-      codecs.c_str(), settings.lead, settings.narrow_window ? ", a window of 2" : "",
-      1e-6 * static_cast<double>(settings.link.delay_ns), 1e-6 * static_cast<double>(settings.link.jitter_ns),
-      100 * settings.link.loss);
+      standbys.c_str(), settings.scene.capacity, settings.frame_rate_hz, codecs.c_str(), settings.lead,
+      settings.narrow_window ? ", a window of 2" : "", 1e-6 * static_cast<double>(settings.link.delay_ns),
+      1e-6 * static_cast<double>(settings.link.jitter_ns), 100 * settings.link.loss);
   return text;
 }
 

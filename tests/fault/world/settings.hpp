@@ -20,6 +20,8 @@ struct Rules {
   static constexpr std::int64_t kReturnsNs = 10'000'000'000;
   /// Everybody else waits for one that does not answer.
   static constexpr std::int64_t kStallNs = 500'000'000;
+  /// A server that hands over waits so long for the other one.
+  static constexpr std::int64_t kHandoverNs = 3'000'000'000;
   /// What a checkpoint may be old.
   static constexpr std::int64_t kCheckpointNs = 1'000'000'000;
 };
@@ -43,7 +45,8 @@ struct Settings {
   transport::simulated::LinkModel link;
   std::vector<ClientSettings> clients;    ///< that are there from the start
   std::vector<ClientSettings> newcomers;  ///< that may join
-  bool stands_by = false;                 ///< there is a second server
+  std::vector<std::uint32_t> ranks;       ///< of the servers that stand by
+  bool swaps = false;                     ///< a server whose session another one has stands by from then on
   bool records = false;
   bool has_gateway = false;
   std::vector<ClientSettings> viewers;  ///< of the gateway

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sdk/transport/simulated/network.hpp"
 #include "tests/fault/world/clock.hpp"
@@ -13,6 +14,8 @@
 #include "tests/fault/world/truth.hpp"
 
 namespace tandem::world {
+
+class Server;
 
 /// The first rule that was broken.
 struct Finding {
@@ -25,6 +28,7 @@ struct Stage {
   transport::simulated::Network network;
   Truth truth;
   Journal journal;
+  std::vector<const Server*> servers;  ///< live or not
   std::int64_t now_ns = 0;
   std::optional<Finding> finding;
   std::uint64_t changes = 0;  ///< processes that were started or ended: links have to be set anew
@@ -34,6 +38,7 @@ struct Stage {
   std::map<transport::ClientId, Epoch> known_ids;
   Epoch crashed_epoch = 0;  ///< of the last server that was killed while nothing else was wrong with it
   Epoch live_epoch = 0;     ///< of the server that runs; 0: none does
+  std::int64_t handover_ns = -100 * kSecond;  ///< when an operator last asked for a handover
 
   explicit Stage(const Settings& drawn);
   [[nodiscard]] double unique() { return next_unique += 1e-6; }

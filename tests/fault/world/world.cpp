@@ -9,6 +9,7 @@
 #include "tests/fault/world/actors/client.hpp"
 #include "tests/fault/world/actors/gateway.hpp"
 #include "tests/fault/world/actors/recorder.hpp"
+#include "tests/support/dice/dice.hpp"
 
 namespace tandem::world {
 namespace {
@@ -63,18 +64,19 @@ class World {
  private:
   std::size_t fill() {
     const Service& of = service_;
-    std::uint64_t id = 1000;
-    const auto add_server = [&](const std::string& name, bool stands_by) {
-      auto server = std::make_unique<Server>(stage_, name, id, stands_by);
-      service_.add(*server);
+    // Each start of an actor counts on from its first id.
+    Dice dice(stage_.settings.seed * 0xA24BAED4963EE407ULL + 5);
+    const auto first_id = [&] { return dice.next() | 1U; };
+    const auto add_server = [&](const std::string& name, std::uint32_t rank) {
+      auto server = std::make_unique<Server>(stage_, name, first_id(), rank);
+      stage_.servers.push_back(server.get());
       cast_.push_back(std::move(server));
-      id += 1000;
     };
-    add_server("server", false);
-    if (stage_.settings.stands_by) add_server("standby", true);
+    add_server("server", 0);
+    for (const std::uint32_t rank : stage_.settings.ranks)
+      add_server("standby " + std::to_string(rank), rank);
     const auto add = [&](const ClientSettings& settings, const std::string& name) {
-      cast_.push_back(std::make_unique<Client>(stage_, name, settings, of, id));
-      id += 1000;
+      cast_.push_back(std::make_unique<Client>(stage_, name, settings, of, first_id()));
     };
     int number = 0;
     for (const ClientSettings& settings : stage_.settings.clients) {
@@ -85,19 +87,16 @@ class World {
                         std::to_string(++number));
     }
     if (stage_.settings.records) {
-      cast_.push_back(std::make_unique<RecorderActor>(stage_, "recorder", of, id));
-      id += 1000;
+      cast_.push_back(std::make_unique<RecorderActor>(stage_, "recorder", of, first_id()));
     }
     if (stage_.settings.has_gateway) {
-      auto gateway = std::make_unique<GatewayActor>(stage_, "gateway", of, id);
+      auto gateway = std::make_unique<GatewayActor>(stage_, "gateway", of, first_id());
       GatewayActor& entrance = *gateway;
       cast_.push_back(std::move(gateway));
-      id += 1000;
-      for (const ClientSettings& settings : stage_.settings.viewers) {
-        cast_.push_back(std::make_unique<Browser>(stage_, "browser " + std::to_string(id / 1000), settings,
-                                                  entrance, id));
-        id += 1000;
-      }
+      number = 0;
+      for (const ClientSettings& settings : stage_.settings.viewers)
+        cast_.push_back(std::make_unique<Browser>(stage_, "browser " + std::to_string(++number), settings,
+                                                  entrance, first_id()));
     }
     const std::size_t newcomers_from = cast_.size();
     number = 0;

@@ -94,6 +94,8 @@ TEST_F(KeeperTest, AServerGoesOnFromTheNewestUnderAHigherEpoch) {
   EXPECT_EQ(simulation.value, std::byte{90});
   EXPECT_EQ(begun->epoch(5000), 5000U);
   EXPECT_GT(begun->epoch(7), 1000U) << "a clock that went back";
+  EXPECT_EQ(begun->epoch(7) % kBeginners, 7U) << "it still says who began it";
+  EXPECT_EQ(begun->epoch(8) % kBeginners, 0U);
   EXPECT_NE(begun->epoch(7), begun->epoch(8))
       << "the server before may have ended without a checkpoint of its own";
   EXPECT_NE(begun->told.find("frame 90 of epoch 1000"), std::string::npos);

@@ -116,6 +116,28 @@ TEST(Simulated, TransientLocalTopicsHandTheirHistoryToLateReaders) {
   EXPECT_TRUE(take<SnapshotMessage>(*client).empty()) << "snapshots are volatile";
 }
 
+TEST(Simulated, APartThatIsOlderThanItsLifespanIsNotRepaired) {
+  for (const std::int64_t cut_ms : {200, 400}) {
+    NetworkOptions options;
+    options.part_lifespan_ns = 300 * kMs;
+    Network network(options);
+    const auto server = std::move(*network.make_server("s"));
+    const auto client = std::move(*network.make_client("s"));
+    ASSERT_TRUE(client->open_stream(session(), session().streams[0], kClient));
+    ASSERT_TRUE(client->open_snapshots(0));
+    ASSERT_TRUE(server->open_client(kClient));
+    network.advance_to(100 * kMs);
+    network.set_cut_one_way(server->self(), client->self(), true);
+    ASSERT_TRUE(server->write(kClient, snapshot(1)));
+    ASSERT_TRUE(server->write(delta(1)));
+    network.advance_to((100 + cut_ms) * kMs);
+    network.set_cut_one_way(server->self(), client->self(), false);
+    network.advance_to(1000 * kMs);
+    EXPECT_EQ(take<SnapshotMessage>(*client).size(), cut_ms < 300 ? 1U : 0U);
+    EXPECT_EQ(frames(*client), range(1, 1)) << "a delta has no lifespan";
+  }
+}
+
 TEST(Simulated, ACutLinkLosesNoScheduledInputThatIsStillKept) {
   Network network(NetworkOptions{});
   const auto server = std::move(*network.make_server("s"));

@@ -22,6 +22,7 @@ void Actor::start() {
 void Actor::crash(std::int64_t back_at_ns, bool power_fails) {
   if (up_) {
     set_paused(false);
+    set_hung(false);
     for (const transport::ParticipantId& participant : participants()) stage_.network.kill(participant);
     up_ = false;
     clock_.show(stage_.now_ns);
@@ -31,7 +32,7 @@ void Actor::crash(std::int64_t back_at_ns, bool power_fails) {
 }
 
 void Actor::leave(std::int64_t back_at_ns) {
-  if (!up_ || paused_) return;
+  if (!up_ || paused()) return;
   up_ = false;
   clock_.show(stage_.now_ns);
   on_leave();
@@ -53,6 +54,12 @@ void Actor::set_paused(bool paused) {
     stage_.network.set_frozen(participant, paused);
 }
 
+void Actor::set_hung(bool hung) {
+  if (!up_ || hung_ == hung) return;
+  hung_ = hung;
+  disturb();
+}
+
 void Actor::set_starved(std::int64_t between_ns) {
   starved_ns_ = between_ns;
   if (between_ns == 0) not_before_ns_ = stage_.now_ns;
@@ -67,7 +74,7 @@ std::uint64_t Actor::delivered() const {
 
 std::int64_t Actor::wake_ns() const {
   if (!up_) return back_at_ns_;
-  if (paused_) return INT64_MAX;
+  if (paused()) return INT64_MAX;
   return std::max(not_before_ns_, std::min(arrival_ns(), clock_.world_ns(due_ns())));
 }
 
@@ -76,7 +83,7 @@ void Actor::turn() {
     if (stage_.now_ns >= back_at_ns_) start();
     return;
   }
-  if (paused_ || stage_.now_ns < not_before_ns_) return;
+  if (paused() || stage_.now_ns < not_before_ns_) return;
   if (stage_.now_ns < std::min(arrival_ns(), clock_.world_ns(due_ns()))) {
     const std::uint64_t delivered = this->delivered();
     if (delivered == delivered_) return;

@@ -24,9 +24,12 @@ class Actor {
   void crash(std::int64_t back_at_ns, bool power_fails = false);
   void leave(std::int64_t back_at_ns);
   void set_paused(bool paused);
+  /// The thread stands still, and all that DDS does by itself goes on.
+  void set_hung(bool hung);
   /// The thread runs only so often; 0: whenever it wants.
   void set_starved(std::int64_t between_ns);
   virtual void burst(std::uint32_t /*inputs*/) {}
+  virtual void repeat() {}
   virtual void prefer(std::uint64_t /*salt*/) {}
   virtual void set_disk_full(bool /*full*/) {}
 
@@ -37,7 +40,8 @@ class Actor {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool up() const { return up_; }
-  [[nodiscard]] bool paused() const { return paused_; }
+  /// It does nothing for now.
+  [[nodiscard]] bool paused() const { return paused_ || hung_; }
   [[nodiscard]] Clock& clock() { return clock_; }
   [[nodiscard]] const Clock& clock() const { return clock_; }
   /// The DDS participants that are up.
@@ -78,7 +82,7 @@ class Actor {
 
   std::string name_;
   Clock clock_;
-  bool up_ = false, paused_ = false;
+  bool up_ = false, paused_ = false, hung_ = false;
   std::int64_t back_at_ns_ = INT64_MAX;
   std::int64_t starved_ns_ = 0, not_before_ns_ = 0;
   std::int64_t disturbed_ns_ = 0;

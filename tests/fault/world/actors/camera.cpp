@@ -34,6 +34,7 @@ class Camera::Both final : public client::CoreListener {
     if (capture_) capture_->on_snapshot(snapshot);
   }
   void on_scheduled(const transport::ScheduledInputMessage& input) override {
+    witness_.on_scheduled(input);
     if (capture_) capture_->on_scheduled(input);
   }
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {

@@ -53,6 +53,7 @@ void Client::drop() {
   core_.reset();
   witness_.reset();
   port_.reset();
+  last_input_.reset();
 }
 
 void Client::on_crash(bool /*power_fails*/) { drop(); }
@@ -91,14 +92,31 @@ void Client::send_input() {
   const double unique = stage_.unique();
   const std::uint64_t kind = dice_.below(10);
   const client::Now now{steady_ns(), wall_ns()};
-  const auto number =
-      kind < 7 ? core_->send(transport::InputKind::kGravity,
-                             {unique, -9 + dice_.uniform(-3, 3), dice_.uniform(-3, 3)}, {}, now)
-      : kind < 9
-          ? core_->send(transport::InputKind::kPush,
-                        {unique, 0, 0, 1.5, dice_.uniform(-2, 2), dice_.uniform(0, 3), 0}, {}, now)
-          : core_->send(static_cast<transport::InputKind>(dice_.chance(0.5) ? 1 : 77), {unique}, {}, now);
-  if (number) witness_->sent(*number, unique, kind == 9);
+  transport::InputKind what = transport::InputKind::kGravity;
+  std::vector<double> values{unique};
+  if (kind < 7) {
+    values.insert(values.end(), {-9 + dice_.uniform(-3, 3), dice_.uniform(-3, 3)});
+  } else if (kind < 9) {
+    what = transport::InputKind::kPush;
+    values.insert(values.end(), {0, 0, 1.5, dice_.uniform(-2, 2), dice_.uniform(0, 3), 0});
+  } else if (dice_.chance(0.5)) {
+    what = static_cast<transport::InputKind>(77);
+  }
+  const auto number = core_->send(what, values, {}, now);
+  if (!number) return;
+  witness_->sent(*number, unique, kind == 9);
+  last_input_ = {.client = next_id_ - 1,
+                 .epoch = core_->session()->epoch,
+                 .number = *number,
+                 .client_frame = core_->status().frame,
+                 .kind = static_cast<std::uint32_t>(what),
+                 .values = std::move(values),
+                 .bytes = {}};
+}
+
+// What no client may do, and none does that has our SDK.
+void Client::repeat() {
+  if (up() && !paused() && last_input_) static_cast<void>(port_->write(*last_input_));
 }
 
 void Client::burst(std::uint32_t inputs) {
@@ -161,7 +179,30 @@ void Witness::on_session(const transport::SessionMessage& session) {
   next_ = 0;
 }
 
-void Witness::on_stream(const transport::StreamMessage& stream) { stream_ = stream.id.id; }
+// One that changes its stream while many deltas wait goes on from a later frame than it had.
+void Witness::on_stream(const transport::StreamMessage& stream) {
+  stream_ = stream.id.id;
+  const ClientTimeline* timeline = core_->timeline();
+  if (timeline == nullptr) {
+    next_ = 0;
+    return;
+  }
+  if (timeline->applied() + 1 < next_)
+    blame("same state", "frame " + std::to_string(timeline->applied()) + " of another stream after frame " +
+                            std::to_string(next_ - 1));
+  next_ = timeline->applied() + 1;
+  compare(stream_, timeline->applied(), timeline->hash());
+}
+
+// It acts on a frame that no client has simulated.
+void Witness::on_scheduled(const transport::ScheduledInputMessage& input) {
+  const ClientTimeline* timeline = core_->timeline();
+  if (timeline == nullptr || input.epoch != epoch_ || input.number <= timeline->inputs_held()) return;
+  if (input.frame <= timeline->now())
+    blame("acts once", "scheduled input " + std::to_string(input.number) + " acts on frame " +
+                           std::to_string(input.frame) + ", and frame " + std::to_string(timeline->now()) +
+                           " is simulated");
+}
 
 void Witness::compare(std::uint32_t stream, Frame frame, std::uint64_t hash) {
   if (const std::string wrong = stage_.truth.hold(epoch_, stream, frame, hash); !wrong.empty())

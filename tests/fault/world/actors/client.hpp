@@ -27,6 +27,7 @@ class Witness : public client::CoreListener {
   void on_session(const transport::SessionMessage& session) override;
   void on_stream(const transport::StreamMessage& stream) override;
   void on_snapshot(const transport::SnapshotMessage& snapshot) override;
+  void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void on_outcome(const client::InputOutcome& outcome) override;
   void on_resync(client::ResyncReason reason) override;
@@ -69,6 +70,7 @@ class Client final : public Actor {
   ~Client() override;
 
   void burst(std::uint32_t inputs) override;
+  void repeat() override;
   void prefer(std::uint64_t salt) override;
   [[nodiscard]] std::vector<transport::ParticipantId> participants() const override;
   void check() override;
@@ -95,6 +97,7 @@ class Client final : public Actor {
   std::unique_ptr<client::ClientCore> core_;
   std::int64_t due_ns_ = 0;
   std::int64_t next_input_ns_ = 0, next_draw_ns_ = 0;
+  std::optional<transport::InputMessage> last_input_;
   ClientPhase told_phase_ = ClientPhase::kSearching;
   Sample sample_;
 };

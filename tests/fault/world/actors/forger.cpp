@@ -60,6 +60,24 @@ transport::Bytes Forger::some_bytes(std::uint64_t most) {
 
 void Forger::speak() { dice_.chance(0.6) ? speak_as_client() : speak_as_server(); }
 
+void Forger::squat() {
+  if (squats_in_ != stage_.live_epoch) squats_since_ns_ = stage_.now_ns;
+  squats_in_ = stage_.live_epoch;
+  const bool hurries = stage_.now_ns - squats_since_ns_ < 200 * kMs;
+  if (!hurries && stage_.now_ns - squatted_ns_ < kSecond) return;
+  squatted_ns_ = stage_.now_ns;
+  for (const auto& [id, epoch] : stage_.known_ids) {
+    if (epoch != stage_.live_epoch) continue;
+    transport::AckMessage ack;
+    ack.client = id;
+    ack.epoch = epoch;
+    ack.phase = transport::Phase::kJoining;
+    ack.role_wanted = transport::Role::kObserver;
+    ack.join_attempt = 1;
+    static_cast<void>(client_->write(ack));
+  }
+}
+
 void Forger::speak_as_client() {
   if (dice_.one_in(2)) {
     transport::AckMessage ack;

@@ -15,6 +15,9 @@ class Forger {
   Forger(Stage& stage, std::uint64_t salt);
   /// Sends one sample.
   void speak();
+  /// Asks to join under the id of each client that the live server knows: again and again when it has just
+  /// begun, else once a second.
+  void squat();
 
  private:
   void speak_as_client();
@@ -28,6 +31,8 @@ class Forger {
 
   Stage& stage_;
   Dice dice_;
+  Epoch squats_in_ = 0;
+  std::int64_t squats_since_ns_ = 0, squatted_ns_ = 0;
   std::unique_ptr<transport::ClientPort> client_;
   std::unique_ptr<transport::ServerPort> server_;
 };

@@ -44,7 +44,8 @@ void GatewayActor::on_crash(bool /*power_fails*/) { drop(); }
 void GatewayActor::on_leave() { drop(); }
 
 std::int64_t GatewayActor::plays_for_ns() const {
-  return plays_since_ns_ == INT64_MAX ? 0 : std::min(well_for_ns(), stage_.now_ns - plays_since_ns_);
+  if (plays_since_ns_ == INT64_MAX) return 0;
+  return std::min({well_for_ns(), server_.serves_for_ns(), stage_.now_ns - plays_since_ns_});
 }
 
 std::shared_ptr<Connection> GatewayActor::connect() {

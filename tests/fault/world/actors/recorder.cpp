@@ -71,7 +71,10 @@ class RecorderActor::Both final : public client::CoreListener {
     witness_.on_snapshot(snapshot);
     capture_.on_snapshot(snapshot);
   }
-  void on_scheduled(const transport::ScheduledInputMessage& input) override { capture_.on_scheduled(input); }
+  void on_scheduled(const transport::ScheduledInputMessage& input) override {
+    witness_.on_scheduled(input);
+    capture_.on_scheduled(input);
+  }
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
     witness_.on_applied(epoch, delta);
     capture_.on_applied(epoch, delta);

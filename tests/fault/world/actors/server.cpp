@@ -40,13 +40,14 @@ class Mounted final : public checkpoint::Disk {
 
 constexpr std::int64_t kSoundNs = 3 * kSecond;
 constexpr std::int64_t kServiceRestartNs = kSecond;  // as systemd does with a service that failed
+constexpr std::int64_t kOperatorNs = 6 * kSecond;    // without any live server
 
 }  // namespace
 
-Server::Server(Stage& stage, std::string name, transport::ClientId standby_id, bool stands_by)
+Server::Server(Stage& stage, std::string name, transport::ClientId standby_id, std::uint32_t rank)
     : Actor(stage, std::move(name)),
       disk_(std::make_shared<checkpoint::SimulatedDisk>()),
-      stands_by_(stands_by),
+      rank_(rank),
       standby_id_(standby_id) {}
 
 Server::~Server() = default;
@@ -61,7 +62,7 @@ bool Server::runs() const { return up() && host_ && host_->state() == host::Host
 void Service::look() {
   const Server* live = nullptr;
   int running = 0;
-  for (const Server* server : servers_) {
+  for (const Server* server : stage_.servers) {
     if (!server->runs()) continue;
     ++running;
     live = server;
@@ -77,7 +78,13 @@ std::int64_t Service::serves_for_ns() const {
   return live_ == nullptr ? 0 : std::min(stage_.now_ns - since_ns_, live_->well_for_ns());
 }
 
-void Server::on_start() { stands_by_ ? stand_by() : begin(); }
+void Server::on_start() {
+  if (rank_ > 0 || std::exchange(swapped_, false)) {
+    stand_by();
+  } else {
+    begin();
+  }
+}
 
 void Server::begin() {
   port_ = std::move(*stage_.network.make_server("default"));
@@ -157,12 +164,38 @@ void Server::stand_by() {
            host::roll_forward(host_config(stage_.settings), *engine_, from, journal);
   };
   static_cast<void>(port_->open_streams(static_cast<std::uint32_t>(config.streams.size())));
-  auto made = standby::Standby::create(
-      {.session = "default", .id = standby_id_++, .rank = 1, .epoch = static_cast<Epoch>(wall_ns() / kMs)},
-      *port_, accept, follows);
+  auto made = standby::Standby::create({.session = "default",
+                                        .id = standby_id_++,
+                                        .rank = rank(),
+                                        .epoch = static_cast<Epoch>(wall_ns() / kMs)},
+                                       *port_, accept, follows);
   if (!made) throw std::runtime_error(made.error().message);
   standby_ = std::move(*made);
+  no_live_since_ns_ = stage_.now_ns;
   tell("stands by");
+}
+
+void Server::check_takeover(const standby::Takeover& takeover, Frame from) const {
+  const Epoch epoch = takeover.checkpoint->epoch;
+  const Frame last = stage_.truth.lineage(epoch)->last;
+  const std::string what =
+      " frame " + std::to_string(from) + ", and the live server was at frame " + std::to_string(last);
+  if (takeover.handed_over && from != last && well_for_ns() > kSoundNs)
+    return blame("at most a second", "is handed" + what);
+  // It had the time to receive a checkpoint, and each second another.
+  if (stage_.crashed_epoch == epoch && well_for_ns() > 8 * kSecond &&
+      static_cast<double>(last - from) > 1 + stage_.settings.frame_rate_hz)
+    blame("at most a second", "takes over from" + what);
+  if (takeover.handed_over) return;
+  for (const Server* other : stage_.servers)
+    if (other != this && other->comes_before(*this, epoch))
+      blame("one world", "takes over, and " + other->name() + " comes before it");
+}
+
+// It could have taken over, and both have seen each other long enough.
+bool Server::comes_before(const Server& other, Epoch epoch) const {
+  return up() && standby_ && rank() < other.rank() && standby_->follows() == epoch && standby_->holds() > 0 &&
+         std::min(well_for_ns(), other.well_for_ns()) > 8 * kSecond;
 }
 
 void Server::take_over() {
@@ -176,12 +209,7 @@ void Server::take_over() {
   tell("takes over from epoch " + std::to_string(world.epoch) + " at frame " + std::to_string(world.frame) +
        ", " + std::to_string(world.frame - takeover.checkpoint->frame) + " after its checkpoint");
   for (const checkpoint::ClientState& client : world.clients) taken_over_.push_back(client.id);
-  // It had the time to receive a checkpoint, and each second another.
-  const Frame last = stage_.truth.lineage(world.epoch)->last;
-  if (stage_.crashed_epoch == world.epoch && well_for_ns() > 8 * kSecond &&
-      static_cast<double>(last - world.frame) > 1 + stage_.settings.frame_rate_hz)
-    blame("at most a second", "takes over from frame " + std::to_string(world.frame) +
-                                  ", and the live server was at frame " + std::to_string(last));
+  check_takeover(takeover, world.frame);
   config.epoch = standby_->epoch_at(wall_ns() / kMs);
   standby_.reset();
   const auto newest = keeper_->take_over(host::checkpoint_world(config), *engine_);
@@ -290,7 +318,10 @@ void Server::on_poll() {
   if (standby_) {
     const bool is_time = standby_->poll(steady_ns());
     for (const std::string& notice : standby_->take_notices()) tell(notice);
-    if (!is_time) return;
+    if (!is_time) {
+      call_operator();
+      return;
+    }
     take_over();
   }
   for (int turns = 0; turns < 8; ++turns) {  // as a loop that catches up
@@ -307,6 +338,7 @@ void Server::on_poll() {
   if (host_->error() || handed_over) {
     tell(handed_over ? "is handed over" : "ends: " + host_->error()->message);
     if (host_->state() == host::Host::State::kEnded) blame("one world", host_->error()->message);
+    swapped_ = stage_.settings.swaps;
     drop();
     ended(stage_.now_ns + kServiceRestartNs);
     return;
@@ -320,6 +352,16 @@ void Server::on_poll() {
       tell("runs");
     }
   }
+}
+
+// One of the servers has to begin a world.
+void Server::call_operator() {
+  const bool any = std::ranges::any_of(stage_.servers, [](const Server* server) { return server->runs(); });
+  if (rank_ > 0 || any) no_live_since_ns_ = stage_.now_ns;
+  if (stage_.now_ns - no_live_since_ns_ < kOperatorNs) return;
+  tell("is started again, as the live server");
+  drop();
+  ended(stage_.now_ns);
 }
 
 void Server::note_acts() {
@@ -342,10 +384,16 @@ void Server::note_frame() {
   const std::int64_t waited_ns = stage_.now_ns - std::exchange(last_frame_ns_, stage_.now_ns);
   const auto period_ns = static_cast<std::int64_t>(1e9 / stage_.settings.frame_rate_hz);
   // Two looks of the server, of 50 ms each, besides.
-  if (waited_ns > Rules::kStallNs + 2 * period_ns + 120 * kMs && well_for_ns() > waited_ns)
+  if (waited_ns > longest_wait_ns() + 2 * period_ns + 120 * kMs && well_for_ns() > waited_ns)
     blame("waiting", "frame " + std::to_string(report.frame) + " came " + std::to_string(waited_ns / kMs) +
                          " ms after the one before");
   if (keeper_->writing() && !write_at_ns_) write_at_ns_ = stage_.now_ns + disk_delay_ns_;
+}
+
+// One that prepares a handover gives up after 10 s, and one that waits for its successor after 3 s.
+std::int64_t Server::longest_wait_ns() const {
+  const bool may_wait = stage_.now_ns - stage_.handover_ns < 14 * kSecond;
+  return may_wait ? Rules::kHandoverNs + Rules::kStallNs : Rules::kStallNs;
 }
 
 void Server::write_checkpoint() {
@@ -416,7 +464,7 @@ void Server::check() {
   if (host_->state() != host::Host::State::kRunning) return;
   const auto period_ns = static_cast<std::int64_t>(1e9 / stage_.settings.frame_rate_hz);
   const std::int64_t waits_ns = stage_.now_ns - last_frame_ns_;
-  if (waits_ns > 2 * (Rules::kStallNs + 2 * period_ns + 120 * kMs) && well_for_ns() > waits_ns)
+  if (waits_ns > 2 * (longest_wait_ns() + 2 * period_ns + 120 * kMs) && well_for_ns() > waits_ns)
     blame("waiting", "no frame for " + std::to_string(waits_ns / kMs) + " ms");
 }
 

@@ -19,8 +19,8 @@ namespace tandem::world {
 
 class Server final : public Actor {
  public:
-  /// `stands_by`: how it is started, each time.
-  Server(Stage& stage, std::string name, transport::ClientId standby_id, bool stands_by = false);
+  /// `rank`: of one that is started to stand by, each time; 0: it is started as the live one.
+  Server(Stage& stage, std::string name, transport::ClientId standby_id, std::uint32_t rank = 0);
   ~Server() override;
 
   // What the faults do.
@@ -37,6 +37,8 @@ class Server final : public Actor {
   [[nodiscard]] std::vector<transport::ParticipantId> participants() const override;
   [[nodiscard]] const host::Host* host() const { return host_.get(); }
   void check() override;
+  /// True if the other one has to wait for it before it takes over from the server of `epoch`.
+  [[nodiscard]] bool comes_before(const Server& other, Epoch epoch) const;
   /// It makes frames, or would.
   [[nodiscard]] bool runs() const;
 
@@ -51,9 +53,13 @@ class Server final : public Actor {
   void begin();
   void stand_by();
   void take_over();
+  void call_operator();
+  void check_takeover(const standby::Takeover& takeover, Frame from) const;
+  [[nodiscard]] std::uint32_t rank() const { return rank_ == 0 ? 5 : rank_; }
   void begin_host(host::HostConfig config);
   void check_start(const checkpoint::Start& start);
   void note_frame();
+  [[nodiscard]] std::int64_t longest_wait_ns() const;
   void note_acts();
   void write_checkpoint();
   void check_folder();
@@ -82,8 +88,10 @@ class Server final : public Actor {
   std::unique_ptr<host::Host> host_;
   std::optional<std::int64_t> write_at_ns_;
   bool publishing_ = true;
-  const bool stands_by_;
+  const std::uint32_t rank_;
+  bool swapped_ = false;  ///< another server has the session, so this one stands by at its next start
   transport::ClientId standby_id_;
+  std::int64_t no_live_since_ns_ = 0;
   Epoch epoch_ = 0;
   std::size_t acts_seen_ = 0;
   std::int64_t last_frame_ns_ = 0, last_poll_ns_ = 0;
@@ -106,7 +114,6 @@ class Server final : public Actor {
 class Service {
  public:
   explicit Service(const Stage& stage) : stage_(stage) {}
-  void add(const Server& server) { servers_.push_back(&server); }
   /// Call after each turn of the world.
   void look();
   /// How long that one has been there, and nothing was wrong with it; 0 while there is none or another.
@@ -116,7 +123,6 @@ class Service {
 
  private:
   const Stage& stage_;
-  std::vector<const Server*> servers_;
   const Server* live_ = nullptr;
   Epoch epoch_ = 0;
   std::int64_t since_ns_ = 0;

@@ -31,7 +31,8 @@ bool of_the_server(FaultKind kind) {
 bool harmless(FaultKind kind) {
   return kind == FaultKind::kForge || kind == FaultKind::kBurst || kind == FaultKind::kNewcomer ||
          kind == FaultKind::kQuality || kind == FaultKind::kSlowDisk || kind == FaultKind::kFullDisk ||
-         kind == FaultKind::kLostFsync || kind == FaultKind::kTornWrite;
+         kind == FaultKind::kLostFsync || kind == FaultKind::kTornWrite || kind == FaultKind::kHandover ||
+         kind == FaultKind::kRepeat || kind == FaultKind::kSquat || kind == FaultKind::kLastWords;
 }
 
 void worsen(LinkModel& link, const Fault& fault, const std::shared_ptr<Bottleneck>& bottleneck) {
@@ -56,6 +57,10 @@ void worsen(LinkModel& link, const Fault& fault, const std::shared_ptr<Bottlenec
       break;
     case FaultKind::kTruncate:
       link.truncated = std::max(link.truncated, fault.strength);
+      if (fault.salt % 4 != 0) {  // so that parts come one by one, and twice
+        link.loss = std::max(link.loss, 0.3);
+        link.delay_ns += 150 * kMs;
+      }
       break;
     case FaultKind::kLostForGood:
       link.loss = std::max(link.loss, 0.1);
@@ -78,9 +83,20 @@ std::size_t Chaos::other_than(const Fault& fault) const {
   return other != whom ? other : (whom + 1) % cast_.size();
 }
 
-Server& Chaos::server(std::uint32_t whom) {
-  auto* const server = dynamic_cast<Server*>(&actor(whom));
-  return server != nullptr ? *server : static_cast<Server&>(*cast_.front());
+std::size_t Chaos::server_index(std::uint32_t whom) const {
+  const std::size_t index = index_of(whom);
+  return dynamic_cast<const Server*>(cast_[index].get()) != nullptr ? index : 0;
+}
+
+Server& Chaos::server(std::uint32_t whom) { return static_cast<Server&>(*cast_[server_index(whom)]); }
+
+Server* Chaos::live_server() {
+  for (const auto& any : cast_) {
+    auto* const server = dynamic_cast<Server*>(any.get());
+    if (server != nullptr && server->runs() && server->host()->session().epoch == stage_.live_epoch)
+      return server;
+  }
+  return nullptr;
 }
 
 void Chaos::each_server(const std::function<void(Server&)>& change) {
@@ -110,11 +126,30 @@ void Chaos::turn() {
   if (!healed_ && stage_.now_ns >= heal_at_ns_) heal();
   for (Active& active : active_) {
     disturb(active);
-    if (active.forger == nullptr || stage_.now_ns < active.speaks_at_ns) continue;
-    active.forger->speak();
-    active.speaks_at_ns = stage_.now_ns + seconds(1 / std::max(1.0, active.fault.strength * 10));
+    if (stage_.now_ns >= active.speaks_at_ns) speak(active);
   }
   if (links_of_ != stage_.changes) set_links();
+}
+
+void Chaos::speak(Active& active) {
+  if (active.fault.kind == FaultKind::kSquat) {
+    active.forger->squat();
+    active.speaks_at_ns = stage_.now_ns + 10 * kMs;
+    return;
+  }
+  if (active.forger != nullptr) {
+    active.forger->speak();
+    active.speaks_at_ns = stage_.now_ns + seconds(1 / std::max(1.0, active.fault.strength * 10));
+    return;
+  }
+  // As `tandem handover`, which repeats its command until it is heard.
+  transport::CommandMessage command;
+  command.epoch = stage_.live_epoch;
+  command.session = "default";
+  command.request = active.fault.salt;
+  static_cast<void>(active.operates->write(command));
+  stage_.handover_ns = stage_.now_ns;
+  active.speaks_at_ns = stage_.now_ns + 250 * kMs;
 }
 
 void Chaos::disturb(const Active& active) {
@@ -152,6 +187,9 @@ void Chaos::begin(const Fault& fault) {
     case FaultKind::kBurst:
       whom.burst(static_cast<std::uint32_t>(fault.strength));
       return;
+    case FaultKind::kRepeat:
+      whom.repeat();
+      return;
     case FaultKind::kQuality:
       server(fault.whom).change_quality(fault.salt);
       return;
@@ -186,6 +224,20 @@ void Chaos::begin(const Fault& fault) {
     case FaultKind::kLostFsync:
       each_server([&](Server& any) { any.set_disk_lies(true); });
       break;
+    case FaultKind::kHang:
+      active.fault.whom = static_cast<std::uint32_t>(server_index(fault.whom));
+      server(fault.whom).set_hung(true);
+      break;
+    case FaultKind::kHandover:
+      active.operates = std::move(*stage_.network.make_commander("default"));
+      active.speaks_at_ns = stage_.now_ns + 100 * kMs;
+      break;
+    case FaultKind::kLastWords:
+      for (const auto& any : cast_) any->burst(static_cast<std::uint32_t>(fault.strength));
+      break;
+    case FaultKind::kSquat:
+      active.until_ns = INT64_MAX;
+      [[fallthrough]];
     case FaultKind::kForge:
       active.forger = std::make_unique<Forger>(stage_, fault.salt);
       active.speaks_at_ns = stage_.now_ns;
@@ -212,7 +264,13 @@ void Chaos::end(const Active& active) {
   };
   disturb(active);
   if (cuts(fault.kind) || changes_links(fault.kind)) return set_links();
+  if (fault.kind == FaultKind::kLastWords) {
+    if (Server* const live = live_server())
+      live->crash(stage_.now_ns + static_cast<std::int64_t>(fault.salt % 3000) * kMs);
+    return;
+  }
   if (std::ranges::any_of(active_, still)) return;  // another one of this kind goes on
+  if (fault.kind == FaultKind::kHang) whom.set_hung(false);
   if (fault.kind == FaultKind::kPause) whom.set_paused(false);
   if (fault.kind == FaultKind::kDrift) whom.clock().set_drift(stage_.now_ns, 0);
   if (fault.kind == FaultKind::kStarve) whom.set_starved(0);
@@ -227,7 +285,13 @@ void Chaos::end(const Active& active) {
 void Chaos::heal() {
   healed_ = true;
   stage_.journal.add(stage_.now_ns, "faults", "end");
-  for (Active& active : std::exchange(active_, {})) end(active);
+  for (Active& active : std::exchange(active_, {})) {
+    if (active.until_ns == INT64_MAX) {
+      active_.push_back(std::move(active));
+    } else {
+      end(active);
+    }
+  }
   each_server([&](Server& any) { any.keep_next_write_whole(); });
   set_links();
   for (std::size_t i = 0; i < newcomers_from_; ++i)

@@ -18,7 +18,7 @@ using Cast = std::vector<std::unique_ptr<Actor>>;
 
 class Chaos {
  public:
-  /// Faults end at `heal_at_ns`, the latest. All must outlive it.
+  /// Faults end at `heal_at_ns`, the latest, but for squatters. All must outlive it.
   Chaos(Stage& stage, Cast& cast, std::size_t newcomers_from, const Plan& plan, std::int64_t heal_at_ns);
 
   /// The time at which turn() has something to do.
@@ -31,17 +31,21 @@ class Chaos {
     Fault fault;
     std::int64_t until_ns = 0;
     std::unique_ptr<Forger> forger = {};
-    std::int64_t speaks_at_ns = INT64_MAX;
+    std::unique_ptr<transport::simulated::CommandPort> operates = {};
+    std::int64_t speaks_at_ns = INT64_MAX;  ///< the forger or the operator
     std::shared_ptr<transport::simulated::Bottleneck> bottleneck = {};
   };
   void begin(const Fault& fault);
   void end(const Active& active);
+  void speak(Active& active);
   void heal();
   [[nodiscard]] std::size_t index_of(std::uint32_t whom) const;
   [[nodiscard]] Actor& actor(std::uint32_t whom) { return *cast_[index_of(whom)]; }
   [[nodiscard]] std::size_t other_than(const Fault& fault) const;
   /// Whom a fault of servers hits: the first one, if not another.
+  [[nodiscard]] std::size_t server_index(std::uint32_t whom) const;
   [[nodiscard]] Server& server(std::uint32_t whom);
+  [[nodiscard]] Server* live_server();  ///< null: none
   void each_server(const std::function<void(Server&)>& change);
   /// True if a fault of the network changes the way from one to another.
   [[nodiscard]] bool concerns(const Active& active, std::size_t from, std::size_t to) const;

@@ -34,8 +34,8 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"duplicate", 0.5, 0.2, 6, 0.05, 1},
     {"thin", 0.7, 0.5, 8, 100, 1000},
     {"flip", 0.7, 0.2, 4, 0.001, 0.2},
-    {"truncate", 0.7, 0.2, 4, 0.001, 0.2},
-    {"forge", 0.7, 0.2, 6, 1, 40},
+    {"truncate", 2, 0.5, 8, 0.001, 0.3},
+    {"forge", 0.7, 0.2, 10, 1, 40},
     {"slow-disk", 0.7, 0.5, 8, 0.02, 3},
     {"full-disk", 0.7, 0.2, 6, 0, 0},
     {"lost-fsync", 0.7, 0.2, 6, 0, 0},
@@ -48,12 +48,18 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"quality", 0.5, 0, 0, 0, 0},
     {"preference", 0.7, 0, 0, 0, 0},
     {"lost-for-good", 1, 0.2, 6, 0.01, 0.3},
+    {"handover", 0.7, 0.3, 2, 0, 0},
+    {"hang", 0.7, 0.3, 6, 0, 0},
+    {"repeat", 0.7, 0, 0, 0, 0},
+    {"last-words", 1, 0.005, 0.12, 10, 120},
+    {"squat", 0.4, 0, 0, 0, 0},
 }};
 
 /// Somebody starts anew: then an announcement must not be lost for good, as nobody repeats it.
 bool starts_anew(FaultKind kind) {
   return kind == FaultKind::kCrash || kind == FaultKind::kLeave || kind == FaultKind::kPower ||
-         kind == FaultKind::kTornWrite || kind == FaultKind::kNewcomer;
+         kind == FaultKind::kTornWrite || kind == FaultKind::kNewcomer || kind == FaultKind::kHandover ||
+         kind == FaultKind::kHang || kind == FaultKind::kLastWords;
 }
 
 const Shape& shape_of(FaultKind kind) { return kShapes[static_cast<std::size_t>(kind)]; }

@@ -25,7 +25,7 @@ enum class FaultKind : std::uint8_t {
   kDuplicate,
   kThin,      ///< a bottleneck of 100 to 1000 kbit/s
   kFlip,      ///< bits of deltas and snapshots
-  kTruncate,  ///< deltas and snapshots
+  kTruncate,  ///< deltas and snapshots; mostly on a long link that loses
   kForge,     ///< a participant of the session sends arbitrary samples under all names
   kSlowDisk,  ///< `strength`: seconds for a checkpoint
   kFullDisk,
@@ -39,8 +39,13 @@ enum class FaultKind : std::uint8_t {
   kQuality,      ///< the operator sets other parameters
   kPreference,   ///< a client prefers another stream
   kLostForGood,  ///< what is lost is not repaired, `strength`: share; in worlds where nobody starts anew
+  kHandover,     ///< an operator asks the live server to hand over, until it has heard it
+  kHang,         ///< a server's thread stands still, and its network goes on
+  kRepeat,       ///< a client sends its last input again
+  kLastWords,    ///< a burst of inputs of everybody, and after the duration the live server is killed
+  kSquat,        ///< until the world ends, a participant says it is each client that a server knows
 };
-inline constexpr std::size_t kFaultKinds = 28;
+inline constexpr std::size_t kFaultKinds = 33;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
