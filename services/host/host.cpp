@@ -7,6 +7,7 @@
 #include <deque>
 #include <utility>
 
+#include "sdk/core/lattice/groups.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
@@ -447,6 +448,8 @@ void Host::Impl::publish_status() {
                               .participants = now.streams[id].participants,
                               .observers = now.streams[id].observers,
                               .window = roster.window(),
+                              .raw_body_bytes =
+                                  static_cast<std::uint32_t>(body_bytes(bits_of(groups_of(layout)))),
                               .made = made,
                               .threshold_m = threshold_m(id),
                               .codec = layout.codec,

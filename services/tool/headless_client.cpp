@@ -13,7 +13,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/scenes/script.hpp"
-#include "services/tool/figures.hpp"
+#include "services/json/figures.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
