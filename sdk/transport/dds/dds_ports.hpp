@@ -78,8 +78,8 @@ class Monitor {
 
 /// Takes the lines that Cyclone DDS would write on stderr. `error`: the process ends after it; other errors
 /// reach callers as well. Called by any thread, several at once. Lines about a configuration (CYCLONEDDS_URI)
-/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for the
-/// process.
+/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for
+/// the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
 /// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what

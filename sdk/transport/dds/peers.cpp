@@ -51,8 +51,7 @@ Result<Entity> make_participant_reader(const Node& node) {
              "the reader of participants");
 }
 
-std::optional<Peer> describe_writer(dds_entity_t participants, dds_entity_t reader,
-                                    const ParticipantId& of) {
+std::optional<Peer> describe_writer(dds_entity_t participants, dds_entity_t reader, const ParticipantId& of) {
   const dds_return_t count = dds_get_matched_publications(reader, nullptr, 0);
   if (count <= 0) return std::nullopt;
   std::vector<dds_instance_handle_t> writers(static_cast<std::size_t>(count));

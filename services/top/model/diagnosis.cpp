@@ -22,7 +22,8 @@ constexpr int kMissing = 2;
 constexpr double kMissingShare = 0.02;
 // A client's own work for a frame may take this part of the frame's time (idl/STATES.md, "Status").
 constexpr double kWorkShare = 0.5;
-// Hosts keep their clocks within a second of one another; a lag that is due to the clocks is larger, or negative.
+// Hosts keep their clocks within a second of one another; a lag that is due to the clocks is larger, or
+// negative.
 constexpr double kClockS = 1;
 constexpr double kRateShare = 0.95;
 
@@ -58,9 +59,7 @@ void count_reports(const Client& client, ClientFacts& facts) {
   }
 }
 
-bool lags(const ClientFacts& facts) {
-  return facts.lag_ms > std::max(kLagMs, kLagPeriods * facts.period_ms);
-}
+bool lags(const ClientFacts& facts) { return facts.lag_ms > std::max(kLagMs, kLagPeriods * facts.period_ms); }
 
 struct Causes {
   const Overview& overview;
@@ -86,9 +85,10 @@ struct Causes {
   void not_run() {
     if (facts.late_reports < kLateReports || client.gateway) return;
     add(fmt::format("its process is held up, by {:.0f} ms", facts.late_ms),
-        fmt::format("Its process does not run when it should: {} of its last reports were written up to {:.0f} ms late, "
-                    "by its own clock. It is stopped in turns, or others take its processor.",
-                    facts.late_reports, facts.late_ms));
+        fmt::format(
+            "Its process does not run when it should: {} of its last reports were written up to {:.0f} ms late, "
+            "by its own clock. It is stopped in turns, or others take its processor.",
+            facts.late_reports, facts.late_ms));
   }
 
   void link_loses() {
@@ -102,7 +102,8 @@ struct Causes {
   void link_thin() {
     if (stream == nullptr || stream->gone) return;
     const double all = sane(stream->status.mbit_per_s), taken = sane(client.status.mbit_per_s);
-    if (all <= 0.01 || taken >= 0.8 * all || facts.rate_hz >= 0.9 * sane(stream->status.frame_rate_hz)) return;
+    if (all <= 0.01 || taken >= 0.8 * all || facts.rate_hz >= 0.9 * sane(stream->status.frame_rate_hz))
+      return;
     add(fmt::format("its link is too thin: {:.2f} of {:.2f} Mbit/s", taken, all),
         fmt::format("It takes in {:.2f} of the {:.2f} Mbit/s of its stream. Give it a thinner stream "
                     "(--prefer bandwidth), or the server a --target-bandwidth.",
@@ -117,11 +118,13 @@ struct Causes {
       least = std::min(least, sane(point.lag_ms));
       most = std::max(most, sane(point.lag_ms));
     }
-    add(client.gateway ? fmt::format("its link to the gateway, or its own computer; lag {:.0f} ms", facts.lag_ms)
-                       : fmt::format("its link is slow or loses frames (others: {:.0f} ms)", usual),
-        fmt::format("Its own work and its process are in time, so frames are late or lost on its link: lag {:.0f} to {:.0f} ms in the "
-                    "last minute, {:.0f} ms in the middle of the stream's clients.",
-                    least, most, usual));
+    add(client.gateway
+            ? fmt::format("its link to the gateway, or its own computer; lag {:.0f} ms", facts.lag_ms)
+            : fmt::format("its link is slow or loses frames (others: {:.0f} ms)", usual),
+        fmt::format(
+            "Its own work and its process are in time, so frames are late or lost on its link: lag {:.0f} to {:.0f} ms in the "
+            "last minute, {:.0f} ms in the middle of the stream's clients.",
+            least, most, usual));
   }
 };
 
@@ -172,7 +175,8 @@ Diagnosis diagnose(const Overview& overview, const Client& client, Moment now) {
   if (stream != nullptr && stream->gone) {
     found.trouble = Trouble::kBad;
     found.why = fmt::format("its server is gone for {}", since(stream->heard));
-    found.facts.push_back("It shows the last frame that the server sent, and waits for the server to come back.");
+    found.facts.push_back(
+        "It shows the last frame that the server sent, and waits for the server to come back.");
     return found;
   }
   const ClientFacts facts = facts_of(overview, client);
@@ -188,13 +192,15 @@ Diagnosis diagnose(const Overview& overview, const Client& client, Moment now) {
   }
   if (!found.why.empty()) found.trouble = late ? Trouble::kBad : Trouble::kWarning;
   if (facts.rejoins > 0) {
-    found.facts.push_back(fmt::format("It lost frames and joined again {} times in the last minute.", facts.rejoins));
+    found.facts.push_back(
+        fmt::format("It lost frames and joined again {} times in the last minute.", facts.rejoins));
     found.why = fmt::format("{} rejoins a minute: {}", facts.rejoins, found.why);
   }
   if (client.demoted) {
     found.trouble = Trouble::kBad;
-    found.why = after("demoted", found.why.empty() ? fmt::format("held the server up {} ago", since(*client.demoted))
-                                                   : found.why);
+    found.why =
+        after("demoted", found.why.empty() ? fmt::format("held the server up {} ago", since(*client.demoted))
+                                           : found.why);
     found.facts.push_back(fmt::format(
         "It wants to be a participant, but the server had to wait for it for too long. It has been an observer for {}, and its inputs are "
         "refused, until it keeps up for 10 s.",
@@ -210,19 +216,22 @@ Diagnosis diagnose(const Overview& overview, const Client& client, Moment now) {
     found.trouble = std::max(found.trouble, Trouble::kNote);
     const double off_s = std::abs(facts.clock_ahead_s);
     const char* const way = facts.clock_ahead_s > 0 ? "ahead of" : "behind";
-    found.facts.push_back(fmt::format(
-        "The clock of its host is {:.1f} s {} the server's; the lag shown is corrected for that.", off_s, way));
+    found.facts.push_back(
+        fmt::format("The clock of its host is {:.1f} s {} the server's; the lag shown is corrected for that.",
+                    off_s, way));
     if (found.why.empty()) found.why = fmt::format("its clock is {:.1f} s {} the server's", off_s, way);
   }
   if (client.status.hash_mismatches > 0) {
     found.trouble = Trouble::kBad;
-    found.facts.push_back(fmt::format("Its state differed from the server's {} times. This is a fault: please report it.",
-                                      client.status.hash_mismatches));
+    found.facts.push_back(
+        fmt::format("Its state differed from the server's {} times. This is a fault: please report it.",
+                    client.status.hash_mismatches));
     found.why = after("state differed from the server's", found.why);
   }
   if (client.viewers > 0) {
     found.facts.push_back(fmt::format("It is a gateway with {} viewers.", client.viewers));
-    if (found.why.empty()) found.why = fmt::format("gateway of {} viewer{}", client.viewers, client.viewers == 1 ? "" : "s");
+    if (found.why.empty())
+      found.why = fmt::format("gateway of {} viewer{}", client.viewers, client.viewers == 1 ? "" : "s");
   }
   return found;
 }
@@ -254,7 +263,8 @@ Diagnosis diagnose(const Overview& overview, const StreamKey& key, const Stream&
   }
   if (frame_ms > 0.8 * budget_ms) {
     found.why = fmt::format("{}: a frame takes {:.0f} of {:.0f} ms", rate, frame_ms, budget_ms);
-    found.facts.push_back("The server does not finish its frames in time: fewer bodies, a cheaper predictor, or more processor.");
+    found.facts.push_back(
+        "The server does not finish its frames in time: fewer bodies, a cheaper predictor, or more processor.");
   } else if (suspended_ms > 500) {
     found.why = fmt::format("{}: waits for participants", rate);
     found.facts.push_back(fmt::format(
@@ -266,7 +276,8 @@ Diagnosis diagnose(const Overview& overview, const StreamKey& key, const Stream&
       if (slowest == nullptr || client.status.applied < slowest->status.applied) slowest = &client;
     }
     if (slowest != nullptr)
-      found.facts.push_back(fmt::format("The client that is most behind is {}.", short_id(slowest->status.client)));
+      found.facts.push_back(
+          fmt::format("The client that is most behind is {}.", short_id(slowest->status.client)));
   } else {
     found.why = fmt::format("{}: its process is held up", rate);
     found.facts.push_back("Its frames are short and it waits for nobody, so others take its processor.");

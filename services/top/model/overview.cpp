@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <string_view>
 
+#include "sdk/transport/limits.hpp"
 #include "sdk/transport/plain_text.hpp"
 #include "sdk/transport/units.hpp"
 
@@ -101,9 +104,8 @@ void Overview::note_changes(const Client& before, const transport::ClientStatusM
   if (now_is.hash_mismatches > before.status.hash_mismatches)
     say(Trouble::kBad, "had a state that differed from the server's");
   if (!(now_is.stream == before.status.stream))
-    say(Trouble::kNote,
-        fmt::format("plays stream {} now: {}", now_is.stream.id,
-                    transport::plain_text(now_is.stream_reason, transport::kMaxReasonBytes)));
+    say(Trouble::kNote, fmt::format("plays stream {} now: {}", now_is.stream.id,
+                                    transport::plain_text(now_is.stream_reason, transport::kMaxReasonBytes)));
 }
 
 void Overview::update(const transport::Stamped<transport::ClientStatusMessage>& heard,
@@ -159,8 +161,8 @@ void Overview::update(const transport::Stamped<transport::ClientStatusMessage>& 
   client.seen_as_observer = observes ? client.seen_as_observer + 1 : 0;
   const bool was_participant = same_run && is_participant(client.status);
   const bool wants_to_be = client.peer && client.peer->lease.count() > 0 && client.peer->lease < kShortLease;
-  const bool demoted = observes && (was_participant || client.demoted ||
-                                    (wants_to_be && client.seen_as_observer > 1));
+  const bool demoted =
+      observes && (was_participant || client.demoted || (wants_to_be && client.seen_as_observer > 1));
   if (demoted && !client.demoted) {
     client.demoted = now;
     note(now, Trouble::kWarning, status.session,
@@ -184,8 +186,7 @@ void Overview::update(const transport::Stamped<transport::ClientStatusMessage>& 
 void Overview::update(const transport::SessionMessage& session) {
   const bool live = session.server_role == transport::ServerRole::kLive;
   for (const transport::StreamMessage& announced : session.streams) {
-    const auto found =
-        streams_.find({session.session, live ? 0 : session.epoch, announced.id.id});
+    const auto found = streams_.find({session.session, live ? 0 : session.epoch, announced.id.id});
     if (found == streams_.end() || found->second.status.epoch != session.epoch) continue;
     found->second.nominal_hz = session.frame_rate_hz;
     found->second.name = announced.name;
@@ -224,7 +225,8 @@ void Overview::age(Moment now) {
     if (stream.gone || now.steady_ns - stream.heard.steady_ns <= kServerSilenceNs) continue;
     stream.gone = true;
     if (key.stream == 0)
-      note(now, Trouble::kBad, key.session, key.standby == 0 ? "the server is gone" : "a server that stood by is gone");
+      note(now, Trouble::kBad, key.session,
+           key.standby == 0 ? "the server is gone" : "a server that stood by is gone");
   }
   for (auto& [id, client] : clients_) {
     if (client.gone || now.steady_ns - client.heard.steady_ns <= kClientSilenceNs) continue;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sdk/transport/plain_text.hpp"
-#include "services/json/json.hpp"
 #include "services/json/figures.hpp"
+#include "services/json/json.hpp"
 #include "services/top/model/diagnosis.hpp"
 
 namespace tandem::top {

@@ -4,15 +4,18 @@
 
 #include <cmath>
 #include <numeric>
+#include <type_traits>
 
 namespace tandem::top {
 namespace {
 
-constexpr std::size_t kLeastLast = 30;  // columns for the words at the end of a row
+// Columns for the words at the end of a row, at least.
+constexpr std::size_t kStreamWords = 22, kClientWords = 30;
 constexpr std::size_t kBar = 8, kSpark = 12;
 
 template <class Row>
 std::vector<std::size_t> fitting(const std::vector<Column<Row>>& columns, std::size_t width) {
+  constexpr std::size_t kLeastLast = std::is_same_v<Row, StreamRow> ? kStreamWords : kClientWords;
   std::vector<std::size_t> by_rank(columns.size() - 1), shown_ones;
   std::iota(by_rank.begin(), by_rank.end(), std::size_t{0});
   std::ranges::stable_sort(by_rank, {}, [&columns](std::size_t i) { return columns[i].rank; });
@@ -41,27 +44,23 @@ Line line(const std::vector<Column<Row>>& columns, const Sheet& sheet, const Tex
 
 template <class Row>
 Line header(const std::vector<Column<Row>>& columns, std::size_t sorted, const Sheet& sheet) {
-  return line(
-      columns, sheet,
-      [&](Line& out, std::size_t i, std::size_t width) {
-        const Align align = i + 1 == columns.size() ? Align::kLeft : columns[i].align;
-        out.add(cell(columns[i].title, width, align, sheet.alphabet),
-                i == sorted ? Style::kStrong : Style::kDim);
-      });
+  return line(columns, sheet, [&](Line& out, std::size_t i, std::size_t width) {
+    const Align align = i + 1 == columns.size() ? Align::kLeft : columns[i].align;
+    out.add(cell(columns[i].title, width, align, sheet.alphabet), i == sorted ? Style::kStrong : Style::kDim);
+  });
 }
 
 template <class Row>
-Line row_line(const std::vector<Column<Row>>& columns, const Row& row, bool chosen, bool gone, const Sheet& sheet) {
+Line row_line(const std::vector<Column<Row>>& columns, const Row& row, bool chosen, bool gone,
+              const Sheet& sheet) {
   const Style style = gone ? Style::kDim : Style::kNormal;
-  Line out = line(
-      columns, sheet,
-      [&](Line& to, std::size_t i, std::size_t width) {
-        const bool is_last = i + 1 == columns.size();
-        const bool words = is_last && row.diagnosis.trouble >= Trouble::kWarning;
-        to.add(cell(columns[i].text(row, sheet.now, sheet.alphabet), width,
-                    is_last ? Align::kLeft : columns[i].align, sheet.alphabet),
-               words ? style_of(row.diagnosis.trouble) : style);
-      });
+  Line out = line(columns, sheet, [&](Line& to, std::size_t i, std::size_t width) {
+    const bool is_last = i + 1 == columns.size();
+    const bool words = is_last && row.diagnosis.trouble >= Trouble::kWarning;
+    to.add(cell(columns[i].text(row, sheet.now, sheet.alphabet), width,
+                is_last ? Align::kLeft : columns[i].align, sheet.alphabet),
+           words ? style_of(row.diagnosis.trouble) : style);
+  });
   if (chosen) {
     out.parts.front().text = ">";
     for (Part& part : out.parts) part.style = Style::kChosen;
@@ -95,123 +94,131 @@ std::string frame_text(const Stream& stream, std::size_t columns, Alphabet alpha
          cell(number(frame, 1, 5), 5, Align::kRight, alphabet) + '/' + number(budget, 0, 4);
 }
 
+bool is_gone(const StreamRow& row) { return row.stream->gone; }
+bool is_gone(const ClientRow& row) { return row.client->gone; }
+const std::deque<StreamPoint>& minute(const StreamRow& row) { return row.stream->minute; }
+const std::deque<ClientPoint>& minute(const ClientRow& row) { return row.client->minute; }
+
+template <class Row, class Of>
+Column<Row> value_column(std::string_view title, std::size_t width, int rank, int decimals, Of of) {
+  return {title,
+          width,
+          Align::kRight,
+          rank,
+          [=](const Row& row, Moment, Alphabet) {
+            return is_gone(row) ? std::string("-") : number(static_cast<double>(of(row)), decimals, width);
+          },
+          [=](const Row& row) { return by(static_cast<double>(of(row))); }};
+}
+
+template <class Row, class Of>
+Column<Row> text_column(std::string_view title, std::size_t width, int rank, Of of) {
+  return {title,
+          width,
+          Align::kLeft,
+          rank,
+          [=](const Row& row, Moment, Alphabet) { return std::string(of(row)); },
+          [=](const Row& row) { return by(std::string(of(row))); }};
+}
+
+/// `least`: what is less than this looks small, whatever the other values are.
+template <class Row, class Of>
+Column<Row> minute_column(std::string_view title, int rank, double least, Of of) {
+  return {title,
+          kSpark,
+          Align::kLeft,
+          rank,
+          [=](const Row& row, Moment now, Alphabet alphabet) {
+            const auto values = spread(minute(row), now, kSpark, of);
+            return sparkline(values, std::max(least, largest(values)), alphabet);
+          },
+          [=](const Row& row) { return by(minute(row).empty() ? 0 : of(minute(row).back())); }};
+}
+
+std::string clients_text(const Stream& stream) {
+  if (stream.gone) return "-";
+  std::string text = fmt::format("{}+{}", stream.status.participants, stream.status.observers);
+  if (stream.viewers > 0) text += fmt::format("+{}v", stream.viewers);
+  return text;
+}
+
 std::vector<Column<StreamRow>> make_stream_columns() {
   using R = StreamRow;
-  const auto status = [](const R& row) -> const transport::ServerStatusMessage& { return row.stream->status; };
   const auto value = [](std::string_view title, std::size_t width, int rank, int decimals, auto of) {
-    return Column<R>{title, width, Align::kRight, rank,
-                     [=](const R& row, Moment, Alphabet) {
-                       return row.stream->gone ? std::string("-") : number(double{1} * of(row), decimals, width);
-                     },
-                     [=](const R& row) { return by(double{1} * of(row)); }};
+    return value_column<R>(title, width, rank, decimals,
+                           [of](const R& row) { return of(row.stream->status); });
   };
-  const auto words = [](std::string_view title, std::size_t width, int rank, auto of) {
-    return Column<R>{title, width, Align::kLeft, rank, [=](const R& row, Moment, Alphabet) { return of(row); },
-                     [=](const R& row) { return by(of(row)); }};
+  using Status = transport::ServerStatusMessage;
+  return {
+      text_column<R>("SESSION", 16, 0, [](const R& row) { return name_of(*row.key, *row.stream); }),
+      value("HZ", 5, 1, 1, [](const Status& s) { return s.frame_rate_hz; }),
+      {"FRAME MS, OF BUDGET", kBar + 12, Align::kLeft, 2,
+       [](const R& row, Moment, Alphabet alphabet) {
+         return row.stream->gone ? std::string() : frame_text(*row.stream, kBar, alphabet);
+       },
+       [](const R& row) { return by(row.stream->status.frame_ms_p50); }},
+      value("BODIES", 7, 5, 0, [](const Status& s) { return s.bodies; }),
+      value("MBIT/S", 6, 3, 2, [](const Status& s) { return s.mbit_per_s; }),
+      value("% RAW", 6, 4, 1, [](const Status& s) { return share_of_raw(s); }),
+      {"CLIENTS", 9, Align::kRight, 1,
+       [](const R& row, Moment, Alphabet) { return clients_text(*row.stream); },
+       [](const R& row) {
+         const Status& s = row.stream->status;
+         return by(double{1} * s.participants + s.observers + row.stream->viewers);
+       }},
+      value("AT REST", 7, 12, 0, [](const Status& s) { return s.at_rest; }),
+      value("CORRECTED", 9, 11, 0, [](const Status& s) { return s.corrected_per_frame; }),
+      value("STALLS", 6, 13, 0, [](const Status& s) { return s.stalls; }),
+      minute_column<R>("RATE, 1 MIN", 9, 0, [](const StreamPoint& p) { return p.rate_hz; }),
+      minute_column<R>("MBIT/S,1 MIN", 10, 0, [](const StreamPoint& p) { return p.mbit_per_s; }),
+      {"PREDICTOR, THRESHOLD", 0, Align::kLeft, 0,
+       [](const R& row, Moment, Alphabet) {
+         const Status& s = row.stream->status;
+         if (!row.diagnosis.why.empty()) return row.diagnosis.why;
+         return fmt::format("{}, {}", s.predictor, number(s.threshold, 3, 6));
+       },
+       [](const R& row) {
+         return SortKey{static_cast<int>(row.diagnosis.trouble), row.stream->status.predictor};
+       }},
   };
-  const auto spark = [](std::string_view title, int rank, auto of) {
-    return Column<R>{title, kSpark, Align::kLeft, rank,
-                     [=](const R& row, Moment now, Alphabet alphabet) {
-                       const auto values = spread(row.stream->minute, now, kSpark, of);
-                       return sparkline(values, largest(values), alphabet);
-                     },
-                     [=](const R& row) { return by(row.stream->minute.empty() ? 0 : of(row.stream->minute.back())); }};
-  };
-  std::vector<Column<R>> columns;
-  columns.push_back(words("SESSION", 16, 0, [](const R& row) { return name_of(*row.key, *row.stream); }));
-  columns.push_back(value("HZ", 5, 1, 1, [=](const R& row) { return status(row).frame_rate_hz; }));
-  columns.push_back({"FRAME MS, OF BUDGET", kBar + 12, Align::kLeft, 2,
-                     [](const R& row, Moment, Alphabet alphabet) {
-                       return row.stream->gone ? std::string() : frame_text(*row.stream, kBar, alphabet);
-                     },
-                     [=](const R& row) { return by(status(row).frame_ms_p50); }});
-  columns.push_back(value("BODIES", 7, 5, 0, [=](const R& row) { return status(row).bodies; }));
-  columns.push_back(value("MBIT/S", 6, 3, 2, [=](const R& row) { return status(row).mbit_per_s; }));
-  columns.push_back({"OF RAW", 6, Align::kRight, 4,
-                     [=](const R& row, Moment, Alphabet) {
-                       return row.stream->gone ? std::string("-") : number(share_of_raw(status(row)), 1, 4) + " %";
-                     },
-                     [=](const R& row) { return by(share_of_raw(status(row))); }});
-  columns.push_back({"CLIENTS", 9, Align::kRight, 1,
-                     [=](const R& row, Moment, Alphabet) {
-                       if (row.stream->gone) return std::string("-");
-                       std::string text = fmt::format("{}+{}", status(row).participants, status(row).observers);
-                       if (row.stream->viewers > 0) text += fmt::format("+{}v", row.stream->viewers);
-                       return text;
-                     },
-                     [=](const R& row) {
-                       return by(double{1} * status(row).participants + status(row).observers + row.stream->viewers);
-                     }});
-  columns.push_back(value("AT REST", 7, 12, 0, [=](const R& row) { return status(row).at_rest; }));
-  columns.push_back(value("CORRECTED", 9, 11, 0, [=](const R& row) { return status(row).corrected_per_frame; }));
-  columns.push_back(value("STALLS", 6, 13, 0, [=](const R& row) { return status(row).stalls; }));
-  columns.push_back(spark("RATE, 1 MIN", 9, [](const StreamPoint& p) { return p.rate_hz; }));
-  columns.push_back(spark("MBIT/S,1 MIN", 10, [](const StreamPoint& p) { return p.mbit_per_s; }));
-  columns.push_back({"PREDICTOR, THRESHOLD; STATE", 0, Align::kLeft, 0,
-                     [=](const R& row, Moment, Alphabet) {
-                       if (!row.diagnosis.why.empty()) return row.diagnosis.why;
-                       return fmt::format("{}, {}", status(row).predictor, number(status(row).threshold, 3, 6));
-                     },
-                     [=](const R& row) { return SortKey{double{1} * static_cast<int>(row.diagnosis.trouble), status(row).predictor}; }});
-  return columns;
+}
+
+std::string stream_text(const ClientRow& row) {
+  const std::uint32_t id = row.client->status.stream.id;
+  if (row.stream == nullptr) return fmt::format("{}", id);
+  const std::string& name = row.stream->name.empty() ? row.stream->status.predictor : row.stream->name;
+  return fmt::format("{} {}", id, name);
 }
 
 std::vector<Column<ClientRow>> make_client_columns() {
   using R = ClientRow;
-  const auto value = [](std::string_view title, std::size_t width, int rank, int decimals, auto of) {
-    return Column<R>{title, width, Align::kRight, rank,
-                     [=](const R& row, Moment, Alphabet) {
-                       return row.client->gone ? std::string("-") : number(double{1} * of(row), decimals, width);
-                     },
-                     [=](const R& row) { return by(double{1} * of(row)); }};
+  return {
+      text_column<R>("CLIENT", 8, 0, [](const R& row) { return short_id(row.client->status.client); }),
+      text_column<R>("SESSION", 12, 8, [](const R& row) { return row.client->status.session; }),
+      text_column<R>("STATE", 8, 1, [](const R& row) { return state_word(row); }),
+      value_column<R>("LAG MS", 7, 2, 0, [](const R& row) { return row.facts.lag_ms; }),
+      value_column<R>("HZ", 5, 4, 1, [](const R& row) { return row.facts.rate_hz; }),
+      value_column<R>("WORK MS", 7, 5, 1, [](const R& row) { return row.facts.work_ms; }),
+      value_column<R>("MBIT/S", 6, 3, 2, [](const R& row) { return row.client->status.mbit_per_s; }),
+      {"STREAM", 12, Align::kLeft, 7, [](const R& row, Moment, Alphabet) { return stream_text(row); },
+       [](const R& row) { return by(row.client->status.stream.id); }},
+      text_column<R>("HOST", 10, 6,
+                     [](const R& row) { return row.client->peer ? row.client->peer->host : std::string(); }),
+      minute_column<R>("LAG, 1 MIN", 9, 100, [](const ClientPoint& p) { return p.lag_ms; }),
+      minute_column<R>("RATE, 1 MIN", 10, 0, [](const ClientPoint& p) { return p.rate_hz; }),
+      minute_column<R>("MBIT/S,1 MIN", 11, 0, [](const ClientPoint& p) { return p.mbit_per_s; }),
+      value_column<R>("REJOINS", 7, 12, 0, [](const R& row) { return row.client->status.resyncs; }),
+      value_column<R>("REFUSED", 7, 13, 0, [](const R& row) { return row.client->status.inputs_refused; }),
+      {"WHY IT LAGS, OR WHY THIS STREAM", 0, Align::kLeft, 0,
+       [](const R& row, Moment, Alphabet) {
+         return row.diagnosis.why.empty() ? row.client->status.stream_reason : row.diagnosis.why;
+       },
+       // The worst first; those that are gone say less than those that lag.
+       [](const R& row) {
+         return SortKey{1e12 * static_cast<int>(row.diagnosis.trouble) + row.facts.lag_ms,
+                        row.client->status.stream_reason};
+       }},
   };
-  const auto words = [](std::string_view title, std::size_t width, int rank, auto of) {
-    return Column<R>{title, width, Align::kLeft, rank,
-                     [=](const R& row, Moment, Alphabet) { return std::string(of(row)); },
-                     [=](const R& row) { return by(std::string(of(row))); }};
-  };
-  const auto spark = [](std::string_view title, int rank, double least, auto of) {
-    return Column<R>{title, kSpark, Align::kLeft, rank,
-                     [=](const R& row, Moment now, Alphabet alphabet) {
-                       const auto values = spread(row.client->minute, now, kSpark, of);
-                       return sparkline(values, std::max(least, largest(values)), alphabet);
-                     },
-                     [=](const R& row) { return by(row.client->minute.empty() ? 0 : of(row.client->minute.back())); }};
-  };
-  std::vector<Column<R>> columns;
-  columns.push_back(words("CLIENT", 8, 0, [](const R& row) { return short_id(row.client->status.client); }));
-  columns.push_back(words("SESSION", 12, 8, [](const R& row) { return row.client->status.session; }));
-  columns.push_back(words("STATE", 8, 1, [](const R& row) { return state_word(row); }));
-  columns.push_back(value("LAG MS", 7, 2, 0, [](const R& row) { return row.facts.lag_ms; }));
-  columns.push_back(value("HZ", 5, 4, 1, [](const R& row) { return row.facts.rate_hz; }));
-  columns.push_back(value("WORK MS", 7, 5, 1, [](const R& row) { return row.facts.work_ms; }));
-  columns.push_back(value("MBIT/S", 6, 3, 2, [](const R& row) { return row.client->status.mbit_per_s; }));
-  columns.push_back({"STREAM", 12, Align::kLeft, 7,
-                     [](const R& row, Moment, Alphabet) {
-                       const std::uint32_t id = row.client->status.stream.id;
-                       if (row.stream == nullptr) return fmt::format("{}", id);
-                       return row.stream->name.empty() ? fmt::format("{} {}", id, row.stream->status.predictor)
-                                                       : fmt::format("{} {}", id, row.stream->name);
-                     },
-                     [](const R& row) { return by(row.client->status.stream.id); }});
-  columns.push_back(words("HOST", 10, 6, [](const R& row) {
-    return row.client->peer ? row.client->peer->host : std::string();
-  }));
-  columns.push_back(spark("LAG, 1 MIN", 9, 100, [](const ClientPoint& p) { return p.lag_ms; }));
-  columns.push_back(spark("RATE, 1 MIN", 10, 0, [](const ClientPoint& p) { return p.rate_hz; }));
-  columns.push_back(spark("MBIT/S,1 MIN", 11, 0, [](const ClientPoint& p) { return p.mbit_per_s; }));
-  columns.push_back(value("REJOINS", 7, 12, 0, [](const R& row) { return row.client->status.resyncs; }));
-  columns.push_back(value("REFUSED", 7, 13, 0, [](const R& row) { return row.client->status.inputs_refused; }));
-  columns.push_back({"WHY IT LAGS, OR WHY THIS STREAM", 0, Align::kLeft, 0,
-                     [](const R& row, Moment, Alphabet) {
-                       return row.diagnosis.why.empty() ? row.client->status.stream_reason : row.diagnosis.why;
-                     },
-                     [](const R& row) {
-                       // The worst first; those that are gone say less than those that lag.
-                       return SortKey{1e12 * static_cast<int>(row.diagnosis.trouble) + row.facts.lag_ms,
-                                      row.client->status.stream_reason};
-                     }});
-  return columns;
 }
 
 }  // namespace
@@ -243,7 +250,8 @@ std::vector<ClientRow> client_rows(const Overview& overview, const StreamKey* on
     if (only != nullptr &&
         (client.status.session != only->session || client.status.stream.id != only->stream))
       continue;
-    rows.push_back({&client, overview.stream_of(client), facts_of(overview, client), diagnose(overview, client, now)});
+    rows.push_back(
+        {&client, overview.stream_of(client), facts_of(overview, client), diagnose(overview, client, now)});
   }
   sort(rows, client_columns(), order);
   return rows;
@@ -275,7 +283,8 @@ std::string_view state_word(const ClientRow& row) {
   if (client.joining) return "joining";
   if (client.demoted) return "demoted";
   if (client.gateway) return "viewer";
-  return client.status.role == static_cast<std::uint32_t>(transport::Role::kParticipant) ? "plays" : "observes";
+  return client.status.role == static_cast<std::uint32_t>(transport::Role::kParticipant) ? "plays"
+                                                                                         : "observes";
 }
 
 double share_of_raw(const transport::ServerStatusMessage& status) {
