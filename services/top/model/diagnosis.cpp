@@ -84,7 +84,7 @@ struct Causes {
 
   void not_run() {
     if (facts.late_reports < kLateReports || client.gateway) return;
-    add(fmt::format("its process is held up, by {:.0f} ms", facts.late_ms),
+    add(fmt::format("process held up, by {:.0f} ms", facts.late_ms),
         fmt::format(
             "Its process does not run when it should: {} of its last reports were written up to {:.0f} ms late, "
             "by its own clock. It is stopped in turns, or others take its processor.",
@@ -94,7 +94,7 @@ struct Causes {
   void link_loses() {
     const int all = facts.reports + facts.missing;
     if (client.gateway || facts.missing < kMissing || facts.missing < kMissingShare * all) return;
-    add(fmt::format("its link loses packets ({:.0f} % of reports)", 100.0 * facts.missing / all),
+    add(fmt::format("link loses packets: {:.0f} % of reports", 100.0 * facts.missing / all),
         fmt::format("Its link loses packets: {} of the last {} reports that it wrote did not come here.",
                     facts.missing, all));
   }
@@ -104,7 +104,7 @@ struct Causes {
     const double all = sane(stream->status.mbit_per_s), taken = sane(client.status.mbit_per_s);
     if (all <= 0.01 || taken >= 0.8 * all || facts.rate_hz >= 0.9 * sane(stream->status.frame_rate_hz))
       return;
-    add(fmt::format("its link is too thin: {:.2f} of {:.2f} Mbit/s", taken, all),
+    add(fmt::format("link too thin: {:.2f} of {:.2f} Mbit/s", taken, all),
         fmt::format("It takes in {:.2f} of the {:.2f} Mbit/s of its stream. Give it a thinner stream "
                     "(--prefer bandwidth), or the server a --target-bandwidth.",
                     taken, all));
@@ -118,9 +118,8 @@ struct Causes {
       least = std::min(least, sane(point.lag_ms));
       most = std::max(most, sane(point.lag_ms));
     }
-    add(client.gateway
-            ? fmt::format("its link to the gateway, or its own computer; lag {:.0f} ms", facts.lag_ms)
-            : fmt::format("its link is slow or loses frames (others: {:.0f} ms)", usual),
+    add(client.gateway ? std::string("its link to the gateway, or its computer")
+                       : fmt::format("link slow or lossy; others lag {:.0f} ms", usual),
         fmt::format(
             "Its own work and its process are in time, so frames are late or lost on its link: lag {:.0f} to {:.0f} ms in the "
             "last minute, {:.0f} ms in the middle of the stream's clients.",

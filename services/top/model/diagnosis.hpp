@@ -12,6 +12,7 @@ namespace tandem::top {
 /// What the reports of a client's last 20 s tell, besides its newest status. Numbers are finite.
 struct ClientFacts {
   double lag_ms = 0;         ///< corrected by the difference of the clocks, if that is large
+  double worst_lag_ms = 0;   ///< of the last 20 s
   double clock_ahead_s = 0;  ///< of the client's host, compared with the server's; 0: not noticeable
   double rate_hz = 0;
   double period_ms = 0;  ///< of a frame; 0: unknown
