@@ -17,9 +17,9 @@ constexpr double kLagPeriods = 3;
 constexpr double kLateMs = 60;
 constexpr int kLateReports = 2;
 constexpr std::int64_t kLookNs = 20'000'000'000;
-// Missing reports: as many, and this part of all.
-constexpr int kMissing = 2;
-constexpr double kMissingShare = 0.02;
+// Missing reports tell of a link that loses packets: as many, and this part of all.
+constexpr int kMissing = 3;
+constexpr double kMissingShare = 0.03;
 // A client's own work for a frame may take this part of the frame's time (idl/STATES.md, "Status").
 constexpr double kWorkShare = 0.5;
 // Hosts keep their clocks within a second of one another; a lag that is due to the clocks is larger, or
@@ -59,7 +59,9 @@ void count_reports(const Client& client, ClientFacts& facts) {
   }
 }
 
-bool lags(const ClientFacts& facts) { return facts.lag_ms > std::max(kLagMs, kLagPeriods * facts.period_ms); }
+bool lags(const ClientFacts& facts) {
+  return facts.worst_lag_ms > std::max(kLagMs, kLagPeriods * facts.period_ms);
+}
 
 struct Causes {
   const Overview& overview;
@@ -113,17 +115,12 @@ struct Causes {
   void link_slow() {
     if (!found.why.empty()) return;
     const double usual = stream != nullptr ? sane(stream->usual_lag_ms) : 0;
-    double least = facts.lag_ms, most = facts.lag_ms;
-    for (const ClientPoint& point : client.minute) {
-      least = std::min(least, sane(point.lag_ms));
-      most = std::max(most, sane(point.lag_ms));
-    }
     add(client.gateway ? std::string("its link to the gateway, or its computer")
                        : fmt::format("link slow or lossy; others lag {:.0f} ms", usual),
         fmt::format(
-            "Its own work and its process are in time, so frames are late or lost on its link: lag {:.0f} to {:.0f} ms in the "
-            "last minute, {:.0f} ms in the middle of the stream's clients.",
-            least, most, usual));
+            "Its own work and its process are in time, so its frames are late or lost on the way: up to "
+            "{:.0f} ms in the last 20 s, where others of its stream have {:.0f} ms.",
+            facts.worst_lag_ms, usual));
   }
 };
 
@@ -152,11 +149,17 @@ ClientFacts facts_of(const Overview& overview, const Client& client) {
   // A count that starts again belongs to another process under the same id.
   const std::uint64_t before = client.minute.front().resyncs;
   facts.rejoins = client.status.resyncs > before ? client.status.resyncs - before : 0;
-  if (stream == nullptr || client.gateway) return facts;
-  const double ahead_s = least_transit_s(stream->minute) - least_transit_s(client.minute);
-  if (std::abs(ahead_s) > kClockS || facts.lag_ms < -1) {
-    facts.clock_ahead_s = sane(ahead_s);
-    facts.lag_ms = std::max(sane(facts.lag_ms - 1e3 * ahead_s), 0.0);
+  if (stream != nullptr && !client.gateway) {
+    const double ahead_s = least_transit_s(stream->minute) - least_transit_s(client.minute);
+    if (std::abs(ahead_s) > kClockS || facts.lag_ms < -1) facts.clock_ahead_s = sane(ahead_s);
+  }
+  const auto corrected = [&facts](double lag_ms) {
+    return facts.clock_ahead_s == 0 ? sane(lag_ms) : std::max(sane(lag_ms) - 1e3 * facts.clock_ahead_s, 0.0);
+  };
+  facts.worst_lag_ms = facts.lag_ms = corrected(facts.lag_ms);
+  for (const ClientPoint& point : client.minute) {
+    if (client.minute.back().at_ns - point.at_ns > kLookNs) continue;
+    facts.worst_lag_ms = std::max(facts.worst_lag_ms, corrected(point.lag_ms));
   }
   return facts;
 }
@@ -174,8 +177,7 @@ Diagnosis diagnose(const Overview& overview, const Client& client, Moment now) {
   if (stream != nullptr && stream->gone) {
     found.trouble = Trouble::kBad;
     found.why = fmt::format("its server is gone for {}", since(stream->heard));
-    found.facts.push_back(
-        "It shows the last frame that the server sent, and waits for the server to come back.");
+    found.facts.push_back("It shows the last frame that it got, and waits for the server.");
     return found;
   }
   const ClientFacts facts = facts_of(overview, client);
@@ -183,33 +185,31 @@ Diagnosis diagnose(const Overview& overview, const Client& client, Moment now) {
   const bool lag = lags(facts);
   const bool late = client.demoted.has_value() || lag || facts.rejoins > 0;
   causes.own_work();
+  if (late) causes.not_run();
+  causes.link_loses();
   if (late) {
-    causes.not_run();
-    causes.link_loses();
     causes.link_thin();
     if (lag || facts.rejoins > 0) causes.link_slow();
   }
   if (!found.why.empty()) found.trouble = late ? Trouble::kBad : Trouble::kWarning;
   if (facts.rejoins > 0) {
+    const char* const times = facts.rejoins == 1 ? "time" : "times";
     found.facts.push_back(
-        fmt::format("It lost frames and joined again {} times in the last minute.", facts.rejoins));
-    found.why = fmt::format("{} rejoins a minute: {}", facts.rejoins, found.why);
+        fmt::format("It lost frames and joined again {} {} in the last minute.", facts.rejoins, times));
+    found.why += fmt::format("; {} rejoin{}", facts.rejoins, facts.rejoins == 1 ? "" : "s");
   }
   if (client.demoted) {
     found.trouble = Trouble::kBad;
-    found.why =
-        after("demoted", found.why.empty() ? fmt::format("held the server up {} ago", since(*client.demoted))
-                                           : found.why);
+    if (found.why.empty()) found.why = fmt::format("held the server up {} ago", since(*client.demoted));
     found.facts.push_back(fmt::format(
-        "It wants to be a participant, but the server had to wait for it for too long. It has been an observer for {}, and its inputs are "
-        "refused, until it keeps up for 10 s.",
+        "The server had to wait for it for too long, and made it an observer {} ago. Its inputs are "
+        "refused until it has kept up for 10 s.",
         since(*client.demoted)));
   }
   if (client.joining && now.steady_ns - client.joining->steady_ns > 3 * kSecond) {
     found.trouble = Trouble::kBad;
     found.why = fmt::format("joining for {}: waits for its snapshot", since(*client.joining));
-    found.facts.push_back(
-        "It has no state yet. The snapshot is as large as the server's log says, and passes at the pace of its link.");
+    found.facts.push_back("It has no state yet: its snapshot passes at the pace of its link.");
   }
   if (facts.clock_ahead_s != 0) {
     found.trouble = std::max(found.trouble, Trouble::kNote);

@@ -28,14 +28,14 @@ class Composer {
   template <class Points, class Value>
   void minute(std::string_view label, const Points& points, double least, std::string_view unit, int decimals,
               Value value) {
-    const std::size_t room = size_.columns - std::min<std::size_t>(size_.columns, kLabel + 46);
+    const std::size_t room = size_.columns - std::min<std::size_t>(size_.columns, kLabel + 32);
     const std::size_t columns = std::clamp<std::size_t>(room, 10, 60);
     const auto values = spread(points, now_, columns, value);
     const double most = largest(values), now_is = points.empty() ? 0 : sane(value(points.back()));
     Line line(" " + cell(label, kLabel, Align::kLeft, alphabet_), Style::kDim);
     line.add(sparkline(values, std::max(least, most), alphabet_));
-    line.add(fmt::format(" {} {} now, {} at most in the last minute", number(now_is, decimals, 7), unit,
-                         number(most, decimals, 7)));
+    line.add(
+        fmt::format(" {} {} now, at most {}", number(now_is, decimals, 7), unit, number(most, decimals, 7)));
     page_.push_back(std::move(line));
   }
   void fact(std::string_view label, std::string_view text) {

@@ -11,7 +11,7 @@
 namespace tandem::top {
 namespace {
 
-constexpr std::size_t kExplanationLines = 3;
+constexpr std::size_t kExplanationLines = 4;
 
 constexpr std::array<std::string_view, 18> kHelp{
     "Worst clients stand first. The line below the tables says why the chosen one lags.",
@@ -31,7 +31,7 @@ constexpr std::array<std::string_view, 18> kHelp{
     "WORK    its own decoding, applying and simulating of a frame",
     "CLIENTS participants + observers + viewers behind gateways",
     "FRAME   the server's time for a frame (median) of what a frame has; | is the slowest",
-    "OF RAW  the stream's rate compared with all its channels uncompressed",
+    "% RAW   the stream's rate compared with all its channels uncompressed",
 };
 
 std::string clock_text(std::int64_t wall_ns) {
@@ -114,15 +114,15 @@ Page tables(const Overview& overview, const View& view, const Rows& rows, const 
                 Style::kNormal, alphabet);
     return page;
   }
-  Page foot = size.lines >= 12 ? explanation(view, rows, size, alphabet) : Page();
+  Page foot = size.lines >= 16 ? explanation(view, rows, size, alphabet) : Page();
   if (foot.size() > kExplanationLines) foot.resize(kExplanationLines);
-  const std::size_t foot_lines = size.lines >= 12 ? kExplanationLines + 1 : 0;
+  const std::size_t foot_lines = size.lines >= 16 ? kExplanationLines + 1 : 0;
   // A quarter for the streams, the rest for the clients.
   const std::size_t room = size.lines - std::min(size.lines, page.size() + 3 + foot_lines);
   const std::size_t for_streams = std::min(rows.streams.size(), std::max<std::size_t>(room / 4, 1));
   page.push_back(stream_header(view.order(Focus::kStreams).column, sheet));
   add_rows(page, rows.streams, view.chosen_stream(rows), view.focus() == Focus::kStreams, for_streams, sheet);
-  if (size.lines >= 12) page.emplace_back();
+  if (size.lines >= 16) page.emplace_back();
   page.push_back(client_header(view.order(Focus::kClients).column, sheet));
   const std::size_t for_clients = size.lines - std::min(size.lines, page.size() + foot_lines);
   add_rows(page, rows.clients, view.chosen_client(rows), view.focus() == Focus::kClients, for_clients, sheet);
@@ -158,13 +158,20 @@ Page log(const Overview& overview, const View& view, const Rows& rows, const Sur
   const std::string id =
       chosen ? fmt::format("{:016x}", rows.clients[*chosen].client->status.client) : std::string();
   const std::size_t room = size.lines - std::min(size.lines, page.size());
-  const std::size_t all = around.log_lines.size();
-  const std::size_t last = all - std::min(view.scrolled(), all - std::min(all, room));
-  for (std::size_t i = last - std::min(last, room); i < last; ++i) {
-    const bool of_chosen = !id.empty() && around.log_lines[i].find(id) != std::string::npos;
-    page.emplace_back(" " + shown(around.log_lines[i], alphabet),
-                      of_chosen ? Style::kStrong : Style::kNormal);
+  Page lines;
+  for (const std::string& line : around.log_lines) {
+    const Style style = !id.empty() && line.find(id) != std::string::npos ? Style::kStrong : Style::kNormal;
+    const char* indent = " ";
+    for (const std::string& part :
+         wrap(line, size.columns - std::min<std::size_t>(size.columns, 4), alphabet)) {
+      lines.emplace_back(indent + part, style);
+      indent = "   ";
+    }
   }
+  const std::size_t last =
+      lines.size() - std::min(view.scrolled(), lines.size() - std::min(lines.size(), room));
+  const auto at = [&lines](std::size_t i) { return lines.begin() + static_cast<std::ptrdiff_t>(i); };
+  page.insert(page.end(), at(last - std::min(last, room)), at(last));
   return page;
 }
 

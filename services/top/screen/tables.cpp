@@ -196,7 +196,7 @@ std::vector<Column<ClientRow>> make_client_columns() {
       text_column<R>("CLIENT", 8, 0, [](const R& row) { return short_id(row.client->status.client); }),
       text_column<R>("SESSION", 12, 8, [](const R& row) { return row.client->status.session; }),
       text_column<R>("STATE", 8, 1, [](const R& row) { return state_word(row); }),
-      value_column<R>("LAG MS", 7, 2, 0, [](const R& row) { return row.facts.lag_ms; }),
+      value_column<R>("LAG MS", 7, 2, 1, [](const R& row) { return row.facts.lag_ms; }),
       value_column<R>("HZ", 5, 4, 1, [](const R& row) { return row.facts.rate_hz; }),
       value_column<R>("WORK MS", 7, 5, 1, [](const R& row) { return row.facts.work_ms; }),
       value_column<R>("MBIT/S", 6, 3, 2, [](const R& row) { return row.client->status.mbit_per_s; }),
