@@ -295,15 +295,23 @@ TEST_F(Top, keeps_hostile_text_and_numbers_off_the_terminal) {
   auto client_status = client(1, "a");
   client_status.lag_ms = std::numeric_limits<double>::infinity();
   client_status.mbit_per_s = -1e300;
-  client_status.stream_reason = "\x9b2J\u200b";
+  client_status.stream_reason =
+      "\x9b"
+      "2J\u200b";
   hear(client_status, 0);
   for (const Panel panel : {Panel::kTables, Panel::kDetails, Panel::kLog, Panel::kHelp}) {
     for (const Size size : {Size{100, 30}, Size{80, 24}, Size{200, 60}, Size{20, 5}, Size{1, 1}}) {
       View view;
       const Rows rows = view.rows(overview, at(0));
-      if (panel == Panel::kDetails) ASSERT_TRUE(view.press(Key::kDetails, rows, 5));
-      if (panel == Panel::kLog) ASSERT_TRUE(view.press(Key::kLog, rows, 5));
-      if (panel == Panel::kHelp) ASSERT_TRUE(view.press(Key::kHelp, rows, 5));
+      if (panel == Panel::kDetails) {
+        ASSERT_TRUE(view.press(Key::kDetails, rows, 5));
+      }
+      if (panel == Panel::kLog) {
+        ASSERT_TRUE(view.press(Key::kLog, rows, 5));
+      }
+      if (panel == Panel::kHelp) {
+        ASSERT_TRUE(view.press(Key::kHelp, rows, 5));
+      }
       Surroundings around;
       around.log_lines = {"\x1b[31mred", std::string(500, 'x')};
       const Page page = compose(overview, view, rows, around, size, at(0), Alphabet::kAscii);
