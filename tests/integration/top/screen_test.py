@@ -67,7 +67,7 @@ class Screens(unittest.TestCase):
             terminal.press("tab")
             terminal.wait_for("^>arena")
             terminal.press("enter")
-            terminal.wait_for("session arena, stream 0")
+            terminal.wait_for(r"session arena, stream \d")
             terminal.press("l")
             terminal.wait_for(r"evil \?")
             terminal.wait_for("LOG: /")
@@ -131,4 +131,4 @@ class Screens(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
