@@ -28,7 +28,7 @@ class Screens(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         os.environ["CYCLONEDDS_URI"] = URI
-        cls.log = tempfile.NamedTemporaryFile("w+", suffix=".log")
+        cls.log = tempfile.NamedTemporaryFile("a", suffix=".log")
         cls.running = []
         cls.server = cls.start(TANDEMD, "--scene", "half_pipe", "--bodies", "500", "--session", "arena", "--scripted", err=cls.log)
         cls.start(TANDEM, "join", "--session", "arena", "--seconds", "300")
