@@ -28,9 +28,11 @@ class Screens(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         os.environ["CYCLONEDDS_URI"] = URI
-        cls.log = tempfile.NamedTemporaryFile("a", suffix=".log")
+        cls.log = tempfile.NamedTemporaryFile(suffix=".log")
+        cls.appended = open(cls.log.name, "a")  # the test writes into it, too
         cls.running = []
-        cls.server = cls.start(TANDEMD, "--scene", "half_pipe", "--bodies", "500", "--session", "arena", "--scripted", err=cls.log)
+        cls.server = cls.start(TANDEMD, "--scene", "half_pipe", "--bodies", "500", "--session", "arena", "--scripted",
+                               err=cls.appended)  # fmt: skip
         cls.start(TANDEM, "join", "--session", "arena", "--seconds", "300")
         cls.start(TANDEM, "join", "--session", "arena", "--observe", "--seconds", "300")
 
@@ -44,6 +46,7 @@ class Screens(unittest.TestCase):
         for each in cls.running:
             each.kill()
             each.wait()
+        cls.appended.close()
         cls.log.close()
 
     def top(self, *words, **how):
