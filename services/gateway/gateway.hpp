@@ -115,6 +115,7 @@ class Gateway {
   [[nodiscard]] std::optional<Refusal> take(Viewer& viewer, const transport::AckMessage& ack,
                                             std::int64_t now_ns);
   void take(Viewer& viewer, transport::InputMessage&& input, std::int64_t now_ns);
+  void report(Viewer& viewer, transport::ClientStatusMessage&& status, std::int64_t now_ns);
   void on_joining(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns);
   [[nodiscard]] transport::Reason check(Viewer& viewer, const transport::InputMessage& input,
                                         std::int64_t now_ns) const;

@@ -41,6 +41,10 @@ Result<std::uint64_t> SessionClient::send(transport::InputKind kind, std::vector
   return core_.send(kind, std::move(values), std::move(bytes), {.steady_ns = now_ns, .wall_ns = 0});
 }
 
+void SessionClient::report(const transport::ClientStatusMessage& status) {
+  static_cast<void>(port_.write(status));
+}
+
 // Viewers are told of the one stream that exists for them. If it cannot be played, they give the reason
 // themselves.
 void SessionClient::on_session(const transport::SessionMessage& session) { untold_ = session; }

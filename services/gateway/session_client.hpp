@@ -30,6 +30,7 @@ class SessionClient final : public World, private client::CoreListener {
   [[nodiscard]] std::optional<Cut> cut() override;
   Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
                              std::int64_t now_ns) override;
+  void report(const transport::ClientStatusMessage& status) override;
 
  private:
   void on_session(const transport::SessionMessage& session) override;

@@ -58,7 +58,6 @@ std::optional<Refusal> Gateway::receive(ViewerId id, std::span<const std::byte> 
   return refusal;
 }
 
-// A viewer's status is for tools that watch a DDS domain; the gateway does not read it.
 std::optional<Refusal> Gateway::take(Viewer& viewer, transport::ViewerMessage&& message,
                                      std::int64_t now_ns) {
   const auto client = std::visit([](const auto& body) { return body.client; }, message);
@@ -67,6 +66,8 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, transport::ViewerMessage&& 
   if (viewer.client != client) return Refusal::kForeignClient;
   if (const auto* ack = std::get_if<transport::AckMessage>(&message)) return take(viewer, *ack, now_ns);
   if (auto* input = std::get_if<transport::InputMessage>(&message)) take(viewer, std::move(*input), now_ns);
+  if (auto* status = std::get_if<transport::ClientStatusMessage>(&message))
+    report(viewer, std::move(*status), now_ns);
   return std::nullopt;
 }
 
@@ -96,6 +97,18 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage
     state.place = newest_delta_.value_or(log_.end());
   }
   return std::nullopt;
+}
+
+// A viewer's figures are its own word; where and what it plays is not.
+void Gateway::report(Viewer& viewer, transport::ClientStatusMessage&& status, std::int64_t now_ns) {
+  if (!session_ || session_->streams.empty() || !alive_ || status.epoch != session_->epoch ||
+      !viewer.reports.take(now_ns))
+    return;
+  status.session = session_->session;
+  status.stream = session_->streams.front().id;
+  status.role = static_cast<std::uint32_t>(role_of(viewer));
+  status.phase = static_cast<std::uint32_t>(viewer.now.phase);
+  world_.report(status);
 }
 
 void Gateway::on_joining(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns) {

@@ -7,6 +7,7 @@
 #include <deque>
 #include <utility>
 
+#include "sdk/core/lattice/groups.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
@@ -440,18 +441,20 @@ void Host::Impl::publish_status() {
     const HostTotals now = totals_now();
     const Layout& layout = source->session().streams[id].layout;
     const bool made = source->active()[id];
-    lanes[id].status.publish(now,
-                             {.frame = source->frame(),
-                              .bodies = source->agreed(first_made()).alive_count(),
-                              .at_rest = made ? source->agreed(id).rest_count() : 0,
-                              .participants = now.streams[id].participants,
-                              .observers = now.streams[id].observers,
-                              .window = roster.window(),
-                              .made = made,
-                              .threshold_m = threshold_m(id),
-                              .codec = layout.codec,
-                              .predictor = layout.predictor},
-                             now_ns);
+    lanes[id].status.publish(
+        now,
+        {.frame = source->frame(),
+         .bodies = source->agreed(first_made()).alive_count(),
+         .at_rest = made ? source->agreed(id).rest_count() : 0,
+         .participants = now.streams[id].participants,
+         .observers = now.streams[id].observers,
+         .window = roster.window(),
+         .raw_body_bytes = static_cast<std::uint32_t>(body_bytes(bits_of(groups_of(layout)))),
+         .made = made,
+         .threshold_m = threshold_m(id),
+         .codec = layout.codec,
+         .predictor = layout.predictor},
+        now_ns);
   }
 }
 

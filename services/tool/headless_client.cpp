@@ -12,8 +12,8 @@
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/json/figures.hpp"
 #include "services/scenes/script.hpp"
-#include "services/tool/figures.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
@@ -65,7 +65,8 @@ Result<void> HeadlessClient::open() {
   if (!port) return tl::unexpected<Error>(port.error());
   port_ = std::move(*port);
   if (!options_.profile.empty() && options_.index == 0)
-    tell(transport::describe_dds_profile(options_.domain, options_.profile, transport::Side::kClient));
+    tell(LogLevel::kInfo,
+         transport::describe_dds_profile(options_.domain, options_.profile, transport::Side::kClient));
   if (recorder_) recording_port_ = std::make_unique<RecordingPort>(*port_, *recorder_);
   transport::ClientPort& used =
       recording_port_ ? static_cast<transport::ClientPort&>(*recording_port_) : *port_;

@@ -1,13 +1,17 @@
-// `tandem top`: sessions and clients of a DDS domain, from their status topics.
+// `tandem top`: sessions and clients of a DDS domain, on a screen, as tables or as JSON.
 
 #include <fmt/format.h>
 #include <stdio_ext.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
+#include <clocale>
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "sdk/transport/clock.hpp"
@@ -16,38 +20,76 @@
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
-#include "services/tool/top_view.hpp"
+#include "services/top/model/overview.hpp"
+#include "services/top/model/status_json.hpp"
+#include "services/top/screen/log_tail.hpp"
+#include "services/top/screen/pages.hpp"
+#include "services/top/screen/terminal.hpp"
 
 namespace tandem::tool {
 namespace {
 
 // Status comes once a second; discovery takes up to as long.
-constexpr std::int64_t kOnceNs = 5 * kSecond / 2;
+constexpr double kOnceS = 2.5;
+constexpr std::size_t kTableColumns = 100;
+constexpr std::int64_t kAnnouncementsNs = 2 * kSecond;
+constexpr std::chrono::milliseconds kKeysWait(50);
 
 struct TopOptions {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network
-  std::string session;
+  std::string session, log;
+  double listen_s = kOnceS;
   bool once = false, json = false, stream = false;
 };
 
-void collect(transport::Monitor& monitor, TopView& view) {
-  std::vector<transport::Received<transport::ServerStatusMessage>> servers;
-  std::vector<transport::Received<transport::ClientStatusMessage>> clients;
-  monitor.take(servers);
-  monitor.take(clients);
-  const std::int64_t now_ns = transport::steady_ns();
-  for (const auto& server : servers) view.update(server.message, now_ns);
-  for (const auto& client : clients) view.update(client.message, now_ns);
-  view.forget_silent(now_ns);
-}
+top::Moment now() { return {.steady_ns = transport::steady_ns(), .wall_ns = transport::wall_ns()}; }
+
+/// Feeds an overview with what a monitor hears.
+class Collector {
+ public:
+  Collector(transport::Monitor& monitor, top::Overview& overview) : monitor_(monitor), overview_(overview) {}
+
+  void collect() {
+    servers_.clear();
+    clients_.clear();
+    monitor_.take(servers_);
+    monitor_.take(clients_);
+    const top::Moment at = now();
+    for (const auto& server : servers_) overview_.update(server, at);
+    for (const auto& client : clients_) {
+      const bool known = overview_.described(client.message.client);
+      overview_.update(client, known ? std::nullopt : monitor_.describe(client.from), at);
+    }
+    if (at.steady_ns >= announcements_due_ns_) {
+      announcements_due_ns_ = at.steady_ns + kAnnouncementsNs;
+      sessions_.clear();
+      monitor_.list_sessions(sessions_);
+      for (const auto& session : sessions_) overview_.update(session.message);
+    }
+    if (!servers_.empty() || !clients_.empty() || at.steady_ns - aged_ns_ >= kSecond) {
+      aged_ns_ = at.steady_ns;
+      overview_.age(at);
+    }
+  }
+  /// Announcements are looked at with the next collect().
+  void expect_announcements() { announcements_due_ns_ = 0; }
+
+ private:
+  transport::Monitor& monitor_;
+  top::Overview& overview_;
+  std::vector<transport::Stamped<transport::ServerStatusMessage>> servers_;
+  std::vector<transport::Stamped<transport::ClientStatusMessage>> clients_;
+  std::vector<transport::Received<transport::SessionMessage>> sessions_;
+  std::int64_t announcements_due_ns_ = 0, aged_ns_ = 0;
+};
 
 /// Returns false if stdout takes no more.
-bool show(const TopView& view, const TopOptions& options) {
-  const bool screen = !options.once && !options.stream && ::isatty(STDOUT_FILENO) != 0;
-  if (screen) std::fputs("\x1b[H\x1b[2J", stdout);
-  std::fputs(options.json || options.stream ? (view.to_json() + '\n').c_str() : view.to_table().c_str(),
-             stdout);
+bool print(const top::Overview& overview, const TopOptions& options) {
+  const std::string text = options.json || options.stream
+                               ? top::to_json(overview, now()) + '\n'
+                               : top::print(overview, kTableColumns, now(), top::alphabet_of_locale());
+  std::fputs(text.c_str(), stdout);
   return std::fflush(stdout) == 0;
 }
 
@@ -55,6 +97,65 @@ bool show(const TopView& view, const TopOptions& options) {
 int reader_left() {
   __fpurge(stdout);
   std::clearerr(stdout);
+  return 0;
+}
+
+/// Prints once, or once a second until the program shall end.
+int run_printing(const TopOptions& options, transport::Monitor& monitor, SignalWatch& signals) {
+  top::Overview overview;
+  if (!options.session.empty()) overview.only(options.session);
+  Collector collector(monitor, overview);
+  const std::int64_t start_ns = transport::steady_ns();
+  std::int64_t shown_ns = start_ns;
+  while (!signals.stop()) {
+    monitor.wait(std::chrono::milliseconds(100));
+    collector.collect();
+    const std::int64_t now_ns = transport::steady_ns();
+    if (options.once) {
+      if (static_cast<double>(now_ns - start_ns) < options.listen_s * 1e9) continue;
+      collector.expect_announcements();
+      collector.collect();
+      return print(overview, options) && !overview.empty() ? 0 : 1;
+    }
+    if (now_ns - shown_ns >= kSecond) {
+      shown_ns += kSecond;
+      if (!print(overview, options)) return errno == EPIPE ? reader_left() : 1;
+    }
+  }
+  return 0;
+}
+
+/// Draws until the operator ends it, a signal comes or the terminal goes.
+int run_screen(const TopOptions& options, transport::Monitor& monitor, const SignalWatch& signals,
+               top::Terminal terminal) {
+  top::Overview overview;
+  if (!options.session.empty()) overview.only(options.session);
+  Collector collector(monitor, overview);
+  top::View view;
+  top::LogTail log(options.log);
+  const top::Alphabet alphabet = top::alphabet_of_locale();
+  std::int64_t drawn_ns = 0;
+  while (!signals.stop() && terminal.there()) {
+    monitor.wait(kKeysWait);
+    collector.collect();
+    const top::Moment at = now();
+    top::Key key = terminal.key();
+    if (key == top::Key::kNone && at.steady_ns - drawn_ns < kSecond / 2) continue;
+    top::Rows rows = view.rows(overview, at);
+    for (; key != top::Key::kNone; key = terminal.key()) {
+      if (!view.press(key, rows, terminal.size().lines / 2)) return 0;
+      rows = view.rows(overview, at);
+    }
+    top::Surroundings around{.domain = options.domain, .log_source = {}, .log_lines = {}};
+    if (view.panel() == top::Panel::kLog) {
+      const auto chosen = view.chosen_stream(rows);
+      log.refresh(chosen ? rows.streams[*chosen].key->session : std::string(), at.steady_ns);
+      around.log_source = log.source();
+      around.log_lines = log.lines();
+    }
+    terminal.draw(top::compose(overview, view, rows, around, terminal.size(), at, alphabet));
+    drawn_ns = at.steady_ns;
+  }
   return 0;
 }
 
@@ -70,41 +171,40 @@ int run_top(const TopOptions& options) {
   }
   tell_profile("tandem top", options.domain, options.profile);
   std::signal(SIGPIPE, SIG_IGN);
-  TopView view;
-  if (!options.session.empty()) view.only(options.session);
-  const std::int64_t start_ns = transport::steady_ns();
-  std::int64_t shown_ns = start_ns;
-  while (!signals.stop()) {
-    (*monitor)->wait(std::chrono::milliseconds(100));
-    collect(**monitor, view);
-    const std::int64_t now_ns = transport::steady_ns();
-    if (options.once) {
-      if (now_ns - start_ns < kOnceNs) continue;
-      return signals.finish(show(view, options) && !view.empty() ? 0 : 1);
-    }
-    if (now_ns - shown_ns >= kSecond) {
-      shown_ns += kSecond;
-      if (!show(view, options)) return signals.finish(errno == EPIPE ? reader_left() : 1);
-    }
+  std::setlocale(LC_CTYPE, "");
+  if (!options.once && !options.stream) {
+    if (auto terminal = top::Terminal::open())
+      return signals.finish(run_screen(options, **monitor, signals, std::move(*terminal)));
   }
-  return signals.finish(0);
+  return signals.finish(run_printing(options, **monitor, signals));
 }
 
 }  // namespace
 
 void add_top(commandline::Command app, Run& run) {
   commandline::Command command =
-      app.add_subcommand("top", "Shows the sessions and clients of a domain, their bandwidth and lag.");
+      app.add_subcommand("top", "Shows the sessions and clients of a domain, and why a client lags.");
   const auto options = std::make_shared<TopOptions>();
   add_domain_options(command, options->domain, options->profile);
   command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(
-      "--once", options->once, "Listen for 2.5 s, print once and stop; exit with 1 if nothing was heard");
+      "--once", options->once, "Listen, print once and stop; exit with 1 if nothing was heard");
+  command
+      .add_option("--listen", options->listen_s,
+                  "How long --once listens, seconds; causes that need more than two reports of a client show "
+                  "after some more")
+      .range(0.1, 3600.0)
+      .show_default()
+      .needs(once);
   command.add_flag("--json", options->json, "Print one JSON object: sessions, clients").needs(once);
   command
       .add_flag("--stream", options->stream, "Print a line with a JSON object once a second, until stopped")
       .excludes(once);
-  command.footer("Without flags, shows a table that is refreshed once a second, until Ctrl-C.");
+  command.add_option("--log", options->log,
+                     "The server's log, for the key l (default: the journal of tandemd@SESSION)");
+  command.footer(
+      "On a terminal it is a screen, and ? says which keys it has. Otherwise it prints tables once a second, "
+      "until Ctrl-C.");
   command.on_chosen([options, &run] { run = [options] { return run_top(*options); }; });
 }
 

@@ -114,12 +114,14 @@ EDGES = {
     + ["services/gateway/doors", "services/gateway/viewing"]
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
     + ["services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
+    "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
+    "services/top/screen": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/system", "services/top/model"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/logging", "services/metrics", "services/process", "services/recording", "services/scenes"]
-    + ["services/system", "services/tokens"],
+    + ["services/system", "services/tokens", "services/top/model", "services/top/screen"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
@@ -142,6 +144,7 @@ OWNERS = [
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
     (re.compile(r"^openssl/"), "OpenSSL", ["services/tokens", "services/gateway", "tests"]),
+    (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),

@@ -13,9 +13,10 @@ constexpr std::size_t kMostHeard = 4096;
 }  // namespace
 
 void Browser::hear(std::int64_t now_ns) {
-  std::vector<transport::Received<transport::ServerStatusMessage>> statuses;
+  std::vector<transport::Stamped<transport::ServerStatusMessage>> statuses;
   monitor_->take(statuses);
-  for (auto& [status, from] : statuses) {
+  for (auto& heard : statuses) {
+    transport::ServerStatusMessage& status = heard.message;
     if (status.stream != 0 || status.server_role != transport::ServerRole::kLive ||
         (heard_.size() >= kMostHeard && !heard_.contains(status.session)))
       continue;

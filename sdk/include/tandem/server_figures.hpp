@@ -29,7 +29,7 @@ struct ServerFigures : ServerCounts {
   double uptime_s = 0;                 ///< since the start
   double frame_rate_hz = 0;            ///< as achieved
   double mbit_per_s = 0;               ///< payload rate; 1 Mbit = 2^20 bits
-  double raw_mbit_per_s = 0;           ///< rate that positions and velocities would need uncompressed
+  double raw_mbit_per_s = 0;           ///< rate of the stream's channels, uncompressed
   double frame_ms_p50 = 0;             ///< step, predict, encode, apply
   double frame_ms_p99 = 0;             ///< as frame_ms_p50
   double corrected_per_frame = 0;      ///< bodies that a delta corrects

@@ -49,7 +49,7 @@ class Announcements {
 
   [[nodiscard]] SessionBook& book() { return book_; }
   /// The newest status samples that the caller has not taken yet.
-  [[nodiscard]] std::vector<Received<ServerStatusMessage>>& statuses() { return statuses_; }
+  [[nodiscard]] std::vector<Stamped<ServerStatusMessage>>& statuses() { return statuses_; }
 
  private:
   static constexpr std::ptrdiff_t kMaxStatuses = 256;
@@ -59,7 +59,7 @@ class Announcements {
 
   Reader<SessionMessage> sessions_;
   Reader<ServerStatusMessage> status_;
-  std::vector<Received<ServerStatusMessage>> statuses_;
+  std::vector<Stamped<ServerStatusMessage>> statuses_;
   SessionBook book_;
 };
 

@@ -40,6 +40,7 @@ class Arrivals {
   struct Arrival {
     dds_instance_handle_t writer = 0;
     std::size_t bytes = 0;
+    std::int64_t written_ns = 0;  ///< wall clock of the writer's host
     M message;
   };
 
@@ -100,7 +101,7 @@ class Arrivals {
     held_[writer].samples += 1;
     held_[writer].bytes += size;
     bytes_ += size;
-    arrivals_.push_back({writer, size, std::move(*message)});
+    arrivals_.push_back({writer, size, sample.timestamp.v, std::move(*message)});
     while (arrivals_.size() > std::max(kMostSamples, 2 * of_writer_) || bytes_ > kMostBytes) {
       const auto less = [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; };
       drop_oldest_of(std::max_element(held_.begin(), held_.end(), less)->first);

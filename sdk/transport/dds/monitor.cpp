@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "sdk/transport/dds/announcements.hpp"
+#include "sdk/transport/dds/peers.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -13,6 +14,7 @@ class DdsMonitor final : public Monitor {
     dds::Node node;
     dds::Announcements servers;
     dds::Reader<ClientStatusMessage> clients;
+    dds::Entity participants;  // a reader of the participants that discovery knows
   };
 
   explicit DdsMonitor(Endpoints endpoints) : endpoints_(std::move(endpoints)) {}
@@ -21,14 +23,17 @@ class DdsMonitor final : public Monitor {
     refresh();
     endpoints_.servers.book().list_live(out);
   }
-  void take(std::vector<Received<ServerStatusMessage>>& out) override {
+  void take(std::vector<Stamped<ServerStatusMessage>>& out) override {
     refresh();
     auto& statuses = endpoints_.servers.statuses();
     std::move(statuses.begin(), statuses.end(), std::back_inserter(out));
     statuses.clear();
   }
-  void take(std::vector<Received<ClientStatusMessage>>& out) override {
+  void take(std::vector<Stamped<ClientStatusMessage>>& out) override {
     endpoints_.clients.take(dropped_, out);
+  }
+  std::optional<Peer> describe(const ParticipantId& client) override {
+    return dds::describe_writer(endpoints_.participants.get(), endpoints_.clients.get(), client);
   }
   // Its writer is made when it is needed, as most monitors only watch.
   Result<void> write(const CommandMessage& message) override {
@@ -60,8 +65,10 @@ Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options) {
   if (!servers) return tl::unexpected(servers.error());
   auto clients = node->reader<ClientStatusMessage>("client status");
   if (!clients) return tl::unexpected(clients.error());
-  return std::make_unique<DdsMonitor>(
-      DdsMonitor::Endpoints{std::move(*node), std::move(*servers), std::move(*clients)});
+  auto participants = dds::make_participant_reader(*node);
+  if (!participants) return tl::unexpected(participants.error());
+  return std::make_unique<DdsMonitor>(DdsMonitor::Endpoints{std::move(*node), std::move(*servers),
+                                                            std::move(*clients), std::move(*participants)});
 }
 
 }  // namespace tandem::transport

@@ -68,7 +68,7 @@ class Reader {
   /// Sets the limits for samples that arrive from now on; at first they are the fixed maximum.
   void set_limits(const Limits& limits) { arrivals_->set_limits(limits); }
 
-  /// Calls `sink(writer, Received<M>&&)` for each sample in order. Counts in `dropped` the samples that broke
+  /// Calls `sink(writer, Stamped<M>&&)` for each sample in order. Counts in `dropped` the samples that broke
   /// a limit. A sample whose writer has meanwhile left the participant's endpoints cannot be attributed and
   /// is skipped.
   template <class Sink>
@@ -77,15 +77,17 @@ class Reader {
     arrivals_->take(taken_, broke_limits);
     for (auto& arrival : taken_) {
       const auto from = participants_.of_writer(entity_.get(), arrival.writer);
-      if (from) sink(arrival.writer, Received<M>{std::move(arrival.message), *from});
+      if (from) sink(arrival.writer, Stamped<M>{{std::move(arrival.message), *from}, arrival.written_ns});
     }
     if (broke_limits != 0) dropped += broke_limits;
     taken_.clear();
   }
-  void take(std::atomic<std::uint64_t>& dropped, std::vector<Received<M>>& out) {
-    take(dropped, [&out](dds_instance_handle_t, Received<M>&& r) { out.push_back(std::move(r)); });
+  template <class R>
+  void take(std::atomic<std::uint64_t>& dropped, std::vector<R>& out) {
+    take(dropped, [&out](dds_instance_handle_t, Stamped<M>&& r) { out.push_back(std::move(r)); });
   }
 
+  [[nodiscard]] dds_entity_t get() const { return entity_.get(); }
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const { return writers_->state(writer); }
   /// The state of that participant's writers together: live if one of them is, gone if none is matched.
   [[nodiscard]] WriterState state_of(const ParticipantId& participant) {
@@ -172,6 +174,7 @@ class Node {
   }
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
+  [[nodiscard]] const Entity& participant() const { return participant_; }
   /// Waits until something arrives at a watched reader created here, one of its writers comes to life or
   /// dies, wake() is called, or the timeout passes.
   void wait(std::chrono::nanoseconds timeout) { bell_->wait(timeout); }

@@ -70,7 +70,7 @@ export interface ServerFigures {
   frameRateHz: number;
   /** Payload rate; 1 Mbit = 2^20 bits. */
   mbitPerS: number;
-  /** Rate that positions and velocities would need uncompressed. */
+  /** Rate of the stream's channels, uncompressed. */
   rawMbitPerS: number;
   /** Step, predict, encode, apply. */
   frameMsP50: number;

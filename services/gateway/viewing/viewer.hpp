@@ -37,6 +37,7 @@ struct Viewer {
   std::uint64_t told_announcement = 0;  ///< number of the newest announcement it was sent
   std::uint64_t told_status = 0;
   accounts::TokenBucket messages{kMessagesPerSecond, kMessagesPerSecond};
+  accounts::TokenBucket reports{1, 2};  ///< of its status, for monitors
   accounts::TokenBucket inputs = accounts::kInputs;
   accounts::TokenBucket other_inputs{kOtherInputsPerSecond, kOtherInputsPerSecond};
   accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;

@@ -35,6 +35,8 @@ class World {
   /// Sends an input under the gateway's one client id; returns its number. Its outcome comes later.
   virtual Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values,
                                      transport::Bytes bytes, std::int64_t now_ns) = 0;
+  /// Publishes a viewer's status for monitors of the domain. Best effort.
+  virtual void report(const transport::ClientStatusMessage& status) = 0;
 };
 
 }  // namespace tandem::gateway

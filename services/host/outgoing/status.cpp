@@ -5,11 +5,6 @@
 #include "sdk/transport/units.hpp"
 
 namespace tandem::host {
-namespace {
-
-constexpr double kRawBytesPerBody = 24;
-
-}  // namespace
 
 void StatusDesk::publish(const HostTotals& totals, const Present& present, std::int64_t now_ns) {
   next_ns_ = now_ns + kSecond;
@@ -35,7 +30,8 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   status.uptime_s = static_cast<double>(now_ns - started_ns_) * 1e-9;
   status.frame_rate_hz = frames / elapsed_s;
   status.mbit_per_s = mbit_per_s_;
-  status.raw_mbit_per_s = present.bodies * kRawBytesPerBody * 8 * status.frame_rate_hz / kBitsPerMbit;
+  const auto raw_bytes = double{1} * present.bodies * present.raw_body_bytes;
+  status.raw_mbit_per_s = raw_bytes * 8 * status.frame_rate_hz / kBitsPerMbit;
   status.frame_ms_p50 = durations_.quantile_ms(0.5);
   status.frame_ms_p99 = durations_.quantile_ms(0.99);
   status.corrected_per_frame = corrected_per_frame_;

@@ -26,6 +26,7 @@ class StatusDesk {
   struct Present {
     Frame frame = 0;
     std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0;
+    std::uint32_t raw_body_bytes = 0;  ///< what one body's channels take uncompressed
     bool made = true;        ///< the stream is made now; if not, the figures of the last second in which it
                              ///< was made stay
     double threshold_m = 0;  ///< in force

@@ -2,6 +2,7 @@
 
 #include <dds/dds.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <limits>
 #include <thread>
@@ -307,8 +308,8 @@ TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
   client_status.session = options_.session;
   client_status.lag_ms = 3.5;
   client_status.resyncs = 1;
-  std::vector<Received<ServerStatusMessage>> servers;
-  std::vector<Received<ClientStatusMessage>> clients;
+  std::vector<Stamped<ServerStatusMessage>> servers;
+  std::vector<Stamped<ClientStatusMessage>> clients;
   EXPECT_TRUE(eventually([&] {  // best effort: repeated, as the programs do
     EXPECT_TRUE(server->write(server_status));
     EXPECT_TRUE(client->write(client_status));
@@ -320,6 +321,14 @@ TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
   EXPECT_EQ(servers.at(0).message, server_status);
   EXPECT_EQ(servers.at(0).from, server->self());
   EXPECT_EQ(clients.at(0).message, client_status);
+  EXPECT_GT(clients.at(0).written_ns, 0);
+  const auto peer = (*monitor)->describe(clients.at(0).from);
+  ASSERT_TRUE(peer);
+  EXPECT_EQ(peer->name.rfind("tandem client", 0), 0U) << peer->name;
+  EXPECT_FALSE(peer->host.empty());
+  EXPECT_EQ(peer->pid, std::to_string(::getpid()));
+  EXPECT_EQ(peer->lease, options_.lease / 2);
+  EXPECT_FALSE((*monitor)->describe(ParticipantId{}));
   std::vector<Received<SessionMessage>> sessions;
   EXPECT_TRUE(eventually([&] {
     (*monitor)->list_sessions(sessions);
@@ -455,7 +464,7 @@ TEST_F(DdsPorts, WhatOtherServersSayDoesNotWakeAServer) {
   ASSERT_TRUE(monitor);
   ServerStatusMessage status;
   status.session = options_.session;
-  std::vector<Received<ServerStatusMessage>> heard;
+  std::vector<Stamped<ServerStatusMessage>> heard;
   EXPECT_TRUE(eventually([&] {
     EXPECT_TRUE(other->write(status));
     (*monitor)->take(heard);

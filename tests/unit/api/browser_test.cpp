@@ -17,16 +17,19 @@ class FakeMonitor final : public transport::Monitor {
  public:
   struct Domain {
     std::vector<transport::Received<transport::SessionMessage>> sessions = {};
-    std::vector<transport::Received<transport::ServerStatusMessage>> statuses = {};
+    std::vector<transport::Stamped<transport::ServerStatusMessage>> statuses = {};
   };
   explicit FakeMonitor(Domain& domain) : domain_(domain) {}
   void list_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
     out = domain_.sessions;
   }
-  void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override {
+  void take(std::vector<transport::Stamped<transport::ServerStatusMessage>>& out) override {
     out = std::exchange(domain_.statuses, {});
   }
-  void take(std::vector<transport::Received<transport::ClientStatusMessage>>& /*out*/) override {}
+  void take(std::vector<transport::Stamped<transport::ClientStatusMessage>>& /*out*/) override {}
+  std::optional<transport::Peer> describe(const transport::ParticipantId& /*client*/) override {
+    return std::nullopt;
+  }
   Result<void> write(const transport::CommandMessage& /*message*/) override { return {}; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
@@ -86,7 +89,7 @@ TEST_F(Browsing, StatusFillsInWhoIsThere) {
   status.participants = 2;
   status.observers = 3;
   status.mbit_per_s = 0.5;
-  domain.statuses = {client::from_server(status)};
+  domain.statuses = {{client::from_server(status), 0}};
   const auto sessions = list();
   ASSERT_EQ(sessions.size(), 1U);
   EXPECT_EQ(sessions[0].bodies, 39U);

@@ -40,6 +40,7 @@ class FakeWorld final : public World {
     sent.push_back({kind, std::move(values)});
     return sent.size();
   }
+  void report(const transport::ClientStatusMessage& status) override { reported.push_back(status); }
 
   bool plays = true;
   bool settled = true;
@@ -49,6 +50,7 @@ class FakeWorld final : public World {
   transport::Bytes snapshot = transport::Bytes(15'000);
   int cuts = 0;
   std::vector<Sent> sent;
+  std::vector<transport::ClientStatusMessage> reported;
 };
 
 inline transport::SessionMessage fake_session(Epoch epoch = kEpoch) {

@@ -281,6 +281,28 @@ TEST_F(ViewerInputs, AViewerCannotSpeakAsAnother) {
   EXPECT_EQ(gateway.counts().of(Refusal::kForeignClient), 2U);
 }
 
+TEST_F(ViewerInputs, AStatusIsPublishedOnceASecondAsTheGatewayKnowsTheViewer) {
+  const ViewerId id = join(1);
+  transport::ClientStatusMessage status;
+  status.client = 1;
+  status.session = "another";
+  status.epoch = kEpoch;
+  status.stream = {.id = 7, .generation = 3};
+  status.lag_ms = 12;
+  for (int i = 0; i < 10; ++i) EXPECT_FALSE(say(id, status));
+  ASSERT_EQ(world.reported.size(), 2U) << "the burst";
+  EXPECT_EQ(world.reported[0].session, "default");
+  EXPECT_EQ(world.reported[0].stream, StreamId{});
+  EXPECT_EQ(world.reported[0].lag_ms, 12);
+  later(kSecond);
+  EXPECT_FALSE(say(id, status));
+  EXPECT_EQ(world.reported.size(), 3U);
+  later(kSecond);
+  status.epoch = kEpoch + 1;
+  EXPECT_FALSE(say(id, status));
+  EXPECT_EQ(world.reported.size(), 3U);
+}
+
 TEST_F(ViewerInputs, WhatOnlyAGatewaySendsIsRefused) {
   const ViewerId id = join(1);
   transport::DeltaMessage delta;

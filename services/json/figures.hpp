@@ -1,11 +1,11 @@
 #pragma once
-// Figures as the tool prints them.
+// Figures as JSON.
 
 #include <string_view>
 
 #include "services/json/json.hpp"
 
-namespace tandem::tool {
+namespace tandem {
 
 /// Adds a member with this name; a percentile such as `frame_ms_p50` becomes the member `p50` of `frame_ms`.
 inline void put_figure(Json& object, std::string_view name, const Json& value) {
@@ -17,4 +17,4 @@ inline void put_figure(Json& object, std::string_view name, const Json& value) {
   }
 }
 
-}  // namespace tandem::tool
+}  // namespace tandem
