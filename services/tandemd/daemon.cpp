@@ -20,6 +20,7 @@
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
+#include "services/host/waiting.hpp"
 #include "services/json/json.hpp"
 #include "services/logging/log.hpp"
 #include "services/scenes/scene.hpp"
@@ -145,6 +146,17 @@ void log_line(const std::string& line, bool warning) {
   spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
 }
 
+/// Makes the frame whose step is under way, so that a last checkpoint can be written; but does not wait long.
+void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes) {
+  const std::int64_t until_ns = steady_ns() + kSecond;
+  while (host.frame_under_way() && !host.error() && steady_ns() < until_ns) {
+    host::wait_for_work(host, port, std::chrono::milliseconds{10});
+    if (!host.poll(steady_ns(), wall_ns())) continue;
+    for (const host::DeltaReport& delta : host.report().deltas)
+      hashes.add(delta.stream, host.report().frame, delta.hash);
+  }
+}
+
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
@@ -179,9 +191,9 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     failures.show(now_ns);
     if (publisher.gave_up()) return Ending::kCannotWrite;
     if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
-    const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
-    if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
+    host::wait_for_work(host, port, std::chrono::nanoseconds(host.next_wake_ns() - steady_ns()));
   }
+  finish_frame(host, port, hashes);
   return Ending::kDone;
 }
 
