@@ -10,12 +10,14 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/port.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
@@ -23,11 +25,13 @@
 #include "services/host/waiting.hpp"
 #include "services/json/json.hpp"
 #include "services/logging/log.hpp"
+#include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
-#include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
+#include "services/tandemd/restarts.hpp"
+#include "services/tandemd/served_world.hpp"
 #include "services/tandemd/service.hpp"
 #include "services/tandemd/stand_by.hpp"
 
@@ -45,9 +49,9 @@ int report_error(const Error& error, int exit_code) {
 /// Writes lines `epoch,frame,hash`, with a file for each stream.
 class HashLog {
  public:
-  /// `path` for stream 0, `path`.k for stream k.
+  /// `path` for stream 0, `path`.k for stream k. Those that are open stay so.
   [[nodiscard]] Result<void> open(const std::string& path, std::size_t streams) {
-    for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
+    for (std::size_t stream = paths_.size(); stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
       if (!files_.back())
@@ -88,8 +92,9 @@ class HashLog {
 /// Runs the scene's script: sends each input in time for its frame.
 class ScriptSender {
  public:
-  ScriptSender(const scenes::Scene& scene, const Options& options) : lead_(options.lead) {
-    if (options.scripted) script_.emplace(scene, options.seed, options.users);
+  /// `scene` may be empty if there is no script.
+  ScriptSender(const std::optional<scenes::Scene>& scene, const Options& options) : lead_(options.lead) {
+    if (scene && options.scripted) script_.emplace(*scene, options.seed, options.users);
   }
 
   /// Leaves out what a checkpoint of that frame holds already: it was sent before the frame was made.
@@ -281,61 +286,77 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
   return closed && printed ? 0 : 1;
 }
 
-}  // namespace
+/// How a session ended.
+struct SessionEnd {
+  int exit_code = 0;
+  bool engine_failed = false;  ///< the engine's process ended, or broke the rules; another one could go on
+  bool served = false;         ///< there was a session
+};
 
-int run_daemon(const Options& options, SignalWatch& signals) {
-  const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
-  auto config =
-      planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
-  if (!config) return report_error(placed(options.places, "", config.error()), 2);
-  auto simulation =
-      scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
-  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
-  config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
+/// Serves one session: from one start of its simulation to the end. `hashes` is open.
+SessionEnd run_session(const Options& given, SignalWatch& signals, HashLog& hashes) {
+  const auto done = [&signals](int exit_code) { return SessionEnd{signals.finish(exit_code)}; };
+  Options options = given;
+  auto served = open_world(options, signals.stop());
+  if (!served) {
+    const NotOpened& why = served.error();
+    if (signals.stop()) return done(0);
+    const int code = report_error(placed(options.places, why.field, why.error), why.exit_code);
+    return {code, options.engine.has_value()};
+  }
+  engine::Simulation& simulation = *served->simulation;
+  if (!served->session.empty() && options.session == Options().session) options.session = served->session;
+  if (const auto named = transport::check_session_name(options.session); !named)
+    return {report_error(named.error(), 2)};
+  auto config = planning::plan_server(served->world, options.choice, options);
+  if (!config) return {report_error(placed(options.places, "", config.error()), 2)};
+  config->engine = served->engine;
   auto keeping = options.standby
                      ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
-                     : host::Keeping::begin(options.checkpoint, **simulation, *config, &log_line, &steady_ns);
-  if (!keeping) return report_error(keeping.error(), 1);
+                     : host::Keeping::begin(options.checkpoint, simulation, *config, &log_line, &steady_ns);
+  if (!keeping) return {report_error(keeping.error(), 1)};
   auto port = open_port(*config, options, signals.stop());
-  if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
-  HashLog hashes;
+  if (!port) return {report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2)};
   if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
-    return signals.finish(report_error(opened.error(), 1));
+    return done(report_error(opened.error(), 1));
 
   Metrics metrics;
   if (options.metrics) {
-    auto served =
-        metrics.serve(*options.metrics, facts_of(*config, options.session, scene->name, options.free_rate));
-    if (!served) return signals.finish(report_error(served.error(), 1));
+    auto answers = metrics.serve(*options.metrics,
+                                 facts_of(*config, options.session, served->world.name, options.free_rate));
+    if (!answers) return done(report_error(answers.error(), 1));
   }
   Service service;
   if (options.standby) {
-    const auto takes_over =
-        stand_by(options, **simulation, **port, *config, *keeping, service, signals.stop());
-    if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
-    if (!*takes_over) return signals.finish(0);
+    const auto takes_over = stand_by(options, simulation, **port, *config, *keeping, service, signals.stop());
+    if (!takes_over) return done(report_error(takes_over.error(), 1));
+    if (!*takes_over) return done(0);
   }
   const bool goes_on = config->goes_on_from != nullptr;
   hashes.begin(config->epoch);
   const double frame_rate_hz = config->frame_rate_hz;
   const std::vector<host::StreamConfig> streams = config->streams;
-  auto host = host::Host::create(std::move(*config), **simulation, **port);
-  if (!host) return signals.finish(report_error(host.error(), options.standby ? 1 : 2));
+  auto host = host::Host::create(std::move(*config), simulation, **port);
+  if (!host) return done(report_error(host.error(), options.standby ? 1 : 2));
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
-  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
-               options.choice.bodies,
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", served->world.name,
+               simulation.capacity(),
                alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
                options.domain, (*host)->session().epoch);
   for (const host::StreamConfig& stream : streams)
     if (!alone) spdlog::info("stream {}: {}", stream.name, coding_text(stream));
 
   host::Publisher publisher((*host)->outbox(), **port);
-  ScriptSender script(*scene, options);
+  ScriptSender script(served->scene, options);
   if (goes_on) script.skip_to((*host)->frame());
   const Ending ending =
       serve(**host, **port, script, hashes, *keeping, publisher, metrics, service, options, signals.stop());
+  if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
+    // What was made reaches the clients before the writers are gone.
+    publisher.flush();
+    return {report_error(*(*host)->error(), 1), true, true};
+  }
   keeping->end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =
@@ -345,7 +366,34 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   if (publisher.failures() > 0) {
     spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());
   }
-  return exit_code;
+  return {exit_code};
+}
+
+}  // namespace
+
+int run_daemon(const Options& options, SignalWatch& signals) {
+  HashLog hashes;
+  Restarts restarts;
+  bool served = false;
+  for (;;) {
+    const std::int64_t began_ns = steady_ns();
+    const SessionEnd end = run_session(options, signals, hashes);
+    served = served || end.served;
+    // An engine that never worked is a mistake of its author's. An inherited socket leads to one engine only.
+    if (!end.engine_failed || !served || options.engine->descriptor >= 0) return end.exit_code;
+    const auto wait_ns = restarts.wait_after_ns(steady_ns() - began_ns);
+    if (!wait_ns) {
+      spdlog::error("the engine ended {} times, each time soon after its start; giving up",
+                    restarts.in_a_row() - 1);
+      return end.exit_code;
+    }
+    spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
+                 static_cast<double>(*wait_ns) * 1e-9);
+    const std::int64_t until_ns = steady_ns() + *wait_ns;
+    while (steady_ns() < until_ns && !signals.stop())
+      std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    if (signals.stop()) return 0;
+  }
 }
 
 }  // namespace tandem::daemon

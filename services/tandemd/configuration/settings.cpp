@@ -34,6 +34,15 @@ std::vector<Setting> session_settings(const Options& defaults) {
        "", "10000"},
       {"session", "Name that clients join by", "1 to 64 of A-Z, a-z, 0-9, '.', '_' and '-'", defaults.session,
        quoted(defaults.session)},
+      {"engine",
+       "Command of an engine in another process, instead of a scene (idl/ENGINE.md). The server starts it with sh, and again "
+       "when it ends by itself, from the last checkpoint if there is one",
+       "a command", "", quoted("python3 boids.py")},
+      {"engine_socket", "Instead of a command: where the server waits for an engine of the same user",
+       "a path", "", quoted("/run/user/1000/tandem-engine")},
+      {"engine_fd",
+       "Instead of a command: a descriptor that the server inherits and that is connected to the engine",
+       "0 to 65535", "", "3"},
       {"domain", "DDS domain", fmt::format("0 to {}", transport::kMaxDomain),
        fmt::format("{}", defaults.domain), fmt::format("{}", defaults.domain)},
   };
