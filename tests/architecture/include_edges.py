@@ -50,6 +50,7 @@ OF_LAB = (
     + HOST
     + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
     + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
+    + DOOR
 )
 EDGES = {
     "sdk/include": [],
@@ -119,7 +120,8 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
+    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"]
+    + DOOR,
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],

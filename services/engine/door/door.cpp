@@ -469,7 +469,8 @@ void Session::shut(const Error& error) {
     }
     attend();
     if (const std::string how = process_.ended(); !how.empty()) line += fmt::format(" ({})", how);
-    if (!process_.last_lines().empty())
+    // An engine may repeat what it was told.
+    if (!process_.last_lines().empty() && process_.last_lines().back() != error.message)
       line += fmt::format("; its last words: {}", process_.last_lines().back());
   }
   failure_ = Error{error.code, std::move(line)};

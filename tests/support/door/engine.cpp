@@ -15,8 +15,10 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <random>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "services/scenes/scene.hpp"
@@ -182,6 +184,19 @@ bool misbehave(std::string_view mode) {
   if (mode == "error") {
     tandem_engine_complain(&engine, "the springs\x1b[31m broke");
     std::exit(1);
+  }
+  if (mode == "scribble") {
+    static const bool started = [] {
+      // Columns only: the head of a slot has tests of its own.
+      std::thread([] {
+        std::mt19937 random(7);
+        for (;;)
+          engine.memory[engine.first + 64 + random() % (engine.slot_bytes - 64)] =
+              static_cast<unsigned char>(random());
+      }).detach();
+      return true;
+    }();
+    return !started;
   }
   if (mode == "nan") value("position", 1, 3) = std::numeric_limits<float>::quiet_NaN();
   if (mode == "far") value("position", 2, 4) = 1e30F;
