@@ -49,9 +49,9 @@ int report_error(const Error& error, int exit_code) {
 /// Writes lines `epoch,frame,hash`, with a file for each stream.
 class HashLog {
  public:
-  /// `path` for stream 0, `path`.k for stream k. Those that are open stay so.
+  /// `path` for stream 0, `path`.k for stream k.
   [[nodiscard]] Result<void> open(const std::string& path, std::size_t streams) {
-    for (std::size_t stream = paths_.size(); stream < streams && !path.empty(); ++stream) {
+    for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
       files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
       if (!files_.back())
@@ -166,7 +166,7 @@ enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, k
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
-             const Options& options, const std::atomic<bool>& stop) {
+             Options& options, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
@@ -177,7 +177,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
     const bool produced = host.poll(now_ns, wall_ns());
-    metrics.watch(host, publisher, produced, now_ns);
+    metrics.watch(host, publisher, keeping, produced, now_ns);
     service.watch(host, now_ns);
     service.reload(options, host, keeping, now_ns);
     if (produced) {
@@ -286,113 +286,153 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
   return closed && printed ? 0 : 1;
 }
 
-/// How a session ended.
-struct SessionEnd {
+/// How a life of a server ended.
+struct End {
+  enum class Next : std::uint8_t { kExit, kStandBy, kAnotherEngine };
+  Next next = Next::kExit;
   int exit_code = 0;
-  bool engine_failed = false;  ///< the engine's process ended, or broke the rules; another one could go on
-  bool served = false;         ///< there was a session
 };
 
-/// Serves one session: from one start of its simulation to the end. `hashes` is open.
-SessionEnd run_session(const Options& given, SignalWatch& signals, HashLog& hashes) {
-  const auto done = [&signals](int exit_code) { return SessionEnd{signals.finish(exit_code)}; };
-  Options options = given;
-  auto served = open_world(options, signals.stop());
-  if (!served) {
-    const NotOpened& why = served.error();
-    if (signals.stop()) return done(0);
-    const int code = report_error(placed(options.places, why.field, why.error), why.exit_code);
-    return {code, options.engine.has_value()};
-  }
-  engine::Simulation& simulation = *served->simulation;
-  if (!served->session.empty() && options.session == Options().session) options.session = served->session;
-  if (const auto named = transport::check_session_name(options.session); !named)
-    return {report_error(named.error(), 2)};
-  auto config = planning::plan_server(served->world, options.choice, options);
-  if (!config) return {report_error(placed(options.places, "", config.error()), 2)};
-  config->engine = served->engine;
-  auto keeping = options.standby
-                     ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
-                     : host::Keeping::begin(options.checkpoint, simulation, *config, &log_line, &steady_ns);
-  if (!keeping) return {report_error(keeping.error(), 1)};
-  auto port = open_port(*config, options, signals.stop());
-  if (!port) return {report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2)};
-  if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
-    return done(report_error(opened.error(), 1));
+/// What stays from one life of a server to the next: it may stand by again, or go on with another engine.
+struct Stage {
+  Options& options;  ///< with what was read again
+  const ServedWorld& served;
+  HashLog& hashes;
+  Metrics& metrics;
+  Service& service;
+  SignalWatch& signals;
+};
 
-  Metrics metrics;
-  if (options.metrics) {
-    auto answers = metrics.serve(*options.metrics,
-                                 facts_of(*config, options.session, served->world.name, options.free_rate));
-    if (!answers) return done(report_error(answers.error(), 1));
-  }
-  Service service;
+End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
+  Options& options = stage.options;
+  SignalWatch& signals = stage.signals;
+  engine::Simulation& simulation = *stage.served.simulation;
+  const auto exits = [&signals](int code) { return End{End::Next::kExit, signals.finish(code)}; };
   if (options.standby) {
-    const auto takes_over = stand_by(options, simulation, **port, *config, *keeping, service, signals.stop());
-    if (!takes_over) return done(report_error(takes_over.error(), 1));
-    if (!*takes_over) return done(0);
+    const auto takes_over =
+        stand_by(options, simulation, port, config, keeping, stage.service, stage.metrics, signals.stop());
+    if (!takes_over) return exits(report_error(takes_over.error(), 1));
+    if (!*takes_over) return exits(0);
   }
-  const bool goes_on = config->goes_on_from != nullptr;
-  hashes.begin(config->epoch);
-  const double frame_rate_hz = config->frame_rate_hz;
-  const std::vector<host::StreamConfig> streams = config->streams;
-  auto host = host::Host::create(std::move(*config), simulation, **port);
-  if (!host) return done(report_error(host.error(), options.standby ? 1 : 2));
+  const bool goes_on = config.goes_on_from != nullptr;
+  stage.hashes.begin(config.epoch);
+  const double frame_rate_hz = config.frame_rate_hz;
+  const std::vector<host::StreamConfig> streams = config.streams;
+  auto host = host::Host::create(std::move(config), simulation, port);
+  if (!host) return exits(report_error(host.error(), options.standby ? 1 : 2));
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
-  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", served->world.name,
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", stage.served.world.name,
                simulation.capacity(),
                alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
                options.domain, (*host)->session().epoch);
   for (const host::StreamConfig& stream : streams)
     if (!alone) spdlog::info("stream {}: {}", stream.name, coding_text(stream));
 
-  host::Publisher publisher((*host)->outbox(), **port);
-  ScriptSender script(served->scene, options);
+  host::Publisher publisher((*host)->outbox(), port);
+  ScriptSender script(stage.served.scene, options);
   if (goes_on) script.skip_to((*host)->frame());
-  const Ending ending =
-      serve(**host, **port, script, hashes, *keeping, publisher, metrics, service, options, signals.stop());
+  const Ending ending = serve(**host, port, script, stage.hashes, keeping, publisher, stage.metrics,
+                              stage.service, options, signals.stop());
   if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
-    // What was made reaches the clients before the writers are gone.
-    publisher.flush();
-    return {report_error(*(*host)->error(), 1), true, true};
+    publisher.flush();  // what was made reaches the clients before the writers are gone
+    return {End::Next::kAnotherEngine, report_error(*(*host)->error(), 1)};
   }
-  keeping->end(**host);
+  if (ending == Ending::kRefused && options.standby) {
+    spdlog::warn("{}; this one stands by again", (*host)->error()->message);
+    return {End::Next::kStandBy};
+  }
+  keeping.end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =
-      signals.finish(tell_end(**host, ending, hashes, *keeping, streams, frame_rate_hz, options));
+      signals.finish(tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {
     spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());
   }
-  return {exit_code};
+  return {End::Next::kExit, exit_code};
 }
 
-}  // namespace
-
-int run_daemon(const Options& options, SignalWatch& signals) {
-  HashLog hashes;
-  Restarts restarts;
-  bool served = false;
+/// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
+tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
+                                           std::int64_t ran_ns, int exit_code,
+                                           const std::atomic<bool>& stop) {
   for (;;) {
-    const std::int64_t began_ns = steady_ns();
-    const SessionEnd end = run_session(options, signals, hashes);
-    served = served || end.served;
-    // An engine that never worked is a mistake of its author's. An inherited socket leads to one engine only.
-    if (!end.engine_failed || !served || options.engine->descriptor >= 0) return end.exit_code;
-    const auto wait_ns = restarts.wait_after_ns(steady_ns() - began_ns);
+    const auto wait_ns = restarts.wait_after_ns(ran_ns);
+    // An inherited socket leads to one engine only.
+    if (options.engine->descriptor >= 0) return tl::unexpected(exit_code);
     if (!wait_ns) {
       spdlog::error("the engine ended {} times, each time soon after its start; giving up",
-                    restarts.in_a_row() - 1);
-      return end.exit_code;
+                    Restarts::kMostInARow + 1);
+      return tl::unexpected(exit_code);
     }
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
                  static_cast<double>(*wait_ns) * 1e-9);
     const std::int64_t until_ns = steady_ns() + *wait_ns;
-    while (steady_ns() < until_ns && !signals.stop())
+    while (steady_ns() < until_ns && !stop) {
+      service.watch(steady_ns());
       std::this_thread::sleep_for(std::chrono::milliseconds{20});
-    if (signals.stop()) return 0;
+    }
+    if (stop) return tl::unexpected(0);
+    auto served = open_world(options, stop);
+    if (served) return std::move(*served);
+    if (stop) return tl::unexpected(0);
+    report_error(served.error().error, 1);
+    ran_ns = 0;
+  }
+}
+
+}  // namespace
+
+int run_daemon(Options options, SignalWatch& signals) {
+  auto opened_world = open_world(options, signals.stop());
+  if (!opened_world) {
+    const NotOpened& why = opened_world.error();
+    if (signals.stop()) return signals.finish(0);
+    return report_error(placed(options.places, why.field, why.error), why.exit_code);
+  }
+  ServedWorld served = std::move(*opened_world);
+  if (!served.session.empty() && options.session == Options().session) options.session = served.session;
+  if (const auto named = transport::check_session_name(options.session); !named)
+    return report_error(named.error(), 2);
+  HashLog hashes;
+  Metrics metrics;
+  Service service;
+  Restarts restarts;
+  const Stage stage{options, served, hashes, metrics, service, signals};
+  for (bool first = true;; first = false) {
+    const std::int64_t began_ns = steady_ns();
+    auto config = planning::plan_server(served.world, options.choice, options);
+    if (!config) return report_error(placed(options.places, "", config.error()), 2);
+    config->engine = served.engine;
+    std::optional<End> end;
+    {
+      auto keeping = options.standby ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
+                                     : host::Keeping::begin(options.checkpoint, *served.simulation, *config,
+                                                            &log_line, &steady_ns);
+      if (!keeping) return report_error(keeping.error(), 1);
+      // Another life has another DDS participant, so that nobody takes it for the server that it was.
+      auto port = open_port(*config, options, signals.stop());
+      if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+      if (first) {
+        if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
+          return signals.finish(report_error(opened.error(), 1));
+        if (options.metrics) {
+          auto answers = metrics.serve(
+              *options.metrics, facts_of(*config, options.session, served.world.name, options.free_rate));
+          if (!answers) return signals.finish(report_error(answers.error(), 1));
+        }
+      }
+      end = live(stage, std::move(*config), **port, *keeping);
+    }
+    if (end->next == End::Next::kExit) return end->exit_code;
+    logging::set_context(options.session, 0);
+    if (end->next != End::Next::kAnotherEngine) continue;
+    auto next =
+        next_engine(options, restarts, service, steady_ns() - began_ns, end->exit_code, signals.stop());
+    if (!next) return signals.finish(next.error());
+    served = std::move(*next);
   }
 }
 

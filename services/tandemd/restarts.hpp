@@ -16,7 +16,6 @@ class Restarts {
 
   /// A session ended that ran for so long. Returns the time to wait; empty: no further start.
   [[nodiscard]] std::optional<std::int64_t> wait_after_ns(std::int64_t ran_ns);
-  [[nodiscard]] int in_a_row() const { return in_a_row_; }
 
  private:
   int in_a_row_ = 0;
