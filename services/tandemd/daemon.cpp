@@ -122,6 +122,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.session = options.session;
   dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
   dds.stop = &stop;
@@ -416,6 +417,9 @@ int run_daemon(Options options, SignalWatch& signals) {
       auto port = open_port(*config, options, signals.stop());
       if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
+        if (!options.profile.empty())
+          spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
+                                                             transport::Side::kServer));
         if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
           return signals.finish(report_error(opened.error(), 1));
         if (options.metrics) {

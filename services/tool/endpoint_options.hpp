@@ -1,5 +1,8 @@
 #pragma once
-// Options that several commands share: --domain and --session of those that use DDS, --prefer of clients.
+// Options that several commands share: --domain, --profile and --session of those that use DDS, --prefer of
+// clients.
+
+#include <fmt/format.h>
 
 #include <cstdint>
 #include <string>
@@ -7,18 +10,36 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/commandline/commandline.hpp"
+#include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
 
-/// Both outlive `command`.
-inline void add_endpoint_options(commandline::Command command, std::uint32_t& domain, std::string& session) {
+/// --domain and --profile. Both outlive `command`.
+inline void add_domain_options(commandline::Command command, std::uint32_t& domain, std::string& profile,
+                               transport::Side side = transport::Side::kClient) {
   command.add_option("--domain", domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
+  command.add_option("--profile", profile, transport::kProfileHelp).check([side](const std::string& text) {
+    return transport::refusal_of_profile(text, side);
+  });
+}
+
+/// These and --session. All outlive `command`.
+inline void add_endpoint_options(commandline::Command command, std::uint32_t& domain, std::string& profile,
+                                 std::string& session, transport::Side side = transport::Side::kClient) {
+  add_domain_options(command, domain, profile, side);
   command.add_option("--session", session, "Session name")
       .check([](const std::string& name) {
         const auto ok = transport::check_session_name(name);
         return ok ? std::string() : ok.error().message;
       })
       .show_default();
+}
+
+/// Says on stderr what the profile uses, if there is one. Call it when the domain is open.
+inline void tell_profile(const char* program, std::uint32_t domain, const std::string& profile,
+                         transport::Side side = transport::Side::kClient) {
+  if (!profile.empty())
+    print_error(fmt::format("{}: {}\n", program, transport::describe_dds_profile(domain, profile, side)));
 }
 
 /// `prefer` outlives `command`.

@@ -34,6 +34,7 @@ using transport::wall_ns;
 struct ReplayOptions {
   std::string file;
   std::uint32_t domain = 0;
+  std::string profile = {};  ///< of the network
   std::string session = "default";
   double rate = 1;
   double from_s = 0;
@@ -88,6 +89,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   config.clock_ns = &steady_ns;
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.session = options.session;
   dds.delta_depth =
       transport::delta_depth(config.frame_rate_hz, config.window_ceiling, playback.stream().max_delta_bytes);
@@ -95,6 +97,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
   state.port = std::move(*port);
+  if (first) tell_profile("tandem replay", options.domain, options.profile, transport::Side::kServer);
   auto frames = std::make_unique<RecordedSource>(playback, config, state.seeks);
   const RecordedSource& source = *frames;
   const auto host = host::Host::create(config, std::move(frames), *state.port);
@@ -183,7 +186,8 @@ void add_replay(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand("replay", "Publishes a recorded session again.");
   const auto options = std::make_shared<ReplayOptions>();
   command.add_option("file", options->file, "File that `tandem record` wrote").required();
-  add_endpoint_options(command, options->domain, options->session);
+  add_endpoint_options(command, options->domain, options->profile, options->session,
+                       transport::Side::kServer);
   command
       .add_option("--rate", options->rate,
                   "Speed, where 1 is that of the session; the maximum is 1000 frames per second")

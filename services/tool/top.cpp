@@ -15,6 +15,7 @@
 #include "sdk/transport/units.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
 #include "services/tool/top_view.hpp"
 
 namespace tandem::tool {
@@ -25,6 +26,7 @@ constexpr std::int64_t kOnceNs = 5 * kSecond / 2;
 
 struct TopOptions {
   std::uint32_t domain = 0;
+  std::string profile = {};  ///< of the network
   std::string session;
   bool once = false, json = false, stream = false;
 };
@@ -60,11 +62,13 @@ int run_top(const TopOptions& options) {
   SignalWatch signals("tandem top");
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
     return 1;
   }
+  tell_profile("tandem top", options.domain, options.profile);
   std::signal(SIGPIPE, SIG_IGN);
   TopView view;
   if (!options.session.empty()) view.only(options.session);
@@ -92,9 +96,7 @@ void add_top(commandline::Command app, Run& run) {
   commandline::Command command =
       app.add_subcommand("top", "Shows the sessions and clients of a domain, their bandwidth and lag.");
   const auto options = std::make_shared<TopOptions>();
-  command.add_option("--domain", options->domain, "DDS domain")
-      .range(0U, transport::kMaxDomain)
-      .show_default();
+  add_domain_options(command, options->domain, options->profile);
   command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(
       "--once", options->once, "Listen for 2.5 s, print once and stop; exit with 1 if nothing was heard");

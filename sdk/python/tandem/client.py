@@ -36,9 +36,18 @@ def clock_ns() -> int:
     return _client.clock_ns()
 
 
-def sessions(domain: int = 0, wait: float = 2.0) -> list[SessionInfo]:
-    """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name."""
-    browser = _client.Browser(domain)
+def _no_nul(text: str, what: str) -> str:
+    if "\0" in text:  # C would read it only up to there
+        raise Error(Result.INVALID_ARGUMENT, f"{what} has no NUL")
+    return text
+
+
+def sessions(domain: int = 0, wait: float = 2.0, profile: str = "") -> list[SessionInfo]:
+    """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name.
+
+    profile     the kind of network, as of a Client
+    """
+    browser = _client.Browser(domain, _no_nul(profile, "a profile"))
     time.sleep(wait)
     return [SessionInfo._of(session) for session in browser.list()]
 
@@ -90,6 +99,7 @@ class Client:
         background: bool = True,
         echo: bool = False,
         prefer: str = "auto",
+        profile: str = "",
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -102,6 +112,9 @@ class Client:
                     least once a frame, which does all the work
         echo        EXPERIMENTAL: sample() shows the application's own gravity at once
         prefer      which stream to play: "auto", "bandwidth", "computing", "error", or a stream's name
+        profile     the kind of network: "loopback", "lan", "wifi", "wan:server=ADDRESS" or
+                    "multihomed:interface=NAME,interface=NAME"; the same for all clients of a process on a domain. With
+                    one, the variable CYCLONEDDS_URI is not used
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start).
@@ -109,10 +122,9 @@ class Client:
         role = Role.OBSERVER if observe else Role.PARTICIPANT
         if log is not None and not callable(log):
             raise TypeError("log must be a function of a level and a line")
-        if "\0" in session:  # C would read the name only up to there
-            raise Error(Result.INVALID_ARGUMENT, "a session's name has no NUL")
+        _no_nul(session, "a session's name")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
-        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, told)
+        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), told)
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
 

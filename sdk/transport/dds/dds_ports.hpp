@@ -4,11 +4,13 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/result.hpp"
 
@@ -19,6 +21,9 @@ inline constexpr std::uint32_t kMaxDomain = 230;
 
 struct DdsOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
+  /// The kind of network, "NAME" or "NAME:key=value,..." (deploy/dds), the same for all ports of a process on
+  /// the domain. With one, CYCLONEDDS_URI is not used. Empty: Tandem's defaults and then CYCLONEDDS_URI.
+  std::string profile = {};
   std::string session = "default";
   /// Client ports: DDS tools show this id, and servers learn it before the session is known, so that their
   /// writers for the client exist when it joins. 0: not announced.
@@ -37,9 +42,9 @@ struct DdsOptions {
   const std::atomic<bool>* stop = nullptr;
 };
 
-/// Joins the domain as "tandemd SESSION". The environment variable CYCLONEDDS_URI overrides Tandem's defaults
-/// (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, session name, depth, lease), kTransport (also what
-/// CYCLONEDDS_URI causes).
+/// Joins the domain as "tandemd SESSION". Without a profile, the environment variable CYCLONEDDS_URI
+/// overrides Tandem's defaults (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, profile, session name,
+/// depth, lease), kTransport (also what CYCLONEDDS_URI and the profile's interfaces cause).
 [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
 
 /// Joins the domain as "tandem client ID". Errors: as above.
@@ -61,15 +66,37 @@ class Monitor {
 
 /// Takes the lines that Cyclone DDS would write on stderr. `error`: the process ends after it; other errors
 /// reach callers as well. Called by any thread, several at once. Lines about a configuration (CYCLONEDDS_URI)
-/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for the
-/// process.
+/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for
+/// the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
-/// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
-/// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr.
-[[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain);
+/// A participant of a domain, in its own words.
+struct HeardParticipant {
+  std::string name;                    ///< "tandemd SESSION", "tandem client ID"; other text for strangers
+  std::string host;                    ///< empty unless it uses Cyclone DDS
+  std::vector<std::string> addresses;  ///< as host
+  bool own = false;                    ///< the one that listens
+};
 
-/// Joins the domain as "tandem monitor"; only `options.domain` is used. Errors: as above.
+/// Joins the domain as "tandem doctor", without a topic of ours, and listens until `enough` says so or for
+/// `patience`. Returns the participants there are then, itself included; at most 256. Errors: as a port's.
+[[nodiscard]] Result<std::vector<HeardParticipant>> listen_for_participants(
+    std::uint32_t domain, const std::string& profile, Side side, std::chrono::nanoseconds patience,
+    const std::function<bool(const std::vector<HeardParticipant>&)>& enough);
+
+/// What --help says of --profile.
+inline constexpr const char* kProfileHelp =
+    "The kind of network, with which CYCLONEDDS_URI is not used: loopback, lan, wifi, wan or multihomed, with parameters "
+    "behind a colon, as in lan:interface=eth0 or wan:server=203.0.113.5 (deploy/dds)";
+/// Why the text is no profile; empty: it is one.
+[[nodiscard]] std::string refusal_of_profile(const std::string& text, Side side);
+
+/// A line for people about a profile: what it uses of this machine, and that it stands above CYCLONEDDS_URI.
+/// Empty without a profile, or if it cannot be used here.
+[[nodiscard]] std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side);
+
+/// Joins the domain as "tandem monitor"; only `options.domain` and `options.profile` are used. Errors: as
+/// above.
 [[nodiscard]] Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options);
 
 }  // namespace tandem::transport
