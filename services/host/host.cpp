@@ -165,6 +165,8 @@ struct Host::Impl {
   bool held = false;                    // the due frame had to wait
   bool stalled = false;                 // the wait was counted as a stall
   std::int64_t suspended_ns = 0;
+  bool under_way = false;           // a frame was begun and is not made
+  std::int64_t frame_began_ns = 0;  // by clock()
 
   FrameReport report;
   HostTotals totals;
@@ -327,6 +329,12 @@ void Host::Impl::look_around() {
 }
 
 bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
+  if (source->failed()) {  // also while nothing is due
+    state = State::kEnded;
+    error = source->error();
+    return false;
+  }
+  if (under_way) return source->next_ready() && produce_frame(snapshots_due);
   if (state == State::kWaiting && roster.counted() >= config.wait_for) {
     state = State::kRunning;
     pacing.start(now_ns);
@@ -344,11 +352,15 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
   pacing.frame_started(now_ns, config.free_rate ? stalled : held);
   held = false;
   stalled = false;
-  return produce_frame(snapshots_due);
+  roster.frame_starts(moment());
+  frame_began_ns = clock();
+  source->begin_next();
+  under_way = true;
+  return source->next_ready() && produce_frame(snapshots_due);
 }
 
 bool Host::Impl::produce_frame(StreamSet snapshots_due) {
-  roster.frame_starts(moment());
+  under_way = false;
   choose_streams({});
   const std::int64_t start = clock();
   const auto frame = source->next(snapshots_due, outbox);
@@ -362,7 +374,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   push_frame(outbox, config.epoch, *frame, wall_ns + (produced - start));
   times.published(frame->frame, now_ns);
   report.frame = frame->frame;
-  report.frame_ms = static_cast<double>(produced - start) * 1e-6;
+  report.frame_ms = static_cast<double>(produced - frame_began_ns) * 1e-6;
   report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
   report.deltas.clear();
   for (const MadeDelta& made : frame->deltas) {
@@ -375,12 +387,12 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   }
   for (std::string& line : source->take_notices(now_ns)) note(std::move(line));
   ++totals.frames;
-  frame_durations.add(produced - start);
+  frame_durations.add(produced - frame_began_ns);
   if (!config.free_rate) {
-    if (auto line = overrun.frame_took(frame->step_ns, produced - start, now_ns); !line.empty())
+    if (auto line = overrun.frame_took(frame->step_ns, produced - frame_began_ns, now_ns); !line.empty())
       note(std::move(line));
   }
-  for (Lane& lane : lanes) lane.status.frame_took(produced - start);
+  for (Lane& lane : lanes) lane.status.frame_took(produced - frame_began_ns);
   return true;
 }
 
@@ -463,8 +475,11 @@ void Host::Impl::plan_wake() {
   const auto at = [this](std::int64_t ns) { wake_ns = std::min(wake_ns, ns); };
   if (state == State::kClaiming) at(*first_poll_ns + config.claim_ns);
   if (succession.stopped()) at(now_ns + kShortWakeNs);
-  if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped())
+  if (under_way) {
+    if (source->next_descriptor() < 0) at(now_ns + kMillisecond);
+  } else if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped()) {
     at(pacing.deadline_ns());
+  }
   if (waiting == Waiting::kQueue) at(now_ns + kMillisecond);
   if (waiting == Waiting::kParticipants) {
     if (const auto left = roster.patience_ns(moment())) {
@@ -530,6 +545,8 @@ bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
 }
 
 std::int64_t Host::next_wake_ns() const { return impl_->wake_ns; }
+bool Host::frame_under_way() const { return impl_->under_way; }
+int Host::descriptor() const { return impl_->under_way ? impl_->source->next_descriptor() : -1; }
 Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }

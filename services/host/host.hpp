@@ -48,16 +48,21 @@ class Host {
   Host(const Host&) = delete;
   Host& operator=(const Host&) = delete;
 
-  /// Takes what arrived, then produces at most one frame and queues what must be published. `now_ns` is a
+  /// Takes what arrived, then begins or finishes at most one frame and queues what must be published. A frame
+  /// whose step takes a while is begun by one poll and finished by a later one. `now_ns` is a
   /// steady clock that never goes back, `wall_ns` the time of day. Returns true if a frame was produced: see
   /// report().
   bool poll(std::int64_t now_ns, std::int64_t wall_ns);
   /// Steady time at which poll() has something to do even if nothing arrives. At most 50 ms ahead.
   [[nodiscard]] std::int64_t next_wake_ns() const;
+  /// True if a frame was begun and is not finished: capture() has to wait.
+  [[nodiscard]] bool frame_under_way() const;
+  /// Readable when the frame under way can be finished; -1: there is none, or next_wake_ns() says when.
+  [[nodiscard]] int descriptor() const;
 
   [[nodiscard]] State state() const;
   /// Set in kRefused: kConflict, naming the other server. Set in kEnded if a simulation ran:
-  /// kInvalidArgument, its body columns are no longer `capacity` long.
+  /// kInvalidArgument, its body columns are no longer `capacity` long; kIo, its failure().
   [[nodiscard]] const std::optional<Error>& error() const;
   [[nodiscard]] const FrameReport& report() const;
   [[nodiscard]] Outbox& outbox();
@@ -67,7 +72,7 @@ class Host {
   Result<Frame> inject(const engine::Input& input);
 
   /// Copies all that a server needs to go on from frame(), for a checkpoint: HostConfig::goes_on_from. Call
-  /// it right after a poll() that returned true. Keeps the memory that `out` has. Only for a simulation.
+  /// it right after a poll() that returned true, or while no frame is under way. Keeps the memory that `out` has. Only for a simulation.
   void capture(checkpoint::Checkpoint& out) const;
 
   /// True if servers stand by: checkpoints are needed, and offered with offer_checkpoint(). Only for a

@@ -10,23 +10,28 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/port.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
+#include "services/host/waiting.hpp"
 #include "services/json/json.hpp"
 #include "services/logging/log.hpp"
+#include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
-#include "services/sessions/session_plan.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
+#include "services/tandemd/restarts.hpp"
+#include "services/tandemd/served_world.hpp"
 #include "services/tandemd/service.hpp"
 #include "services/tandemd/stand_by.hpp"
 
@@ -87,8 +92,9 @@ class HashLog {
 /// Runs the scene's script: sends each input in time for its frame.
 class ScriptSender {
  public:
-  ScriptSender(const scenes::Scene& scene, const Options& options) : lead_(options.lead) {
-    if (options.scripted) script_.emplace(scene, options.seed, options.users);
+  /// `scene` may be empty if there is no script.
+  ScriptSender(const std::optional<scenes::Scene>& scene, const Options& options) : lead_(options.lead) {
+    if (scene && options.scripted) script_.emplace(*scene, options.seed, options.users);
   }
 
   /// Leaves out what a checkpoint of that frame holds already: it was sent before the frame was made.
@@ -146,6 +152,17 @@ void log_line(const std::string& line, bool warning) {
   spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
 }
 
+/// Makes the frame whose step is under way, so that a last checkpoint can be written; but does not wait long.
+void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes) {
+  const std::int64_t until_ns = steady_ns() + kSecond;
+  while (host.frame_under_way() && !host.error() && steady_ns() < until_ns) {
+    host::wait_for_work(host, port, std::chrono::milliseconds{10});
+    if (!host.poll(steady_ns(), wall_ns())) continue;
+    for (const host::DeltaReport& delta : host.report().deltas)
+      hashes.add(delta.stream, host.report().frame, delta.hash);
+  }
+}
+
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver };
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
@@ -180,9 +197,9 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     failures.show(now_ns);
     if (publisher.gave_up()) return Ending::kCannotWrite;
     if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
-    const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
-    if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
+    host::wait_for_work(host, port, std::chrono::nanoseconds(host.next_wake_ns() - steady_ns()));
   }
+  finish_frame(host, port, hashes);
   return Ending::kDone;
 }
 
@@ -270,14 +287,17 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
   return closed && printed ? 0 : 1;
 }
 
-/// The exit code; empty if another server took the place of one that is to stand by.
-using End = std::optional<int>;
+/// How a life of a server ended.
+struct End {
+  enum class Next : std::uint8_t { kExit, kStandBy, kAnotherEngine };
+  Next next = Next::kExit;
+  int exit_code = 0;
+};
 
-/// What stays from one life of a server to the next: it may stand by again.
+/// What stays from one life of a server to the next: it may stand by again, or go on with another engine.
 struct Stage {
   Options& options;  ///< with what was read again
-  const scenes::Scene& scene;
-  engine::Simulation& simulation;
+  const ServedWorld& served;
   HashLog& hashes;
   Metrics& metrics;
   Service& service;
@@ -287,35 +307,41 @@ struct Stage {
 End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
   Options& options = stage.options;
   SignalWatch& signals = stage.signals;
+  engine::Simulation& simulation = *stage.served.simulation;
+  const auto exits = [&signals](int code) { return End{End::Next::kExit, signals.finish(code)}; };
   if (options.standby) {
-    const auto takes_over = stand_by(options, stage.simulation, port, config, keeping, stage.service,
-                                     stage.metrics, signals.stop());
-    if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
-    if (!*takes_over) return signals.finish(0);
+    const auto takes_over =
+        stand_by(options, simulation, port, config, keeping, stage.service, stage.metrics, signals.stop());
+    if (!takes_over) return exits(report_error(takes_over.error(), 1));
+    if (!*takes_over) return exits(0);
   }
   const bool goes_on = config.goes_on_from != nullptr;
   stage.hashes.begin(config.epoch);
   const double frame_rate_hz = config.frame_rate_hz;
   const std::vector<host::StreamConfig> streams = config.streams;
-  auto host = host::Host::create(std::move(config), stage.simulation, port);
-  if (!host) return signals.finish(report_error(host.error(), options.standby ? 1 : 2));
+  auto host = host::Host::create(std::move(config), simulation, port);
+  if (!host) return exits(report_error(host.error(), options.standby ? 1 : 2));
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
-  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", stage.scene.name,
-               options.choice.bodies,
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", stage.served.world.name,
+               simulation.capacity(),
                alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
                options.domain, (*host)->session().epoch);
   for (const host::StreamConfig& stream : streams)
     if (!alone) spdlog::info("stream {}: {}", stream.name, coding_text(stream));
 
   host::Publisher publisher((*host)->outbox(), port);
-  ScriptSender script(stage.scene, options);
+  ScriptSender script(stage.served.scene, options);
   if (goes_on) script.skip_to((*host)->frame());
   const Ending ending = serve(**host, port, script, stage.hashes, keeping, publisher, stage.metrics,
                               stage.service, options, signals.stop());
+  if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
+    publisher.flush();  // what was made reaches the clients before the writers are gone
+    return {End::Next::kAnotherEngine, report_error(*(*host)->error(), 1)};
+  }
   if (ending == Ending::kRefused && options.standby) {
     spdlog::warn("{}; this one stands by again", (*host)->error()->message);
-    return std::nullopt;
+    return {End::Next::kStandBy};
   }
   keeping.end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
@@ -326,47 +352,91 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   if (publisher.failures() > 0) {
     spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());
   }
-  return exit_code;
+  return {End::Next::kExit, exit_code};
+}
+
+/// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
+tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
+                                           std::int64_t ran_ns, int exit_code,
+                                           const std::atomic<bool>& stop) {
+  for (;;) {
+    const auto wait_ns = restarts.wait_after_ns(ran_ns);
+    // An inherited socket leads to one engine only.
+    if (options.engine->descriptor >= 0) return tl::unexpected(exit_code);
+    if (!wait_ns) {
+      spdlog::error("the engine ended {} times, each time soon after its start; giving up",
+                    Restarts::kMostInARow + 1);
+      return tl::unexpected(exit_code);
+    }
+    spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
+                 static_cast<double>(*wait_ns) * 1e-9);
+    const std::int64_t until_ns = steady_ns() + *wait_ns;
+    while (steady_ns() < until_ns && !stop) {
+      service.watch(steady_ns());
+      std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    }
+    if (stop) return tl::unexpected(0);
+    auto served = open_world(options, stop);
+    if (served) return std::move(*served);
+    if (stop) return tl::unexpected(0);
+    report_error(served.error().error, 1);
+    ran_ns = 0;
+  }
 }
 
 }  // namespace
 
 int run_daemon(Options options, SignalWatch& signals) {
-  const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
-  auto simulation =
-      scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
-  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
+  auto opened_world = open_world(options, signals.stop());
+  if (!opened_world) {
+    const NotOpened& why = opened_world.error();
+    if (signals.stop()) return signals.finish(0);
+    return report_error(placed(options.places, why.field, why.error), why.exit_code);
+  }
+  ServedWorld served = std::move(*opened_world);
+  if (!served.session.empty() && options.session == Options().session) options.session = served.session;
+  if (const auto named = transport::check_session_name(options.session); !named)
+    return report_error(named.error(), 2);
   HashLog hashes;
   Metrics metrics;
   Service service;
-  const Stage stage{options, *scene, **simulation, hashes, metrics, service, signals};
+  Restarts restarts;
+  const Stage stage{options, served, hashes, metrics, service, signals};
   for (bool first = true;; first = false) {
-    auto config =
-        planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
+    const std::int64_t began_ns = steady_ns();
+    auto config = planning::plan_server(served.world, options.choice, options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);
-    config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
-    auto keeping = options.standby ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
-                                   : host::Keeping::begin(options.checkpoint, **simulation, *config,
-                                                          &log_line, &steady_ns);
-    if (!keeping) return report_error(keeping.error(), 1);
-    // Another life has another DDS participant, so that nobody takes it for the server that it was.
-    auto port = open_port(*config, options, signals.stop());
-    if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
-    if (first) {
-      if (!options.profile.empty())
-        spdlog::info(
-            "{}", transport::describe_dds_profile(options.domain, options.profile, transport::Side::kServer));
-      if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
-        return signals.finish(report_error(opened.error(), 1));
-      if (options.metrics) {
-        auto served = metrics.serve(*options.metrics,
-                                    facts_of(*config, options.session, scene->name, options.free_rate));
-        if (!served) return signals.finish(report_error(served.error(), 1));
+    config->engine = served.engine;
+    std::optional<End> end;
+    {
+      auto keeping = options.standby ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
+                                     : host::Keeping::begin(options.checkpoint, *served.simulation, *config,
+                                                            &log_line, &steady_ns);
+      if (!keeping) return report_error(keeping.error(), 1);
+      // Another life has another DDS participant, so that nobody takes it for the server that it was.
+      auto port = open_port(*config, options, signals.stop());
+      if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+      if (first) {
+        if (!options.profile.empty())
+          spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
+                                                             transport::Side::kServer));
+        if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
+          return signals.finish(report_error(opened.error(), 1));
+        if (options.metrics) {
+          auto answers = metrics.serve(
+              *options.metrics, facts_of(*config, options.session, served.world.name, options.free_rate));
+          if (!answers) return signals.finish(report_error(answers.error(), 1));
+        }
       }
+      end = live(stage, std::move(*config), **port, *keeping);
     }
-    if (const End end = live(stage, std::move(*config), **port, *keeping)) return *end;
+    if (end->next == End::Next::kExit) return end->exit_code;
     logging::set_context(options.session, 0);
+    if (end->next != End::Next::kAnotherEngine) continue;
+    auto next =
+        next_engine(options, restarts, service, steady_ns() - began_ns, end->exit_code, signals.stop());
+    if (!next) return signals.finish(next.error());
+    served = std::move(*next);
   }
 }
 

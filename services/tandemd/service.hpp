@@ -19,6 +19,8 @@ class Service {
   /// Call it in every turn of the loop.
   void watch(const host::Host& host, std::int64_t now_ns);
   void watch(const standby::Standby& standby, const std::string& session, std::int64_t now_ns);
+  /// The same, while another engine is awaited.
+  void watch(std::int64_t now_ns) { notifier_.alive(now_ns); }
   /// The same. If the configuration is to be read again, changes what can change live, also in `options`, and
   /// logs the fields that changed and those that cannot, or what is wrong.
   void reload(Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns);

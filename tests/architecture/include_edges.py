@@ -24,6 +24,7 @@ TABLES = LAYOUT + PREDICT + CODEC + ["sdk/core/tables"]
 TIMELINE = TABLES + ["sdk/core/timeline"]
 FIGURES = ["public/client_figures.hpp", "public/server_figures.hpp"]
 CLIENT = ["sdk/client", "sdk/client/drawing", "sdk/client/following", "sdk/client/session"]
+DOOR = ["services/engine/door"]
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
 HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/keeping", "services/host/outgoing"]
 HOST += ["services/host/standbys", "services/host/streams"]
@@ -37,6 +38,8 @@ OF_TANDEMD = (
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
     + ["services/logging", "services/workers"]
+    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
+    + DOOR
     + HOST
 )
 OF_LAB = (
@@ -47,6 +50,7 @@ OF_LAB = (
     + HOST
     + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
     + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
+    + DOOR
 )
 EDGES = {
     "sdk/include": [],
@@ -96,6 +100,7 @@ EDGES = {
     "services/host": OF_HOST + HOST,
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
+    "services/engine/door": ["public/result.hpp", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"] + SIMULATION,
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
@@ -121,7 +126,8 @@ EDGES = {
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/logging", "services/metrics", "services/process", "services/recording", "services/scenes"]
-    + ["services/system", "services/tokens", "services/top/model", "services/top/screen"],
+    + ["services/system", "services/tokens", "services/top/model", "services/top/screen"]
+    + DOOR,
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],

@@ -5,13 +5,14 @@
         bodies = client.sample()
         print(bodies.frame, bodies.positions[bodies.alive].mean(axis=0))
 
-`Client` joins a session, `sessions()` finds those on a domain, `Recording` reads what `tandem record` wrote.
+`Client` joins a session, `Server` streams a simulation of yours, `sessions()` finds those on a domain, `Recording` reads what `tandem record` wrote.
 Whatever fails raises `Error`.
 """
 
 from tandem.client import Client, Sample, clock_ns, sessions, version
 from tandem.errors import Error, Result
 from tandem.recording import Recording, State
+from tandem.server import Frame, Input, Server, Type
 from tandem.session import (
     BodyType,
     Change,
@@ -29,8 +30,8 @@ from tandem.session import (
 )
 
 __all__ = [
-    "BodyType", "Change", "Client", "Error", "Event", "EventKind", "LogLevel", "Phase", "Recording", "Result", "Role",
-    "Sample", "SampleMode", "Scene", "SessionInfo", "Shape", "Solid", "State", "Status", "clock_ns", "sessions",
+    "BodyType", "Change", "Client", "Error", "Event", "EventKind", "Frame", "Input", "LogLevel", "Phase", "Recording", "Result", "Role",
+    "Sample", "SampleMode", "Scene", "Server", "SessionInfo", "Shape", "Solid", "State", "Status", "Type", "clock_ns", "sessions",
     "version",
 ]  # fmt: skip
 __version__ = version()

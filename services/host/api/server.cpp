@@ -12,6 +12,7 @@
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
+#include "services/host/waiting.hpp"
 #include "services/planning/plan.hpp"
 
 namespace tandem {
@@ -138,7 +139,7 @@ struct Server::Impl {
       return false;
     }
     const std::int64_t wait_ns = std::min(longest_ns, host->next_wake_ns() - steady_ns());
-    if (wait_ns > 0) port->wait(std::chrono::nanoseconds(wait_ns));
+    host::wait_for_work(*host, *port, std::chrono::nanoseconds(wait_ns));
     return true;
   }
 

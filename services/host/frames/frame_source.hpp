@@ -63,6 +63,15 @@ class FrameSource {
   /// How far agreed() is from the bodies that it stands for, in scene units; 0 where that is not known.
   [[nodiscard]] virtual PositionError error_of(std::uint32_t /*stream*/) const { return {}; }
 
+  /// Begins the next frame, where that takes a while. Without it, next() does both.
+  virtual void begin_next() {}
+  /// True if next() need not wait for what begin_next() began.
+  [[nodiscard]] virtual bool next_ready() { return true; }
+  /// A file descriptor that becomes readable when next_ready() may have changed; -1: none.
+  [[nodiscard]] virtual int next_descriptor() const { return -1; }
+  /// True if the frames ended between two of them: see error().
+  [[nodiscard]] virtual bool failed() { return false; }
+
   /// Makes the next frame; empty if there is none any more. `snapshots_follow`: the streams of which a
   /// snapshot is cut right after it. Queues the messages that have to leave before the deltas.
   virtual std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) = 0;

@@ -134,10 +134,28 @@ const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
   return lane.stream ? lane.stream->parameters() : lane.config.layout.parameters;
 }
 
+void LiveSource::begin_next() {
+  step_began_ns_ = clock();
+  for (const Waiting& waiting : scheduled_)
+    if (waiting.drive.frame <= frame_ + 1) simulation_->apply(waiting.input);
+  for (const engine::Input& input : immediate_) simulation_->apply(input);
+  immediate_.clear();
+  stepping_ = true;
+  simulation_->begin_step();
+}
+
+bool LiveSource::failed() {
+  std::string why = simulation_->failure();
+  if (why.empty()) return false;
+  error_ = {ErrorCode::kIo, std::move(why)};
+  return true;
+}
+
 std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
-  const std::int64_t start_ns = clock();
-  apply(next_frame());
-  simulation_->step();
+  if (!stepping_) begin_next();
+  stepping_ = false;
+  if (failed()) return std::nullopt;
+  settle_inputs();
   under_way_ = true;
   const std::int64_t stepped_ns = clock();
   const engine::Bodies bodies = simulation_->bodies();
@@ -161,7 +179,7 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     return std::nullopt;
   }
   return MadeFrame{
-      .frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = stepped_ns - start_ns};
+      .frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = stepped_ns - step_began_ns_};
 }
 
 void LiveSource::make_deltas() {
@@ -321,15 +339,11 @@ void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
                               of.quality->largest_threshold * of.lattice.unit));
 }
 
-void LiveSource::apply(Frame s) {
-  const auto later = std::ranges::find_if(scheduled_, [s](const Waiting& w) { return w.drive.frame > s; });
-  for (auto it = scheduled_.begin(); it != later; ++it) {
-    simulation_->apply(it->input);
-    drive_ = it->drive.drive;
-  }
-  scheduled_.erase(scheduled_.begin(), later);
-  for (const engine::Input& input : immediate_) simulation_->apply(input);
-  immediate_.clear();
+void LiveSource::settle_inputs() {
+  const auto acted = [this](const Waiting& w) { return w.drive.frame <= frame_ + 1; };
+  for (const Waiting& waiting : scheduled_)
+    if (acted(waiting)) drive_ = waiting.drive.drive;
+  std::erase_if(scheduled_, acted);
 }
 
 }  // namespace tandem::host

@@ -40,6 +40,13 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::uint64_t hash(std::uint32_t id) const override { return lanes_[id].stream->hash(); }
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t id) const override;
   [[nodiscard]] PositionError error_of(std::uint32_t id) const override;
+  /// Hands over the inputs that act on the next frame, and begins its step. Until next() has returned, all
+  /// that this class tells is of the frame before.
+  void begin_next() override;
+  [[nodiscard]] bool next_ready() override { return simulation_->step_ready(); }
+  [[nodiscard]] int next_descriptor() const override { return simulation_->step_descriptor(); }
+  [[nodiscard]] bool failed() override;
+  /// Precondition: next_ready(), if begin_next() was called.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
   InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;
@@ -76,8 +83,8 @@ class LiveSource final : public FrameSource {
                                       const InputOrigin& origin, Outbox& outbox);
   /// Notes whether a body appeared in the last step, so that names() has to be asked.
   void note_births();
-  /// Hands the simulation all inputs that act on frame s, the one that is about to be stepped.
-  void apply(Frame s);
+  /// The step is finished: its inputs are no longer pending.
+  void settle_inputs();
   void make_deltas();
   /// True if the sender's budget is used up for an input of that cost.
   [[nodiscard]] bool too_dear(double cost, const InputOrigin& origin);
@@ -86,7 +93,8 @@ class LiveSource final : public FrameSource {
   /// How many bodies were lost, and whose inputs came before.
   [[nodiscard]] std::string lost_after(std::uint64_t lost, std::int64_t now_ns);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
-  [[nodiscard]] Frame next_frame() const { return frame_ + 1; }
+  /// The frame that an immediate input acts on now.
+  [[nodiscard]] Frame next_frame() const { return frame_ + (stepping_ ? 2 : 1); }
   [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
 
   engine::Simulation* simulation_;
@@ -98,7 +106,9 @@ class LiveSource final : public FrameSource {
   std::int64_t (*clock_ns_)();
   Frame frame_;
   std::string engine_;
-  bool under_way_ = false;                // the simulation has been stepped
+  bool under_way_ = false;  // the simulation has been stepped
+  bool stepping_ = false;   // a step was begun, and its frame is not made
+  std::int64_t step_began_ns_ = 0;
   Drive drive_;                           // in force at frame_
   std::uint64_t last_input_ = 0;          // number
   std::vector<MadeDelta> deltas_;         // of the current frame

@@ -31,12 +31,13 @@ void remember(Checkpoint& world, const transport::InputDecision& decision) {
   known->outcomes.push_back({decision.number, decision.frame, decision.code});
 }
 
-void decide(Checkpoint& world, const transport::InputDecision& decision) {
+// `later`: immediate inputs that were accepted while a step was under way, and so act on the one after it.
+void decide(Checkpoint& world, const transport::InputDecision& decision, std::vector<engine::Input>& later) {
   if (decision.client != 0) remember(world, decision);
   if (decision.code != static_cast<std::uint32_t>(transport::Reason::kNone)) return;
   engine::Input input{.kind = decision.kind, .values = decision.values, .bytes = decision.bytes};
   if (decision.scheduled == 0) {
-    world.immediate.push_back(std::move(input));
+    (decision.frame > world.frame + 1 ? later : world.immediate).push_back(std::move(input));
     return;
   }
   world.scheduled.push_back({decision.scheduled, decision.frame, std::move(input)});
@@ -62,12 +63,15 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
   if (!mirror) return tl::unexpected(mirror.error());
   mirror->restore(world.next_reuse, world.withheld);
   StateHasher hasher;
+  std::vector<engine::Input> later;
   for (const transport::JournalMessage& entry : journal) {
-    for (const transport::InputDecision& decision : entry.decisions) decide(world, decision);
+    for (const transport::InputDecision& decision : entry.decisions) decide(world, decision, later);
     if (entry.state == transport::JournalState::kNotMade) continue;
     if (entry.frame != world.frame + 1) return fail(ErrorCode::kMalformed, "the journal leaves out a frame");
     apply(world, simulation);
+    world.immediate.swap(later);
     simulation.step();
+    if (std::string why = simulation.failure(); !why.empty()) return fail(ErrorCode::kIo, std::move(why));
     const engine::Bodies bodies = simulation.bodies();
     if (auto good = mirror->check(bodies); !good) return tl::unexpected(good.error());
     mirror->update(bodies, simulation.events());
@@ -76,6 +80,7 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
       return fail(ErrorCode::kMismatch,
                   fmt::format("this machine makes another frame {} than the live server did", world.frame));
   }
+  world.immediate.insert(world.immediate.end(), later.begin(), later.end());
   world.gravity = simulation.gravity();
   world.damping_per_s = simulation.damping_per_s();
   world.bodies = mirror->target().alive_count();

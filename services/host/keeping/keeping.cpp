@@ -56,7 +56,10 @@ void Keeping::after_poll(Host& host, bool produced, std::int64_t now_ns) {
 }
 
 void Keeping::end(const Host& host) {
-  if (!ran_ || host.state() == Host::State::kRefused || host.state() == Host::State::kHandedOver) return;
+  const Host::State state = host.state();
+  if (!ran_ || state == Host::State::kRefused || state == Host::State::kHandedOver) return;
+  // A simulation that failed may have nothing to save any more.
+  if (host.frame_under_way() || (state == Host::State::kEnded && host.error())) return;
   keeper_->end(clock_ns_(), [&host](checkpoint::Checkpoint& out) { host.capture(out); });
   tell(clock_ns_());
 }

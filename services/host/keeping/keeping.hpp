@@ -35,7 +35,8 @@ class Keeping {
   void after_poll(Host& host, bool produced, std::int64_t now_ns);
   /// Changes the interval, which is in its range, from the next checkpoint on.
   void set_interval(double interval_s) { keeper_->set_interval(interval_s); }
-  /// Writes a last checkpoint, if a frame was made and the session was not another server's.
+  /// Writes a last checkpoint, if a frame was made, none is under way, and the session was not another
+  /// server's.
   void end(const Host& host);
   /// Empty without a folder.
   [[nodiscard]] std::optional<checkpoint::Figures> figures() const { return keeper_->figures(clock_ns_()); }

@@ -1,15 +1,20 @@
 // Only this file converts the engine's floats to integers. It is separate so that it can be compiled for
 // vector units. It does nothing but conversions, so results do not depend on that.
+#include <algorithm>
+#include <array>
+#include <cstring>
+
 #include "services/host/streams/mirror.hpp"
 
 namespace tandem::host {
 
-void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
-                     std::span<std::int32_t> out, std::span<std::int32_t> off) {
-  const std::size_t count = in.size();
-  const float* __restrict x = in.data();
-  std::int32_t* __restrict to = out.data();
-  std::int32_t* __restrict bad = off.data();
+namespace {
+
+// Values at a time, which stay in the innermost cache.
+constexpr std::size_t kBlock = 512;
+
+void quantise_block(const float* __restrict x, std::size_t count, double scale, std::int32_t limit,
+                    float off_bound, std::int32_t* __restrict to, std::int32_t* __restrict bad) {
   const auto bound = static_cast<float>(limit / scale);
   for (std::size_t i = 0; i < count; ++i) {
     const float magnitude = x[i] < 0 ? -x[i] : x[i];
@@ -25,6 +30,23 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
   for (std::size_t i = 0; i < count; ++i) {
     const std::int32_t high = to[i] > limit ? limit : to[i];  // the last bit of a float may lie beyond
     to[i] = high < -limit ? -limit : high;
+  }
+}
+
+}  // namespace
+
+// Each value is loaded once, into a block: an engine in another process may write while this reads, and a
+// value that changes between its check and its use would be converted unchecked.
+void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
+                     std::span<std::int32_t> out, std::span<std::int32_t> off) {
+  std::array<float, kBlock>
+      block;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  for (std::size_t first = 0; first < in.size(); first += kBlock) {
+    const std::size_t count = std::min(kBlock, in.size() - first);
+    std::memcpy(block.data(), in.data() + first, count * sizeof(float));
+    // The compiler must not read the source again instead of the block.
+    asm volatile("" : : "r"(block.data()) : "memory");
+    quantise_block(block.data(), count, scale, limit, off_bound, out.data() + first, off.data() + first);
   }
 }
 

@@ -94,6 +94,7 @@ void tandem::tool::add_bench(commandline::Command app, Run& run) {
   add_bandwidth(bench, run);
   add_train(bench, run);
   add_memory(bench, run);
+  add_door(bench, run);
   add_engine(bench, run);
   add_framerate(bench, run);
   add_client(bench, run);

@@ -18,6 +18,7 @@ using tool::Run;
 void add_bandwidth(commandline::Command bench, Run& run);
 void add_train(commandline::Command bench, Run& run);
 void add_memory(commandline::Command bench, Run& run);
+void add_door(commandline::Command bench, Run& run);
 void add_engine(commandline::Command bench, Run& run);
 void add_client(commandline::Command bench, Run& run);
 void add_framerate(commandline::Command bench, Run& run);

@@ -72,6 +72,9 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   Flags flags(app, config);
   flags.add("scene", &Config::mutable_scene);
   flags.add("bodies", &Config::set_bodies);
+  flags.add("engine", &Config::mutable_engine);
+  flags.add("engine_socket", &Config::mutable_engine_socket);
+  flags.add("engine_fd", &Config::set_engine_fd);
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
   flags.add("profile", &Config::mutable_profile);

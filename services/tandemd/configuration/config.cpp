@@ -48,7 +48,7 @@ Result<void> read_service(const ServerConfig& config, Options& options) {
 
 Result<void> check_numbers(const Options& options) {
   const std::uint32_t bodies = options.choice.bodies;
-  if (bodies == 0 || bodies > engine::kMaxBodies)
+  if (!options.engine && (bodies == 0 || bodies > engine::kMaxBodies))
     return refuse("bodies", fmt::format("must be 1 to {}, not {}", engine::kMaxBodies, bodies));
   if (options.domain > transport::kMaxDomain)
     return refuse("domain", fmt::format("must be 0 to {}", transport::kMaxDomain));
@@ -80,6 +80,33 @@ Result<void> read_standby(const ServerConfig& config, Options& options) {
   if (options.standby && options.checkpoint.required)
     return refuse("standby",
                   "conflicts with --checkpoint require: a server that stands by goes on from the live one");
+  return {};
+}
+
+/// Reads how an engine in another process comes, and refuses what belongs to a scene.
+Result<void> read_engine(const ServerConfig& config, Options& options) {
+  constexpr std::uint32_t kMostDescriptor = 65535;
+  const int ways =
+      (config.has_engine() ? 1 : 0) + (config.has_engine_socket() ? 1 : 0) + (config.has_engine_fd() ? 1 : 0);
+  const char* const flag = config.has_engine()          ? "engine"
+                           : config.has_engine_socket() ? "engine-socket"
+                                                        : "engine-fd";
+  if (ways == 0) return {};
+  if (ways > 1)
+    return refuse(flag, "an engine comes in one way: give only one of engine, engine-socket and engine-fd");
+  if (config.has_engine() && config.engine().empty()) return refuse(flag, "give a command");
+  if (config.has_engine_socket() && config.engine_socket().empty()) return refuse(flag, "give a path");
+  if (config.engine_fd() > kMostDescriptor)
+    return refuse(flag, fmt::format("must be 0 to {}", kMostDescriptor));
+  if (config.has_scene() || config.has_bodies())
+    return refuse(flag, "the engine says what it simulates: leave out scene and bodies");
+  if (config.scripted() || config.has_users()) return refuse(flag, "only scenes have scripts");
+  if (config.standby())
+    return refuse(flag, "conflicts with standby: a server with such an engine cannot stand by");
+  options.engine =
+      engine::door::Way{.command = config.engine(),
+                        .path = config.engine_socket(),
+                        .descriptor = config.has_engine_fd() ? static_cast<int>(config.engine_fd()) : -1};
   return {};
 }
 
@@ -240,9 +267,10 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
 namespace {
 
 Result<Options> checked(const ServerConfig& config) {
-  if (config.scene().empty()) return refuse("scene", "give a scene's name or file");
-  if (!config.has_bodies()) return refuse("bodies", "give the number of bodies");
   Options options;
+  if (auto good = read_engine(config, options); !good) return tl::unexpected(good.error());
+  if (!options.engine && config.scene().empty()) return refuse("scene", "give a scene's name or file");
+  if (!options.engine && !config.has_bodies()) return refuse("bodies", "give the number of bodies");
   options.scene = config.scene();
   options.choice = choice_of(config);
   if (config.has_seed()) options.seed = config.seed();

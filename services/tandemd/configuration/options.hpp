@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/checkpoint/keeper.hpp"
+#include "services/engine/door/door.hpp"
 #include "services/logging/log.hpp"
 #include "services/metrics/address.hpp"
 #include "services/sessions/session_plan.hpp"
@@ -28,8 +29,9 @@ struct Changes {
 };
 
 struct Options : planning::ServiceWishes {
-  std::string scene;               ///< name or file
-  sessions::SessionChoice choice;  ///< its bodies and threads also apply to the full simulation
+  std::string scene;                        ///< name or file; empty with an engine in another process
+  std::optional<engine::door::Way> engine;  ///< how an engine in another process comes
+  sessions::SessionChoice choice;           ///< its bodies and threads also apply to the full simulation
   std::uint64_t seed = 1;
   bool scripted = false;    ///< run the scene's script in the server
   std::uint32_t users = 0;  ///< users of that script; 0: the scene's number

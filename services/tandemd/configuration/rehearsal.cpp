@@ -7,6 +7,7 @@
 namespace tandem::daemon {
 
 Result<void> rehearse(const Options& options) {
+  if (options.engine) return {};  // it says what it simulates when it comes
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return tl::unexpected(placed(options.places, "scene", scene.error()));
   const auto config =

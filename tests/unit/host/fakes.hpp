@@ -50,6 +50,16 @@ class FakeSimulation final : public engine::Simulation {
       std::copy_n(input.values.begin(), 3, gravity_in_force.begin());
     }
   }
+  void begin_step() override { begun = true; }
+  [[nodiscard]] bool step_ready() override {
+    if (!begun) return true;
+    if (!failure_now.empty()) return true;
+    if (ready && !ready()) return false;
+    begun = false;
+    step();
+    return true;
+  }
+  [[nodiscard]] std::string failure() override { return failure_now; }
   void step() override {
     ++steps;
     events_now.clear();
@@ -95,6 +105,9 @@ class FakeSimulation final : public engine::Simulation {
   mutable int asked_for_names = 0;
   engine::InputBudget budget;
   std::function<void(std::uint64_t step)> on_step;
+  std::function<bool()> ready;  // says whether the step that was begun is finished; empty: always
+  bool begun = false;
+  std::string failure_now;
   std::uint64_t steps = 0;
   std::vector<std::pair<std::uint64_t, engine::Input>> applied;  // with the step it acted in
 };

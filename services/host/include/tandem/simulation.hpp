@@ -116,6 +116,21 @@ class Simulation {
   virtual void apply(const Input& /*input*/) {}
   virtual void step() = 0;
 
+  // A step that can be waited for, for an engine that computes elsewhere. The server goes on with its clients
+  // while such a step is under way. Meanwhile it calls only classify(), input_budget(), step_ready(),
+  // step_descriptor() and failure().
+
+  /// Begins a step and returns soon. The default makes the step.
+  virtual void begin_step() { step(); }
+  /// True if the step that was begun is finished, or failure() says why it never will be.
+  [[nodiscard]] virtual bool step_ready() { return true; }
+  /// A file descriptor that becomes readable when step_ready() may have changed; -1: none, and the server
+  /// asks once a millisecond.
+  [[nodiscard]] virtual int step_descriptor() const { return -1; }
+  /// Why there will be no further step, in one line; empty: there will be. The session then ends with it. The
+  /// server asks often, also between steps.
+  [[nodiscard]] virtual std::string failure() { return {}; }
+
   [[nodiscard]] virtual Bodies bodies() const = 0;
   /// Events of the last step; valid until the next one.
   [[nodiscard]] virtual std::span<const Event> events() const { return {}; }

@@ -1,0 +1,276 @@
+"""A simulation in numpy, streamed by a server: the door of `idl/ENGINE.md`."""
+
+import dataclasses
+import os
+import pathlib
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+
+import mmap
+import numpy as np
+
+from tandem.errors import Error, Result
+
+_HELLO, _LAYOUT, _START, _INPUT, _STEP, _DONE, _SAVE, _SAVED, _LOAD, _LOADED, _ERROR, _BYE = range(1, 13)
+_KINDS = {1: "gravity", 2: "push", 16: "application"}
+_FLOATS = {"position": 3, "velocity": 3, "orientation": 4, "angular_velocity": 3}
+
+
+@dataclasses.dataclass(frozen=True)
+class Type:
+    """What clients draw for a type of bodies. `values`: those of the shape, see BodyShape in `tandem/body_shape.hpp`."""
+
+    name: str = "body"
+    radius: float = 0.5  #: of the sphere around a body
+    colour: str = "#C0C0C0"
+    mass: float = 1.0
+    shape: str = "sphere"
+    values: tuple = ()
+
+    def _line(self):
+        colour = self.colour.lstrip("#").upper()
+        return " ".join(map(str, ("type", self.name, self.radius, colour + "FF"[len(colour) - 6 :], self.mass, self.shape, *self.values)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Input:
+    """What a user did. It acts in the frame that has it."""
+
+    kind: str  #: gravity, push or application
+    values: np.ndarray  #: of gravity: x, y, z; of a push: centre, radius, change of velocity
+    bytes: bytes = b""  #: of an application
+
+    @property
+    def centre(self):
+        return self.values[:3]
+
+    @property
+    def radius(self):
+        return self.values[3]
+
+    @property
+    def velocity(self):
+        return self.values[4:7]
+
+
+class Frame:
+    """The frame to compute; valid in its turn of the loop only. The columns are the server's memory: write all of each."""
+
+    def __init__(self, server, number, inputs):
+        self._server, self.number, self.inputs = server, number, inputs
+
+    position = property(lambda self: self._server._columns["position"], doc="(capacity, 3)")
+    velocity = property(lambda self: self._server._columns["velocity"], doc="(capacity, 3)")
+    orientation = property(lambda self: self._server._columns["orientation"], doc="(capacity, 4): x, y, z, w")
+    angular_velocity = property(lambda self: self._server._columns["angular_velocity"], doc="(capacity, 3), rad/s")
+    alive = property(lambda self: self._server._columns["alive"], doc="(capacity,), 0: dead; another value: another body")
+    type = property(lambda self: self._server._columns["type"], doc="(capacity,)")
+    colliding = 0  #: bodies in contact, for statistics
+
+    def write(self, *, alive=None, reborn=(), **columns):
+        """Copies columns of the first n slots; the other slots keep what they have. `alive`: truths; a slot that comes alive has a new
+        body. `reborn`: slots that have a new body, though they lived before."""
+        self._server._write(columns, alive, reborn)
+
+
+class Server:
+    """Streams a simulation that runs here. Starts `tandemd`, unless `tandemd --engine` started this program, or `door` is the path of
+    its `--engine-socket`.
+
+    `dt`: seconds of a step. `turns`: bodies have orientations. `gravity_limit`, `push_limit`: the largest input of a user, None: refused;
+    `application_limit`: bytes. `save()` returns bytes and `load(bytes)` the columns for `Frame.write()`, or None if they are of another
+    world; with both the server can keep checkpoints. `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
+    `options`: further flags of tandemd. Errors: `tandem.Error`.
+    """
+
+    def __init__(self, capacity, dt, *, session="default", domain=0, types=(), name="python", dtype=np.float32, turns=False,
+                 gravity=(0, 0, 0), damping=0, up="y", threshold=None, extent=None, gravity_limit=1000, push_limit=1000,
+                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, options=(), tandemd=None):  # fmt: skip
+        self._process, self._socket, self._columns = None, None, {}
+        self._save, self._load, self._births = save, load, None
+        wanted = {"threshold": threshold, "extent": extent, "input gravity": gravity_limit, "input push": push_limit, "input application": application_limit}
+        lines = ["engine 1.0", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
+                 f"float {np.dtype(dtype).itemsize * 8}", f"gravity {' '.join(str(float(v)) for v in gravity)}", f"damping {damping}",
+                 f"save {int(save is not None and load is not None)}", f"step_limit {step_limit}",
+                 *(f"{key} {value}" for key, value in wanted.items() if value is not None),
+                 *(each._line() for each in types), *hello]  # fmt: skip
+        self._connect(door or os.environ.get("TANDEM_DOOR"), session, domain, options, tandemd)
+        try:
+            self._send(_HELLO, "\n".join(lines).encode() + b"\n")
+            self._take_layout()
+        except BaseException:
+            self.close()
+            raise
+
+    def _connect(self, door, session, domain, options, tandemd):
+        if door is not None and door.startswith("fd:"):
+            self._socket = socket.socket(fileno=int(door[3:]))
+            return
+        if door is not None:
+            self._socket = socket.socket(socket.AF_UNIX)
+            self._socket.connect(door)
+            return
+        program = tandemd or os.environ.get("TANDEMD") or shutil.which("tandemd")
+        if program is None:
+            raise Error(Result.IO, "tandemd is not in the PATH: install tandem-server, or give its path as tandemd=")
+        self._socket, theirs = socket.socketpair()
+        with theirs:
+            defaults = {"--session": session, "--domain": domain}  # a flag may be given once only
+            flags = [word for flag, value in defaults.items() if flag not in options for word in (flag, value)]
+            command = [program, "--engine-fd", theirs.fileno(), *flags, *options]
+            self._process = subprocess.Popen(list(map(str, command)), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
+
+    def _take_layout(self):
+        try:
+            head, fds, _, _ = socket.recv_fds(self._socket, 8, 1)
+        except ConnectionError:
+            head, fds = b"", []
+        head += self._receive(8 - len(head))
+        kind, length = struct.unpack("<II", head)
+        body = self._receive(length)
+        if kind != _LAYOUT:
+            self._fail(kind, body)
+        numbers, columns = {}, []
+        for line in body.decode().splitlines():
+            key, *values = line.split()
+            if key == "column":
+                columns.append((values[0], values[1], int(values[2]), int(values[3])))
+            elif values and values[0].isdigit():
+                numbers[key] = int(values[0])
+        memory = mmap.mmap(fds[0], numbers["bytes"])  # lives as long as an array on it
+        os.close(fds[0])
+        self.capacity, padded = numbers["capacity"], numbers["padded"]
+        self._head = np.frombuffer(memory, np.uint64, 3, numbers["first"])
+        dtypes = {"f32": np.float32, "f64": np.float64, "u8": np.uint8, "u16": np.uint16}
+        for name, element, axes, offset in columns:
+            flat = np.frombuffer(memory, dtypes[element], axes * padded, numbers["first"] + offset).reshape(axes, padded)
+            self._columns[name] = flat[:, : self.capacity].T if axes > 1 else flat[0, : self.capacity]
+        if "orientation" in self._columns:
+            self._columns["orientation"][:, 3] = 1
+        self._births = np.zeros(self.capacity, np.uint8)
+
+    def start(self, *, alive=True, **columns):
+        """The start frame: columns as in `Frame.write()`. The server announces the session then."""
+        self._write(columns, alive, ())
+        self._answer(_START, b"", 0)
+
+    def frames(self):
+        """Yields a `Frame` at a time, at the server's pace, until the server ends."""
+        inputs = []
+        while True:
+            kind, body = self._message()
+            if kind is None or kind == _BYE:
+                return
+            if kind == _INPUT:
+                _, number, count = struct.unpack_from("<QII", body)
+                values = np.frombuffer(body, np.float64, count, 16) if number < 16 else np.empty(0)
+                inputs.append(Input(_KINDS.get(number, str(number)), values, body[16:] if number >= 16 else b""))
+            elif kind == _STEP:
+                number, slot, _ = struct.unpack("<QII", body)
+                frame, inputs = Frame(self, number, inputs), []
+                yield frame
+                self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), 0), number)
+            elif kind == _SAVE:
+                data = bytes(self._save())
+                pathlib.Path(body.decode()).write_bytes(data)
+                self._send(_SAVED, struct.pack("<Q", len(data)))
+            elif kind == _LOAD:
+                number = struct.unpack_from("<Q", body)[0]
+                columns = self._load(pathlib.Path(body[8:].decode()).read_bytes())
+                if columns is not None:
+                    self._write(dict(columns), columns.get("alive"), ())
+                self._answer(_LOADED, struct.pack("<QII", number, columns is not None, 0), number)
+            else:
+                self._fail(kind, body)
+
+    def _write(self, columns, alive, reborn):
+        columns.pop("alive", None)
+        for name, values in columns.items():
+            if name not in self._columns:
+                raise TypeError(f"there is no column {name!r}; there are {', '.join(self._columns)}")
+            self._columns[name][: len(values)] = values
+        marks = self._columns["alive"]
+        if alive is not None:
+            lives = np.broadcast_to(np.asarray(alive, bool), self.capacity) if np.ndim(alive) == 0 else np.asarray(alive, bool)
+            now = marks[: len(lives)]
+            born = lives & (now == 0)
+            self._births[: len(lives)][born] = self._births[: len(lives)][born] % 255 + 1
+            now[~lives] = 0
+            now[born] = self._births[: len(lives)][born]
+        reborn = np.asarray(reborn, np.intp)
+        if reborn.size:
+            self._births[reborn] = self._births[reborn] % 255 + 1
+            marks[reborn] = self._births[reborn]
+
+    def _answer(self, kind, body, number):
+        self._head[:] = number
+        self._send(kind, body)
+
+    def _send(self, kind, body):
+        try:
+            self._socket.sendall(struct.pack("<II", kind, len(body)) + body)
+        except OSError:
+            self._check_over()
+
+    def _receive(self, count):
+        held = b""
+        while len(held) < count:
+            try:
+                got = self._socket.recv(count - len(held))
+            except ConnectionError:
+                got = b""
+            if not got:
+                raise Error(Result.IO, "the server ended before it took this engine; its own lines say why")
+            held += got
+        return held
+
+    def _message(self):
+        """The next message; (None, b"") if the server is gone."""
+        try:
+            kind, length = struct.unpack("<II", self._receive(8))
+            return kind, self._receive(length)
+        except Error:
+            return None, b""
+
+    def _check_over(self):
+        """The server hung up while this engine spoke: it may have said why."""
+        kind, body = self._message()
+        while kind is not None and kind not in (_ERROR, _BYE):
+            kind, body = self._message()
+        if kind == _ERROR:
+            self._fail(kind, body)
+
+    def _fail(self, kind, body):
+        if kind == _ERROR:
+            raise Error(Result.INVALID_ARGUMENT, "the server refuses this engine: " + body.decode("utf-8", "replace"))
+        raise Error(Result.UNSUPPORTED, f"the server sent a message of type {kind}")
+
+    def close(self):
+        """Ends the session, and waits for the `tandemd` that this started."""
+        if self._socket is not None:
+            self._socket.close()
+        if self._process is not None:
+            try:
+                self._process.wait(5)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+        self._socket, self._process = None, None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, value, traceback):
+        if self._socket is not None:
+            last = f"{kind.__name__}: {value}" if kind is not None and not issubclass(kind, KeyboardInterrupt) else ""
+            try:
+                message = (_ERROR, last.encode()[:500]) if last else (_BYE, b"")
+                self._socket.sendall(struct.pack("<II", message[0], len(message[1])) + message[1])
+            except OSError:
+                pass
+        if self._process is not None and kind is None and sys.exc_info()[0] is None:
+            self._process.terminate()
+        self.close()

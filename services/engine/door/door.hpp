@@ -1,0 +1,48 @@
+#pragma once
+// An engine in another process as a simulation (idl/ENGINE.md).
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "services/engine/door/wire.hpp"
+#include "tandem/result.hpp"
+#include "tandem/simulation.hpp"
+
+namespace tandem::engine::door {
+
+/// How an engine comes to its server; one of the three is set.
+struct Way {
+  std::string command = {};  ///< started with sh(1); it finds the socket's path in TANDEM_DOOR
+  std::string path = {};     ///< of a socket at which the server waits for it
+  int descriptor = -1;       ///< a connected socket that the server inherited; it belongs to the door then
+};
+
+struct Options {
+  Way way = {};
+  double connect_limit_s = 10;  ///< from the start of a command to HELLO
+  double start_limit_s = 60;    ///< from LAYOUT to START, and for SAVE and LOAD
+  /// Receives lines for a log; warnings need somebody's attention. An engine's own output begins with
+  /// "engine: ".
+  std::function<void(const std::string& line, bool warning)> log = [](const std::string&, bool) {};
+  const std::atomic<bool>* stop = nullptr;  ///< ends a wait for an engine
+};
+
+/// A simulation whose engine has said START. Steps can be waited for. Its checkpoints are the engine's files.
+/// After a failure() it makes no further step, and the engine's process group is killed if it was started
+/// here. While an engine saves or loads, or step() is called, the caller waits. Not thread-safe.
+class Door : public Simulation {
+ public:
+  /// Waits for the engine: a command's for connect_limit_s, others until `stop`. Errors: kIo (it cannot be
+  /// started, or hung up), kMalformed, kUnsupported (what it says is wrong), kTimeout, kInvalidArgument (the
+  /// way).
+  static Result<std::unique_ptr<Door>> open(Options options);
+
+  [[nodiscard]] virtual const Hello& hello() const = 0;
+  /// The process that speaks; 0: not known.
+  [[nodiscard]] virtual int engine_process() const = 0;
+};
+
+}  // namespace tandem::engine::door

@@ -1,0 +1,258 @@
+// `tandem bench door`: what it costs that an engine is another process.
+
+#include "tandem/engine.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "services/engine/door/door.hpp"
+#include "services/host/frames/live_source.hpp"
+#include "services/json/json.hpp"
+#include "services/lab/commands/bench.hpp"
+#include "services/lab/measures/scene_source.hpp"
+#include "services/sessions/session_plan.hpp"
+
+namespace tandem::lab {
+namespace {
+
+using engine::door::Door;
+
+struct DoorOptions {
+  std::vector<std::uint32_t> bodies{10'000, 100'000, 1'000'000};
+  std::uint32_t frames = 200;
+  std::string python = "/usr/bin/python3", scene = "half_pipe", play;
+  std::uint32_t scene_bodies = 10'000;
+  bool json = false;
+};
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+}
+
+double ms_since(std::int64_t start_ns) { return static_cast<double>(steady_ns() - start_ns) * 1e-6; }
+
+// --- The engine's side: what the bench starts ---
+
+template <class T>
+void put(const tandem_engine& door, const char* column, std::uint32_t axis, std::span<const T> values) {
+  std::memcpy(tandem_engine_column(&door, column, axis), values.data(), values.size_bytes());
+}
+
+void put(const tandem_engine& door, const engine::Bodies& bodies) {
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    put(door, "position", axis, bodies.position[axis]);
+    put(door, "velocity", axis, bodies.velocity[axis]);
+    if (!bodies.orientation[0].empty()) put(door, "angular_velocity", axis, bodies.angular_velocity[axis]);
+  }
+  for (std::uint32_t axis = 0; axis < 4 && !bodies.orientation[0].empty(); ++axis)
+    put(door, "orientation", axis, bodies.orientation[axis]);
+  put(door, "alive", 0, bodies.alive);
+  put(door, "type", 0, bodies.type);
+}
+
+/// Serves the frames of `write` until the server ends. Returns an exit code.
+int serve_door(const std::string& hello, const std::function<void(tandem_engine&)>& write,
+               const std::function<void()>& step) {
+  static tandem_engine door;
+  if (tandem_engine_open(&door, hello.c_str()) != 0) return tandem_engine_close(&door);
+  write(door);
+  tandem_engine_start(&door);
+  for (;;) {
+    const int what = tandem_engine_next(&door);
+    if (what == TANDEM_ENGINE_BYE || what < 0) return tandem_engine_close(&door);
+    if (what != TANDEM_ENGINE_STEP) continue;
+    step();
+    write(door);
+    tandem_engine_done(&door, 0);
+  }
+}
+
+/// Columns that stand still: only the hand-over costs.
+int play_columns(std::uint32_t bodies) {
+  std::vector<float> zero(bodies), one(bodies, 1.0F);
+  std::vector<std::uint8_t> alive(bodies, 1);
+  std::vector<std::uint16_t> type(bodies);
+  std::vector<std::vector<float>> own(13, zero);
+  own[9] = one;
+  engine::Bodies columns;
+  for (std::size_t i = 0; i < 3; ++i) columns.position[i] = own[i];
+  for (std::size_t i = 0; i < 3; ++i) columns.velocity[i] = own[3 + i];
+  for (std::size_t i = 0; i < 4; ++i) columns.orientation[i] = own[6 + i];
+  for (std::size_t i = 0; i < 3; ++i) columns.angular_velocity[i] = own[10 + i];
+  columns.alive = alive;
+  columns.type = type;
+  return serve_door(
+      fmt::format("name columns\ncapacity {}\ndt 0.033\nturns 1\n", bodies),
+      [&columns](tandem_engine& door) { put(door, columns); }, [] {});
+}
+
+int play_scene(const std::string& name, std::uint32_t bodies) {
+  const auto scene = scenes::load_scene(name);
+  if (!scene) return report("bench door", scene.error());
+  auto simulation = scenes::make_simulation(*scene, bodies, 1, 1);
+  if (!simulation) return report("bench door", simulation.error());
+  std::string hello =
+      fmt::format("name {}\ncapacity {}\ndt {}\nturns {:d}\n", name, bodies, scene->dt_s, scene->turns);
+  for (const scenes::BodyType& type : scene->types)
+    hello += fmt::format("type {} {}\n", type.name, type.bounding_radius_m);
+  return serve_door(
+      hello, [&](tandem_engine& door) { put(door, (*simulation)->bodies()); },
+      [&] { (*simulation)->step(); });
+}
+
+int play(const std::string& what) {
+  const std::size_t colon = what.find(':');
+  const auto bodies = static_cast<std::uint32_t>(std::strtoul(what.c_str() + colon + 1, nullptr, 10));
+  const std::string name = what.substr(0, colon);
+  return name == "columns" ? play_columns(bodies) : play_scene(name, bodies);
+}
+
+// --- The server's side ---
+
+Result<std::unique_ptr<Door>> open(const std::string& command) {
+  engine::door::Options options;
+  options.way.command = command;
+  return Door::open(std::move(options));
+}
+
+struct Trip {
+  std::vector<double> done_ms, read_ms;
+};
+
+Result<Trip> measure(Door& door, std::uint32_t frames) {
+  Trip trip;
+  constexpr std::uint32_t kWarm = 5;
+  for (std::uint32_t i = 0; i < frames + kWarm; ++i) {
+    const std::int64_t start_ns = steady_ns();
+    door.begin_step();
+    pollfd answer{.fd = door.step_descriptor(), .events = POLLIN, .revents = 0};
+    ::poll(&answer, 1, 10'000);
+    const double done_ms = ms_since(start_ns);
+    while (!door.step_ready()) ::poll(&answer, 1, 10);
+    if (std::string why = door.failure(); !why.empty()) return fail(ErrorCode::kIo, std::move(why));
+    if (i < kWarm) continue;
+    trip.done_ms.push_back(done_ms);
+    trip.read_ms.push_back(ms_since(start_ns) - done_ms);
+  }
+  return trip;
+}
+
+std::string numpy_command(const std::string& python, std::uint32_t bodies) {
+  return fmt::format(
+      "exec {} -B -c 'import numpy as np, tandem\n"
+      "n = {}\n"
+      "p, v, w = (np.zeros((n, 3), np.float32) for _ in range(3))\n"
+      "q = np.zeros((n, 4), np.float32); q[:, 3] = 1; t = np.zeros(n, np.uint16)\n"
+      "with tandem.Server(n, 0.033, turns=True) as server:\n"
+      "    server.start(position=p, velocity=v, orientation=q, angular_velocity=w, type=t)\n"
+      "    for frame in server.frames():\n"
+      "        frame.write(position=p, velocity=v, orientation=q, angular_velocity=w, type=t)'",
+      python, bodies);
+}
+
+/// Milliseconds of whole frames, as a server makes them: step, rounding, prediction, encoding.
+Result<std::vector<double>> frames_of(host::LiveSource& source, std::uint32_t frames) {
+  host::Outbox outbox({});
+  std::vector<double> took_ms;
+  for (std::uint32_t i = 0; i < frames; ++i) {
+    const std::int64_t start_ns = steady_ns();
+    source.begin_next();
+    while (!source.next_ready()) {
+      pollfd answer{.fd = source.next_descriptor(), .events = POLLIN, .revents = 0};
+      ::poll(&answer, 1, 10);
+    }
+    if (!source.next({}, outbox)) return tl::unexpected(*source.error());
+    took_ms.push_back(ms_since(start_ns));
+  }
+  return took_ms;
+}
+
+int run_door(const DoorOptions& options) {
+  if (!options.play.empty()) return play(options.play);
+  const std::string self = fmt::format("exec /proc/{}/exe bench door --play ", ::getpid());
+  Json rows = Json::array();
+  const auto line = [&options](const std::string& text) {
+    if (!options.json) fmt::print("{}\n", text);
+  };
+  line("STEP sent to DONE received, and the server's copies after it; ms, median (p99)");
+  for (const std::uint32_t bodies : options.bodies) {
+    for (const bool numpy : {false, true}) {
+      const std::string name = numpy ? "numpy" : "C";
+      auto door =
+          open(numpy ? numpy_command(options.python, bodies) : fmt::format("{}columns:{}", self, bodies));
+      auto trip = door ? measure(**door, options.frames) : Result<Trip>(tl::unexpected(door.error()));
+      if (!trip) {
+        line(fmt::format("{:>9} {:5}  not measured: {}", bodies, name, trip.error().message));
+        rows.push_back({{"bodies", bodies}, {"engine", name}, {"error", trip.error().message}});
+        continue;
+      }
+      const double p50 = quantile(trip->done_ms, 0.5), p99 = quantile(trip->done_ms, 0.99);
+      const double read = quantile(trip->read_ms, 0.5);
+      line(fmt::format("{:>9} {:5}  {:.3f} ({:.3f})  {:.3f}", bodies, name, p50, p99, read));
+      rows.push_back(
+          {{"bodies", bodies}, {"engine", name}, {"done_ms", p50}, {"done_ms_p99", p99}, {"read_ms", read}});
+    }
+  }
+  const auto scene = scenes::load_scene(options.scene);
+  if (!scene) return report("bench door", scene.error());
+  auto linked = scenes::make_simulation(*scene, options.scene_bodies, 1, 1);
+  if (!linked) return report("bench door", linked.error());
+  auto door = open(fmt::format("{}{}:{}", self, options.scene, options.scene_bodies));
+  if (!door) return report("bench door", door.error());
+  sessions::SessionChoice choice;
+  choice.bodies = options.scene_bodies;
+  const auto config = sessions::plan_session(*scene, choice);
+  if (!config) return report("bench door", config.error());
+  auto linked_frames = host::LiveSource::create(*config, **linked),
+       door_frames = host::LiveSource::create(*config, **door);
+  if (!linked_frames || !door_frames)
+    return report("bench door", linked_frames ? door_frames.error() : linked_frames.error());
+  // In turns, so that both see the same machine.
+  std::vector<double> here, there;
+  for (std::uint32_t done = 0; done < options.frames; done += 20) {
+    const auto a = frames_of(**linked_frames, 20);
+    const auto b = frames_of(**door_frames, 20);
+    if (!a || !b) return report("bench door", a ? b.error() : a.error());
+    here.insert(here.end(), a->begin(), a->end());
+    there.insert(there.end(), b->begin(), b->end());
+  }
+  const double linked_ms = quantile(here, 0.5), door_ms = quantile(there, 0.5);
+  line(fmt::format(
+      "{} with {} bodies, whole frames: linked in {:.3f} ms, behind the door {:.3f} ms ({:+.1f} %)",
+      options.scene, options.scene_bodies, linked_ms, door_ms, 100 * (door_ms / linked_ms - 1)));
+  if (options.json)
+    fmt::print("{}\n", Json{{"hand_over", rows}, {"linked_ms", linked_ms}, {"door_ms", door_ms}}.dump());
+  return 0;
+}
+
+}  // namespace
+
+void add_door(commandline::Command bench, Run& run) {
+  commandline::Command command = bench.add_subcommand(
+      "door", "Measures what it costs that an engine is another process (idl/ENGINE.md).");
+  const auto options = std::make_shared<DoorOptions>();
+  add_bodies_option(command, options->bodies);
+  command.add_option("--frames", options->frames, "Frames of each row").range(20U, 100'000U).show_default();
+  command.add_option("--python", options->python, "Interpreter with numpy and the package tandem")
+      .show_default();
+  command.add_option("--scene", options->scene, "Scene that is also linked in").show_default();
+  command.add_option("--scene-bodies", options->scene_bodies, "Its bodies")
+      .range(1U, engine::kMaxBodies)
+      .show_default();
+  command.add_option("--play", options->play,
+                     "columns:N or SCENE:N: be the engine; the bench starts itself so");
+  command.add_flag("--json", options->json, "Print one JSON object");
+  command.on_chosen([options, &run] { run = [options] { return run_door(*options); }; });
+}
+
+}  // namespace tandem::lab

@@ -1,0 +1,108 @@
+#include "services/tandemd/served_world.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "services/sessions/session_plan.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using engine::door::Hello;
+
+// As share of the smallest radius; an engine that wants another one says so.
+constexpr double kThresholdShare = 0.02;
+constexpr double kExtent = 100;  // scene units
+
+std::string vector_text(const engine::Vec3& v) {
+  return fmt::format("{{ x: {} y: {} z: {} }}", v[0], v[1], v[2]);
+}
+
+// Planes, boxes and balls as clients draw them: protobuf text of idl/scene.proto.
+std::string description_of(const Scenery& scenery) {
+  std::string text;
+  for (const Scenery::Plane& plane : scenery.planes) {
+    engine::Vec3 through{};
+    for (std::size_t i = 0; i < 3; ++i) through[i] = plane.normal[i] * plane.offset;
+    text +=
+        fmt::format("planes {{ through {} normal {} }}\n", vector_text(through), vector_text(plane.normal));
+  }
+  for (const Scenery::Box& box : scenery.boxes) {
+    const engine::Vec3 size{2 * box.half[0], 2 * box.half[1], 2 * box.half[2]};
+    text += fmt::format("boxes {{ centre {} size {} }}\n", vector_text(box.centre), vector_text(size));
+  }
+  for (const Scenery::Ball& ball : scenery.balls)
+    text += fmt::format("spheres {{ centre {} radius_m: {} }}\n", vector_text(ball.centre), ball.radius);
+  return text;
+}
+
+tl::unexpected<NotOpened> refuse(Error error, std::string field, int exit_code) {
+  return tl::unexpected(NotOpened{std::move(error), std::move(field), exit_code});
+}
+
+tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop) {
+  engine::door::Options door{.way = *options.engine};
+  door.stop = &stop;
+  door.log = [](const std::string& line, bool warning) {
+    spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
+  };
+  auto opened = engine::door::Door::open(std::move(door));
+  if (!opened) return refuse(opened.error(), "", 1);
+  const Hello& hello = (*opened)->hello();
+  spdlog::info("engine {}, process {}: {} slots, {:g} s a step", hello.name, (*opened)->engine_process(),
+               hello.capacity, hello.dt_s);
+  return ServedWorld{.world = world_of(hello),
+                     .session = hello.session,
+                     .engine = "door:" + hello.name,
+                     .scene = std::nullopt,
+                     .simulation = std::move(*opened)};
+}
+
+}  // namespace
+
+planning::World world_of(const Hello& hello) {
+  planning::World world;
+  world.name = hello.scene.empty() ? hello.name : hello.scene;
+  world.description = description_of(hello.scenery);
+  world.capacity = hello.capacity;
+  world.dt_s = hello.dt_s;
+  world.turns = hello.turns;
+  world.up_axis = static_cast<transport::UpAxis>(hello.up_axis);
+  double smallest = hello.types.front().radius;
+  for (const engine::door::BodyType& type : hello.types) {
+    smallest = std::min(smallest, type.radius);
+    world.types.push_back({.name = type.name,
+                           .bounding_radius = type.radius,
+                           .contact_radius = type.radius,
+                           .mass = type.mass,
+                           .colour_rgba = type.colour_rgba,
+                           .shape = type.shape,
+                           .shape_values = type.shape_values});
+  }
+  world.threshold = hello.threshold.value_or(kThresholdShare * smallest);
+  // The lattice reaches about a million thresholds.
+  world.extent = hello.extent.value_or(std::min(kExtent, 2e5 * world.threshold));
+  if (hello.has_law) world.scenery = hello.scenery;
+  return world;
+}
+
+tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop) {
+  if (options.engine) return wait_for_engine(options, stop);
+  auto scene = scenes::load_scene(options.scene);
+  if (!scene) return refuse(scene.error(), "scene", 2);
+  auto simulation =
+      scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
+  if (!simulation) return refuse(simulation.error(), "bodies", 2);
+  ServedWorld served{.world = sessions::world_of(*scene, options.choice.bodies),
+                     .session = {},
+                     .engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles",
+                     .scene = std::nullopt,
+                     .simulation = std::move(*simulation)};
+  served.scene = std::move(*scene);
+  return served;
+}
+
+}  // namespace tandem::daemon

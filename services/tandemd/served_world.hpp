@@ -1,0 +1,39 @@
+#pragma once
+// What a server simulates: a scene with the engine linked in, or an engine in another process.
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "services/engine/door/door.hpp"
+#include "services/planning/world.hpp"
+#include "services/scenes/scene.hpp"
+#include "services/tandemd/configuration/options.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::daemon {
+
+struct ServedWorld {
+  planning::World world;
+  std::string session;                 ///< the name that the engine wishes; empty: none
+  std::string engine;                  ///< its name, as checkpoints keep it
+  std::optional<scenes::Scene> scene;  ///< empty: an engine in another process
+  std::unique_ptr<engine::Simulation> simulation;
+};
+
+/// A failure of open_world().
+struct NotOpened {
+  Error error;
+  std::string field;  ///< of the configuration; empty: none
+  int exit_code = 2;
+};
+
+/// Loads the scene, or waits for the engine; `stop` ends the wait.
+[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(const Options& options,
+                                                              const std::atomic<bool>& stop);
+
+/// What the planner needs to know of an engine that said `hello`.
+[[nodiscard]] planning::World world_of(const engine::door::Hello& hello);
+
+}  // namespace tandem::daemon

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Simulations in numpy that tandemd streams: tandem.Server, the example, and an engine that dies."""
+
+import contextlib
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import stage
+
+import tandem
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "sdk/examples"
+
+COUNTER = """
+import sys, numpy as np, tandem
+n = 8
+state = {"frame": 0}
+x = lambda: np.arange(n)[:, None] * [1, 0, 0] + [0, 0.001 * state["frame"], 0]
+def load(data):
+    state["frame"] = int(data)
+    print("loaded", state["frame"], flush=True)
+    return {"position": x()}
+with tandem.Server(n, 1 / 30, name="counter", application_limit=8, gravity_limit=50, threshold=0.01, extent=100,
+                   save=lambda: str(state["frame"]).encode(), load=load, options=sys.argv[1:]) as server:
+    server.start(position=x())
+    for frame in server.frames():
+        state["frame"] = frame.number
+        for each in frame.inputs:
+            print(frame.number, each.kind, [float(v) for v in each.values], each.bytes, flush=True)
+            if each.bytes == b"fail": 1 / 0
+            if each.bytes == b"die": frame.write(alive=np.arange(n) != 3)
+            if each.bytes == b"live": frame.write(alive=True)
+            if each.bytes == b"again": frame.write(reborn=[5])
+        frame.write(position=x())
+"""
+
+
+def wait_for(what, holds, limit_s=stage.LIMIT_S):
+    end = time.monotonic() + limit_s
+    while time.monotonic() < end:
+        value = holds()
+        if value:
+            return value
+        time.sleep(0.02)
+    raise AssertionError(f"{what} did not come about")
+
+
+@contextlib.contextmanager
+def running(folder, name, command):
+    """A process whose output goes to a file; gives (process, text of it so far)."""
+    path = pathlib.Path(folder) / f"{name}.log"
+    with open(path, "wb") as out, subprocess.Popen(list(map(str, command)), stdout=out, stderr=out) as process:
+        try:
+            yield process, lambda: path.read_text(encoding="utf-8", errors="replace")
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(stage.LIMIT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+class Server(unittest.TestCase):
+    def setUp(self):
+        self.folder = self.enterContext(tempfile.TemporaryDirectory())
+
+    def test_the_example_plays_and_is_short(self):
+        lines = (EXAMPLES / "boids.py").read_text(encoding="utf-8").splitlines()
+        self.assertLessEqual(sum(bool(line.strip()) for line in lines), 31)
+        command = [sys.executable, "-B", EXAMPLES / "boids.py", *stage.common("boids")]
+        with running(self.folder, "boids", command) as (process, text):
+            with contextlib.suppress(AssertionError):
+                wait_for("the session", lambda: "epoch" in text())
+            stage.tool("join", *stage.common("boids"), "--timeout", stage.LIMIT_S, "--seconds", 2, "--json")
+            self.assertIsNone(process.poll(), text())
+            process.send_signal(signal.SIGINT)
+
+    def play_counter(self, *options):
+        script = pathlib.Path(self.folder) / "counter.py"
+        script.write_text(COUNTER, encoding="utf-8")
+        return running(self.folder, "counter", [sys.executable, "-B", script, *stage.common("counter"), *options])
+
+    def test_inputs_reach_the_loop_and_slots_tell_births_and_deaths(self):
+        with self.play_counter() as (_, text), tandem.Client("counter", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            client.send_gravity((1, -2, 3))
+            client.send_push((1, 0, 0), 2.5, (0, 4, 0))
+            wait_for("gravity", lambda: "gravity [1.0, -2.0, 3.0]" in text())
+            wait_for("the push", lambda: "push [1.0, 0.0, 0.0, 2.5, 0.0, 4.0, 0.0]" in text())
+            alive = lambda: client.sample().alive
+            self.assertTrue(alive().all())
+            client.send_bytes(b"die")
+            wait_for("a death", lambda: not alive()[3])
+            self.assertEqual(int(alive().sum()), 7)
+            client.send_bytes(b"live")
+            wait_for("a birth", lambda: alive().all())
+            number = client.send_bytes(b"far too long")
+            said = wait_for("the refusal", lambda: [e.text for e in client.events() if e.number == number and e.text])
+            self.assertIn("at most 8 bytes", said[0])
+            self.assertEqual(client.status().hash_mismatches, 0)
+
+    def test_an_exception_in_the_loop_is_told_by_the_server(self):
+        with self.play_counter() as (process, text), tandem.Client("counter", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            client.send_bytes(b"fail")
+            process.wait(stage.LIMIT_S)
+            self.assertIn("the engine gave up in frame", text())
+            self.assertIn("ZeroDivisionError: division by zero", text())
+
+    def test_a_killed_engine_goes_on_from_the_last_checkpoint_in_a_new_epoch(self):
+        script = pathlib.Path(self.folder) / "counter.py"
+        script.write_text(COUNTER, encoding="utf-8")
+        command = [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}", *stage.common("counter"),
+                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2]  # fmt: skip
+        with running(self.folder, "tandemd", command) as (process, text), tandem.Client("counter", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            epoch = client.status().epoch
+            engine = wait_for("the engine", lambda: text().partition(", process ")[2].partition(":")[0])
+            wait_for("frames", lambda: client.sample().frame > 30)
+            os.kill(int(engine), signal.SIGSTOP)
+            wait_for("the line", lambda: "is stopped in frame" in text())
+            held = client.sample().frame
+            os.kill(int(engine), signal.SIGCONT)
+            wait_for("it to go on", lambda: client.sample().frame > held + 5)
+            self.assertEqual(client.status().epoch, epoch)
+            os.kill(int(engine), signal.SIGKILL)
+            wait_for("the line", lambda: "the engine hung up" in text())
+            wait_for("another epoch", lambda: client.status().epoch > epoch and client.status().phase == tandem.Phase.PLAYING)
+            self.assertIn("loaded", text())
+            self.assertGreater(client.scene().continues_frame, 0)
+            self.assertEqual(client.status().hash_mismatches, 0)
+            self.assertIsNone(process.poll())
+
+    def test_what_the_server_refuses_is_an_error_here(self):
+        with self.assertRaises(tandem.Error) as raised:
+            tandem.Server(0, 1 / 30, options=stage.common("refused"))
+        self.assertIn("capacity", str(raised.exception))
+        with self.assertRaises(TypeError), tandem.Server(4, 1 / 30, options=stage.common("refused")) as server:
+            server.start(positions=[])
+
+
+if __name__ == "__main__":
+    unittest.main()

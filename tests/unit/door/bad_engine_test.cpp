@@ -1,0 +1,216 @@
+// What bad engines get: one clear line, and never a crash.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include <filesystem>
+
+#include "services/engine/door/door.hpp"
+#include "tests/unit/host/fakes.hpp"
+
+namespace tandem::engine::door {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+Result<std::unique_ptr<Door>> open_small(const std::string& mode, std::vector<std::string>* lines = nullptr) {
+  Options options{.way = {.command = std::string("exec ") + DOOR_ENGINE + " small " + mode}};
+  options.connect_limit_s = 1;
+  options.start_limit_s = 1;
+  if (lines != nullptr) options.log = [lines](const std::string& line, bool) { lines->push_back(line); };
+  return Door::open(std::move(options));
+}
+
+std::string failure_of(const std::string& mode) {
+  auto door = open_small(mode + " 3");
+  if (!door) return "at the start: " + door.error().message;
+  for (int i = 0; i < 5 && (*door)->failure().empty(); ++i) (*door)->step();
+  return (*door)->failure();
+}
+
+struct Case {
+  const char* mode;
+  const char* said;
+};
+
+class BadEngine : public ::testing::TestWithParam<Case> {};
+
+TEST_P(BadEngine, GetsOneClearLine) { EXPECT_THAT(failure_of(GetParam().mode), HasSubstr(GetParam().said)); }
+
+INSTANTIATE_TEST_SUITE_P(
+    Modes, BadEngine,
+    ::testing::Values(
+        Case{"exit", "hung up in frame 3 (exit code 3)"}, Case{"crash", "its last words: the last word"},
+        Case{"hang", "did not answer for 1 s in frame 3"}, Case{"stop", "in frame 3: it is stopped"},
+        Case{"wrong-frame", "DONE is of frame 10 in frame 3"},
+        Case{"wrong-slot", "DONE is of slot 9, not 0 in frame 3"},
+        Case{"wrong-size", "wrong size of 23 bytes in frame 3"},
+        Case{"stale", "begun 2, frame 2, done 2 in frame 3"}, Case{"twice", "frame 3"},
+        Case{"unknown", "unknown type 77"}, Case{"huge", "DONE has 2147483647 bytes"},
+        Case{"half", "did not answer for 1 s in frame 3"},
+        Case{"error", "gave up in frame 3: the springs?[31m broke"}, Case{"punch", ""},
+        Case{"silent", "did not connect within 1 s"},
+        Case{"exit-early", "ended with exit code 4 before HELLO"}, Case{"no-start", "before START"},
+        Case{"capacity", "capacity: '99999999'"}, Case{"no-dt", "dt is missing"}),
+    [](const auto& mode) {
+      std::string name = mode.param.mode;
+      std::erase(name, '-');
+      return name;
+    });
+
+// What a mirror says of a frame in which one body is wrong.
+std::string mirrored(const std::string& mode) {
+  auto door = open_small(mode + " 2");
+  if (!door) return door.error().message;
+  host::HostConfig config = host::turning_config();
+  config.streams[0].layout.capacity = 17;
+  config.streams[0].layout.type_count = 1;
+  config.streams[0].layout.radii.assign(1, 1000);
+  config.extent = 60;
+  host::Mirror mirror = *host::make_mirror(config.streams, (*door)->bodies(), config.extent);
+  for (int i = 0; i < 3; ++i) {
+    (*door)->step();
+    if (!(*door)->failure().empty()) return (*door)->failure();
+    mirror.update((*door)->bodies(), (*door)->events());
+  }
+  return mirror.last_removed();
+}
+
+TEST(BadBody, IsHiddenAndNamedWithSlotAndColumn) {
+  EXPECT_EQ(mirrored("nan"), "slot 3 (its y is not a number)");
+  EXPECT_THAT(mirrored("far"), HasSubstr("slot 4 (its z is 1e+30"));
+  EXPECT_THAT(mirrored("norm"), HasSubstr("slot 5 (its orientation has norm 5"));
+  EXPECT_THAT(mirrored("type"), HasSubstr("slot 6 (its type is 60000"));
+  EXPECT_EQ(mirrored("dead"), "");
+}
+
+TEST(Door, InputsAreRefusedByWhatTheEngineSaid) {
+  const auto door = open_small("good");
+  ASSERT_TRUE(door.has_value()) << door.error().message;
+  const auto why = [&](const Input& input) { return (*door)->classify(input).reason; };
+  EXPECT_EQ(why({.kind = 1, .values = {0, 0, 1}}), "small takes no gravity");
+  EXPECT_EQ(why({.kind = 16, .bytes = std::vector<std::byte>(9)}),
+            "an application's input has at most 8 bytes");
+  EXPECT_EQ(why({.kind = 99}), "small takes no input of kind 99");
+  EXPECT_EQ((*door)->classify({.kind = 16, .bytes = std::vector<std::byte>(8)}).effect,
+            Classification::Effect::kImmediate);
+}
+
+TEST(Door, SaysThatAnEngineIsStoppedAndGoesOnWithIt) {
+  std::vector<std::string> lines;
+  auto door = open_small("good", &lines);
+  ASSERT_TRUE(door.has_value()) << door.error().message;
+  (*door)->step();
+  ::kill((*door)->engine_process(), SIGSTOP);
+  (*door)->begin_step();
+  const auto wait_until = [&](const auto& holds) {
+    for (int i = 0; i < 80 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds{10});
+  };
+  wait_until([&] {
+    static_cast<void>((*door)->step_ready());
+    return !lines.empty();
+  });
+  EXPECT_THAT(lines, Contains(AllOf(HasSubstr("is stopped in frame 2"))));
+  ::kill((*door)->engine_process(), SIGCONT);
+  bool ready = false;
+  wait_until([&] { return ready = ready || (*door)->step_ready(); });
+  EXPECT_TRUE(ready);
+  EXPECT_EQ((*door)->failure(), "");
+}
+
+TEST(Door, TheMemoryCannotShrinkOrGrow) {
+  const auto door = open_small("good");
+  ASSERT_TRUE(door.has_value());
+  bool tried = false;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code ignored;
+    const std::string target = std::filesystem::read_symlink(entry.path(), ignored).string();
+    if (!target.starts_with("/memfd:tandem-door")) continue;
+    tried = true;
+    const int fd = ::open(entry.path().c_str(), O_RDWR | O_CLOEXEC);
+    EXPECT_NE(::ftruncate(fd, 0), 0);
+    EXPECT_NE(::ftruncate(fd, 1 << 20), 0);
+    ::close(fd);
+  }
+  EXPECT_TRUE(tried);
+}
+
+TEST(Door, ASecondEngineAtASocketIsTurnedAway) {
+  const std::string path = ::testing::TempDir() + "door_" + std::to_string(::getpid());
+  std::vector<std::string> lines;
+  Options options{.way = {.path = path}};
+  options.log = [&lines](const std::string& line, bool) { lines.push_back(line); };
+  const std::string command = "(while ! test -S " + path + "; do sleep 0.01; done; TANDEM_DOOR=" + path +
+                              " " + DOOR_ENGINE + " small good) &";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const auto door = Door::open(std::move(options));
+  ASSERT_TRUE(door.has_value()) << door.error().message;
+  struct stat there {};
+  ASSERT_EQ(::stat(path.c_str(), &there), 0);
+  EXPECT_EQ(there.st_mode & 0777, 0600U);
+  const std::string second = "TANDEM_DOOR=" + path + " " + DOOR_ENGINE + " small good 2>" + path + ".said &";
+  ASSERT_EQ(std::system(second.c_str()), 0);
+  for (int i = 0; i < 300 && lines.size() < 2; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{10});
+    EXPECT_EQ((*door)->failure(), "");
+  }
+  EXPECT_THAT(lines, Contains(HasSubstr("there is an engine already")));
+  (*door)->step();
+  EXPECT_EQ((*door)->failure(), "");
+  std::filesystem::remove(path + ".said");
+}
+
+// A process that writes at random over all of the memory, while a mirror follows the bodies.
+TEST(Door, AScribblingProcessMakesWrongBodiesAndNothingElse) {
+  const auto door = open_small("scribble 1");
+  ASSERT_TRUE(door.has_value()) << door.error().message;
+  host::HostConfig config = host::turning_config();
+  config.streams[0].layout.capacity = 17;
+  config.streams[0].layout.type_count = 1;
+  config.streams[0].layout.radii.assign(1, 1000);
+  config.extent = 60;
+  host::Mirror mirror = *host::make_mirror(config.streams, (*door)->bodies(), config.extent);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds{2};
+  int frames = 0;
+  while (std::chrono::steady_clock::now() < end) {
+    (*door)->step();
+    ASSERT_EQ((*door)->failure(), "");
+    ++frames;
+    for (int reads = 0; reads < 200; ++reads) {
+      mirror.update((*door)->bodies(), (*door)->events());
+      for (std::uint32_t s = 0; s < 17; ++s) {
+        ASSERT_EQ(mirror.target().type()[s], 0U);
+        for (std::size_t i = 0; i < 3; ++i) ASSERT_LE(std::abs(mirror.target().p(i)[s]), kPositionLimit);
+      }
+    }
+  }
+  EXPECT_GT(frames, 0);
+}
+
+std::size_t descriptors() {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}));
+}
+
+TEST(Door, TwoHundredRestartsLeakNoDescriptorAndNoProcess) {
+  { auto warm = open_small("exit 2"); }
+  const std::size_t before = descriptors();
+  for (int i = 0; i < 200; ++i) {
+    auto door = open_small(i % 2 == 0 ? "exit 2" : "good");
+    ASSERT_TRUE(door.has_value()) << door.error().message;
+    (*door)->step();
+    (*door)->step();
+    EXPECT_EQ((*door)->failure().empty(), i % 2 == 1);
+  }
+  EXPECT_EQ(descriptors(), before);
+  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "no child is left";
+}
+
+}  // namespace
+}  // namespace tandem::engine::door

@@ -1,0 +1,75 @@
+// Tests how an engine in another process is configured, and when it is started again.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/restarts.hpp"
+#include "services/tandemd/served_world.hpp"
+
+namespace tandem::daemon {
+namespace {
+
+using Config = idl::ServerConfig;
+using ::testing::HasSubstr;
+
+std::string refusal(const Config& config) {
+  const auto options = check_config(config);
+  return options ? "" : options.error().message;
+}
+
+TEST(EngineOptions, ComeInOneWayAndWithoutAScene) {
+  Config config;
+  config.set_engine("python3 boids.py");
+  const auto options = check_config(config);
+  ASSERT_TRUE(options.has_value()) << options.error().message;
+  ASSERT_TRUE(options->engine.has_value());
+  EXPECT_EQ(options->engine->command, "python3 boids.py");
+  config.set_scene("cube");
+  EXPECT_THAT(refusal(config), HasSubstr("leave out scene and bodies"));
+  config.clear_scene();
+  config.set_engine_fd(3);
+  EXPECT_THAT(refusal(config), HasSubstr("comes in one way"));
+  config.clear_engine();
+  EXPECT_EQ(check_config(config)->engine->descriptor, 3);
+  config.set_engine_fd(70000);
+  EXPECT_THAT(refusal(config), HasSubstr("--engine-fd"));
+  config.clear_engine_fd();
+  config.set_engine_socket("");
+  EXPECT_THAT(refusal(config), HasSubstr("--engine-socket: give a path"));
+  config.set_engine_socket("/run/engine");
+  config.set_scripted(true);
+  EXPECT_THAT(refusal(config), HasSubstr("only scenes have scripts"));
+  config.set_scripted(false);
+  config.set_standby(true);
+  EXPECT_THAT(refusal(config), HasSubstr("standby"));
+}
+
+TEST(EngineWorld, HasWhatTheEngineSaid) {
+  const auto hello = engine::door::parse_hello(
+      "engine 1.0\nname pile\ncapacity 17\ndt 0.04\nup z\nturns 1\ntype a 2\ntype b 0.5\nplane 0 0 1 -2\nball 1 2 3 4\n");
+  ASSERT_TRUE(hello.has_value());
+  const planning::World world = world_of(*hello);
+  EXPECT_EQ(world.name, "pile");
+  EXPECT_EQ(world.capacity, 17U);
+  EXPECT_EQ(world.types.size(), 2U);
+  EXPECT_EQ(world.threshold, 0.01);
+  EXPECT_FALSE(world.scenery.has_value()) << "no law was told, so contacts are not predicted";
+  EXPECT_THAT(world.description, HasSubstr("planes { through { x: -0 y: -0 z: -2 }"));
+  EXPECT_THAT(world.description, HasSubstr("spheres"));
+}
+
+TEST(Restarts, WaitTwiceAsLongEachTimeAndGiveUp) {
+  Restarts restarts;
+  std::int64_t before_ns = 0;
+  for (int i = 0; i < Restarts::kMostInARow; ++i) {
+    const auto wait_ns = restarts.wait_after_ns(0);
+    ASSERT_TRUE(wait_ns.has_value());
+    EXPECT_EQ(*wait_ns, i == 0 ? Restarts::kFirstWaitNs : std::min(2 * before_ns, Restarts::kLongestWaitNs));
+    before_ns = *wait_ns;
+  }
+  EXPECT_FALSE(restarts.wait_after_ns(0).has_value());
+  EXPECT_EQ(restarts.wait_after_ns(Restarts::kGoodNs), Restarts::kFirstWaitNs) << "it ran well";
+}
+
+}  // namespace
+}  // namespace tandem::daemon
