@@ -7,6 +7,11 @@ namespace tandem::tool {
 void add_pki(commandline::Command app, Run& run) {
   static const std::vector<AddPkiCommand> kCommands = {
       // One line for each, in the order that --help shows.
+      add_pki_init,    //
+      add_pki_issue,   //
+      add_pki_renew,   //
+      add_pki_revoke,  //
+      add_pki_show,    //
   };
   commandline::Command pki = app.add_subcommand("pki", "Makes and shows who may do what in a session.");
   for (const AddPkiCommand add : kCommands) add(pki, run);

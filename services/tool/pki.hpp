@@ -9,4 +9,10 @@ namespace tandem::tool {
 /// Adds one subcommand to `tandem pki`; when the command line chooses it, its callback sets `run`.
 using AddPkiCommand = void (*)(commandline::Command pki, Run& run);
 
+void add_pki_init(commandline::Command pki, Run& run);
+void add_pki_issue(commandline::Command pki, Run& run);
+void add_pki_renew(commandline::Command pki, Run& run);
+void add_pki_revoke(commandline::Command pki, Run& run);
+void add_pki_show(commandline::Command pki, Run& run);
+
 }  // namespace tandem::tool

@@ -62,7 +62,8 @@ EDGES = {
     "sdk/core/timeline": TABLES,
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
-    "sdk/transport/dds": LAYOUT + ["sdk/transport"],
+    "sdk/transport/secure": ["public/result.hpp"],
+    "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/secure"],
     "sdk/statistics": [],
     "sdk/client/drawing": OF_CLIENT,
     "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
@@ -77,6 +78,7 @@ EDGES = {
     "services/commandline": [],
     "services/json": [],
     "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
+    "services/pki": ["public/result.hpp", "sdk/transport/secure", "services/json", "services/system"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
@@ -115,7 +117,8 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/process", "services/recording", "services/scenes", "services/system"],
+    + ["services/metrics", "services/pki", "services/process", "services/recording", "services/scenes", "services/system"]
+    + ["sdk/transport/secure"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
@@ -136,6 +139,7 @@ OWNERS = [
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/pki", "tests"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),

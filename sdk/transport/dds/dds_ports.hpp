@@ -35,14 +35,19 @@ struct DdsOptions {
   std::chrono::nanoseconds write_timeout = std::chrono::seconds(2);
   /// If this is not null and set, writes are not repeated any more. It must outlive the port.
   const std::atomic<bool>* stop = nullptr;
+  /// DDS Security: folder of this program's identity, which `tandem pki issue` made. Empty: none, unless
+  /// CYCLONEDDS_URI has one.
+  std::string secure = {};
+  /// Client ports: it sends inputs. With the identity of an observer it cannot.
+  bool acts = true;
 };
 
 /// Joins the domain as "tandemd SESSION". The environment variable CYCLONEDDS_URI overrides Tandem's defaults
-/// (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, session name, depth, lease), kTransport (also what
-/// CYCLONEDDS_URI causes).
+/// (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, session name, depth, lease; an identity that is not
+/// good, or not a server's), kIo (a file of the identity), kTransport (also what CYCLONEDDS_URI causes).
 [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
 
-/// Joins the domain as "tandem client ID". Errors: as above.
+/// Joins the domain as "tandem client ID". Errors: as above. A port that does not act cannot write inputs.
 [[nodiscard]] Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options);
 
 /// Watches all sessions of a domain without joining any. All calls from one thread.
@@ -54,22 +59,23 @@ class Monitor {
   /// The status samples since the last call: at most the latest 8 of each server and client, oldest first.
   virtual void take(std::vector<Received<ServerStatusMessage>>& out) = 0;
   virtual void take(std::vector<Received<ClientStatusMessage>>& out) = 0;
-  /// Sends a command to the server of the session that it names.
+  /// Sends a command to the server of the session that it names. With DDS Security only an operator may.
   virtual Result<void> write(const CommandMessage& message) = 0;
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
 };
 
 /// Takes the lines that Cyclone DDS would write on stderr. `error`: the process ends after it; other errors
 /// reach callers as well. Called by any thread, several at once. Lines about a configuration (CYCLONEDDS_URI)
-/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for the
-/// process.
+/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for
+/// the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
 /// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
 /// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr.
 [[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain);
 
-/// Joins the domain as "tandem monitor"; only `options.domain` is used. Errors: as above.
+/// Joins the domain as "tandem monitor"; only `options.domain` and `options.secure` are used. Errors: as
+/// above.
 [[nodiscard]] Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options);
 
 }  // namespace tandem::transport
