@@ -252,6 +252,7 @@ int run(const Options& options, SignalWatch& signals) {
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.stop = &signals.stop();
   auto port = transport::make_dds_client_port(dds);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);

@@ -25,6 +25,7 @@
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
 #include "services/sessions/session_plan.hpp"
+#include "services/system/own_networks.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
 #include "services/tandemd/service.hpp"
@@ -117,9 +118,21 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
   dds.stop = &stop;
   return transport::make_dds_server_port(dds);
+}
+
+/// Once: on a network, anybody may do what SECURITY.md says of strangers.
+void warn_without_security(const Options& options) {
+  if (!options.secure.empty()) return;
+  const std::vector<std::string> networks = system::networks_in_use();
+  if (networks.empty()) return;
+  spdlog::warn(
+      "without --secure, everybody who reaches {} can watch this session, act in it and pretend to be its server; "
+      "see `tandem pki --help`",
+      fmt::format("{}", fmt::join(networks, ", ")));
 }
 
 /// Logs failed writes: the first one at once, then their number every 10 s.
@@ -287,6 +300,7 @@ int run_daemon(const Options& options, SignalWatch& signals) {
   if (!keeping) return report_error(keeping.error(), 1);
   auto port = open_port(*config, options, signals.stop());
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+  warn_without_security(options);
   HashLog hashes;
   if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
     return signals.finish(report_error(opened.error(), 1));

@@ -15,10 +15,15 @@
 #include <fstream>
 #include <memory>
 
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/secure/openssl.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/json/json.hpp"
 #include "services/system/descriptor.hpp"
+#include "services/system/own_networks.hpp"
 #include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -163,6 +168,21 @@ Check judge_configuration(const MachineFacts& facts) {
           "correct what Cyclone DDS names on stderr: the file, the XML element or the interface"};
 }
 
+Check judge_security(const MachineFacts& facts) {
+  if (!facts.secure.empty()) {
+    if (!facts.identity) return {"security", Verdict::kFailure, facts.identity.error().message, ""};
+    return {"security", Verdict::kGood,
+            fmt::format("{} {}, until {}", facts.identity->role, facts.identity->name,
+                        transport::secure::date_text(facts.identity->not_after_s)),
+            ""};
+  }
+  if (facts.networks.empty()) return {"security", Verdict::kGood, "none, and DDS uses no network", ""};
+  return {"security", Verdict::kWarning,
+          fmt::format("without --secure, everybody who reaches {} can watch, act and pretend to be a server",
+                      fmt::join(facts.networks, ", ")),
+          "make identities with `tandem pki`, and give each program its own: --secure DIR"};
+}
+
 const char* word(Verdict verdict) {
   switch (verdict) {
     case Verdict::kGood:
@@ -198,7 +218,7 @@ int print(const std::vector<Check>& checks, bool json) {
 
 }  // namespace
 
-MachineFacts machine_facts(std::uint32_t domain) {
+MachineFacts machine_facts(std::uint32_t domain, const std::string& secure) {
   MachineFacts facts;
   facts.interfaces = interfaces();
   for (const Interface& interface : facts.interfaces) {
@@ -209,7 +229,12 @@ MachineFacts machine_facts(std::uint32_t domain) {
   rlimit files{};
   if (::getrlimit(RLIMIT_NOFILE, &files) == 0) facts.open_files_limit = files.rlim_cur;
   if (const char* uri = std::getenv("CYCLONEDDS_URI")) facts.cyclonedds_uri = uri;
-  if (auto opened = transport::check_dds_domain(domain); !opened) facts.domain_fault = opened.error().message;
+  const auto note_networks = [&facts] { facts.networks = system::networks_in_use(); };
+  if (auto opened = transport::check_dds_domain(domain, note_networks); !opened)
+    facts.domain_fault = opened.error().message;
+  facts.secure = secure;
+  if (!secure.empty())
+    facts.identity = transport::secure::check_identity_folder(secure, transport::wall_ns() / kSecond);
   return facts;
 }
 
@@ -224,7 +249,8 @@ std::vector<Check> judge(const MachineFacts& facts) {
           judge_buffer("receive buffer", "net.core.rmem_max", facts.receive_buffer_max_bytes),
           judge_buffer("send buffer", "net.core.wmem_max", facts.send_buffer_max_bytes),
           files,
-          judge_configuration(facts)};
+          judge_configuration(facts),
+          judge_security(facts)};
 }
 
 void add_doctor(commandline::Command app, Run& run) {
@@ -232,11 +258,14 @@ void add_doctor(commandline::Command app, Run& run) {
       "doctor", "Checks interfaces, multicast, socket buffers and limits, and suggests changes.");
   const auto json = std::make_shared<bool>(false);
   const auto domain = std::make_shared<std::uint32_t>(0);
+  const auto secure = std::make_shared<std::string>();
   command.add_option("--domain", *domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
+  add_secure_option(command, *secure);
   command.add_flag("--json", *json, "Print one JSON object: ok, checks[name, verdict, detail, advice]");
   command.footer("Exits with 1 if sessions cannot work at all, and with 0 if there are only warnings.");
-  command.on_chosen(
-      [json, domain, &run] { run = [json, domain] { return print(judge(machine_facts(*domain)), *json); }; });
+  command.on_chosen([json, domain, secure, &run] {
+    run = [json, domain, secure] { return print(judge(machine_facts(*domain, *secure)), *json); };
+  });
 }
 
 }  // namespace tandem::tool

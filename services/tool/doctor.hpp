@@ -5,6 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "sdk/transport/secure/identity_folder.hpp"
+#include "tandem/result.hpp"
+
 namespace tandem::tool {
 
 enum class Verdict : std::uint8_t { kGood, kWarning, kFailure };
@@ -31,15 +34,20 @@ struct MachineFacts {
   std::int64_t receive_buffer_max_bytes = 0,
                send_buffer_max_bytes = 0;  ///< net.core.{r,w}mem_max; -1 unknown
   std::uint64_t open_files_limit = 0;
-  std::string cyclonedds_uri;  ///< empty: unset
-  std::string domain_fault;    ///< why the DDS domain cannot be opened; empty: it can
+  std::string cyclonedds_uri;         ///< empty: unset
+  std::string domain_fault;           ///< why the DDS domain cannot be opened; empty: it can
+  std::vector<std::string> networks;  ///< addresses, not of loopback, that DDS uses
+  std::string secure;                 ///< folder of an identity; empty: none was given
+  Result<transport::secure::Identity> identity = fail(ErrorCode::kNotReady, "");  ///< of that folder
 };
 
-/// Looks at this machine, and opens the DDS domain. Sends one datagram per interface to a multicast group
-/// with a time to live of 0, so that it never leaves the host. Takes at most a second.
-[[nodiscard]] MachineFacts machine_facts(std::uint32_t domain);
+/// Looks at this machine and the identity in `secure`, and opens the DDS domain. Sends one datagram per
+/// interface to a multicast group with a time to live of 0, so that it never leaves the host. Takes at most a
+/// second.
+[[nodiscard]] MachineFacts machine_facts(std::uint32_t domain, const std::string& secure = {});
 
-/// Judges the facts. One check each for interfaces, multicast, buffers, limits and the DDS configuration.
+/// Judges the facts. One check each for interfaces, multicast, buffers, limits, the DDS configuration and DDS
+/// Security.
 [[nodiscard]] std::vector<Check> judge(const MachineFacts& facts);
 
 }  // namespace tandem::tool

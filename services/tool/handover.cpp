@@ -15,6 +15,7 @@
 #include "services/json/json.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
@@ -27,6 +28,7 @@ constexpr std::int64_t kRepeatNs = kSecond / 4;
 
 struct Options {
   std::uint32_t domain = 0;
+  std::string secure;
   std::string session = "default";
   bool json = false;
 };
@@ -64,6 +66,7 @@ int run_handover(const Options& options) {
   SignalWatch signals(kName);
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.secure = options.secure;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) return failed(monitor.error().message);
   Servers servers;
@@ -131,6 +134,7 @@ void add_handover(commandline::Command app, Run& run) {
   command.add_option("--domain", options->domain, "DDS domain")
       .range(0U, transport::kMaxDomain)
       .show_default();
+  add_secure_option(command, options->secure);
   command.add_flag("--json", options->json, "Print one JSON object");
   command.footer(
       "No frame is lost; clients join the other server by themselves. Exits with 1 if there is no server to "

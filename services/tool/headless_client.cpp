@@ -59,6 +59,8 @@ Result<void> HeadlessClient::open() {
   dds.domain = options_.domain;
   dds.session = options_.session;
   dds.client = core.id;
+  dds.secure = options_.secure;
+  dds.acts = !options_.observe;
   if (options_.observe) dds.lease = transport::DdsOptions::kObserverLease;
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());

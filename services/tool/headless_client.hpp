@@ -19,6 +19,7 @@ namespace tandem::tool {
 
 struct HeadlessOptions {
   std::uint32_t domain = 0;
+  std::string secure;  ///< folder of its identity; empty: none
   std::string session = "default";
   bool observe = false;
   std::uint32_t lead = 1;

@@ -34,6 +34,7 @@ using transport::wall_ns;
 struct ReplayOptions {
   std::string file;
   std::uint32_t domain = 0;
+  std::string secure;
   std::string session = "default";
   double rate = 1;
   double from_s = 0;
@@ -89,6 +90,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.delta_depth =
       transport::delta_depth(config.frame_rate_hz, config.window_ceiling, playback.stream().max_delta_bytes);
   dds.stop = &stop;
@@ -184,6 +186,7 @@ void add_replay(commandline::Command app, Run& run) {
   const auto options = std::make_shared<ReplayOptions>();
   command.add_option("file", options->file, "File that `tandem record` wrote").required();
   add_endpoint_options(command, options->domain, options->session);
+  add_secure_option(command, options->secure);
   command
       .add_option("--rate", options->rate,
                   "Speed, where 1 is that of the session; the maximum is 1000 frames per second")

@@ -15,6 +15,7 @@
 #include "sdk/transport/units.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
+#include "services/tool/endpoint_options.hpp"
 #include "services/tool/top_view.hpp"
 
 namespace tandem::tool {
@@ -25,6 +26,7 @@ constexpr std::int64_t kOnceNs = 5 * kSecond / 2;
 
 struct TopOptions {
   std::uint32_t domain = 0;
+  std::string secure;
   std::string session;
   bool once = false, json = false, stream = false;
 };
@@ -60,6 +62,7 @@ int run_top(const TopOptions& options) {
   SignalWatch signals("tandem top");
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.secure = options.secure;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
@@ -95,6 +98,7 @@ void add_top(commandline::Command app, Run& run) {
   command.add_option("--domain", options->domain, "DDS domain")
       .range(0U, transport::kMaxDomain)
       .show_default();
+  add_secure_option(command, options->secure);
   command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(
       "--once", options->once, "Listen for 2.5 s, print once and stop; exit with 1 if nothing was heard");

@@ -36,7 +36,7 @@ OF_TANDEMD = (
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/logging", "services/workers"]
+    + ["services/logging", "services/system", "services/workers"]
     + HOST
 )
 OF_LAB = (

@@ -62,11 +62,17 @@ using namespace tandem;  // what follows is C
 using namespace tandem::api;
 
 tandem_result tandem_browser_open(uint32_t domain, tandem_browser* browser) noexcept {
+  return tandem_browser_open_secure(domain, nullptr, browser);
+}
+
+tandem_result tandem_browser_open_secure(uint32_t domain, const char* secure,
+                                         tandem_browser* browser) noexcept {
   return call([&] {
     if (browser == nullptr) return null_pointer("`browser` is null");
     if (in_forked_child()) return forked_child();
     transport::DdsOptions options;
     options.domain = domain;
+    if (secure != nullptr) options.secure = secure;
     auto monitor = transport::make_dds_monitor(options);
     if (!monitor) return refuse(monitor.error());
     return browse_over(std::move(*monitor), browser);

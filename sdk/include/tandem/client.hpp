@@ -40,6 +40,8 @@ struct ClientOptions {
   /// Which of the session's streams to play: "auto", "bandwidth", "computing", "error" or a name; see
   /// tandem_options::prefer.
   std::string prefer = "auto";
+  /// Folder of this program's identity for DDS Security; see tandem_options::secure. Empty: none.
+  std::string secure = {};
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
   /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -148,6 +150,7 @@ class Client {
     tandem_options c = TANDEM_OPTIONS_INIT;
     c.session = options.session.c_str();
     c.domain = options.domain;
+    c.secure = options.secure.c_str();
     c.role = static_cast<tandem_role>(options.role);
     c.lead = options.lead;
     c.background = options.background ? 1 : 0;
@@ -307,10 +310,13 @@ class Client {
 /// Watches the sessions of a domain without joining any. Movable. All members may be called from any thread.
 class Browser {
  public:
-  /// Errors: kInvalidArgument (domain), kTransport (DDS could not start).
-  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0) {
+  /// `secure`: as ClientOptions::secure. Errors: kInvalidArgument (domain, identity), kIo (identity),
+  /// kTransport (DDS could not start).
+  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0, const std::string& secure = {}) {
     Browser browser;
-    if (const auto opened = Client::checked(tandem_browser_open(domain, &browser.handle_)); !opened)
+    if (const auto opened =
+            Client::checked(tandem_browser_open_secure(domain, secure.c_str(), &browser.handle_));
+        !opened)
       return Client::unexpected(opened);
     return browser;
   }
@@ -336,8 +342,9 @@ class Browser {
 };
 
 /// The sessions of a domain, after watching it for `watch_s`.
-[[nodiscard]] inline Result<std::vector<SessionInfo>> sessions(std::uint32_t domain = 0, double watch_s = 2) {
-  const auto browser = Browser::open(domain);
+[[nodiscard]] inline Result<std::vector<SessionInfo>> sessions(std::uint32_t domain = 0, double watch_s = 2,
+                                                               const std::string& secure = {}) {
+  const auto browser = Browser::open(domain, secure);
   if (!browser) return tl::unexpected<Error>(browser.error());
   std::this_thread::sleep_for(std::chrono::duration<double>(watch_s));
   return browser->sessions();

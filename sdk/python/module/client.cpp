@@ -49,7 +49,8 @@ void log_line(void* user, tandem_log_level level, const char* line) {
 class Connection {
  public:
   Connection(std::uint32_t domain, const std::string& session, tandem_role role, std::uint32_t lead,
-             bool background, bool echo, const std::string& prefer, const py::object& log) {
+             bool background, bool echo, const std::string& prefer, const std::string& secure,
+             const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
     options.session = session.c_str();
@@ -58,6 +59,7 @@ class Connection {
     options.background = background ? 1 : 0;
     options.echo = echo ? 1 : 0;
     options.prefer = prefer.c_str();
+    options.secure = secure.c_str();
     if (!log.is_none()) {
       log_ = std::make_unique<py::function>(log);
       options.log = &log_line;
@@ -264,8 +266,8 @@ class Connection {
 /// Watches a domain.
 class Browser {
  public:
-  explicit Browser(std::uint32_t domain) {
-    check(unlocked([&] { return tandem_browser_open(domain, &browser_); }));
+  Browser(std::uint32_t domain, const std::string& secure) {
+    check(unlocked([&] { return tandem_browser_open_secure(domain, secure.c_str(), &browser_); }));
   }
   Browser(const Browser&) = delete;
   Browser& operator=(const Browser&) = delete;
@@ -305,7 +307,7 @@ PYBIND11_MODULE(_client, m) {
   m.def("clock_ns", &tandem_clock_ns);
   py::class_<Connection>(m, "Connection")
       .def(py::init<std::uint32_t, const std::string&, tandem_role, std::uint32_t, bool, bool,
-                    const std::string&, const py::object&>())
+                    const std::string&, const std::string&, const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
       .def("prefer", &Connection::prefer)
@@ -321,7 +323,9 @@ PYBIND11_MODULE(_client, m) {
       .def("body_name", &Connection::body_name)
       .def("geometry", &Connection::geometry)
       .def("types", &Connection::types);
-  py::class_<Browser>(m, "Browser").def(py::init<std::uint32_t>()).def("list", &Browser::list);
+  py::class_<Browser>(m, "Browser")
+      .def(py::init<std::uint32_t, const std::string&>())
+      .def("list", &Browser::list);
 }
 
 }  // namespace tandem::python

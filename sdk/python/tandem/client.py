@@ -36,9 +36,12 @@ def clock_ns() -> int:
     return _client.clock_ns()
 
 
-def sessions(domain: int = 0, wait: float = 2.0) -> list[SessionInfo]:
-    """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name."""
-    browser = _client.Browser(domain)
+def sessions(domain: int = 0, wait: float = 2.0, secure: str = "") -> list[SessionInfo]:
+    """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name.
+
+    secure  folder of this program's identity for DDS Security; empty: none
+    """
+    browser = _client.Browser(domain, secure)
     time.sleep(wait)
     return [SessionInfo._of(session) for session in browser.list()]
 
@@ -90,6 +93,7 @@ class Client:
         background: bool = True,
         echo: bool = False,
         prefer: str = "auto",
+        secure: str = "",
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -102,6 +106,7 @@ class Client:
                     least once a frame, which does all the work
         echo        EXPERIMENTAL: sample() shows the application's own gravity at once
         prefer      which stream to play: "auto", "bandwidth", "computing", "error", or a stream's name
+        secure      folder of this program's identity for DDS Security, made by `tandem pki issue`; empty: none
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start).
@@ -112,7 +117,7 @@ class Client:
         if "\0" in session:  # C would read the name only up to there
             raise Error(Result.INVALID_ARGUMENT, "a session's name has no NUL")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
-        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, told)
+        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, secure, told)
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -70,9 +71,11 @@ class Monitor {
 /// the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
-/// Opens the domain and closes it, without a participant and so without traffic. Errors: kTransport for what
-/// CYCLONEDDS_URI causes, of which Cyclone DDS writes the details to stderr.
-[[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain);
+/// Opens the domain, calls `while_open` if it is not empty, and closes the domain, without a participant and
+/// so without traffic. Errors: kTransport for what CYCLONEDDS_URI causes, of which Cyclone DDS writes the
+/// details to stderr.
+[[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain,
+                                            const std::function<void()>& while_open = {});
 
 /// Joins the domain as "tandem monitor"; only `options.domain` and `options.secure` are used. Errors: as
 /// above.

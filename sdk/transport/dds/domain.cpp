@@ -112,8 +112,10 @@ void set_dds_log(WriteLine write) {
   dds_set_log_sink(&on_line, nullptr);
 }
 
-Result<void> check_dds_domain(std::uint32_t domain) {
-  return dds::DomainUse::acquire(domain, dds::Repeat::kSeldom).map([](const dds::DomainUse&) {});
+Result<void> check_dds_domain(std::uint32_t domain, const std::function<void()>& while_open) {
+  return dds::DomainUse::acquire(domain, dds::Repeat::kSeldom).map([&](const dds::DomainUse&) {
+    if (while_open) while_open();
+  });
 }
 
 }  // namespace tandem::transport

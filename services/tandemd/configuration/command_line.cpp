@@ -74,6 +74,7 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("bodies", &Config::set_bodies);
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
+  flags.add("secure", &Config::mutable_secure);
   flags.add("codec", &Config::mutable_codec);
   flags.add("predictor", &Config::mutable_predictor);
   app.add_option_function<std::vector<std::string>>(

@@ -250,6 +250,7 @@ Result<Options> checked(const ServerConfig& config) {
   options.users = config.users();
   if (config.has_session()) options.session = config.session();
   options.domain = config.domain();
+  options.secure = config.secure();
   if (config.has_lead()) options.lead = config.lead();
   if (config.has_client_limit()) options.client_limit = config.client_limit();
   options.wait_for = config.wait_for();

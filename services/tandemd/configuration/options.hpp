@@ -35,6 +35,7 @@ struct Options : planning::ServiceWishes {
   std::uint32_t users = 0;  ///< users of that script; 0: the scene's number
 
   std::uint32_t domain = 0;
+  std::string secure;                ///< folder of its identity; empty: none
   std::optional<double> duration_s;  ///< empty: until stopped
 
   checkpoint::Settings checkpoint;

@@ -36,6 +36,8 @@ std::vector<Setting> session_settings(const Options& defaults) {
        quoted(defaults.session)},
       {"domain", "DDS domain", fmt::format("0 to {}", transport::kMaxDomain),
        fmt::format("{}", defaults.domain), fmt::format("{}", defaults.domain)},
+      {"secure", "Identity of the server for DDS Security; those without one are then strangers",
+       "a folder that `tandem pki issue server` made", "none", quoted("/etc/tandem/identity")},
   };
 }
 

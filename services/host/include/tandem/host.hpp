@@ -40,6 +40,9 @@ struct ServedType {
 struct ServerOptions {
   std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
   std::uint32_t domain = 0;         ///< DDS domain, 0..230
+  /// Folder of the server's identity for DDS Security, made by `tandem pki issue server`. Empty: none, and
+  /// everybody on the network can join.
+  std::string secure = "";
   /// Maximum distance between a body's position in the simulation and at the clients; if bodies turn, between
   /// the two positions of any point of its surface. Scene units. A smaller threshold makes a frame larger.
   double threshold = 0.01;
