@@ -23,7 +23,7 @@ template <class M>
 class Door {
  public:
   Door(dds::Node& node, M forged) : forged_(std::move(forged)) {
-    if (auto reader = node.reader<M>("intruder")) reader_.emplace(std::move(*reader));
+    if (auto reader = node.reader<M>("intruder", {.ignore_own = true})) reader_.emplace(std::move(*reader));
     if (auto writer = node.writer<M>("intruder")) writer_.emplace(std::move(*writer));
   }
   void listen() {
