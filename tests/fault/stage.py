@@ -108,7 +108,7 @@ class Process:
         self.lines = []
         self.process = subprocess.Popen(
             [str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, env={**os.environ, "CYCLONEDDS_URI": URI.format(interface)},
+            text=True, errors="replace", env={**os.environ, "CYCLONEDDS_URI": URI.format(interface)},
         )  # fmt: skip
         threading.Thread(target=self.read, daemon=True).start()
 

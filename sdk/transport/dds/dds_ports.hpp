@@ -65,10 +65,11 @@ class Monitor {
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
 };
 
-/// Takes the lines that Cyclone DDS would write on stderr. `error`: the process ends after it; other errors
-/// reach callers as well. Called by any thread, several at once. Lines about a configuration (CYCLONEDDS_URI)
-/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for
-/// the process.
+/// Takes the lines that Cyclone DDS would write on stderr: of those that are no errors 50 at once and one a
+/// second, cut to 240 bytes, without control characters; the next one says how many were left out. `error`:
+/// the process ends after it; other errors reach callers as well. Called by any thread, several at once.
+/// Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened. Call it before that, and
+/// once; only programs do, as the sink is one for the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
 /// Opens the domain, calls `while_open` if it is not empty, and closes the domain, without a participant and

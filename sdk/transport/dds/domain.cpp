@@ -3,6 +3,8 @@
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <map>
 #include <mutex>
@@ -11,6 +13,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/plain_text.hpp"
 
 namespace tandem::transport::dds {
 namespace {
@@ -99,10 +102,42 @@ using WriteLine = void (*)(std::string_view line, bool error);
 // Cyclone gives back only an address of data, and a function is none.
 WriteLine write_line = nullptr;
 
+// Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes.
+class Complaints {
+ public:
+  void take(std::string_view line) {
+    const std::lock_guard lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    const double passed_s = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    allowed_ = std::min(kBurst, allowed_ + passed_s * kPerSecond);
+    if (allowed_ < 1) {
+      ++left_out_;
+      return;
+    }
+    allowed_ -= 1;
+    std::string text = plain_text(line, kMostBytes);
+    if (left_out_ > 0) text += " (" + std::to_string(left_out_) + " lines before it were left out)";
+    left_out_ = 0;
+    write_line(text, false);
+  }
+
+ private:
+  static constexpr double kPerSecond = 1, kBurst = 50;
+  static constexpr std::size_t kMostBytes = 240;
+
+  std::mutex mutex_;
+  double allowed_ = kBurst;
+  std::uint64_t left_out_ = 0;
+  std::chrono::steady_clock::time_point last_;
+};
+
 void on_line(void* /*argument*/, const dds_log_data_t* data) {
+  static auto* const complaints = new Complaints;  // Cyclone's threads may outlive static objects
   std::string_view line(data->message);
   while (!line.empty() && line.back() == '\n') line.remove_suffix(1);
-  write_line(line, (data->priority & DDS_LC_FATAL) != 0);
+  if ((data->priority & DDS_LC_FATAL) != 0) return write_line(line, true);
+  complaints->take(line);
 }
 
 }  // namespace
