@@ -2,8 +2,10 @@
 """10,000 datagrams a second of garbage at the DDS ports of a session: random bytes, and packets of the session itself with
 a few bytes changed, cut, doubled or grown.
 
-garbage.py --tandemd PATH --tandem PATH [--short | --seconds N] [--seed N] [--secure] [--list]
+garbage.py --tandemd PATH --tandem PATH [--short | --seconds N] [--seed N] [--secure | --forge] [--list]
 
+Without DDS Security the packets are in the name of a program that is not there; with --secure or --forge also in those of server
+and clients. With --forge alone this fails, because then everybody can speak for a program: SECURITY.md says what happens.
 Without options it lasts five minutes, with --short five seconds. Checks that 30 Hz are kept within one frame in a hundred, no
 log exceeds 1 MB, and no program ends. Prints the seed; a datagram is known by seed and number. If a program falls, the
 datagrams that were sent last are kept in a file that is named. Garbage comes from one core at nice 15. Exit 0 passed, 1
@@ -68,28 +70,34 @@ def mutated(rng, packet):
     return bytes(out[:65000])
 
 
-def datagram(rng, packets):
+def in_another_name(rng, packet):
+    """The packet with another GUID prefix, in the header and where the packet says it again."""
+    return packet.replace(packet[8:20], rng.randbytes(12))
+
+
+def datagram(rng, packets, forge):
     if rng.random() < 0.2 or not packets:
         head = rng.choice((b"", b"RTPS", b"RTPS\x02\x01\x01\x10" + bytes(12)))
         return head + rng.randbytes(rng.choice((0, 1, 16, 64, 300, 1400)))
-    return mutated(rng, rng.choice(packets))
+    packet = rng.choice(packets)
+    return mutated(rng, packet if forge else in_another_name(rng, packet))
 
 
-def send(packets, seed, seconds):
+def send(packets, seed, seconds, forge):
     """Sends until the time is over; returns the number and the last ones. Falls behind rather than wait for others."""
     rng = random.Random(seed)
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
     out.setblocking(False)
     last, sent, lost = [], 0, 0
-    began = time.monotonic()
     # Made once: making each anew costs more than sending it, and would take the core from the programs that are watched.
-    stock = [datagram(rng, packets) for _ in range(KEPT)]
+    stock = [datagram(rng, packets, forge) for _ in range(KEPT)]
+    began = time.monotonic()
     while (passed := time.monotonic() - began) < seconds:
         while sent < passed * RATE:
             if sent % KEPT == KEPT - 1:
                 for _ in range(KEPT // 20):
-                    stock[rng.randrange(KEPT)] = datagram(rng, packets)
+                    stock[rng.randrange(KEPT)] = datagram(rng, packets, forge)
             what = stock[rng.randrange(KEPT)]
             port = rng.choice(PORTS)
             where = GROUP if port < 7402 else "127.0.0.1"
@@ -135,7 +143,7 @@ def garbage(stage):
     packets = list(ears.packets)
     began = time.monotonic()
     os.nice(15)
-    sent, lost, last, took = send(packets, options.seed, options.seconds)
+    sent, lost, last, took = send(packets, options.seed, options.seconds, options.secure or options.forge)
     ended = time.monotonic()
     time.sleep(3)
     everybody = [server, *clients]
@@ -171,6 +179,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--secure", action="store_true", help="with DDS Security")
+    parser.add_argument("--forge", action="store_true", help="without it, but in the name of server and clients")
     options = parser.parse_args()
     if options.short:
         options.seconds = 5
