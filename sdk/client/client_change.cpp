@@ -73,6 +73,7 @@ void ClientCore::consider_streams(Now now) {
   port_.take(inbox_.statuses);
   for (const auto& received : inbox_.statuses) {
     if (received.from != e.server || received.message.epoch != e.session.epoch) continue;
+    e.quiet_ns = 0;
     chooser_->on_status(received.message);
     listener_.on_server_status(received.message);
   }

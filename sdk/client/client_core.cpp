@@ -23,6 +23,9 @@ constexpr std::int64_t kMaxSleepNs = 50 * kMillisecond;
 constexpr std::int64_t kMaxPlayingSleepNs = 500 * kMillisecond;
 // If nothing comes from a server for so long while the client joins, another server may take its place.
 constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
+// If nothing comes from a server that lives for so long, one that continues its world takes its place. A
+// server sends a status each second.
+constexpr std::int64_t kQuietNs = 3 * kSecond / 2;
 
 Drawable drawable(const Picture& picture) {
   return {picture.epoch, static_cast<std::uint32_t>(picture.agreed->alive.size()),
@@ -70,8 +73,8 @@ ClientCore::ClientCore(CoreOptions options, transport::ClientPort& port, CoreLis
 std::int64_t ClientCore::poll(Now now) {
   // After a pause of this process late messages may still wait to be read: counts the pause as one short
   // wait.
-  const std::int64_t since_ns =
-      last_poll_ns_ == 0 ? 0 : std::clamp<std::int64_t>(now.steady_ns - last_poll_ns_, 0, kMaxSleepNs);
+  const std::int64_t slept_ns = last_poll_ns_ == 0 ? 0 : now.steady_ns - last_poll_ns_;
+  const std::int64_t since_ns = std::clamp<std::int64_t>(slept_ns, 0, kMaxSleepNs);
   last_poll_ns_ = now.steady_ns;
   poll_began_ns_ = measure();
   server_alive_ = port_.server_alive();
@@ -80,6 +83,7 @@ std::int64_t ClientCore::poll(Now now) {
     epoch_->silence_ns = 0;
     port_.pass_over_session(transport::PassOver::kWhileThereIsAnother);
   }
+  if (epoch_ != nullptr) leave_silent(std::clamp<std::int64_t>(slept_ns, 0, kMaxPlayingSleepNs));
   take_sessions(now);
   if (epoch_ != nullptr) leave_unplayable(now);
   if (epoch_ != nullptr) {
@@ -138,6 +142,12 @@ std::int64_t ClientCore::next_ack_ns() const {
   // If no further delta comes, the server may be waiting.
   const auto quiet_ns = statistics_.last_applied_ns + static_cast<std::int64_t>(1.25 * period_ns);
   return std::min({repeat_ns, last_ack_ns_ + transport::kAckSpacingNs, quiet_ns});
+}
+
+// DDS may go on for a server that hangs.
+void ClientCore::leave_silent(std::int64_t since_ns) {
+  epoch_->quiet_ns += since_ns;
+  if (epoch_->quiet_ns >= kQuietNs) port_.pass_over_session(transport::PassOver::kForItsSuccessor);
 }
 
 void ClientCore::take_sessions(Now now) {

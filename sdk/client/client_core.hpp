@@ -143,6 +143,7 @@ class ClientCore {
   };
 
   // client_core.cpp: sessions, acknowledgements, input, status
+  void leave_silent(std::int64_t since_ns);
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   void adopt_names(std::vector<transport::BodyName> names);
@@ -208,7 +209,7 @@ class ClientCore {
       ++statistics_.stale_messages;
       return false;
     }
-    epoch_->silence_ns = 0;
+    epoch_->silence_ns = epoch_->quiet_ns = 0;
     return true;
   }
   [[nodiscard]] std::int64_t measure() const {

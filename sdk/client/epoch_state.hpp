@@ -48,6 +48,7 @@ struct EpochState {
 
   bool has_loaded = false;         ///< `played` holds a state that can be drawn
   std::int64_t silence_ns = 0;     ///< time since anything came from the server, counted only while polled
+  std::int64_t quiet_ns = 0;       ///< the same, and a status of the server counts, too
   std::int64_t join_began_ns = 0;  ///< when the session was found, or when a loss began a rejoin
   std::int64_t frame_cost_ns = 0;  ///< simulation time since the last applied delta
   bool told_too_slow = false, told_lag = false;

@@ -100,6 +100,7 @@ class ServerPort {
 enum class PassOver : std::uint8_t {
   kUntilAnnouncedAnew,   ///< it cannot be played
   kWhileThereIsAnother,  ///< nothing comes from it
+  kForItsSuccessor,      ///< the same; but only a server that continues its epoch may take its place
 };
 
 /// A client's endpoints in one session. All calls from one thread; takes as in ServerPort.
@@ -111,7 +112,8 @@ class ClientPort {
   /// The announcement to follow, if it is another than before. A client follows one server as long as that
   /// server lives.
   virtual void take_sessions(std::vector<Received<SessionMessage>>& out) = 0;
-  /// The last announcement of take_sessions() is useless: others are preferred.
+  /// The last announcement of take_sessions() is useless: others are preferred. No effect if there is no such
+  /// other.
   virtual void pass_over_session(PassOver until) = 0;
   /// False if the writer of the session's announcement is gone (the server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;

@@ -58,7 +58,22 @@ void SessionBook::take_current(std::vector<Received<SessionMessage>>& out) {
   current_ = version == 0 ? std::nullopt : std::optional(current->writer);
 }
 
+// An announcement of it that comes later puts the one that is passed over at the end of the line.
+void SessionBook::pass_over_for_successor() {
+  const auto current =
+      std::ranges::find_if(entries_, [this](const Entry& entry) { return entry.writer == current_; });
+  if (current == entries_.end()) return;
+  const auto successor = std::ranges::find_if(entries_, [&](const Entry& entry) {
+    return entry.serves() && !entry.passed_over &&
+           entry.announcement.message.continues_epoch == current->announcement.message.epoch;
+  });
+  if (successor == entries_.end()) return;
+  current->passed_over = PassOver::kWhileThereIsAnother;
+  current_ = successor->writer;
+}
+
 void SessionBook::pass_over_current(PassOver until) {
+  if (until == PassOver::kForItsSuccessor) return pass_over_for_successor();
   for (Entry& entry : entries_) {
     if (entry.writer == current_) entry.passed_over = until;
   }

@@ -18,8 +18,8 @@ enum class WriterState : std::uint8_t { kLive, kSilent, kGone };
 /// thread-safe.
 ///
 /// One of them is current: the one seen first among those that are alive and were not passed over. It stays
-/// current as long as it is alive, whatever others announce. The announcement of a server that stands by is
-/// never current and counts as nobody's.
+/// current as long as it is alive and not passed over, whatever others announce. The announcement of a server
+/// that stands by is never current and counts as nobody's.
 class SessionBook {
  public:
   using StateOf = std::function<WriterState(std::uint64_t writer, const ParticipantId& participant)>;
@@ -31,6 +31,7 @@ class SessionBook {
 
   /// Appends the current announcement if it is not the one appended before.
   void take_current(std::vector<Received<SessionMessage>>& out);
+  /// For kForItsSuccessor the successor becomes current at once; without one nothing changes.
   void pass_over_current(PassOver until);
   /// Appends all live announcements in the order they were first seen.
   void list_live(std::vector<Received<SessionMessage>>& out) const;
@@ -49,6 +50,7 @@ class SessionBook {
     }
   };
   void make_room();
+  void pass_over_for_successor();
 
   std::vector<Entry> entries_;  // in the order in which they are considered
   std::uint64_t versions_ = 0;

@@ -151,7 +151,9 @@ std::vector<std::string> Keeper::take_notices(std::int64_t now_ns) {
 
 std::optional<Figures> Keeper::figures(std::int64_t now_ns) const {
   if (!folder_) return std::nullopt;
-  return writer_ ? writer_->figures(now_ns) : Figures();
+  Figures figures = writer_ ? writer_->figures(now_ns) : Figures();
+  figures.interval_s = settings_.interval_s;
+  return figures;
 }
 
 }  // namespace tandem::checkpoint

@@ -29,6 +29,7 @@ struct Figures {
   Frame frame = 0;              ///< of the newest checkpoint on the disk; 0: none
   std::uint64_t bytes = 0;      ///< of that file
   std::optional<double> age_s;  ///< since the frame of that checkpoint; empty: none was written
+  double interval_s = 0;        ///< between two checkpoints
   double copy_ms_max = 0;       ///< longest time that a frame was delayed for a copy
   double write_ms_max = 0;      ///< longest time from copy to disk
 };

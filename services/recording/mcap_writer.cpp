@@ -118,35 +118,37 @@ void McapWriter::end_chunk() {
   ChunkPlace place;
   place.time = chunk_time_;
   place.at = size_;
-  place.stored_bytes = stored.size();
-  place.content_bytes = chunk_.size();
+  place.stored_bytes = static_cast<std::uint32_t>(stored.size());
+  place.content_bytes = static_cast<std::uint32_t>(chunk_.size());
   Fields(record_)
       .put(chunk_time_.first_ns)
       .put(chunk_time_.last_ns)
-      .put(place.content_bytes)
+      .put(std::uint64_t{place.content_bytes})
       .put(crc32(chunk_))
       .put_text(zstd_ != nullptr ? "zstd" : "")
-      .put(place.stored_bytes);
+      .put(std::uint64_t{place.stored_bytes});
   write_record(kChunk, record_, stored);
-  place.size_bytes = size_ - place.at;
-  write_indexes(place);
-  chunks_.push_back(std::move(place));
+  place.size_bytes = static_cast<std::uint32_t>(size_ - place.at);
+  place.indexes = write_indexes();
+  chunks_.push_back(place);
   chunk_.clear();
   chunk_time_ = {};
 }
 
-void McapWriter::write_indexes(ChunkPlace& place) {
-  const std::uint64_t begin = size_;
+std::uint32_t McapWriter::write_indexes() {
+  std::uint32_t written = 0;
   for (auto& [topic, channel] : channels_) {
     if (channel.index.empty()) continue;
-    place.indexes.emplace_back(channel.id, size_);
+    const std::uint64_t begin = size_;
     Fields fields(record_);
     fields.put(channel.id).put(static_cast<std::uint32_t>(channel.index.size() * 16));
     for (const auto& [time, offset] : channel.index) fields.put(time).put(offset);
     write_record(kMessageIndex, record_);
     channel.index.clear();
+    indexes_.push_back({.size_bytes = static_cast<std::uint32_t>(size_ - begin), .channel = channel.id});
+    ++written;
   }
-  place.index_bytes = size_ - begin;
+  return written;
 }
 
 Bytes McapWriter::schema_record(const Channel& channel) const {
@@ -189,18 +191,24 @@ void McapWriter::write_summary() {
   for (const auto& [topic, channel] : channels_)
     statistics.put(channel.id).put(std::uint64_t{channel.messages});
   write_record(kStatistics, record_);
+  auto index = indexes_.cbegin();
   for (const ChunkPlace& chunk : chunks_) {
     Fields fields(record_);
     fields.put(chunk.time.first_ns)
         .put(chunk.time.last_ns)
         .put(chunk.at)
-        .put(chunk.size_bytes)
-        .put(static_cast<std::uint32_t>(chunk.indexes.size() * kCountBytes));
-    for (const auto& [channel, place] : chunk.indexes) fields.put(channel).put(place);
-    fields.put(chunk.index_bytes)
+        .put(std::uint64_t{chunk.size_bytes})
+        .put(static_cast<std::uint32_t>(chunk.indexes * kCountBytes));
+    const std::uint64_t begin = chunk.at + chunk.size_bytes;
+    std::uint64_t end = begin;
+    for (std::uint32_t i = 0; i < chunk.indexes; ++i, ++index) {
+      fields.put(index->channel).put(end);
+      end += index->size_bytes;
+    }
+    fields.put(end - begin)
         .put_text(zstd_ != nullptr ? "zstd" : "")
-        .put(chunk.stored_bytes)
-        .put(chunk.content_bytes);
+        .put(std::uint64_t{chunk.stored_bytes})
+        .put(std::uint64_t{chunk.content_bytes});
     write_record(kChunkIndex, record_);
   }
 }

@@ -3,6 +3,7 @@
 // type. idl/PROTOCOL.md, "Recordings".
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <span>
@@ -86,16 +87,21 @@ class McapWriter {
     std::uint64_t first_ns = UINT64_MAX, last_ns = 0;
     void include(std::uint64_t ns);
   };
+  // What the end of the file says of each chunk. Kept small, because it grows for as long as the file does.
   struct ChunkPlace {
     Span time;
-    std::uint64_t at = 0, size_bytes = 0, index_bytes = 0;
-    std::uint64_t stored_bytes = 0, content_bytes = 0;
-    std::vector<std::pair<std::uint16_t, std::uint64_t>> indexes;  // channel, place
+    std::uint64_t at = 0;
+    std::uint32_t size_bytes = 0, stored_bytes = 0, content_bytes = 0;
+    std::uint32_t indexes = 0;  // how many of indexes_ lie behind it
+  };
+  struct IndexPlace {
+    std::uint32_t size_bytes = 0;
+    std::uint16_t channel = 0;
   };
   [[nodiscard]] static Kind kind_of(const char* topic);
   [[nodiscard]] transport::Bytes schema_record(const Channel& channel) const;
   [[nodiscard]] transport::Bytes channel_record(const Channel& channel) const;
-  void write_indexes(ChunkPlace& place);
+  std::uint32_t write_indexes();
   void write_summary();
   void write_record(std::uint8_t opcode, std::span<const std::byte> content,
                     std::span<const std::byte> more = {});
@@ -110,7 +116,8 @@ class McapWriter {
   std::map<std::string, Channel, std::less<>> channels_;
   transport::Bytes chunk_;  // records of the open chunk
   Span chunk_time_, time_;
-  std::vector<ChunkPlace> chunks_;
+  std::deque<ChunkPlace> chunks_;
+  std::deque<IndexPlace> indexes_;  // of all chunks, in the file's order
   std::uint64_t messages_ = 0;
   transport::Bytes record_, packed_, cdr_;  // kept to reuse their memory
 };

@@ -31,7 +31,8 @@ constexpr std::uint32_t kMostBefore = 8;
 void Standby::Journal::add(transport::JournalMessage&& entry, transport::ClientId self) {
   if (!entries.empty() && entry.number <= entries.back().number) return;
   if (entries.size() >= kMostEntries || bytes >= kMostJournalBytes) return;
-  handed_over = entry.state == transport::JournalState::kLast && entry.successor == self;
+  ended = entry.state == transport::JournalState::kLast;
+  handed_over = ended && entry.successor == self;
   bytes += size_of(entry);
   entries.push_back(std::move(entry));
 }
@@ -56,8 +57,10 @@ Result<std::unique_ptr<Standby>> Standby::create(Options options, transport::Ser
 bool Standby::poll(std::int64_t now_ns) {
   if (started_ns_ == 0) started_ns_ = newest_ns_ = now_ns;
   if (now_ns - looked_ns_ >= kLookNs || due_since_ns_) look_around(now_ns);
+  silence_.pass(now_ns);
   take_journal();
   take_checkpoints(now_ns);
+  take_acknowledgements();
   note_if_slow(now_ns);
   if (now_ns - told_ns_ >= kTellNs || (news_ && now_ns - told_ns_ >= kTellSoonNs)) tell(now_ns);
   if (now_ns - status_ns_ >= kSecond) publish_status(now_ns);
@@ -105,10 +108,12 @@ void Standby::look_around(std::int64_t now_ns) {
 void Standby::follow(const Announcement& server) {
   notices_.push_back(fmt::format("follows the server of epoch {}", server.message.epoch));
   live_ = server;
+  silence_.begin();
+  seen_applied_ = 0;
   assembly_.clear();
   fresh_ = {};
   if (checkpoint_ == nullptr) journal_ = {};
-  journal_.handed_over = false;
+  journal_.handed_over = journal_.ended = false;
   due_since_ns_.reset();
   news_ = true;
 }
@@ -119,6 +124,8 @@ void Standby::take_journal() {
   port_->take(entries_);
   for (auto& [entry, from] : entries_) {
     if (!from_live(entry.epoch, from)) continue;
+    silence_.broken();
+    received_bytes_ += size_of(entry);
     Journal& journal = checkpoint_ == nullptr || holds_the_live() ? journal_ : fresh_;
     journal.add(std::move(entry), options_.id);
     news_ = true;
@@ -129,9 +136,26 @@ void Standby::take_checkpoints(std::int64_t now_ns) {
   parts_.clear();
   port_->take(parts_);
   for (auto& [part, from] : parts_) {
-    if (!from_live(part.epoch, from) || (holds_the_live() && part.frame <= holds())) continue;
+    if (!from_live(part.epoch, from)) continue;
+    silence_.broken();
+    received_bytes_ += part.bytes.size();
+    if (holds_the_live() && part.frame <= holds()) continue;
     news_ = true;
     if (auto whole = assembly_.add(std::move(part))) hold(*whole, now_ns);
+  }
+}
+
+// Where only the link to the live server is bad, its clients show that it works: they apply frames that this
+// server has not heard of.
+void Standby::take_acknowledgements() {
+  acknowledgements_.clear();
+  port_->take(acknowledgements_);
+  if (!holds_the_live()) return;
+  const Frame heard_of = live_frame();
+  for (const auto& [ack, from] : acknowledgements_) {
+    if (ack.epoch != live_->message.epoch || ack.applied <= std::max(heard_of, seen_applied_)) continue;
+    seen_applied_ = ack.applied;
+    silence_.broken();
   }
 }
 
@@ -149,7 +173,7 @@ void Standby::hold(const Assembly::Whole& whole, std::int64_t now_ns) {
   }
   journal_.forget_to(whole.journal);
   checkpoint_ = std::make_shared<const checkpoint::Checkpoint>(std::move(*checkpoint));
-  newest_ns_ = now_ns;
+  held_ns_ = newest_ns_ = now_ns;
   told_ns_ = INT64_MIN / 2;  // the live server may wait for it
 }
 
@@ -236,7 +260,12 @@ Frame Standby::live_frame() const {
 Standby::Cause Standby::cause() const {
   if (checkpoint_ == nullptr || !live_) return Cause::kNone;
   if (holds_the_live() && journal_.handed_over) return Cause::kHandedOver;
-  return live_is_there_ ? Cause::kNone : Cause::kGone;
+  if (!live_is_there_) return Cause::kGone;
+  return is_silent() ? Cause::kSilent : Cause::kNone;
+}
+
+bool Standby::is_silent() const {
+  return live_is_there_ && holds_the_live() && silence_.too_long(journal_.ended);
 }
 
 // Asked once: stepping through the journal takes a while, and the checkpoint of the last frame is on its way.
@@ -256,9 +285,12 @@ bool Standby::is_time(std::int64_t now_ns) {
     asked_follows_ = false;
     return false;
   }
-  if (now == Cause::kHandedOver && live_is_there_) return can_follow_the_last();
+  if (now == Cause::kHandedOver && live_is_there_ && !is_silent()) return can_follow_the_last();
   if (!due_since_ns_) {
     due_since_ns_ = now_ns;
+    if (is_silent())
+      notices_.push_back(fmt::format("the live server of epoch {} has sent nothing for {:.1f} s, so it hangs",
+                                     live_->message.epoch, static_cast<double>(silence_.lasts_ns()) * 1e-9));
     return false;  // the next poll sees who else could take over
   }
   return now_ns - *due_since_ns_ >= before_us_ * kRankNs;

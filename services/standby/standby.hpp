@@ -15,6 +15,7 @@
 #include "sdk/transport/units.hpp"
 #include "services/checkpoint/checkpoint.hpp"
 #include "services/standby/assembly.hpp"
+#include "services/standby/silence.hpp"
 
 namespace tandem::standby {
 
@@ -77,6 +78,12 @@ class Standby {
   [[nodiscard]] Frame holds() const { return checkpoint_ ? checkpoint_->frame : 0; }
   /// The last frame of that world that it knows was made, at least holds().
   [[nodiscard]] Frame live_frame() const;
+  /// Time since the newest checkpoint came that holds() is of; empty: there is none.
+  [[nodiscard]] std::optional<std::int64_t> checkpoint_age_ns(std::int64_t now_ns) const {
+    return checkpoint_ ? std::optional(now_ns - held_ns_) : std::nullopt;
+  }
+  /// Payload of the checkpoints and the journal of live servers.
+  [[nodiscard]] std::uint64_t received_bytes() const { return received_bytes_; }
   /// Lines for a log since the last call.
   [[nodiscard]] std::vector<std::string> take_notices();
 
@@ -84,19 +91,22 @@ class Standby {
   using Announcement = transport::Received<transport::SessionMessage>;
 
   /// Why it is time to take over, or that it is not.
-  enum class Cause : std::uint8_t { kNone, kGone, kHandedOver };
+  enum class Cause : std::uint8_t { kNone, kGone, kSilent, kHandedOver };
 
   Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows);
   void look_around(std::int64_t now_ns);
   void follow(const Announcement& server);
   void take_journal();
   void take_checkpoints(std::int64_t now_ns);
+  void take_acknowledgements();
   void hold(const Assembly::Whole& whole, std::int64_t now_ns);
   void refuse(const std::string& why, std::int64_t now_ns);
   void note_if_slow(std::int64_t now_ns);
   void tell(std::int64_t now_ns);
   void announce();
   void publish_status(std::int64_t now_ns);
+  /// DDS says that the live server is there, but it works no longer.
+  [[nodiscard]] bool is_silent() const;
   [[nodiscard]] Cause cause() const;
   [[nodiscard]] bool is_time(std::int64_t now_ns);
   /// True if this server takes over by a handover, and could do it now.
@@ -116,6 +126,8 @@ class Standby {
 
   std::optional<Announcement> live_;
   bool live_is_there_ = false;
+  Silence silence_;              // of the live server
+  Frame seen_applied_ = 0;       // the highest frame of its epoch that a client says it applied
   std::uint32_t before_us_ = 0;  // living servers that stand by and come before this one
   std::vector<Announcement> servers_;
   std::int64_t looked_ns_ = INT64_MIN / 2;
@@ -127,6 +139,7 @@ class Standby {
     std::deque<transport::JournalMessage> entries;
     std::size_t bytes = 0;
     bool handed_over = false;  // the last one names this server
+    bool ended = false;        // the last one is that of a handover, to whomever
 
     void add(transport::JournalMessage&& entry, transport::ClientId self);
     void forget_to(std::uint64_t number);
@@ -136,11 +149,14 @@ class Standby {
   bool asked_follows_ = false;
   std::vector<transport::Received<transport::JournalMessage>> entries_;
   std::vector<transport::Received<transport::CheckpointMessage>> parts_;
+  std::vector<transport::Received<transport::AckMessage>> acknowledgements_;
 
   std::optional<transport::SessionMessage> announced_;
   std::optional<std::int64_t> due_since_ns_;  // since when there is a cause to take over
   std::int64_t told_ns_ = INT64_MIN / 2, status_ns_ = INT64_MIN / 2, refused_ns_ = INT64_MIN / 2;
   std::int64_t started_ns_ = 0;
+  std::int64_t held_ns_ = 0;  // when checkpoint_ came
+  std::uint64_t received_bytes_ = 0;
   std::int64_t newest_ns_ = 0;  // when the newest checkpoint came, or was last missed in the log
   bool news_ = false;           // something arrived that the live server should know
   std::int64_t wake_ns_ = 0;

@@ -162,7 +162,7 @@ enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, k
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
-             const Options& options, const std::atomic<bool>& stop) {
+             Options& options, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
   const std::int64_t duration_ns =
@@ -173,7 +173,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
     const bool produced = host.poll(now_ns, wall_ns());
-    metrics.watch(host, publisher, produced, now_ns);
+    metrics.watch(host, publisher, keeping, produced, now_ns);
     service.watch(host, now_ns);
     service.reload(options, host, keeping, now_ns);
     if (produced) {
@@ -282,72 +282,102 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
   return closed && printed ? 0 : 1;
 }
 
-}  // namespace
+/// The exit code; empty if another server took the place of one that is to stand by.
+using End = std::optional<int>;
 
-int run_daemon(const Options& options, SignalWatch& signals) {
-  const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
-  auto config =
-      planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
-  if (!config) return report_error(placed(options.places, "", config.error()), 2);
-  auto simulation =
-      scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
-  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
-  config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
-  auto keeping = options.standby
-                     ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
-                     : host::Keeping::begin(options.checkpoint, **simulation, *config, &log_line, &steady_ns);
-  if (!keeping) return report_error(keeping.error(), 1);
-  auto port = open_port(*config, options, signals.stop());
-  if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
-  warn_without_security(options);
-  HashLog hashes;
-  if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
-    return signals.finish(report_error(opened.error(), 1));
+/// What stays from one life of a server to the next: it may stand by again.
+struct Stage {
+  Options& options;  ///< with what was read again
+  const scenes::Scene& scene;
+  engine::Simulation& simulation;
+  HashLog& hashes;
+  Metrics& metrics;
+  Service& service;
+  SignalWatch& signals;
+};
 
-  Metrics metrics;
-  if (options.metrics) {
-    auto served =
-        metrics.serve(*options.metrics, facts_of(*config, options.session, scene->name, options.free_rate));
-    if (!served) return signals.finish(report_error(served.error(), 1));
-  }
-  Service service;
+End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
+  Options& options = stage.options;
+  SignalWatch& signals = stage.signals;
   if (options.standby) {
-    const auto takes_over =
-        stand_by(options, **simulation, **port, *config, *keeping, service, signals.stop());
+    const auto takes_over = stand_by(options, stage.simulation, port, config, keeping, stage.service,
+                                     stage.metrics, signals.stop());
     if (!takes_over) return signals.finish(report_error(takes_over.error(), 1));
     if (!*takes_over) return signals.finish(0);
   }
-  const bool goes_on = config->goes_on_from != nullptr;
-  hashes.begin(config->epoch);
-  const double frame_rate_hz = config->frame_rate_hz;
-  const std::vector<host::StreamConfig> streams = config->streams;
-  auto host = host::Host::create(std::move(*config), **simulation, **port);
+  const bool goes_on = config.goes_on_from != nullptr;
+  stage.hashes.begin(config.epoch);
+  const double frame_rate_hz = config.frame_rate_hz;
+  const std::vector<host::StreamConfig> streams = config.streams;
+  auto host = host::Host::create(std::move(config), stage.simulation, port);
   if (!host) return signals.finish(report_error(host.error(), options.standby ? 1 : 2));
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
-  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", scene->name,
+  spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", stage.scene.name,
                options.choice.bodies,
                alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
                options.domain, (*host)->session().epoch);
   for (const host::StreamConfig& stream : streams)
     if (!alone) spdlog::info("stream {}: {}", stream.name, coding_text(stream));
 
-  host::Publisher publisher((*host)->outbox(), **port);
-  ScriptSender script(*scene, options);
+  host::Publisher publisher((*host)->outbox(), port);
+  ScriptSender script(stage.scene, options);
   if (goes_on) script.skip_to((*host)->frame());
-  const Ending ending =
-      serve(**host, **port, script, hashes, *keeping, publisher, metrics, service, options, signals.stop());
-  keeping->end(**host);
+  const Ending ending = serve(**host, port, script, stage.hashes, keeping, publisher, stage.metrics,
+                              stage.service, options, signals.stop());
+  if (ending == Ending::kRefused && options.standby) {
+    spdlog::warn("{}; this one stands by again", (*host)->error()->message);
+    return std::nullopt;
+  }
+  keeping.end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =
-      signals.finish(tell_end(**host, ending, hashes, *keeping, streams, frame_rate_hz, options));
+      signals.finish(tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {
     spdlog::warn("{} writes failed in all, the last: {}", publisher.failures(), publisher.last_failure());
   }
   return exit_code;
+}
+
+}  // namespace
+
+int run_daemon(Options options, SignalWatch& signals) {
+  const auto scene = scenes::load_scene(options.scene);
+  if (!scene) return report_error(placed(options.places, "scene", scene.error()), 2);
+  auto simulation =
+      scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
+  if (!simulation) return report_error(placed(options.places, "bodies", simulation.error()), 2);
+  HashLog hashes;
+  Metrics metrics;
+  Service service;
+  const Stage stage{options, *scene, **simulation, hashes, metrics, service, signals};
+  for (bool first = true;; first = false) {
+    auto config =
+        planning::plan_server(sessions::world_of(*scene, options.choice.bodies), options.choice, options);
+    if (!config) return report_error(placed(options.places, "", config.error()), 2);
+    config->engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles";
+    auto keeping = options.standby ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
+                                   : host::Keeping::begin(options.checkpoint, **simulation, *config,
+                                                          &log_line, &steady_ns);
+    if (!keeping) return report_error(keeping.error(), 1);
+    // Another life has another DDS participant, so that nobody takes it for the server that it was.
+    auto port = open_port(*config, options, signals.stop());
+    if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+    if (first) {
+      warn_without_security(options);
+      if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
+        return signals.finish(report_error(opened.error(), 1));
+      if (options.metrics) {
+        auto served = metrics.serve(*options.metrics,
+                                    facts_of(*config, options.session, scene->name, options.free_rate));
+        if (!served) return signals.finish(report_error(served.error(), 1));
+      }
+    }
+    if (const End end = live(stage, std::move(*config), **port, *keeping)) return *end;
+    logging::set_context(options.session, 0);
+  }
 }
 
 }  // namespace tandem::daemon

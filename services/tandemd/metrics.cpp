@@ -19,15 +19,43 @@ constexpr double kHeldShare = 0.9;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
 
-void describe_session(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
+void describe_server(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
   page.gauge("tandem_session_info", "The session that this server publishes, as labels", 1,
              {{"session", facts.session}, {"scene", facts.scene}});
-  page.gauge("tandem_epoch_timestamp_seconds", "Start of this epoch, since 1970",
-             static_cast<double>(figures.epoch_ms) / 1e3);
+  constexpr std::size_t kStandingBy = 6;  // after those of Host::State
   page.state("tandem_server_state",
              "1 for the state of the server: it claims the session's name, waits for participants before "
-             "frame 1, runs, was refused by another server of this session, or has ended",
-             {"claiming", "waiting", "running", "refused", "ended"}, static_cast<std::size_t>(figures.state));
+             "frame 1, runs, was refused by another server of this session, has handed the session over, has "
+             "ended, or stands by",
+             {"claiming", "waiting", "running", "refused", "handed_over", "ended", "standing_by"},
+             figures.standby ? kStandingBy : static_cast<std::size_t>(figures.state));
+  if (figures.checkpoint_age_s) {
+    page.gauge(
+        "tandem_checkpoint_age_seconds",
+        "Age of the newest checkpoint that was written, or else of the server; while the server stands "
+        "by, of the one it holds",
+        *figures.checkpoint_age_s);
+  }
+  if (figures.checkpoint_interval_s > 0) {
+    page.gauge("tandem_checkpoint_interval_seconds", "Time between two checkpoints that are written",
+               figures.checkpoint_interval_s);
+  }
+}
+
+void describe_standby(Page& page, const StandbyNow& standby) {
+  page.gauge("tandem_standby_checkpoint_frame",
+             "Frame of the checkpoint that a server which stands by holds; 0: none",
+             static_cast<double>(standby.holds));
+  page.gauge("tandem_standby_behind_frames",
+             "Frames that the live server made since the checkpoint that this server holds",
+             static_cast<double>(standby.behind));
+  page.count("tandem_standby_received_bytes_total", "Checkpoints and inputs received from the live server",
+             static_cast<double>(standby.received_bytes));
+}
+
+void describe_session(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
+  page.gauge("tandem_epoch_timestamp_seconds", "Start of this epoch, since 1970",
+             static_cast<double>(figures.epoch_ms) / 1e3);
   page.gauge("tandem_frame_rate_target_hertz", "Frames per second that are due; 0: as many as possible",
              facts.frame_rate_hz);
   page.gauge("tandem_frame_rate_hertz", "Frames per second, over the last three seconds",
@@ -142,6 +170,8 @@ SessionFacts facts_of(const host::HostConfig& config, const std::string& session
 }
 
 void describe(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
+  describe_server(page, facts, figures);
+  if (figures.standby) return describe_standby(page, *figures.standby);
   if (figures.totals.streams.size() != facts.streams.size()) return;  // it starts
   describe_session(page, facts, figures);
   for (std::size_t id = 0; id < facts.streams.size(); ++id) describe_stream(page, facts, figures, id);
@@ -192,11 +222,41 @@ const char* Metrics::obstacle(const Host& host, const host::Publisher& publisher
   return "it publishes fewer frames than are due";
 }
 
-void Metrics::watch(const Host& host, const host::Publisher& publisher, bool produced, std::int64_t now_ns) {
+void Metrics::note_checkpoints(const host::Keeping& keeping, std::int64_t now_ns) {
+  if (!began_ns_) began_ns_ = now_ns;
+  const auto checkpoints = keeping.figures();
+  figures_.checkpoint_age_s.reset();
+  figures_.checkpoint_interval_s = checkpoints ? checkpoints->interval_s : 0;
+  if (checkpoints) figures_.checkpoint_age_s = checkpoints->age_s.value_or(seconds(now_ns - *began_ns_));
+}
+
+void Metrics::watch(const standby::Standby& standby, std::int64_t now_ns) {
+  if (!endpoint_) return;
+  began_ns_.reset();
+  const Frame holds = standby.holds();
+  if (now_ns >= next_ns_) {
+    next_ns_ = now_ns + kPeriodNs;
+    figures_.standby = {.holds = holds,
+                        .behind = holds == 0 ? 0 : standby.live_frame() - holds,
+                        .received_bytes = standby.received_bytes()};
+    figures_.checkpoint_interval_s = 0;
+    figures_.checkpoint_age_s.reset();
+    if (const auto age_ns = standby.checkpoint_age_ns(now_ns)) figures_.checkpoint_age_s = seconds(*age_ns);
+    latest_.offer(figures_);
+  }
+  const char* const missing = standby.follows() == 0 ? "it has found no live server to stand by for"
+                                                     : "it has no checkpoint of the live server yet";
+  health_.beat(now_ns, holds == 0 ? missing : nullptr);
+}
+
+void Metrics::watch(const Host& host, const host::Publisher& publisher, const host::Keeping& keeping,
+                    bool produced, std::int64_t now_ns) {
   if (!endpoint_) return;
   if (produced) count_frame(host.report());
   if (now_ns >= next_ns_) {
     next_ns_ = now_ns + kPeriodNs;
+    figures_.standby.reset();
+    note_checkpoints(keeping, now_ns);
     figures_.state = host.state();
     figures_.epoch_ms = host.session().epoch;
     figures_.frame = host.frame();

@@ -3,16 +3,19 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sdk/statistics/duration_buckets.hpp"
 #include "services/host/host.hpp"
+#include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/metrics/endpoint.hpp"
 #include "services/metrics/health.hpp"
 #include "services/metrics/latest.hpp"
 #include "services/metrics/rate_watch.hpp"
+#include "services/standby/standby.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {
@@ -27,8 +30,21 @@ struct SessionFacts {
 [[nodiscard]] SessionFacts facts_of(const host::HostConfig& config, const std::string& session,
                                     const std::string& scene, bool free_rate);
 
+/// A server that stands by.
+struct StandbyNow {
+  Frame holds = 0;   ///< frame of its checkpoint; 0: it has none
+  Frame behind = 0;  ///< frames that the live server made since, as far as is known
+  std::uint64_t received_bytes = 0;
+};
+
 /// Figures of a moment, as one thread hands them to the other.
 struct FiguresNow {
+  std::optional<StandbyNow>
+      standby;  ///< set: it stands by, and only the age of its checkpoint counts besides
+  /// Of the newest checkpoint that was written, or else since the server began; while it stands by, of the
+  /// one that it holds. Empty: it writes none, or holds none.
+  std::optional<double> checkpoint_age_s;
+  double checkpoint_interval_s = 0;  ///< 0: it writes none
   host::Host::State state = host::Host::State::kClaiming;
   std::uint64_t epoch_ms = 0;
   Frame frame = 0;
@@ -48,10 +64,13 @@ class Metrics {
   /// Starts to answer, if there is an address. Errors: those of Endpoint::create().
   [[nodiscard]] Result<void> serve(const metrics::Address& address, SessionFacts facts);
   /// Call after every poll.
-  void watch(const host::Host& host, const host::Publisher& publisher, bool produced, std::int64_t now_ns);
+  void watch(const host::Host& host, const host::Publisher& publisher, const host::Keeping& keeping,
+             bool produced, std::int64_t now_ns);
+  void watch(const standby::Standby& standby, std::int64_t now_ns);
 
  private:
   void count_frame(const host::FrameReport& report);
+  void note_checkpoints(const host::Keeping& keeping, std::int64_t now_ns);
   [[nodiscard]] const char* obstacle(const host::Host& host, const host::Publisher& publisher) const;
 
   static constexpr std::int64_t kPeriodNs = kSecond / 4;
@@ -61,6 +80,7 @@ class Metrics {
   FiguresNow figures_;  // of the polling thread
   metrics::RateWatch rate_;
   std::int64_t next_ns_ = 0, next_moment_ns_ = 0;
+  std::optional<std::int64_t> began_ns_;  // to serve the session
   metrics::Latest<FiguresNow> latest_;
   metrics::Health health_;
   std::unique_ptr<metrics::Endpoint> endpoint_;  // last: ends before what it reads

@@ -38,7 +38,25 @@ void Service::watch(const standby::Standby& standby, const std::string& session,
                                    standby.holds(), standby.live_frame() - standby.holds()));
 }
 
-void Service::reload(const Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns) {
+void Service::reload(Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns) {
+  const auto set_limits = [&host](std::uint32_t clients, std::optional<std::int64_t> stall_timeout_ns) {
+    const auto set = host.set_limits(clients, stall_timeout_ns);
+    if (!set) spdlog::error(set.error().message);  // cannot be: the configuration was checked
+  };
+  reload(options, set_limits, keeping, now_ns);
+}
+
+void Service::reload(Options& options, host::HostConfig& config, host::Keeping& keeping,
+                     std::int64_t now_ns) {
+  const auto set_limits = [&config](std::uint32_t clients, std::optional<std::int64_t> stall_timeout_ns) {
+    config.client_limit = clients;
+    config.stall_timeout_ns = stall_timeout_ns;
+  };
+  reload(options, set_limits, keeping, now_ns);
+}
+
+void Service::reload(Options& options, const SetLimits& set_limits, host::Keeping& keeping,
+                     std::int64_t now_ns) {
   const auto changes = options.changes();
   if (!changes) return;
   notifier_.reloading(now_ns);
@@ -48,8 +66,10 @@ void Service::reload(const Options& options, host::Host& host, host::Keeping& ke
     const Changes& changed = **changes;
     std::optional<std::int64_t> stall_timeout_ns;
     if (changed.stall_timeout_s) stall_timeout_ns = static_cast<std::int64_t>(*changed.stall_timeout_s * 1e9);
-    const auto set = host.set_limits(changed.client_limit, stall_timeout_ns);
-    if (!set) spdlog::error(set.error().message);  // cannot be: the configuration was checked
+    options.client_limit = changed.client_limit;
+    options.stall_timeout_s = changed.stall_timeout_s;
+    options.checkpoint.interval_s = changed.checkpoint_interval_s;
+    set_limits(changed.client_limit, stall_timeout_ns);
     keeping.set_interval(changed.checkpoint_interval_s);
     if (!changed.live.empty()) spdlog::info("configuration: changed {}", fmt::join(changed.live, ", "));
     if (!changed.after_restart.empty())

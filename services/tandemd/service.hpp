@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "services/host/host.hpp"
@@ -18,11 +19,17 @@ class Service {
   /// Call it in every turn of the loop.
   void watch(const host::Host& host, std::int64_t now_ns);
   void watch(const standby::Standby& standby, const std::string& session, std::int64_t now_ns);
-  /// The same. If the configuration is to be read again, changes what can change live, and logs the fields
-  /// that changed and those that cannot, or what is wrong.
-  void reload(const Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns);
+  /// The same. If the configuration is to be read again, changes what can change live, also in `options`, and
+  /// logs the fields that changed and those that cannot, or what is wrong.
+  void reload(Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns);
+  /// The same while it stands by: `config` is that of a later takeover.
+  void reload(Options& options, host::HostConfig& config, host::Keeping& keeping, std::int64_t now_ns);
 
  private:
+  /// Sets the limit of clients and the stall timeout.
+  using SetLimits = std::function<void(std::uint32_t, std::optional<std::int64_t>)>;
+  void reload(Options& options, const SetLimits& set_limits, host::Keeping& keeping, std::int64_t now_ns);
+
   ServiceNotifier notifier_;
   std::uint64_t told_frames_ = 0;
   std::int64_t told_ns_ = 0;

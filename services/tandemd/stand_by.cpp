@@ -32,8 +32,8 @@ void log_notices(standby::Standby& standby) {
 
 }  // namespace
 
-Result<bool> stand_by(const Options& options, engine::Simulation& simulation, transport::ServerPort& port,
-                      host::HostConfig& config, host::Keeping& keeping, Service& service,
+Result<bool> stand_by(Options& options, engine::Simulation& simulation, transport::ServerPort& port,
+                      host::HostConfig& config, host::Keeping& keeping, Service& service, Metrics& metrics,
                       const std::atomic<bool>& stop) {
   const checkpoint::World world = host::checkpoint_world(config);
   const auto accept = [&](const checkpoint::Checkpoint& checkpoint,
@@ -63,6 +63,8 @@ Result<bool> stand_by(const Options& options, engine::Simulation& simulation, tr
     if (stop.load(std::memory_order_relaxed)) return false;
     log_notices(**standby);
     service.watch(**standby, options.session, steady_ns());
+    service.reload(options, config, keeping, steady_ns());
+    metrics.watch(**standby, steady_ns());
     const std::int64_t wait_ns = (*standby)->next_wake_ns() - steady_ns();
     if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
   }

@@ -7,6 +7,7 @@
 #include "services/host/frames/configuration.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/tandemd/configuration/options.hpp"
+#include "services/tandemd/metrics.hpp"
 #include "services/tandemd/service.hpp"
 #include "tandem/simulation.hpp"
 
@@ -15,8 +16,9 @@ namespace tandem::daemon {
 /// Stands by for the session's live server until that one is gone or hands over. Then `simulation` holds the
 /// world, and `config` says how the session continues. Returns false if it was stopped before. Errors: those
 /// of the port and of the folder of checkpoints.
-[[nodiscard]] Result<bool> stand_by(const Options& options, engine::Simulation& simulation,
+[[nodiscard]] Result<bool> stand_by(Options& options, engine::Simulation& simulation,
                                     transport::ServerPort& port, host::HostConfig& config,
-                                    host::Keeping& keeping, Service& service, const std::atomic<bool>& stop);
+                                    host::Keeping& keeping, Service& service, Metrics& metrics,
+                                    const std::atomic<bool>& stop);
 
 }  // namespace tandem::daemon

@@ -15,7 +15,7 @@ constexpr std::int64_t kTellFullNs = 10 * kSecond;
 constexpr std::size_t kMostSuccessors = 64;
 constexpr std::int64_t kReadyNs = kSecond;  // how recently a ready server was heard
 
-std::string name_of(const Standbys::Standby& server) {
+std::string name_of(const Standbys::Candidate& server) {
   return fmt::format("server {:016x} of rank {}", server.id, server.rank);
 }
 
@@ -144,8 +144,8 @@ bool Standbys::serve(Server& server, std::int64_t now_ns) {
   }
 }
 
-const Standbys::Standby* Standbys::first_ready(std::int64_t now_ns) const {
-  const Standby* first = nullptr;
+const Standbys::Candidate* Standbys::first_ready(std::int64_t now_ns) const {
+  const Candidate* first = nullptr;
   for (const auto& [id, server] : servers_) {
     const bool ready = server.follows && server.holds_frame > 0 && now_ns - server.heard_ns < kReadyNs;
     if (ready && (first == nullptr || server.rank < first->rank)) first = &server;
@@ -153,7 +153,7 @@ const Standbys::Standby* Standbys::first_ready(std::int64_t now_ns) const {
   return first;
 }
 
-const Standbys::Standby* Standbys::find(transport::ClientId id) const {
+const Standbys::Candidate* Standbys::find(transport::ClientId id) const {
   const auto known = servers_.find(id);
   return known == servers_.end() ? nullptr : &known->second;
 }

@@ -26,8 +26,8 @@ class Standbys {
   /// A server that says nothing for so long does not stand by any more.
   static constexpr std::int64_t kSilentNs = 3 * kSecond;
 
-  /// One server that stands by.
-  struct Standby {
+  /// A server that stands by, as far as the live one knows it: it may succeed.
+  struct Candidate {
     transport::ClientId id = 0;
     transport::ParticipantId from;
     std::uint32_t rank = 1;
@@ -53,8 +53,8 @@ class Standbys {
   /// When send() may have something to do that it does not have now.
   [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
   /// The server of the lowest rank that holds a checkpoint and was heard in the last second; null: none.
-  [[nodiscard]] const Standby* first_ready(std::int64_t now_ns) const;
-  [[nodiscard]] const Standby* find(transport::ClientId id) const;
+  [[nodiscard]] const Candidate* first_ready(std::int64_t now_ns) const;
+  [[nodiscard]] const Candidate* find(transport::ClientId id) const;
   /// True if a server of that participant has stood by and held a checkpoint of this epoch, also long ago.
   [[nodiscard]] bool may_succeed(const transport::ParticipantId& participant) const {
     return successors_.contains(participant);
@@ -68,7 +68,7 @@ class Standbys {
     std::shared_ptr<const checkpoint::Encoded> checkpoint;
     accounts::Passage passage;
   };
-  struct Server : Standby {
+  struct Server : Candidate {
     std::optional<Sending> sending;
     Frame offered = 0;  // of the newest checkpoint that it was sent
   };

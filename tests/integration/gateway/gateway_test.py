@@ -17,7 +17,7 @@ import urllib.error
 import urllib.request
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "session"))
-from session_test import Failed, Stage, check_report, compare  # noqa: E402
+from stage import Failed, Stage, check_report, compare  # noqa: E402
 
 TOKEN = "a-token-of-enough-characters"
 

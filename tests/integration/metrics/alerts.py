@@ -36,7 +36,9 @@ NORMAL = {
     f"tandem_recorder_file_good{{{RECORDER}}}": (1, 0),
     f"tandem_recorder_disk_free_bytes{{{RECORDER}}}": (1e11, 0),
     f"tandem_recorder_written_bytes_total{{{RECORDER}}}": (1e6, 1e6),
-    f"tandem_checkpoint_age_seconds{{{SERVER}}}": (5, 0),
+    f'tandem_server_state{{{SERVER},state="standing_by"}}': (0, 0),
+    f"tandem_checkpoint_age_seconds{{{SERVER}}}": (2, 0),
+    f"tandem_checkpoint_interval_seconds{{{SERVER}}}": (1, 0),
 }
 
 # Alert to what its fault changes: a series' value from then on, and what each further step adds.
@@ -48,7 +50,10 @@ FAULTS = [
     ("TandemRateNotHeld", {f"tandem_frame_rate_hertz{{{SERVER}}}": (24, 0)}),
     ("TandemClientDemotedRepeatedly", {f"tandem_repeated_demotions_total{{{SERVER}}}": (2, 1)}),
     ("TandemHashMismatch", {f"tandem_client_hash_mismatches_total{{{GATEWAY}}}": (1, 0)}),
-    ("TandemCheckpointOld", {f"tandem_checkpoint_age_seconds{{{SERVER}}}": (61, 5)}),
+    ("TandemCheckpointOld", {f"tandem_checkpoint_age_seconds{{{SERVER}}}": (5, 5)}),
+    ("TandemCheckpointOld", {f'tandem_server_state{{{SERVER},state="running"}}': (0, 0),
+                             f'tandem_server_state{{{SERVER},state="standing_by"}}': (1, 0),
+                             f"tandem_checkpoint_age_seconds{{{SERVER}}}": (61, 5)}),
     ("TandemNoSpace", {f"tandem_recorder_disk_free_bytes{{{RECORDER}}}": (9e8, 0)}),
     ("TandemNoSpace", {f"tandem_recorder_disk_free_bytes{{{RECORDER}}}": (2e9, 0),
                        f"tandem_recorder_written_bytes_total{{{RECORDER}}}": (1e9, 1e8)}),
@@ -66,6 +71,7 @@ HARMLESS = [
         f'tandem_server_state{{{SERVER},state="waiting"}}': (1, 0),
         f"tandem_frame_rate_hertz{{{SERVER}}}": (0, 0),
         f"tandem_ready{{{SERVER}}}": (0, 0),
+        f"tandem_checkpoint_age_seconds{{{SERVER}}}": (10, 5),
     },
     # --rate max
     {f"tandem_frame_rate_target_hertz{{{SERVER}}}": (0, 0)},

@@ -40,10 +40,40 @@ double value_of(const metrics::Page& page, const std::string& name, const std::s
   return -1;
 }
 
-TEST(ServerPage, IsEmptyUntilTheHostHasBeenSeen) {
+TEST(ServerPage, HasNoFiguresUntilTheHostHasBeenSeen) {
   metrics::Page page;
   describe(page, two_streams(), {});
-  EXPECT_TRUE(page.families().empty());
+  EXPECT_EQ(value_of(page, "tandem_server_state", "claiming"), 1);
+  EXPECT_EQ(page.families().size(), 2U) << "the session and the state";
+}
+
+TEST(ServerPage, OfAServerThatStandsByTellsWhatItHolds) {
+  FiguresNow figures;
+  figures.standby = {.holds = 60, .behind = 7, .received_bytes = 1000};
+  figures.checkpoint_age_s = 0.5;
+  metrics::Page page;
+  describe(page, two_streams(), figures);
+  EXPECT_EQ(value_of(page, "tandem_server_state", "standing_by"), 1);
+  EXPECT_EQ(value_of(page, "tandem_server_state", "claiming"), 0);
+  EXPECT_EQ(value_of(page, "tandem_standby_checkpoint_frame"), 60);
+  EXPECT_EQ(value_of(page, "tandem_standby_behind_frames"), 7);
+  EXPECT_EQ(value_of(page, "tandem_standby_received_bytes_total"), 1000);
+  EXPECT_EQ(value_of(page, "tandem_checkpoint_age_seconds"), 0.5);
+}
+
+TEST(ServerPage, NamesEachStateOfTheHost) {
+  using State = host::Host::State;
+  const SessionFacts facts = two_streams();
+  FiguresNow figures = figures_of(facts);
+  const std::map<State, std::string> names{{State::kClaiming, "claiming"},      {State::kWaiting, "waiting"},
+                                           {State::kRunning, "running"},        {State::kRefused, "refused"},
+                                           {State::kHandedOver, "handed_over"}, {State::kEnded, "ended"}};
+  for (const auto& [state, name] : names) {
+    figures.state = state;
+    metrics::Page page;
+    describe(page, facts, figures);
+    EXPECT_EQ(value_of(page, "tandem_server_state", name), 1) << name;
+  }
 }
 
 TEST(ServerPage, TellsStreamsAndReasonsApart) {

@@ -71,6 +71,29 @@ TEST_F(Book, OneThatCannotBePlayedIsPassedOverUntilItIsAnnouncedAnew) {
   EXPECT_EQ(current(), Epochs{11});
 }
 
+TEST_F(Book, OneThatIsSilentIsLeftOnlyForAServerThatContinuesItsEpoch) {
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{10});
+  book_.put(2, announcement(20));
+  book_.pass_over_current(PassOver::kForItsSuccessor);
+  EXPECT_EQ(current(), Epochs{}) << "the other one has another world";
+  auto successor = announcement(21);
+  successor.message.continues_epoch = 10;
+  successor.message.server_role = ServerRole::kStandby;
+  book_.put(2, successor);
+  book_.pass_over_current(PassOver::kForItsSuccessor);
+  EXPECT_EQ(current(), Epochs{}) << "it only stands by";
+  successor.message.server_role = ServerRole::kLive;
+  book_.put(2, successor);
+  EXPECT_EQ(current(), Epochs{}) << "as long as the first one works";
+  book_.pass_over_current(PassOver::kForItsSuccessor);
+  EXPECT_EQ(current(), Epochs{21});
+  book_.put(1, announcement(10));
+  EXPECT_EQ(current(), Epochs{}) << "it wakes";
+  states_[2] = WriterState::kGone;
+  EXPECT_EQ(current(), Epochs{10});
+}
+
 TEST_F(Book, OneFromWhichNothingComesIsPassedOverAsLongAsThereIsAnother) {
   book_.put(1, announcement(10));
   EXPECT_EQ(current(), Epochs{10});

@@ -1,4 +1,4 @@
-#include "services/tool/pki.hpp"
+#include "services/tool/pki/pki.hpp"
 
 #include <vector>
 

@@ -13,7 +13,7 @@
 #include "sdk/transport/units.hpp"
 #include "services/json/json.hpp"
 #include "services/pki/authority.hpp"
-#include "services/tool/pki.hpp"
+#include "services/tool/pki/pki.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
