@@ -72,10 +72,32 @@ TEST(Doctor, fails_where_the_domain_cannot_be_opened) {
   EXPECT_EQ(check(facts, "CYCLONEDDS_URI").verdict, Verdict::kFailure);
 }
 
+TEST(Doctor, warns_of_a_network_without_security) {
+  MachineFacts facts = good_machine();
+  facts.networks = {"10.0.0.2"};
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kWarning);
+  EXPECT_THAT(check(facts, "security").detail, ::testing::HasSubstr("10.0.0.2"));
+  EXPECT_THAT(check(facts, "security").advice, ::testing::HasSubstr("--secure"));
+}
+
+TEST(Doctor, fails_with_an_identity_that_is_not_good) {
+  const MachineFacts facts = machine_facts(0, "/nowhere");
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kFailure);
+  EXPECT_THAT(check(facts, "security").detail, ::testing::HasSubstr("/nowhere"));
+}
+
+TEST(Doctor, tells_whose_identity_it_is) {
+  MachineFacts facts = good_machine();
+  facts.secure = "bob";
+  facts.identity = transport::secure::Identity{"/bob", "bob", "participant", 1'800'000'000, true};
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kGood);
+  EXPECT_EQ(check(facts, "security").detail, "participant bob, until 2027-01-15 08:00:00 UTC");
+}
+
 TEST(Doctor, can_look_at_this_machine) {
   const MachineFacts facts = machine_facts(0);
   EXPECT_GT(facts.open_files_limit, 0U);
-  EXPECT_EQ(judge(facts).size(), 6U);
+  EXPECT_EQ(judge(facts).size(), 7U);
 }
 
 }  // namespace
