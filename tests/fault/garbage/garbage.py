@@ -161,10 +161,10 @@ def garbage(stage):
             raise Failed("a client fell silent")
         rates.append((lines[-1]["frame"] - lines[0]["frame"]) / (lines[-1]["seconds"] - lines[0]["seconds"]))
     logs = [each.log_bytes() for each in everybody]
-    reports = [client.stop() for client in clients]
     print(f"  seed {options.seed}, {len(packets)} genuine packets, {sent} datagrams in {took:.0f} s ({sent / took:.0f}/s, "
-          f"{lost} not taken): {min(rates):.2f} frames/s, logs of {max(logs)} bytes at most, "
-          f"{sum(report['resyncs'] for report in reports)} rejoins, "
+          f"{lost} not taken): {min(rates):.2f} frames/s, logs of {max(logs)} bytes at most", flush=True)  # fmt: skip
+    reports = [client.stop() for client in clients]
+    print(f"  {sum(report['resyncs'] for report in reports)} rejoins, "
           f"{sum(report['hash_mismatches'] for report in reports)} mismatches")  # fmt: skip
     if min(rates) < FRAMES_PER_S * 0.99:
         raise Failed(f"{min(rates):.2f} frames/s")
