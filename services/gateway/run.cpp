@@ -251,11 +251,15 @@ int run(const Options& options, SignalWatch& signals) {
   }
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.session = options.session;
   dds.secure = options.secure;
   dds.stop = &signals.stop();
   auto port = transport::make_dds_client_port(dds);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+  if (!options.profile.empty())
+    spdlog::info("{}",
+                 transport::describe_dds_profile(options.domain, options.profile, transport::Side::kClient));
 
   Service service(options, Admission(std::move(token), options.origins), **port);
   if (options.metrics) {

@@ -117,6 +117,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.session = options.session;
   dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
@@ -367,6 +368,9 @@ int run_daemon(Options options, SignalWatch& signals) {
     if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
     if (first) {
       warn_without_security(options);
+      if (!options.profile.empty())
+        spdlog::info(
+            "{}", transport::describe_dds_profile(options.domain, options.profile, transport::Side::kServer));
       if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
         return signals.finish(report_error(opened.error(), 1));
       if (options.metrics) {

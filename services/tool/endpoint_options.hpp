@@ -1,6 +1,8 @@
 #pragma once
-// Options that several commands share: --domain, --session and --secure of those that use DDS, --prefer of
-// clients.
+// Options that several commands share: --domain, --profile, --session and --secure of those that use DDS,
+// --prefer of clients.
+
+#include <fmt/format.h>
 
 #include <cstdint>
 #include <string>
@@ -8,12 +10,23 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/commandline/commandline.hpp"
+#include "services/tool/print_error.hpp"
 
 namespace tandem::tool {
 
-/// Both outlive `command`.
-inline void add_endpoint_options(commandline::Command command, std::uint32_t& domain, std::string& session) {
+/// --domain and --profile. Both outlive `command`.
+inline void add_domain_options(commandline::Command command, std::uint32_t& domain, std::string& profile,
+                               transport::Side side = transport::Side::kClient) {
   command.add_option("--domain", domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
+  command.add_option("--profile", profile, transport::kProfileHelp).check([side](const std::string& text) {
+    return transport::refusal_of_profile(text, side);
+  });
+}
+
+/// These and --session. All outlive `command`.
+inline void add_endpoint_options(commandline::Command command, std::uint32_t& domain, std::string& profile,
+                                 std::string& session, transport::Side side = transport::Side::kClient) {
+  add_domain_options(command, domain, profile, side);
   command.add_option("--session", session, "Session name")
       .check([](const std::string& name) {
         const auto ok = transport::check_session_name(name);
@@ -28,6 +41,13 @@ inline void add_secure_option(commandline::Command command, std::string& secure)
       "--secure", secure,
       "Folder of this program's identity for DDS Security, made by `tandem pki issue`; those without one "
       "are then strangers");
+}
+
+/// Says on stderr what the profile uses, if there is one. Call it when the domain is open.
+inline void tell_profile(const char* program, std::uint32_t domain, const std::string& profile,
+                         transport::Side side = transport::Side::kClient) {
+  if (!profile.empty())
+    print_error(fmt::format("{}: {}\n", program, transport::describe_dds_profile(domain, profile, side)));
 }
 
 /// `prefer` outlives `command`.

@@ -28,6 +28,7 @@ constexpr std::int64_t kRepeatNs = kSecond / 4;
 
 struct Options {
   std::uint32_t domain = 0;
+  std::string profile = {};  ///< of the network
   std::string secure;
   std::string session = "default";
   bool json = false;
@@ -66,9 +67,11 @@ int run_handover(const Options& options) {
   SignalWatch signals(kName);
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.secure = options.secure;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) return failed(monitor.error().message);
+  tell_profile(kName, options.domain, options.profile);
   Servers servers;
   const std::int64_t began_ns = transport::steady_ns();
   while ((!servers.live || !servers.standby) && transport::steady_ns() - began_ns < kFindNs) {
@@ -131,9 +134,7 @@ void add_handover(commandline::Command app, Run& run) {
       "upgrade it.");
   const auto options = std::make_shared<Options>();
   command.add_option("session", options->session, "Session").show_default();
-  command.add_option("--domain", options->domain, "DDS domain")
-      .range(0U, transport::kMaxDomain)
-      .show_default();
+  add_domain_options(command, options->domain, options->profile);
   add_secure_option(command, options->secure);
   command.add_flag("--json", options->json, "Print one JSON object");
   command.footer(

@@ -57,6 +57,7 @@ Result<void> HeadlessClient::open() {
   core.log = [this](LogLevel, std::string_view line) { tell(std::string(line)); };
   transport::DdsOptions dds;
   dds.domain = options_.domain;
+  dds.profile = options_.profile;
   dds.session = options_.session;
   dds.client = core.id;
   dds.secure = options_.secure;
@@ -65,6 +66,8 @@ Result<void> HeadlessClient::open() {
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());
   port_ = std::move(*port);
+  if (!options_.profile.empty() && options_.index == 0)
+    tell(transport::describe_dds_profile(options_.domain, options_.profile, transport::Side::kClient));
   if (recorder_) recording_port_ = std::make_unique<RecordingPort>(*port_, *recorder_);
   transport::ClientPort& used =
       recording_port_ ? static_cast<transport::ClientPort&>(*recording_port_) : *port_;

@@ -34,6 +34,7 @@ using transport::wall_ns;
 struct ReplayOptions {
   std::string file;
   std::uint32_t domain = 0;
+  std::string profile = {};  ///< of the network
   std::string secure;
   std::string session = "default";
   double rate = 1;
@@ -89,6 +90,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   config.clock_ns = &steady_ns;
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.session = options.session;
   dds.secure = options.secure;
   dds.delta_depth =
@@ -97,6 +99,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
   state.port = std::move(*port);
+  if (first) tell_profile("tandem replay", options.domain, options.profile, transport::Side::kServer);
   auto frames = std::make_unique<RecordedSource>(playback, config, state.seeks);
   const RecordedSource& source = *frames;
   const auto host = host::Host::create(config, std::move(frames), *state.port);
@@ -185,7 +188,8 @@ void add_replay(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand("replay", "Publishes a recorded session again.");
   const auto options = std::make_shared<ReplayOptions>();
   command.add_option("file", options->file, "File that `tandem record` wrote").required();
-  add_endpoint_options(command, options->domain, options->session);
+  add_endpoint_options(command, options->domain, options->profile, options->session,
+                       transport::Side::kServer);
   add_secure_option(command, options->secure);
   command
       .add_option("--rate", options->rate,

@@ -26,6 +26,7 @@ constexpr std::int64_t kOnceNs = 5 * kSecond / 2;
 
 struct TopOptions {
   std::uint32_t domain = 0;
+  std::string profile = {};  ///< of the network
   std::string secure;
   std::string session;
   bool once = false, json = false, stream = false;
@@ -62,12 +63,14 @@ int run_top(const TopOptions& options) {
   SignalWatch signals("tandem top");
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.secure = options.secure;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
     return 1;
   }
+  tell_profile("tandem top", options.domain, options.profile);
   std::signal(SIGPIPE, SIG_IGN);
   TopView view;
   if (!options.session.empty()) view.only(options.session);
@@ -95,9 +98,7 @@ void add_top(commandline::Command app, Run& run) {
   commandline::Command command =
       app.add_subcommand("top", "Shows the sessions and clients of a domain, their bandwidth and lag.");
   const auto options = std::make_shared<TopOptions>();
-  command.add_option("--domain", options->domain, "DDS domain")
-      .range(0U, transport::kMaxDomain)
-      .show_default();
+  add_domain_options(command, options->domain, options->profile);
   add_secure_option(command, options->secure);
   command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(

@@ -62,8 +62,9 @@ EDGES = {
     "sdk/core/timeline": TABLES,
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
+    "sdk/transport/network": ["public/result.hpp"],
+    "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network", "sdk/transport/secure"],
     "sdk/transport/secure": ["public/result.hpp"],
-    "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/secure"],
     "sdk/statistics": [],
     "sdk/client/drawing": OF_CLIENT,
     "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
@@ -102,6 +103,7 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
+    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd/configuration": OF_TANDEMD,
@@ -117,7 +119,7 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/metrics", "services/pki", "services/process", "services/recording", "services/scenes", "services/system"]
+    + ["services/doctor", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes", "services/system"]
     + ["sdk/transport/secure"],
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],

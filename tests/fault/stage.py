@@ -100,6 +100,12 @@ def cut_link():
     shell("tc", "qdisc", "replace", "dev", "lo", "root", "tbf", "rate", "8kbit", "burst", "20", "limit", "20")
 
 
+def environment(interface):
+    """Return what programs inherit: they use this interface; with None they have no CYCLONEDDS_URI, and decide themselves."""
+    inherited = {name: value for name, value in os.environ.items() if name != "CYCLONEDDS_URI"}
+    return {**inherited, "CYCLONEDDS_URI": URI.format(interface)} if interface else inherited
+
+
 class Process:
     """A program whose stderr is read line by line, with the time of each."""
 
@@ -108,7 +114,7 @@ class Process:
         self.lines = []
         self.process = subprocess.Popen(
             [str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, errors="replace", env={**os.environ, "CYCLONEDDS_URI": URI.format(interface)},
+            text=True, errors="replace", env=environment(interface),
         )  # fmt: skip
         threading.Thread(target=self.read, daemon=True).start()
 
@@ -191,11 +197,16 @@ class Stage:
     def client(self, *more, namespace=None):
         return self.start(self.options.tandem, "join", "--json", "--live", *more, namespace=namespace)
 
-    def end(self):
+    def end_all(self):
+        """End all programs that run."""
         for each in self.running:
             if each.process.poll() is None:
                 each.process.kill()
             each.process.wait()
+        self.running.clear()
+
+    def end(self):
+        self.end_all()
         shutil.rmtree(self.folder)
 
 

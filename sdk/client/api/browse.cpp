@@ -62,18 +62,24 @@ using namespace tandem;  // what follows is C
 using namespace tandem::api;
 
 tandem_result tandem_browser_open(uint32_t domain, tandem_browser* browser) noexcept {
-  return tandem_browser_open_secure(domain, nullptr, browser);
+  tandem_options options = TANDEM_OPTIONS_INIT;
+  options.domain = domain;
+  return tandem_browser_open_with(&options, browser);
 }
 
-tandem_result tandem_browser_open_secure(uint32_t domain, const char* secure,
-                                         tandem_browser* browser) noexcept {
+tandem_result tandem_browser_open_with(const tandem_options* options, tandem_browser* browser) noexcept {
   return call([&] {
     if (browser == nullptr) return null_pointer("`browser` is null");
     if (in_forked_child()) return forked_child();
-    transport::DdsOptions options;
-    options.domain = domain;
-    if (secure != nullptr) options.secure = secure;
-    auto monitor = transport::make_dds_monitor(options);
+    tandem_options ours = TANDEM_OPTIONS_INIT;
+    if (options != nullptr) {
+      if (const auto read = read_struct(options, ours); read != TANDEM_OK) return read;
+    }
+    transport::DdsOptions dds;
+    dds.domain = ours.domain;
+    if (ours.profile != nullptr) dds.profile = ours.profile;
+    if (ours.secure != nullptr) dds.secure = ours.secure;
+    auto monitor = transport::make_dds_monitor(dds);
     if (!monitor) return refuse(monitor.error());
     return browse_over(std::move(*monitor), browser);
   });

@@ -151,6 +151,7 @@ tandem_result tandem_join(const tandem_options* options, tandem_client* client) 
     auto core = core_options(ours);
     transport::DdsOptions dds;
     dds.domain = ours.domain;
+    if (ours.profile != nullptr) dds.profile = ours.profile;
     dds.session = core.session;
     dds.client = core.id;
     if (ours.secure != nullptr) dds.secure = ours.secure;

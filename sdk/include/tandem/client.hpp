@@ -40,6 +40,9 @@ struct ClientOptions {
   /// Which of the session's streams to play: "auto", "bandwidth", "computing", "error" or a name; see
   /// tandem_options::prefer.
   std::string prefer = "auto";
+  /// The kind of network, "NAME" or "NAME:key=value,..."; see tandem_options::profile. Empty: CYCLONEDDS_URI
+  /// decides.
+  std::string profile = {};
   /// Folder of this program's identity for DDS Security; see tandem_options::secure. Empty: none.
   std::string secure = {};
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
@@ -156,6 +159,7 @@ class Client {
     c.background = options.background ? 1 : 0;
     c.echo = options.echo ? 1 : 0;
     c.prefer = options.prefer.c_str();
+    c.profile = options.profile.c_str();
     if (options.log) {
       client.log_ = std::make_unique<Log>(options.log);
       c.log = &call_log;
@@ -310,13 +314,16 @@ class Client {
 /// Watches the sessions of a domain without joining any. Movable. All members may be called from any thread.
 class Browser {
  public:
-  /// `secure`: as ClientOptions::secure. Errors: kInvalidArgument (domain, identity), kIo (identity),
-  /// kTransport (DDS could not start).
-  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0, const std::string& secure = {}) {
+  /// `profile`, `secure`: see ClientOptions. Errors: kInvalidArgument (domain, profile, identity), kIo
+  /// (identity), kTransport (DDS could not start).
+  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0, const std::string& profile = {},
+                                            const std::string& secure = {}) {
     Browser browser;
-    if (const auto opened =
-            Client::checked(tandem_browser_open_secure(domain, secure.c_str(), &browser.handle_));
-        !opened)
+    tandem_options c = TANDEM_OPTIONS_INIT;
+    c.domain = domain;
+    c.profile = profile.c_str();
+    c.secure = secure.c_str();
+    if (const auto opened = Client::checked(tandem_browser_open_with(&c, &browser.handle_)); !opened)
       return Client::unexpected(opened);
     return browser;
   }
@@ -343,8 +350,9 @@ class Browser {
 
 /// The sessions of a domain, after watching it for `watch_s`.
 [[nodiscard]] inline Result<std::vector<SessionInfo>> sessions(std::uint32_t domain = 0, double watch_s = 2,
+                                                               const std::string& profile = {},
                                                                const std::string& secure = {}) {
-  const auto browser = Browser::open(domain, secure);
+  const auto browser = Browser::open(domain, profile, secure);
   if (!browser) return tl::unexpected<Error>(browser.error());
   std::this_thread::sleep_for(std::chrono::duration<double>(watch_s));
   return browser->sessions();

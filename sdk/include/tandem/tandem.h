@@ -163,19 +163,24 @@ typedef struct tandem_options {
    * stream's name. While it plays, the client changes to another stream if processor or link cannot follow,
    * or if another stream suits the preference better, but never leaves one that was named. Null: "auto". */
   const char* prefer;
+  /** The kind of network, "NAME" or "NAME:key=value,...": "loopback", "lan", "wifi", "wan:server=ADDRESS" or
+   * "multihomed:interface=NAME,interface=NAME" (deploy/dds says more). All clients and browsers of a process
+   * on a domain have the same. With one, CYCLONEDDS_URI is not used. Null or "": Tandem's defaults and then
+   * CYCLONEDDS_URI. */
+  const char* profile;
   /** DDS Security: the folder of this program's identity, which `tandem pki issue` made. Null or empty: none. With
    * an observer's identity a client can only join as an observer. */
   const char* secure;
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL }
 
 /** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults
  * @param client   the new client, to be closed by tandem_leave()
- * @return also TANDEM_TRANSPORT (DDS could not start) and TANDEM_IO (a file in `secure`; a file that is not good is
- * TANDEM_INVALID_ARGUMENT, and the error text names it and the cure) */
+ * @return also TANDEM_TRANSPORT (DDS could not start; an interface of the profile is not there) and
+ * TANDEM_IO (a file in `secure`; if one is not good, TANDEM_INVALID_ARGUMENT and a text with file and cure) */
 TANDEM_API tandem_result tandem_join(const tandem_options* options, tandem_client* client) TANDEM_NOEXCEPT;
 
 /** Leaves the session and frees everything that the client holds. Waits for calls of other threads with this
@@ -571,11 +576,10 @@ typedef struct tandem_session_info {
  * @param browser  the new browser, to be closed by tandem_browser_close()
  * @return also TANDEM_TRANSPORT (DDS could not start) */
 TANDEM_API tandem_result tandem_browser_open(uint32_t domain, tandem_browser* browser) TANDEM_NOEXCEPT;
-/** As tandem_browser_open(), with DDS Security.
- * @param secure  as tandem_options::secure
- * @return also what tandem_join() returns for `secure` */
-TANDEM_API tandem_result tandem_browser_open_secure(uint32_t domain, const char* secure,
-                                                    tandem_browser* browser) TANDEM_NOEXCEPT;
+/** The same with options, of which only `domain`, `profile` and `secure` are used.
+ * @param options  null: the defaults */
+TANDEM_API tandem_result tandem_browser_open_with(const tandem_options* options,
+                                                  tandem_browser* browser) TANDEM_NOEXCEPT;
 /** Writes the sessions that are on the domain now, sorted by name. Does not wait: right after
  * tandem_browser_open() no session is known; each is found within one or two seconds.
  * @param sessions  `capacity` structs, the first with its size; may be null if capacity is 0

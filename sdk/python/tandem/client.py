@@ -36,12 +36,19 @@ def clock_ns() -> int:
     return _client.clock_ns()
 
 
-def sessions(domain: int = 0, wait: float = 2.0, secure: str = "") -> list[SessionInfo]:
+def _no_nul(text: str, what: str) -> str:
+    if "\0" in text:  # C would read it only up to there
+        raise Error(Result.INVALID_ARGUMENT, f"{what} has no NUL")
+    return text
+
+
+def sessions(domain: int = 0, wait: float = 2.0, profile: str = "", secure: str = "") -> list[SessionInfo]:
     """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name.
 
-    secure  folder of this program's identity for DDS Security; empty: none
+    profile     the kind of network, as of a Client
+    secure      folder of this program's identity for DDS Security; empty: none
     """
-    browser = _client.Browser(domain, secure)
+    browser = _client.Browser(domain, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"))
     time.sleep(wait)
     return [SessionInfo._of(session) for session in browser.list()]
 
@@ -93,6 +100,7 @@ class Client:
         background: bool = True,
         echo: bool = False,
         prefer: str = "auto",
+        profile: str = "",
         secure: str = "",
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
@@ -106,6 +114,9 @@ class Client:
                     least once a frame, which does all the work
         echo        EXPERIMENTAL: sample() shows the application's own gravity at once
         prefer      which stream to play: "auto", "bandwidth", "computing", "error", or a stream's name
+        profile     the kind of network: "loopback", "lan", "wifi", "wan:server=ADDRESS" or
+                    "multihomed:interface=NAME,interface=NAME"; the same for all clients of a process on a domain. With
+                    one, the variable CYCLONEDDS_URI is not used
         secure      folder of this program's identity for DDS Security, made by `tandem pki issue`; empty: none
         log         gets a LogLevel and a line for a human
 
@@ -114,10 +125,11 @@ class Client:
         role = Role.OBSERVER if observe else Role.PARTICIPANT
         if log is not None and not callable(log):
             raise TypeError("log must be a function of a level and a line")
-        if "\0" in session:  # C would read the name only up to there
-            raise Error(Result.INVALID_ARGUMENT, "a session's name has no NUL")
+        _no_nul(session, "a session's name")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
-        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, secure, told)
+        self._connection = _client.Connection(
+            domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"), told
+        )
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
 

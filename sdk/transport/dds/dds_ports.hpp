@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/result.hpp"
 
@@ -20,6 +21,9 @@ inline constexpr std::uint32_t kMaxDomain = 230;
 
 struct DdsOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
+  /// The kind of network, "NAME" or "NAME:key=value,..." (deploy/dds), the same for all ports of a process on
+  /// the domain. With one, CYCLONEDDS_URI is not used. Empty: Tandem's defaults and then CYCLONEDDS_URI.
+  std::string profile = {};
   std::string session = "default";
   /// Client ports: DDS tools show this id, and servers learn it before the session is known, so that their
   /// writers for the client exist when it joins. 0: not announced.
@@ -43,9 +47,10 @@ struct DdsOptions {
   bool acts = true;
 };
 
-/// Joins the domain as "tandemd SESSION". The environment variable CYCLONEDDS_URI overrides Tandem's defaults
-/// (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, session name, depth, lease; an identity that is not
-/// good, or not a server's), kIo (a file of the identity), kTransport (also what CYCLONEDDS_URI causes).
+/// Joins the domain as "tandemd SESSION". Without a profile, the environment variable CYCLONEDDS_URI
+/// overrides Tandem's defaults (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, profile, session name,
+/// depth, lease; an identity that is not good, or not a server's), kIo (a file of the identity), kTransport
+/// (also what CYCLONEDDS_URI and the profile's interfaces cause).
 [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
 
 /// Joins the domain as "tandem client ID". Errors: as above. A port that does not act cannot write inputs.
@@ -72,13 +77,32 @@ class Monitor {
 /// once; only programs do, as the sink is one for the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
-/// Opens the domain, calls `while_open` if it is not empty, and closes the domain, without a participant and
-/// so without traffic. Errors: kTransport for what CYCLONEDDS_URI causes, of which Cyclone DDS writes the
-/// details to stderr.
-[[nodiscard]] Result<void> check_dds_domain(std::uint32_t domain,
-                                            const std::function<void()>& while_open = {});
+/// A participant of a domain, in its own words.
+struct HeardParticipant {
+  std::string name;                    ///< "tandemd SESSION", "tandem client ID"; other text for strangers
+  std::string host;                    ///< empty unless it uses Cyclone DDS
+  std::vector<std::string> addresses;  ///< as host
+  bool own = false;                    ///< the one that listens
+};
 
-/// Joins the domain as "tandem monitor"; only `options.domain` and `options.secure` are used. Errors: as
+/// Joins the domain as "tandem doctor", without a topic of ours, and listens until `enough` says so or for
+/// `patience`. Returns the participants there are then, itself included; at most 256. Errors: as a port's.
+[[nodiscard]] Result<std::vector<HeardParticipant>> listen_for_participants(
+    std::uint32_t domain, const std::string& profile, Side side, std::chrono::nanoseconds patience,
+    const std::function<bool(const std::vector<HeardParticipant>&)>& enough);
+
+/// What --help says of --profile.
+inline constexpr const char* kProfileHelp =
+    "The kind of network, with which CYCLONEDDS_URI is not used: loopback, lan, wifi, wan or multihomed, with parameters "
+    "behind a colon, as in lan:interface=eth0 or wan:server=203.0.113.5 (deploy/dds)";
+/// Why the text is no profile; empty: it is one.
+[[nodiscard]] std::string refusal_of_profile(const std::string& text, Side side);
+
+/// A line for people about a profile: what it uses of this machine, and that it stands above CYCLONEDDS_URI.
+/// Empty without a profile, or if it cannot be used here.
+[[nodiscard]] std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side);
+
+/// Joins the domain as "tandem monitor"; only domain, profile and identity of `options` are used. Errors: as
 /// above.
 [[nodiscard]] Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options);
 

@@ -13,6 +13,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/plain_text.hpp"
 
 namespace tandem::transport::dds {
@@ -22,6 +23,8 @@ struct Domains {
   struct Use {
     dds_entity_t handle = 0;  // 0: created by others, so not deleted here
     unsigned users = 0;
+    std::string profile = {};
+    Side side = Side::kClient;
   };
   std::mutex mutex;
   std::map<std::uint32_t, Use> uses;
@@ -51,10 +54,48 @@ std::string defaults(Repeat repeat) {
          " B</MaxSampleSize></Internal></Domain></CycloneDDS>";
 }
 
+Side side_of(Repeat repeat) { return repeat == Repeat::kSoon ? Side::kServer : Side::kClient; }
+
+Result<Profile> profile_here(std::uint32_t domain, Side side, const std::string& text,
+                             const Surroundings& machine) {
+  auto profile = parse_profile(text, side);
+  if (!profile) return fail(profile.error().code, "profile: " + profile.error().message);
+  return resolve_profile(std::move(*profile), side, domain, machine);
+}
+
+/// Whether a further port may use a domain that this process has opened before.
+Result<void> check_same(const Domains::Use& before, const std::string& profile, Side side,
+                        std::uint32_t domain) {
+  const std::string opened = "this process has opened DDS domain " + std::to_string(domain);
+  if (before.profile != profile) {
+    return fail(ErrorCode::kInvalidArgument,
+                opened + " with " +
+                    (before.profile.empty() ? "no profile" : "the profile " + before.profile) +
+                    "; it can have one only");
+  }
+  if (!profile.empty() && side == Side::kServer && before.side == Side::kClient) {
+    return fail(ErrorCode::kInvalidArgument,
+                opened + " for a client, with the profile " + profile + ": start its server first");
+  }
+  return {};
+}
+
+std::string cannot_open(std::uint32_t domain, dds_return_t why, const std::string& profile) {
+  std::string text =
+      "DDS domain " + std::to_string(domain) + " cannot be opened (" + dds_strretcode(why) + "): ";
+  if (profile.empty()) return text + "check CYCLONEDDS_URI, the interfaces it names and the number";
+  return text + "Cyclone DDS refuses the profile " + profile;
+}
+
 }  // namespace
 
-std::string domain_configuration(Repeat repeat) {
+Result<std::string> domain_configuration(std::uint32_t domain, Repeat repeat, const std::string& profile) {
   std::string configuration = defaults(repeat);
+  if (!profile.empty()) {
+    const auto here = profile_here(domain, side_of(repeat), profile, surroundings());
+    if (!here) return tl::unexpected(here.error());
+    return configuration + ',' + profile_xml(*here, side_of(repeat));
+  }
   if (const char* theirs = std::getenv("CYCLONEDDS_URI"); theirs != nullptr && *theirs != '\0') {
     configuration += ',';
     configuration += theirs;
@@ -62,19 +103,28 @@ std::string domain_configuration(Repeat repeat) {
   return configuration;
 }
 
-Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat) {
+Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat, const std::string& profile) {
+  const Side side = side_of(repeat);
   const std::lock_guard lock(domains().mutex);
   if (const auto known = domains().uses.find(domain); known != domains().uses.end()) {
+    if (auto same = check_same(known->second, profile, side, domain); !same)
+      return tl::unexpected(same.error());
     ++known->second.users;
     return DomainUse(domain);
   }
-  const dds_entity_t handle = dds_create_domain(domain, domain_configuration(repeat).c_str());
-  if (handle < 0 && handle != DDS_RETCODE_PRECONDITION_NOT_MET) {
-    return fail(ErrorCode::kTransport, "DDS domain " + std::to_string(domain) + " cannot be opened (" +
-                                           dds_strretcode(handle) +
-                                           "): check CYCLONEDDS_URI, the interfaces it names and the number");
+  const auto configuration = domain_configuration(domain, repeat, profile);
+  if (!configuration) return tl::unexpected(configuration.error());
+  const dds_entity_t handle = dds_create_domain(domain, configuration->c_str());
+  const bool of_others = handle == DDS_RETCODE_PRECONDITION_NOT_MET;
+  if (handle < 0 && !of_others) {
+    return fail(ErrorCode::kTransport, cannot_open(domain, handle, profile));
   }
-  domains().uses.emplace(domain, Domains::Use{handle > 0 ? handle : 0, 1});
+  if (of_others && !profile.empty()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "profile: this process has DDS domain " + std::to_string(domain) +
+                    " open already, not by Tandem, so that the profile " + profile + " would have no effect");
+  }
+  domains().uses.emplace(domain, Domains::Use{of_others ? 0 : handle, 1, profile, side});
   return DomainUse(domain);
 }
 
@@ -101,6 +151,36 @@ namespace {
 using WriteLine = void (*)(std::string_view line, bool error);
 // Cyclone gives back only an address of data, and a function is none.
 WriteLine write_line = nullptr;
+
+/// Cyclone DDS has a line for each datagram that cannot be sent, which can be a hundred a second. Of those to
+/// one address one a minute passes, with what it may mean. Thread-safe.
+class Unsendable {
+ public:
+  /// Returns the line to write; empty: none.
+  std::string judge(std::string_view line) {
+    const std::size_t begin = line.find(kBefore), end = line.find(kBehind);
+    if (begin == std::string_view::npos || end == std::string_view::npos || end < begin + kBefore.size())
+      return std::string(line);
+    const std::string to(line.substr(begin + kBefore.size(), end - begin - kBefore.size()));
+    const auto now = std::chrono::steady_clock::now();
+    const std::lock_guard lock(mutex_);
+    if (const auto told = told_.find(to); told != told_.end() && now - told->second < kInterval) return {};
+    if (told_.size() >= kMostAddresses) told_.clear();
+    told_[to] = now;
+    std::string text = "datagrams to " + to + " cannot be sent";
+    if (is_private(to.substr(0, to.find(':'))))
+      text += "; if that is a client behind NAT, it needs external=ADDRESS in its --profile wan";
+    return text;
+  }
+
+ private:
+  static constexpr std::string_view kBefore = "ddsi_udp_conn_write to udp/", kBehind = " failed with retcode";
+  static constexpr auto kInterval = std::chrono::minutes(1);
+  static constexpr std::size_t kMostAddresses = 1024;
+
+  std::mutex mutex_;
+  std::map<std::string, std::chrono::steady_clock::time_point> told_;
+};
 
 // Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes.
 class Complaints {
@@ -132,25 +212,37 @@ class Complaints {
   std::chrono::steady_clock::time_point last_;
 };
 
-void on_line(void* /*argument*/, const dds_log_data_t* data) {
+void on_line(void* unsendable, const dds_log_data_t* data) {
   static auto* const complaints = new Complaints;  // Cyclone's threads may outlive static objects
   std::string_view line(data->message);
   while (!line.empty() && line.back() == '\n') line.remove_suffix(1);
   if ((data->priority & DDS_LC_FATAL) != 0) return write_line(line, true);
-  complaints->take(line);
+  const std::string judged = static_cast<Unsendable*>(unsendable)->judge(line);
+  if (!judged.empty()) complaints->take(judged);
 }
 
 }  // namespace
 
 void set_dds_log(WriteLine write) {
   write_line = write;
-  dds_set_log_sink(&on_line, nullptr);
+  dds_set_log_sink(&on_line, new Unsendable);  // for as long as the process lives, as the sink
 }
 
-Result<void> check_dds_domain(std::uint32_t domain, const std::function<void()>& while_open) {
-  return dds::DomainUse::acquire(domain, dds::Repeat::kSeldom).map([&](const dds::DomainUse&) {
-    if (while_open) while_open();
-  });
+std::string refusal_of_profile(const std::string& text, Side side) {
+  const auto profile = parse_profile(text, side);
+  return profile ? std::string() : profile.error().message;
+}
+
+std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side) {
+  if (profile.empty()) return {};
+  Surroundings machine = surroundings();
+  machine.port_taken = [](std::uint32_t /*port*/) { return false; };  // by the caller itself, perhaps
+  const auto here = dds::profile_here(domain, side, profile, machine);
+  if (!here) return {};
+  std::string text = describe(*here, side, domain, machine);
+  const char* const theirs = std::getenv("CYCLONEDDS_URI");
+  if (theirs != nullptr && *theirs != '\0') text += "; CYCLONEDDS_URI is set too, and not used";
+  return text;
 }
 
 }  // namespace tandem::transport

@@ -15,14 +15,16 @@ enum class Repeat : std::uint8_t {
             ///< link has no room for that
 };
 
-/// Keeps a domain alive. The first use in a process creates the domain from Tandem's defaults and then
-/// CYCLONEDDS_URI, so that the user's settings win. The last use ends it. A domain that the application
-/// created itself is used as it is. Thread-safe.
+/// Keeps a domain alive. The first use in a process creates the domain from Tandem's defaults and then the
+/// profile (DdsOptions::profile) or, without one, CYCLONEDDS_URI. The last use ends it. A domain that the
+/// application created itself is used as it is. Thread-safe.
 class DomainUse {
  public:
-  /// Errors: kTransport if no domain can be made, for example if an interface that CYCLONEDDS_URI names does
-  /// not exist (yet).
-  static Result<DomainUse> acquire(std::uint32_t domain, Repeat repeat);
+  /// `repeat` also says the side: servers repeat soon. Errors: kInvalidArgument for a profile that is none,
+  /// that differs from the one with which the process opened the domain, or that cannot have an effect;
+  /// kTransport if no domain can be made, for example if an interface that profile or CYCLONEDDS_URI name
+  /// does not exist (yet).
+  static Result<DomainUse> acquire(std::uint32_t domain, Repeat repeat, const std::string& profile);
   DomainUse(DomainUse&& other) noexcept;
   DomainUse& operator=(DomainUse&&) = delete;
   DomainUse(const DomainUse&) = delete;
@@ -35,7 +37,8 @@ class DomainUse {
   bool held_;
 };
 
-/// The configuration that acquire() passes to Cyclone DDS.
-[[nodiscard]] std::string domain_configuration(Repeat repeat);
+/// The configuration that acquire() passes to Cyclone DDS. Errors: as there, for a profile.
+[[nodiscard]] Result<std::string> domain_configuration(std::uint32_t domain, Repeat repeat,
+                                                       const std::string& profile);
 
 }  // namespace tandem::transport::dds

@@ -51,7 +51,7 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
   if (options.lease < std::chrono::milliseconds(100)) {
     return fail(ErrorCode::kInvalidArgument, "a lease under 0.1 s declares healthy peers dead");
   }
-  auto domain = DomainUse::acquire(options.domain, repeat);
+  auto domain = DomainUse::acquire(options.domain, repeat, options.profile);
   if (!domain) return tl::unexpected(domain.error());
   Node node(std::move(*domain), options);
 

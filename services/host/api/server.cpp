@@ -163,6 +163,7 @@ Result<Server> Server::start(const ServerOptions& options, engine::Simulation& s
   if (!largest) return tl::unexpected(largest.error());
   transport::DdsOptions dds;
   dds.domain = options.domain;
+  dds.profile = options.profile;
   dds.session = options.session;
   dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config->frame_rate_hz, config->window_ceiling, *largest);

@@ -75,6 +75,7 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
   flags.add("secure", &Config::mutable_secure);
+  flags.add("profile", &Config::mutable_profile);
   flags.add("codec", &Config::mutable_codec);
   flags.add("predictor", &Config::mutable_predictor);
   app.add_option_function<std::vector<std::string>>(

@@ -251,6 +251,11 @@ Result<Options> checked(const ServerConfig& config) {
   if (config.has_session()) options.session = config.session();
   options.domain = config.domain();
   options.secure = config.secure();
+  if (config.has_profile()) {
+    options.profile = config.profile();
+    if (const auto good = transport::parse_profile(options.profile, transport::Side::kServer); !good)
+      return refuse("profile", good.error().message);
+  }
   if (config.has_lead()) options.lead = config.lead();
   if (config.has_client_limit()) options.client_limit = config.client_limit();
   options.wait_for = config.wait_for();

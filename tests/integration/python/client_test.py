@@ -211,6 +211,18 @@ class Playing(unittest.TestCase):
         self.assertEqual((found[0].capacity, found[0].frame_rate_hz), (BODIES, 30))
         self.assertEqual(tandem.sessions(stage.DOMAIN + 1, wait=0), [])
 
+    def test_a_profile_is_the_kind_of_network(self):
+        self.assertEqual(tandem.sessions(stage.DOMAIN + 2, wait=0, profile="loopback"), [])
+        with tandem.Client(domain=stage.DOMAIN + 3, profile="loopback") as client:
+            self.assertEqual(client.status().phase, Phase.SEARCHING)
+            with self.refused(Result.INVALID_ARGUMENT):  # one process, one profile on a domain
+                tandem.Client(domain=stage.DOMAIN + 3)
+        for wrong in ("moon", "wan", "lan\0"):
+            with self.refused(Result.INVALID_ARGUMENT):
+                tandem.Client(domain=stage.DOMAIN + 4, profile=wrong)
+        with self.refused(Result.TRANSPORT):
+            tandem.sessions(stage.DOMAIN + 4, wait=0, profile="lan:interface=nowhere0")
+
     def test_an_application_updates_by_itself(self):
         with join(background=False) as client:
             with self.refused(Result.WRONG_THREAD):

@@ -160,6 +160,39 @@ TEST_F(DdsPorts, AConfigurationThatMakesNoDomainIsATransportErrorThatNamesIt) {
   EXPECT_EQ(make_dds_server_port(options_).error().code, ErrorCode::kInvalidArgument);
 }
 
+// One process has one domain, and one set of sockets in it.
+TEST_F(DdsPorts, AProfileIsTheSameForAllPortsOfAProcessAndStandsAboveTheEnvironment) {
+  setenv("CYCLONEDDS_URI", "<CycloneDDS><NoSuchThing/></CycloneDDS>", 1);
+  options_.profile = "loopback";
+  const auto server = make_dds_server_port(options_);
+  ASSERT_TRUE(server) << server.error().message;
+  ASSERT_TRUE(make_dds_client_port(options_));
+  for (const char* other : {"", "lan"}) {
+    options_.profile = other;
+    const auto port = make_dds_client_port(options_);
+    ASSERT_FALSE(port) << other;
+    EXPECT_EQ(port.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(port.error().message.find("with the profile loopback"), std::string::npos)
+        << port.error().message;
+  }
+}
+
+TEST_F(DdsPorts, AServerHasToOpenTheDomainOfAProfileBeforeItsClients) {
+  options_.profile = "loopback";
+  const auto client = make_dds_client_port(options_);
+  ASSERT_TRUE(client) << client.error().message;
+  EXPECT_EQ(make_dds_server_port(options_).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(DdsPorts, AProfileThatIsNoneOrNotOfThisMachineIsRefused) {
+  options_.profile = "moon";
+  EXPECT_EQ(make_dds_client_port(options_).error().code, ErrorCode::kInvalidArgument);
+  options_.profile = "lan:interface=nowhere0";
+  const auto port = make_dds_client_port(options_);
+  EXPECT_EQ(port.error().code, ErrorCode::kTransport) << "the interface may come";
+  EXPECT_NE(port.error().message.find("no interface 'nowhere0'"), std::string::npos) << port.error().message;
+}
+
 TEST_F(DdsPorts, EveryTopicArrivesAsItWasWritten) {
   const auto server = this->server();
   const auto client = this->client();

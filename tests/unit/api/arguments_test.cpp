@@ -82,6 +82,7 @@ TEST_F(Arguments, NullPointersAreRefused) {
   const std::array<double, 3> vector{};
   EXPECT_EQ(tandem_join(nullptr, nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_browser_open(0, nullptr), TANDEM_INVALID_ARGUMENT);
+  EXPECT_EQ(tandem_browser_open_with(nullptr, nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_get_status(client, nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_next_event(client, nullptr), TANDEM_INVALID_ARGUMENT);
   EXPECT_EQ(tandem_send_gravity(client, nullptr, nullptr), TANDEM_INVALID_ARGUMENT);
@@ -112,8 +113,14 @@ TEST_F(Arguments, OptionsOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& o) { o.background = 2; }));
   EXPECT_TRUE(refused([](auto& o) { o.echo = 2; }));
   EXPECT_TRUE(refused([](auto& o) { o.size = 0; }));
+  EXPECT_TRUE(refused([](auto& o) { o.profile = "moon"; }));
+  EXPECT_TRUE(refused([](auto& o) { o.profile = "wan"; }));
   tandem_browser none = 0;
   EXPECT_EQ(tandem_browser_open(231, &none), TANDEM_INVALID_ARGUMENT);
+  tandem_options options = TANDEM_OPTIONS_INIT;
+  options.profile = "wan";
+  EXPECT_EQ(tandem_browser_open_with(&options, &none), TANDEM_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(tandem_error_text()).find("wan:server=ADDRESS"), std::string::npos);
 }
 
 TEST_F(Arguments, NumbersThatAreNoneAreRefused) {

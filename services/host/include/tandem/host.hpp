@@ -43,6 +43,9 @@ struct ServerOptions {
   /// Folder of the server's identity for DDS Security, made by `tandem pki issue server`. Empty: none, and
   /// everybody on the network can join.
   std::string secure = "";
+  /// The kind of network, "NAME" or "NAME:key=value,..." (deploy/dds). Empty: CYCLONEDDS_URI decides. A
+  /// process that also has clients on the domain starts its server first, and they have the same profile.
+  std::string profile = {};
   /// Maximum distance between a body's position in the simulation and at the clients; if bodies turn, between
   /// the two positions of any point of its surface. Scene units. A smaller threshold makes a frame larger.
   double threshold = 0.01;

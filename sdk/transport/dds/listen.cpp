@@ -1,0 +1,95 @@
+#include <algorithm>
+#include <thread>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/dds/domain.hpp"
+#include "sdk/transport/dds/entity.hpp"
+
+namespace tandem::transport {
+namespace {
+
+// What strangers say of themselves may be of any length and number.
+constexpr std::size_t kMostTextBytes = 256;
+constexpr std::uint32_t kMostParticipants = 256;
+
+std::string take_text(char* text) {
+  if (text == nullptr) return {};
+  std::string taken = std::string(text).substr(0, kMostTextBytes);
+  dds_free(text);
+  return taken;
+}
+
+/// "udp/10.0.0.1:7410@2,udp/..." without what is around the addresses.
+std::vector<std::string> addresses_in(const std::string& text) {
+  std::vector<std::string> addresses;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    std::string one = text.substr(at, comma - at);
+    if (const std::size_t slash = one.find('/'); slash != std::string::npos) one.erase(0, slash + 1);
+    one = one.substr(0, one.find_first_of(":@"));
+    if (one.starts_with("239.")) one.clear();  // groups, which say nothing of the machine
+    if (!one.empty() && std::ranges::find(addresses, one) == addresses.end())
+      addresses.push_back(std::move(one));
+    at = comma + 1;
+  }
+  return addresses;
+}
+
+HeardParticipant describe(const dds_builtintopic_participant_t& participant) {
+  HeardParticipant heard;
+  char* text = nullptr;
+  if (dds_qget_entity_name(participant.qos, &text)) heard.name = take_text(text);
+  if (text = nullptr; dds_qget_prop(participant.qos, "__Hostname", &text)) heard.host = take_text(text);
+  if (text = nullptr; dds_qget_prop(participant.qos, "__NetworkAddresses", &text))
+    heard.addresses = addresses_in(take_text(text));
+  return heard;
+}
+
+std::vector<HeardParticipant> read_all(dds_entity_t reader, const dds_guid_t& self) {
+  std::vector<HeardParticipant> heard;
+  std::vector<void*> samples(kMostParticipants, nullptr);
+  std::vector<dds_sample_info_t> infos(kMostParticipants);
+  const dds_return_t count =
+      dds_read(reader, samples.data(), infos.data(), kMostParticipants, kMostParticipants);
+  for (dds_return_t i = 0; i < count; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (!infos[at].valid_data || infos[at].instance_state != DDS_ALIVE_INSTANCE_STATE) continue;
+    const auto& participant = *static_cast<const dds_builtintopic_participant_t*>(samples[at]);
+    heard.push_back(describe(participant));
+    heard.back().own = std::ranges::equal(participant.key.v, self.v);
+    // Of participants here Cyclone DDS says "localprocess". It sends from sockets that are bound to its
+    // interfaces.
+    if (heard.back().own) heard.back().addresses = own_udp_addresses();
+  }
+  if (count > 0) dds_return_loan(reader, samples.data(), count);
+  return heard;
+}
+
+}  // namespace
+
+Result<std::vector<HeardParticipant>> listen_for_participants(
+    std::uint32_t domain, const std::string& profile, Side side, std::chrono::nanoseconds patience,
+    const std::function<bool(const std::vector<HeardParticipant>&)>& enough) {
+  using dds::own;
+  const auto use = dds::DomainUse::acquire(
+      domain, side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom, profile);
+  if (!use) return tl::unexpected(use.error());
+  const dds::Qos named(dds_create_qos());
+  dds_qset_entity_name(named.get(), "tandem doctor");
+  const auto participant = own(dds_create_participant(domain, named.get(), nullptr), "the participant");
+  if (!participant) return tl::unexpected(participant.error());
+  const auto reader =
+      own(dds_create_reader(participant->get(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
+          "the reader of participants");
+  if (!reader) return tl::unexpected(reader.error());
+  dds_guid_t self{};
+  static_cast<void>(dds_get_guid(participant->get(), &self));
+  const auto until = std::chrono::steady_clock::now() + patience;
+  for (;;) {
+    auto heard = read_all(reader->get(), self);
+    if (std::chrono::steady_clock::now() >= until || enough(heard)) return heard;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+}  // namespace tandem::transport

@@ -1,0 +1,10 @@
+# Writes OUT, a source with the files of FOLDER that NAMES lists with commas, as profile.hpp declares them.
+string(REPLACE "," ";" names "${NAMES}")
+set(source "#include \"sdk/transport/network/profile.hpp\"\n\nnamespace tandem::transport {\n\n")
+string(APPEND source "const std::vector<ProfileFile>& profile_files() {\n  static const std::vector<ProfileFile> files = {\n")
+foreach(name IN LISTS names)
+  file(READ ${FOLDER}/${name}.xml text)
+  string(APPEND source "      {\"${name}\", R\"xml(${text})xml\"},\n")
+endforeach()
+string(APPEND source "  };\n  return files;\n}\n\n}  // namespace tandem::transport\n")
+file(WRITE ${OUT} "${source}")

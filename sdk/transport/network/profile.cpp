@@ -1,0 +1,326 @@
+#include "sdk/transport/network/profile.hpp"
+
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+namespace tandem::transport {
+namespace {
+
+constexpr std::uint32_t kMostPort = 65'535;
+
+/// How often a profile takes a parameter.
+struct Count {
+  std::size_t least = 0, most = 0;
+};
+struct Rule {
+  const char* name;
+  Count interfaces;
+  bool wide_area;  ///< takes server, external and index
+};
+constexpr Rule kRules[] = {{"loopback", {0, 0}, false},
+                           {"lan", {0, 1}, false},
+                           {"wifi", {0, 1}, false},
+                           {"wan", {0, 1}, true},
+                           {"multihomed", {2, kMostInterfaces}, false}};
+constexpr std::size_t kMostServers = 8;
+
+tl::unexpected<Error> wrong(std::string what) { return fail(ErrorCode::kInvalidArgument, std::move(what)); }
+tl::unexpected<Error> failed(const Profile& profile, const std::string& what) {
+  return fail(ErrorCode::kTransport, "profile " + profile.name + ": " + what);
+}
+
+std::string names_of_profiles() {
+  std::string names;
+  for (std::size_t i = 0; i < std::size(kRules); ++i)
+    names += std::string(i == 0 ? "" : i + 1 == std::size(kRules) ? " or " : ", ") + kRules[i].name;
+  return names;
+}
+
+std::string keys_of(const Rule& rule) {
+  if (rule.wide_area) return "server, interface, external and index";
+  return rule.interfaces.most > 0 ? "interface" : "no parameters";
+}
+
+/// What may stand in the configuration as it is.
+bool harmless(std::string_view text) {
+  return !text.empty() && text.size() <= 255 && std::ranges::all_of(text, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::strchr("._:@-", c) != nullptr;
+  });
+}
+
+std::optional<std::uint32_t> number_in(std::string_view text, std::uint32_t most) {
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value > most) return std::nullopt;
+  return value;
+}
+
+bool is_address(const std::string& text) {
+  in_addr address{};
+  return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
+}
+
+/// "HOST:PORT" or "HOST", whose port is then `otherwise`. Empty if the port is none.
+std::optional<std::pair<std::string, std::uint32_t>> host_and_port(const std::string& text,
+                                                                   std::uint32_t otherwise) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) return std::pair(text, otherwise);
+  const auto port = number_in(std::string_view(text).substr(colon + 1), kMostPort);
+  if (!port || *port == 0 || colon == 0) return std::nullopt;
+  return std::pair(text.substr(0, colon), *port);
+}
+
+Result<void> set_parameter(const Rule& rule, std::string_view key, std::string_view value, Profile& profile) {
+  const auto of_wan = [&rule] { return rule.wide_area; };
+  if (key == "interface" && rule.interfaces.most > 0) {
+    profile.interfaces.emplace_back(value);
+  } else if (key == "server" && of_wan()) {
+    if (!host_and_port(std::string(value), 1))
+      return wrong("server must be ADDRESS or ADDRESS:PORT, not '" + std::string(value) + "'");
+    profile.servers.emplace_back(value);
+  } else if (key == "external" && of_wan()) {
+    if (!is_address(std::string(value)))
+      return wrong("external must be an IPv4 address, not '" + std::string(value) + "'");
+    profile.external = value;
+  } else if (key == "index" && of_wan()) {
+    const auto index = number_in(value, kMostServerIndex);
+    if (!index) return wrong("index must be 0 to " + std::to_string(kMostServerIndex));
+    profile.index = *index;
+  } else {
+    return wrong(profile.name + " takes " + keys_of(rule) + ", not '" + std::string(key) + "'");
+  }
+  return {};
+}
+
+Result<void> check_counts(const Rule& rule, const Profile& profile, Side side) {
+  const std::size_t interfaces = profile.interfaces.size();
+  if (interfaces < rule.interfaces.least || interfaces > rule.interfaces.most) {
+    return rule.interfaces.least > 1 ? wrong(profile.name + " needs two to four interfaces: " + profile.name +
+                                             ":interface=NAME,interface=NAME")
+                                     : wrong(profile.name + " takes one interface");
+  }
+  if (profile.servers.size() > kMostServers)
+    return wrong(profile.name + " takes at most " + std::to_string(kMostServers) + " servers");
+  if (rule.wide_area && side == Side::kClient && profile.servers.empty())
+    return wrong(profile.name + " needs the server's address: " + profile.name + ":server=ADDRESS");
+  return {};
+}
+
+std::string usable(const std::vector<Interface>& all) {
+  std::vector<Interface> good;
+  for (const Interface& each : all) {
+    if (each.up && !each.address.empty()) good.push_back(each);
+  }
+  return list_of(good);
+}
+
+Result<void> check_interface(const Profile& profile, const std::string& name, const Surroundings& machine) {
+  const auto found = std::ranges::find(machine.interfaces, name, &Interface::name);
+  if (found == machine.interfaces.end())
+    return failed(profile,
+                  "there is no interface '" + name + "' (there are " + usable(machine.interfaces) + ")");
+  if (!found->up) return failed(profile, "the interface '" + name + "' is down: ip link set " + name + " up");
+  if (found->address.empty()) return failed(profile, "the interface '" + name + "' has no IPv4 address");
+  if (profile.name != "wan" && !found->multicast && !found->loopback)
+    return failed(profile, "the interface '" + name + "' carries no multicast; use the profile wan");
+  return {};
+}
+
+/// The interface of a network if there is only one, or else that of the default route.
+Result<std::string> only_interface(const Profile& profile, const Surroundings& machine) {
+  std::vector<Interface> candidates;
+  for (const Interface& each : machine.interfaces) {
+    if (each.up && !each.loopback && !each.address.empty() && (each.multicast || profile.name == "wan"))
+      candidates.push_back(each);
+  }
+  if (candidates.empty())
+    return failed(profile, "no interface of a network is up (there are " + list_of(machine.interfaces) + ")");
+  const auto is_default = [&](const Interface& each) { return each.name == machine.default_route; };
+  if (const auto found = std::ranges::find_if(candidates, is_default); found != candidates.end())
+    return found->name;
+  if (candidates.size() == 1) return candidates.front().name;
+  return failed(profile, "this machine is on several networks (" + list_of(candidates) +
+                             "): say which, as in " + profile.name + ":interface=" + candidates.front().name);
+}
+
+/// Replaces the servers' names by addresses with ports.
+Result<void> look_up_servers(Profile& profile, std::uint32_t domain, const Surroundings& machine) {
+  for (std::string& server : profile.servers) {
+    const auto parts = host_and_port(server, server_port(domain, 0));
+    const auto address = machine.look_up(parts->first);
+    if (!address)
+      return failed(profile, "the server '" + parts->first + "' is no IPv4 address and cannot be looked up");
+    server = *address + ":" + std::to_string(parts->second);
+  }
+  return {};
+}
+
+/// The interface that leads to the first server.
+Result<std::string> interface_to_server(const Profile& profile, const Surroundings& machine) {
+  const std::string address = host_and_port(profile.servers.front(), 0)->first;
+  const auto source = machine.source_address_to(address);
+  if (!source) return failed(profile, "there is no route to the server " + address);
+  const auto found = std::ranges::find(machine.interfaces, *source, &Interface::address);
+  if (found == machine.interfaces.end())
+    return failed(profile, "no interface has the address " + *source + ", from which the server " + address +
+                               " is reached");
+  if (found->loopback)
+    return failed(profile,
+                  address +
+                      " is this machine: give the server's address on the network, or use the profile "
+                      "loopback for all programs");
+  return found->name;
+}
+
+const std::vector<std::string>* values_of(
+    std::string_view placeholder, const std::vector<std::pair<std::string, std::vector<std::string>>>& all) {
+  const auto found =
+      std::ranges::find(all, placeholder, [](const auto& each) { return std::string_view(each.first); });
+  return found == all.end() || found->second.empty() ? nullptr : &found->second;
+}
+
+}  // namespace
+
+std::uint32_t server_port(std::uint32_t domain, std::uint32_t index) {
+  return 7410 + 250 * domain + 2 * index;
+}
+
+Result<Profile> parse_profile(const std::string& text, Side side) {
+  Profile profile;
+  const std::size_t colon = text.find(':');
+  profile.name = text.substr(0, colon);
+  const auto rule =
+      std::ranges::find(kRules, profile.name, [](const Rule& each) { return std::string(each.name); });
+  if (rule == std::end(kRules))
+    return wrong("must be " + names_of_profiles() + ", not '" + profile.name + "'");
+  std::string_view rest =
+      colon == std::string::npos ? std::string_view() : std::string_view(text).substr(colon + 1);
+  while (colon != std::string::npos) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view item = rest.substr(0, comma);
+    const std::size_t equals = item.find('=');
+    if (equals == std::string_view::npos || !harmless(item.substr(equals + 1)))
+      return wrong("the parameters of " + profile.name + " must be KEY=VALUE,KEY=VALUE, not '" +
+                   std::string(item) + "'");
+    const auto set = set_parameter(*rule, item.substr(0, equals), item.substr(equals + 1), profile);
+    if (!set) return tl::unexpected(set.error());
+    if (comma == std::string_view::npos) break;
+    rest.remove_prefix(comma + 1);
+  }
+  if (auto good = check_counts(*rule, profile, side); !good) return tl::unexpected(good.error());
+  return profile;
+}
+
+Surroundings surroundings() {
+  Surroundings machine;
+  machine.interfaces = interfaces();
+  machine.default_route = default_route_interface();
+  machine.source_address_to = &source_address_to;
+  machine.port_taken = [](std::uint32_t port) { return udp_port_taken(port, false); };
+  machine.look_up = [](const std::string& host) -> std::optional<std::string> {
+    if (is_address(host)) return host;
+    addrinfo wanted{};
+    wanted.ai_family = AF_INET;
+    wanted.ai_socktype = SOCK_DGRAM;
+    addrinfo* list = nullptr;
+    if (::getaddrinfo(host.c_str(), nullptr, &wanted, &list) != 0) return std::nullopt;
+    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(list, &::freeaddrinfo);
+    sockaddr_in found{};
+    std::memcpy(&found, list->ai_addr, sizeof found);
+    char text[INET_ADDRSTRLEN] = {};
+    if (::inet_ntop(AF_INET, &found.sin_addr, text, sizeof text) == nullptr) return std::nullopt;
+    return std::string(text);
+  };
+  return machine;
+}
+
+Result<Profile> resolve_profile(Profile profile, Side side, std::uint32_t domain,
+                                const Surroundings& machine) {
+  const std::uint32_t port = server_port(domain, profile.index);
+  if (profile.name == "wan" && side == Side::kServer && machine.port_taken(port)) {
+    return failed(profile,
+                  "UDP port " + std::to_string(port) +
+                      " is in use here; if that is another server, give one of them another --domain, or "
+                      "wan:index=N");
+  }
+  if (auto looked_up = look_up_servers(profile, domain, machine); !looked_up)
+    return tl::unexpected(looked_up.error());
+  for (const std::string& name : profile.interfaces) {
+    if (auto good = check_interface(profile, name, machine); !good) return tl::unexpected(good.error());
+    if (std::ranges::count(profile.interfaces, name) > 1)
+      return failed(profile, "the interface '" + name + "' is named twice");
+  }
+  if (!profile.interfaces.empty() || profile.name == "loopback") return profile;
+  const bool by_route = side == Side::kClient && !profile.servers.empty();
+  auto chosen = by_route ? interface_to_server(profile, machine) : only_interface(profile, machine);
+  if (!chosen) return tl::unexpected(chosen.error());
+  profile.interfaces = {std::move(*chosen)};
+  return profile;
+}
+
+std::string describe(const Profile& resolved, Side side, std::uint32_t domain, const Surroundings& machine) {
+  std::string text = "profile " + resolved.name;
+  for (std::size_t i = 0; i < resolved.interfaces.size(); ++i)
+    text += (i == 0 ? " on " : ", ") + resolved.interfaces[i];
+  if (resolved.name == "wan" && side == Side::kServer)
+    text += ", UDP port " + std::to_string(server_port(domain, resolved.index));
+  for (std::size_t i = 0; i < resolved.servers.size(); ++i)
+    text += (i == 0 ? ", servers " : ", ") + resolved.servers[i];
+  if (!resolved.external.empty()) return text + ", seen as " + resolved.external;
+  for (const std::string& server : resolved.servers) {
+    const std::string address = server.substr(0, server.find(':'));
+    const auto source = machine.source_address_to(address);
+    if (!source || !is_private(*source) || is_private(address)) continue;
+    return text + "; " + *source + " is private and " + address +
+           " is not: if NAT is between, the server cannot answer without external=ADDRESS, the address that it sees";
+  }
+  return text;
+}
+
+std::string profile_xml(const Profile& resolved, Side side) {
+  const auto file = std::ranges::find(profile_files(), resolved.name,
+                                      [](const ProfileFile& each) { return std::string(each.name); });
+  const auto one = [](const std::string& value) {
+    return value.empty() ? std::vector<std::string>() : std::vector<std::string>{value};
+  };
+  const std::vector<std::pair<std::string, std::vector<std::string>>> values = {
+      {"TANDEM_INTERFACE", resolved.interfaces},
+      {"TANDEM_SERVER", resolved.servers},
+      {"TANDEM_EXTERNAL", one(resolved.external)},
+      {"TANDEM_INDEX", one(side == Side::kServer ? std::to_string(resolved.index) : "")}};
+  std::string xml;
+  std::string_view text = file->text;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n') + 1);
+    text.remove_prefix(line.size());
+    const std::size_t begin = line.find("${");
+    if (begin == std::string_view::npos) {
+      xml += line;
+      continue;
+    }
+    const std::size_t end = line.find('}', begin);
+    const std::string_view inside = line.substr(begin + 2, end - begin - 2);
+    const std::size_t otherwise = inside.find(":-");
+    const auto write = [&](std::string_view value) {
+      xml.append(line.substr(0, begin)).append(value).append(line.substr(end + 1));
+    };
+    if (const auto* given = values_of(inside.substr(0, otherwise), values)) {
+      std::ranges::for_each(*given, write);
+    } else if (otherwise != std::string_view::npos) {
+      write(inside.substr(otherwise + 2));
+    }
+  }
+  while (!xml.empty() && xml.back() == '\n') xml.pop_back();
+  return xml;
+}
+
+}  // namespace tandem::transport
