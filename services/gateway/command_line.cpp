@@ -91,6 +91,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   Options options;
   app.add_option("--session", options.session, "Name of the session").show_default();
   app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
+  app.add_option("--secure", options.secure,
+                 "Folder of the gateway's identity for DDS Security, made by `tandem pki issue gateway`");
   app.add_option("--profile", options.profile, transport::kProfileHelp).check([](const std::string& text) {
     return transport::refusal_of_profile(text, transport::Side::kClient);
   });

@@ -17,6 +17,7 @@ struct Options {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network (deploy/dds); empty: CYCLONEDDS_URI decides
   std::string session = "default";
+  std::string secure;                ///< folder of its identity for DDS Security; empty: none
   std::string prefer = "computing";  ///< chooses the stream that all viewers play; see CoreOptions
   WebOptions web;
   Limits limits;

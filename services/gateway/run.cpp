@@ -50,6 +50,7 @@ int run(const Options& options, SignalWatch& signals) {
   dds.domain = options.domain;
   dds.profile = options.profile;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.stop = &signals.stop();
   auto port = transport::make_dds_client_port(dds);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);

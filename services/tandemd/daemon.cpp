@@ -28,6 +28,7 @@
 #include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
+#include "services/system/own_networks.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
 #include "services/tandemd/restarts.hpp"
@@ -124,9 +125,21 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   dds.domain = options.domain;
   dds.profile = options.profile;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
   dds.stop = &stop;
   return transport::make_dds_server_port(dds);
+}
+
+/// Once: on a network, anybody may do what SECURITY.md says of strangers.
+void warn_without_security(const Options& options) {
+  if (!options.secure.empty()) return;
+  const std::vector<std::string> networks = system::networks_in_use();
+  if (networks.empty()) return;
+  spdlog::warn(
+      "without --secure, everybody who reaches {} can watch this session, act in it and pretend to be its server; "
+      "see `tandem pki --help`",
+      fmt::format("{}", fmt::join(networks, ", ")));
 }
 
 /// Logs failed writes: the first one at once, then their number every 10 s.
@@ -417,6 +430,7 @@ int run_daemon(Options options, SignalWatch& signals) {
       auto port = open_port(*config, options, signals.stop());
       if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
+        warn_without_security(options);
         if (!options.profile.empty())
           spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
                                                              transport::Side::kServer));

@@ -24,7 +24,7 @@ void add_bench(commandline::Command app, Run& run);
 void add_export(commandline::Command app, Run& run);
 void add_top(commandline::Command app, Run& run);
 void add_doctor(commandline::Command app, Run& run);
-/// Has subcommands of its own: pki.hpp.
+/// Has subcommands of its own: pki/pki.hpp.
 void add_pki(commandline::Command app, Run& run);
 
 }  // namespace tandem::tool

@@ -7,6 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/secure/identity_folder.hpp"
+#include "sdk/transport/secure/openssl.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/doctor/doctor.hpp"
 #include "services/json/json.hpp"
 #include "services/tool/commands.hpp"
@@ -17,6 +21,23 @@ namespace {
 
 using doctor::Check;
 using doctor::Verdict;
+
+/// `networks`: addresses, not of loopback, that DDS uses.
+Check judge_security(const std::string& secure, const std::vector<std::string>& networks) {
+  if (!secure.empty()) {
+    const auto identity = transport::secure::check_identity_folder(secure, transport::wall_ns() / kSecond);
+    if (!identity) return {"security", Verdict::kFailure, identity.error().message, ""};
+    return {"security", Verdict::kGood,
+            fmt::format("{} {}, until {}", identity->role, identity->name,
+                        transport::secure::date_text(identity->not_after_s)),
+            ""};
+  }
+  if (networks.empty()) return {"security", Verdict::kGood, "none, and DDS uses no network", ""};
+  return {"security", Verdict::kWarning,
+          fmt::format("without --secure, everybody who reaches {} can watch, act and pretend to be a server",
+                      fmt::join(networks, ", ")),
+          "make identities with `tandem pki`, and give each program its own: --secure DIR"};
+}
 
 const char* word(Verdict verdict) {
   switch (verdict) {
@@ -62,10 +83,12 @@ void add_doctor(commandline::Command app, Run& run) {
     bool json = false;
     std::uint32_t domain = 0;
     std::string profile;
+    std::string secure;
   };
   const auto options = std::make_shared<Options>();
   // Whether it is a server's or a client's is seen from its parameters.
   add_domain_options(command, options->domain, options->profile, transport::Side::kServer);
+  add_secure_option(command, options->secure);
   command.add_flag("--json", options->json,
                    "Print one JSON object: ok, checks[name, verdict, detail, advice]");
   command.footer(
@@ -73,7 +96,13 @@ void add_doctor(commandline::Command app, Run& run) {
       "sessions cannot work at all, and with 0 if there are only warnings.");
   command.on_chosen([options, &run] {
     run = [options] {
-      return print(judge(doctor::machine_facts(options->domain, options->profile)), options->json);
+      doctor::MachineFacts facts = doctor::machine_facts(options->domain, options->profile);
+      std::vector<std::string> networks;
+      for (const auto& each : facts.participants)
+        if (each.own) networks = each.addresses;
+      std::erase_if(networks, [](const std::string& address) { return address.starts_with("127."); });
+      facts.security.push_back(judge_security(options->secure, networks));
+      return print(judge(facts), options->json);
     };
   });
 }

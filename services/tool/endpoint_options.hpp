@@ -1,6 +1,6 @@
 #pragma once
-// Options that several commands share: --domain, --profile and --session of those that use DDS, --prefer of
-// clients.
+// Options that several commands share: --domain, --profile, --session and --secure of those that use DDS,
+// --prefer of clients.
 
 #include <fmt/format.h>
 
@@ -33,6 +33,14 @@ inline void add_endpoint_options(commandline::Command command, std::uint32_t& do
         return ok ? std::string() : ok.error().message;
       })
       .show_default();
+}
+
+/// `secure` outlives `command`.
+inline void add_secure_option(commandline::Command command, std::string& secure) {
+  command.add_option(
+      "--secure", secure,
+      "Folder of this program's identity for DDS Security, made by `tandem pki issue`; those without one "
+      "are then strangers");
 }
 
 /// Says on stderr what the profile uses, if there is one. Call it when the domain is open.

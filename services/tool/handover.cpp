@@ -29,6 +29,7 @@ constexpr std::int64_t kRepeatNs = kSecond / 4;
 struct Options {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network
+  std::string secure;
   std::string session = "default";
   bool json = false;
 };
@@ -67,6 +68,7 @@ int run_handover(const Options& options) {
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.profile = options.profile;
+  dds.secure = options.secure;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) return failed(monitor.error().message);
   tell_profile(kName, options.domain, options.profile);
@@ -133,6 +135,7 @@ void add_handover(commandline::Command app, Run& run) {
   const auto options = std::make_shared<Options>();
   command.add_option("session", options->session, "Session").show_default();
   add_domain_options(command, options->domain, options->profile);
+  add_secure_option(command, options->secure);
   command.add_flag("--json", options->json, "Print one JSON object");
   command.footer(
       "No frame is lost; clients join the other server by themselves. Exits with 1 if there is no server to "

@@ -60,6 +60,8 @@ Result<void> HeadlessClient::open() {
   dds.profile = options_.profile;
   dds.session = options_.session;
   dds.client = core.id;
+  dds.secure = options_.secure;
+  dds.acts = !options_.observe;
   if (options_.observe) dds.lease = transport::DdsOptions::kObserverLease;
   auto port = transport::make_dds_client_port(dds);
   if (!port) return tl::unexpected<Error>(port.error());

@@ -20,6 +20,7 @@ namespace tandem::tool {
 
 struct HeadlessOptions {
   std::uint32_t domain = 0;
+  std::string secure;        ///< folder of its identity; empty: none
   std::string profile = {};  ///< of the network; see DdsOptions
   std::string session = "default";
   bool observe = false;

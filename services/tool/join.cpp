@@ -79,6 +79,7 @@ void add_join(commandline::Command app, Run& run) {
   const auto options = std::make_shared<JoinOptions>();
   HeadlessOptions& client = options->client;
   add_endpoint_options(command, client.domain, client.profile, client.session);
+  add_secure_option(command, client.secure);
   command.add_flag("--observe", client.observe,
                    "Join as an observer: the server does not wait for this client");
   command

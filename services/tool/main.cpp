@@ -4,10 +4,16 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "services/tool/commands.hpp"
 
 int main(int argc, char** argv) {
+  // Otherwise everybody who sends packets could fill stderr.
+  tandem::transport::set_dds_log([](std::string_view line, bool /*error*/) {
+    std::fprintf(stderr, "tandem: Cyclone DDS: %.*s\n", static_cast<int>(line.size()), line.data());
+  });
   tandem::commandline::Program app{
       "Clients, recordings, measurements and diagnosis for Tandem, which streams large simulations over DDS.",
       "tandem"};

@@ -101,6 +101,7 @@ void add_record(commandline::Command app, Run& run) {
   HeadlessOptions& client = options->client;
   command.add_option("file", client.capture, "File to write, FILE.mcap").required();
   add_endpoint_options(command, client.domain, client.profile, client.session);
+  add_secure_option(command, client.secure);
   client.prefer = "bandwidth";
   add_prefer_option(command, client.prefer);
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")

@@ -36,6 +36,7 @@ struct ReplayOptions {
   std::string file;
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network
+  std::string secure;
   std::string session = "default";
   double rate = 1;
   double from_s = 0;
@@ -93,6 +94,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   dds.domain = options.domain;
   dds.profile = options.profile;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.delta_depth =
       transport::delta_depth(config.frame_rate_hz, config.window_ceiling, playback.stream().max_delta_bytes);
   dds.stop = &stop;
@@ -189,6 +191,7 @@ void add_replay(commandline::Command app, Run& run) {
   command.add_option("file", options->file, "File that `tandem record` wrote").required();
   add_endpoint_options(command, options->domain, options->profile, options->session,
                        transport::Side::kServer);
+  add_secure_option(command, options->secure);
   command
       .add_option("--rate", options->rate,
                   "Speed, where 1 is that of the session; the maximum is 1000 frames per second")

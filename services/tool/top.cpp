@@ -38,6 +38,7 @@ constexpr std::chrono::milliseconds kKeysWait(50);
 struct TopOptions {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network
+  std::string secure;
   std::string session, log;
   double listen_s = kOnceS;
   bool once = false, json = false, stream = false;
@@ -164,6 +165,7 @@ int run_top(const TopOptions& options) {
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.profile = options.profile;
+  dds.secure = options.secure;
   auto monitor = transport::make_dds_monitor(dds);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
@@ -186,6 +188,7 @@ void add_top(commandline::Command app, Run& run) {
       app.add_subcommand("top", "Shows the sessions and clients of a domain, and why a client lags.");
   const auto options = std::make_shared<TopOptions>();
   add_domain_options(command, options->domain, options->profile);
+  add_secure_option(command, options->secure);
   command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(
       "--once", options->once, "Listen, print once and stop; exit with 1 if nothing was heard");

@@ -37,7 +37,7 @@ OF_TANDEMD = (
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/logging", "services/workers"]
+    + ["services/logging", "services/system", "services/workers"]
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
     + DOOR
     + HOST
@@ -67,7 +67,8 @@ EDGES = {
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
     "sdk/transport/network": ["public/result.hpp"],
-    "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network"],
+    "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network", "sdk/transport/secure"],
+    "sdk/transport/secure": ["public/result.hpp"],
     "sdk/statistics": [],
     "sdk/client/drawing": OF_CLIENT,
     "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
@@ -83,6 +84,7 @@ EDGES = {
     "services/json": [],
     "services/tokens": ["public/result.hpp", "services/json"],
     "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
+    "services/pki": ["public/result.hpp", "sdk/transport/secure", "services/json", "services/system"],
     "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
@@ -125,8 +127,8 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/doctor", "services/logging", "services/metrics", "services/process", "services/recording", "services/scenes"]
-    + ["services/system", "services/tokens", "services/top/model", "services/top/screen"]
+    + ["services/doctor", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
+    + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/secure"]
     + DOOR,
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
@@ -149,7 +151,7 @@ OWNERS = [
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
-    (re.compile(r"^openssl/"), "OpenSSL", ["services/tokens", "services/gateway", "tests"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/gateway", "services/pki", "services/tokens", "tests"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),

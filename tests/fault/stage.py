@@ -114,9 +114,10 @@ class Process:
         self.lines = []
         self.process = subprocess.Popen(
             [str(word) for word in command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, env=environment(interface),
+            text=True, errors="replace", env=environment(interface),
         )  # fmt: skip
-        threading.Thread(target=self.read, daemon=True).start()
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
 
     def read(self):
         for line in self.process.stderr:
@@ -132,6 +133,9 @@ class Process:
             if (at := self.first(text, after)) is not None:
                 return at
             if self.process.poll() is not None:
+                self.reader.join(1)  # its last lines may still be on their way
+                if (at := self.first(text, after)) is not None:
+                    return at
                 break
             time.sleep(0.01)
         tail = "\n".join(line for _, line in self.lines[-8:])

@@ -78,6 +78,7 @@ tandem_result tandem_browser_open_with(const tandem_options* options, tandem_bro
     transport::DdsOptions dds;
     dds.domain = ours.domain;
     if (ours.profile != nullptr) dds.profile = ours.profile;
+    if (ours.secure != nullptr) dds.secure = ours.secure;
     auto monitor = transport::make_dds_monitor(dds);
     if (!monitor) return refuse(monitor.error());
     return browse_over(std::move(*monitor), browser);

@@ -154,6 +154,8 @@ tandem_result tandem_join(const tandem_options* options, tandem_client* client) 
     if (ours.profile != nullptr) dds.profile = ours.profile;
     dds.session = core.session;
     dds.client = core.id;
+    if (ours.secure != nullptr) dds.secure = ours.secure;
+    dds.acts = ours.role == TANDEM_PARTICIPANT;
     if (ours.role == TANDEM_OBSERVER) dds.lease = transport::DdsOptions::kObserverLease;
     auto port = transport::make_dds_client_port(dds);
     if (!port) return refuse(port.error());

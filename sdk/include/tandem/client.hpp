@@ -43,6 +43,8 @@ struct ClientOptions {
   /// The kind of network, "NAME" or "NAME:key=value,..."; see tandem_options::profile. Empty: CYCLONEDDS_URI
   /// decides.
   std::string profile = {};
+  /// Folder of this program's identity for DDS Security; see tandem_options::secure. Empty: none.
+  std::string secure = {};
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
   /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -151,6 +153,7 @@ class Client {
     tandem_options c = TANDEM_OPTIONS_INIT;
     c.session = options.session.c_str();
     c.domain = options.domain;
+    c.secure = options.secure.c_str();
     c.role = static_cast<tandem_role>(options.role);
     c.lead = options.lead;
     c.background = options.background ? 1 : 0;
@@ -311,13 +314,15 @@ class Client {
 /// Watches the sessions of a domain without joining any. Movable. All members may be called from any thread.
 class Browser {
  public:
-  /// `profile`: see ClientOptions. Errors: kInvalidArgument (domain, profile), kTransport (DDS could not
-  /// start).
-  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0, const std::string& profile = {}) {
+  /// `profile`, `secure`: see ClientOptions. Errors: kInvalidArgument (domain, profile, identity), kIo
+  /// (identity), kTransport (DDS could not start).
+  [[nodiscard]] static Result<Browser> open(std::uint32_t domain = 0, const std::string& profile = {},
+                                            const std::string& secure = {}) {
     Browser browser;
     tandem_options c = TANDEM_OPTIONS_INIT;
     c.domain = domain;
     c.profile = profile.c_str();
+    c.secure = secure.c_str();
     if (const auto opened = Client::checked(tandem_browser_open_with(&c, &browser.handle_)); !opened)
       return Client::unexpected(opened);
     return browser;
@@ -345,8 +350,9 @@ class Browser {
 
 /// The sessions of a domain, after watching it for `watch_s`.
 [[nodiscard]] inline Result<std::vector<SessionInfo>> sessions(std::uint32_t domain = 0, double watch_s = 2,
-                                                               const std::string& profile = {}) {
-  const auto browser = Browser::open(domain, profile);
+                                                               const std::string& profile = {},
+                                                               const std::string& secure = {}) {
+  const auto browser = Browser::open(domain, profile, secure);
   if (!browser) return tl::unexpected<Error>(browser.error());
   std::this_thread::sleep_for(std::chrono::duration<double>(watch_s));
   return browser->sessions();

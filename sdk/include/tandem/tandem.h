@@ -168,15 +168,19 @@ typedef struct tandem_options {
    * on a domain have the same. With one, CYCLONEDDS_URI is not used. Null or "": Tandem's defaults and then
    * CYCLONEDDS_URI. */
   const char* profile;
+  /** DDS Security: the folder of this program's identity, which `tandem pki issue` made. Null or empty: none. With
+   * an observer's identity a client can only join as an observer. */
+  const char* secure;
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL }
 
 /** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults
  * @param client   the new client, to be closed by tandem_leave()
- * @return also TANDEM_TRANSPORT (DDS could not start; an interface of the profile is not there) */
+ * @return also TANDEM_TRANSPORT (DDS could not start; an interface of the profile is not there) and
+ * TANDEM_IO (a file in `secure`; if one is not good, TANDEM_INVALID_ARGUMENT and a text with file and cure) */
 TANDEM_API tandem_result tandem_join(const tandem_options* options, tandem_client* client) TANDEM_NOEXCEPT;
 
 /** Leaves the session and frees everything that the client holds. Waits for calls of other threads with this
@@ -572,7 +576,7 @@ typedef struct tandem_session_info {
  * @param browser  the new browser, to be closed by tandem_browser_close()
  * @return also TANDEM_TRANSPORT (DDS could not start) */
 TANDEM_API tandem_result tandem_browser_open(uint32_t domain, tandem_browser* browser) TANDEM_NOEXCEPT;
-/** The same with options, of which only `domain` and `profile` are used.
+/** The same with options, of which only `domain`, `profile` and `secure` are used.
  * @param options  null: the defaults */
 TANDEM_API tandem_result tandem_browser_open_with(const tandem_options* options,
                                                   tandem_browser* browser) TANDEM_NOEXCEPT;

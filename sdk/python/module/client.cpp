@@ -50,7 +50,7 @@ class Connection {
  public:
   Connection(std::uint32_t domain, const std::string& session, tandem_role role, std::uint32_t lead,
              bool background, bool echo, const std::string& prefer, const std::string& profile,
-             const py::object& log) {
+             const std::string& secure, const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
     options.session = session.c_str();
@@ -59,6 +59,7 @@ class Connection {
     options.background = background ? 1 : 0;
     options.echo = echo ? 1 : 0;
     options.prefer = prefer.c_str();
+    options.secure = secure.c_str();
     options.profile = profile.c_str();
     if (!log.is_none()) {
       log_ = std::make_unique<py::function>(log);
@@ -266,10 +267,11 @@ class Connection {
 /// Watches a domain.
 class Browser {
  public:
-  Browser(std::uint32_t domain, const std::string& profile) {
+  Browser(std::uint32_t domain, const std::string& profile, const std::string& secure) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
     options.profile = profile.c_str();
+    options.secure = secure.c_str();
     check(unlocked([&] { return tandem_browser_open_with(&options, &browser_); }));
   }
   Browser(const Browser&) = delete;
@@ -310,7 +312,7 @@ PYBIND11_MODULE(_client, m) {
   m.def("clock_ns", &tandem_clock_ns);
   py::class_<Connection>(m, "Connection")
       .def(py::init<std::uint32_t, const std::string&, tandem_role, std::uint32_t, bool, bool,
-                    const std::string&, const std::string&, const py::object&>())
+                    const std::string&, const std::string&, const std::string&, const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
       .def("prefer", &Connection::prefer)
@@ -327,7 +329,7 @@ PYBIND11_MODULE(_client, m) {
       .def("geometry", &Connection::geometry)
       .def("types", &Connection::types);
   py::class_<Browser>(m, "Browser")
-      .def(py::init<std::uint32_t, const std::string&>())
+      .def(py::init<std::uint32_t, const std::string&, const std::string&>())
       .def("list", &Browser::list);
 }
 

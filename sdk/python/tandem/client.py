@@ -42,12 +42,13 @@ def _no_nul(text: str, what: str) -> str:
     return text
 
 
-def sessions(domain: int = 0, wait: float = 2.0, profile: str = "") -> list[SessionInfo]:
+def sessions(domain: int = 0, wait: float = 2.0, profile: str = "", secure: str = "") -> list[SessionInfo]:
     """Listens for `wait` seconds without taking part. Returns the sessions on a DDS domain (0..230), by name.
 
     profile     the kind of network, as of a Client
+    secure      folder of this program's identity for DDS Security; empty: none
     """
-    browser = _client.Browser(domain, _no_nul(profile, "a profile"))
+    browser = _client.Browser(domain, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"))
     time.sleep(wait)
     return [SessionInfo._of(session) for session in browser.list()]
 
@@ -100,6 +101,7 @@ class Client:
         echo: bool = False,
         prefer: str = "auto",
         profile: str = "",
+        secure: str = "",
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -115,6 +117,7 @@ class Client:
         profile     the kind of network: "loopback", "lan", "wifi", "wan:server=ADDRESS" or
                     "multihomed:interface=NAME,interface=NAME"; the same for all clients of a process on a domain. With
                     one, the variable CYCLONEDDS_URI is not used
+        secure      folder of this program's identity for DDS Security, made by `tandem pki issue`; empty: none
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start).
@@ -124,7 +127,9 @@ class Client:
             raise TypeError("log must be a function of a level and a line")
         _no_nul(session, "a session's name")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
-        self._connection = _client.Connection(domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), told)
+        self._connection = _client.Connection(
+            domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"), told
+        )
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)
 

@@ -23,7 +23,7 @@ class DdsClientPort final : public ClientPort {
     Node node;
     dds::Announcements servers;
     Writer<AckMessage> ack;
-    Writer<InputMessage> input;
+    std::optional<Writer<InputMessage>> input;  // empty: its identity may send none
     Writer<ClientStatusMessage> status;
   };
 
@@ -129,7 +129,11 @@ class DdsClientPort final : public ClientPort {
   }
 
   Result<void> write(const AckMessage& message) override { return endpoints_.ack.write(message); }
-  Result<void> write(const InputMessage& message) override { return endpoints_.input.write(message); }
+  Result<void> write(const InputMessage& message) override {
+    if (!endpoints_.input)
+      return fail(ErrorCode::kOutOfOrder, "the identity in " + options_.secure + " is an observer's");
+    return endpoints_.input->write(message);
+  }
   Result<void> write(const ClientStatusMessage& message) override { return endpoints_.status.write(message); }
 
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
@@ -195,18 +199,23 @@ class DdsClientPort final : public ClientPort {
 
 Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options) {
   if (auto named = check_session_name(options.session); !named) return tl::unexpected(named.error());
-  auto node = Node::create(options, "tandem client " + to_hex(options.client), options.session);
+  auto node = Node::create(options, "tandem client " + to_hex(options.client), options.session,
+                           options.acts ? dds::Purpose::kAct : dds::Purpose::kObserve);
   if (!node) return tl::unexpected(node.error());
   auto ack = node->writer<AckMessage>("acknowledgements");
   if (!ack) return tl::unexpected(ack.error());
-  auto input = node->writer<InputMessage>("inputs");
-  if (!input) return tl::unexpected(input.error());
+  std::optional<Writer<InputMessage>> input;
+  if (node->may_act()) {
+    auto made = node->writer<InputMessage>("inputs");
+    if (!made) return tl::unexpected(made.error());
+    input.emplace(std::move(*made));
+  }
   auto status = node->writer<ClientStatusMessage>("client status");
   if (!status) return tl::unexpected(status.error());
   auto servers = dds::Announcements::create(*node);
   if (!servers) return tl::unexpected(servers.error());
   auto port = std::make_unique<DdsClientPort>(
-      DdsClientPort::Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(*input),
+      DdsClientPort::Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(input),
                                std::move(*status)},
       options);
   if (options.client != 0) {

@@ -41,14 +41,20 @@ struct DdsOptions {
   std::chrono::nanoseconds write_timeout = std::chrono::seconds(2);
   /// If this is not null and set, writes are not repeated any more. It must outlive the port.
   const std::atomic<bool>* stop = nullptr;
+  /// DDS Security: folder of this program's identity, which `tandem pki issue` made. Empty: none, unless
+  /// CYCLONEDDS_URI has one.
+  std::string secure = {};
+  /// Client ports: it sends inputs. With the identity of an observer it cannot.
+  bool acts = true;
 };
 
 /// Joins the domain as "tandemd SESSION". Without a profile, the environment variable CYCLONEDDS_URI
 /// overrides Tandem's defaults (idl/PROTOCOL.md). Errors: kInvalidArgument (domain, profile, session name,
-/// depth, lease), kTransport (also what CYCLONEDDS_URI and the profile's interfaces cause).
+/// depth, lease; an identity that is not good, or not a server's), kIo (a file of the identity), kTransport
+/// (also what CYCLONEDDS_URI and the profile's interfaces cause).
 [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
 
-/// Joins the domain as "tandem client ID". Errors: as above.
+/// Joins the domain as "tandem client ID". Errors: as above. A port that does not act cannot write inputs.
 [[nodiscard]] Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options);
 
 /// A sample with the time that its writer gave it.
@@ -76,15 +82,16 @@ class Monitor {
   virtual void take(std::vector<Stamped<ClientStatusMessage>>& out) = 0;
   /// The participant that wrote a client's status; empty if it has left or was never heard.
   [[nodiscard]] virtual std::optional<Peer> describe(const ParticipantId& client) = 0;
-  /// Sends a command to the server of the session that it names.
+  /// Sends a command to the server of the session that it names. With DDS Security only an operator may.
   virtual Result<void> write(const CommandMessage& message) = 0;
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
 };
 
-/// Takes the lines that Cyclone DDS would write on stderr. `error`: the process ends after it; other errors
-/// reach callers as well. Called by any thread, several at once. Lines about a configuration (CYCLONEDDS_URI)
-/// come while the domain is opened. Call it before that, and once; only programs do, as the sink is one for
-/// the process.
+/// Takes the lines that Cyclone DDS would write on stderr: of those that are no errors 50 at once and one a
+/// second, cut to 240 bytes, without control characters; the next one says how many were left out. `error`:
+/// the process ends after it; other errors reach callers as well. Called by any thread, several at once.
+/// Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened. Call it before that, and
+/// once; only programs do, as the sink is one for the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
 
 /// A participant of a domain, in its own words.
@@ -112,7 +119,7 @@ inline constexpr const char* kProfileHelp =
 /// Empty without a profile, or if it cannot be used here.
 [[nodiscard]] std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side);
 
-/// Joins the domain as "tandem monitor"; only `options.domain` and `options.profile` are used. Errors: as
+/// Joins the domain as "tandem monitor"; only domain, profile and identity of `options` are used. Errors: as
 /// above.
 [[nodiscard]] Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options);
 

@@ -3,6 +3,7 @@
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <map>
@@ -13,6 +14,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/network/profile.hpp"
+#include "sdk/transport/plain_text.hpp"
 
 namespace tandem::transport::dds {
 namespace {
@@ -180,11 +182,43 @@ class Unsendable {
   std::map<std::string, std::chrono::steady_clock::time_point> told_;
 };
 
+// Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes.
+class Complaints {
+ public:
+  void take(std::string_view line) {
+    const std::lock_guard lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    const double passed_s = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    allowed_ = std::min(kBurst, allowed_ + passed_s * kPerSecond);
+    if (allowed_ < 1) {
+      ++left_out_;
+      return;
+    }
+    allowed_ -= 1;
+    std::string text = plain_text(line, kMostBytes);
+    if (left_out_ > 0) text += " (" + std::to_string(left_out_) + " lines before it were left out)";
+    left_out_ = 0;
+    write_line(text, false);
+  }
+
+ private:
+  static constexpr double kPerSecond = 1, kBurst = 50;
+  static constexpr std::size_t kMostBytes = 240;
+
+  std::mutex mutex_;
+  double allowed_ = kBurst;
+  std::uint64_t left_out_ = 0;
+  std::chrono::steady_clock::time_point last_;
+};
+
 void on_line(void* unsendable, const dds_log_data_t* data) {
+  static auto* const complaints = new Complaints;  // Cyclone's threads may outlive static objects
   std::string_view line(data->message);
   while (!line.empty() && line.back() == '\n') line.remove_suffix(1);
+  if ((data->priority & DDS_LC_FATAL) != 0) return write_line(line, true);
   const std::string judged = static_cast<Unsendable*>(unsendable)->judge(line);
-  if (!judged.empty()) write_line(judged, (data->priority & DDS_LC_FATAL) != 0);
+  if (!judged.empty()) complaints->take(judged);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ class DdsMonitor final : public Monitor {
 }  // namespace
 
 Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options) {
-  auto node = dds::Node::create(options, "tandem monitor", "*");
+  auto node = dds::Node::create(options, "tandem monitor", "*", dds::Purpose::kWatch);
   if (!node) return tl::unexpected(node.error());
   auto servers = dds::Announcements::create(*node);
   if (!servers) return tl::unexpected(servers.error());

@@ -41,7 +41,7 @@ Node::Node(DomainUse domain, const DdsOptions& options)
     : domain_(std::move(domain)), options_(options), lease_(options.lease.count()) {}
 
 Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition,
-                          Repeat repeat) {
+                          Purpose purpose, Repeat repeat) {
   if (options.domain > kMaxDomain) {
     return fail(ErrorCode::kInvalidArgument, "a DDS domain is 0 to " + std::to_string(kMaxDomain));
   }
@@ -57,7 +57,15 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
 
   const Qos named(dds_create_qos());
   dds_qset_entity_name(named.get(), name.c_str());
-  auto participant = own(dds_create_participant(options.domain, named.get(), nullptr), "the participant");
+  std::string with;
+  if (!options.secure.empty()) {
+    const auto identity = use_identity(options.secure, purpose, named.get());
+    if (!identity) return tl::unexpected(identity.error());
+    node.may_act_ = identity->role != kObserverRole;
+    with = " with the identity in " + options.secure;
+  }
+  auto participant =
+      own(dds_create_participant(options.domain, named.get(), nullptr), "the participant" + with);
   if (!participant) return tl::unexpected(participant.error());
   node.participant_ = std::move(*participant);
   dds_guid_t guid;

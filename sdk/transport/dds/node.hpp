@@ -14,6 +14,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
 #include "sdk/transport/dds/live_writers.hpp"
+#include "sdk/transport/dds/security.hpp"
 #include "sdk/transport/dds/topics.hpp"
 #include "sdk/transport/limits.hpp"
 
@@ -125,9 +126,10 @@ struct ReaderOptions {
 
 class Node {
  public:
-  /// `name` is what DDS tools show. `partition` may be "*".
+  /// `name` is what DDS tools show. `partition` may be "*". `purpose`: what it needs an identity for, if it
+  /// has one.
   static Result<Node> create(const DdsOptions& options, const std::string& name, const std::string& partition,
-                             Repeat repeat = Repeat::kSeldom);
+                             Purpose purpose, Repeat repeat = Repeat::kSeldom);
 
   /// Makes a writer in `partition`, with a publisher of its own; if `partition` is empty, with the node's
   /// publisher.
@@ -175,6 +177,8 @@ class Node {
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
   [[nodiscard]] const Entity& participant() const { return participant_; }
+  /// With DDS Security its permissions may forbid to write inputs.
+  [[nodiscard]] bool may_act() const { return may_act_; }
   /// Waits until something arrives at a watched reader created here, one of its writers comes to life or
   /// dies, wake() is called, or the timeout passes.
   void wait(std::chrono::nanoseconds timeout) { bell_->wait(timeout); }
@@ -195,6 +199,7 @@ class Node {
   Entity publisher_;
   Entity subscriber_;
   ParticipantId self_;
+  bool may_act_ = true;
 };
 
 }  // namespace tandem::transport::dds

@@ -265,7 +265,8 @@ class DdsServerPort final : public ServerPort {
 
 Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options) {
   if (auto named = check_session_name(options.session); !named) return tl::unexpected(named.error());
-  auto node = Node::create(options, "tandemd " + options.session, options.session, dds::Repeat::kSoon);
+  auto node = Node::create(options, "tandemd " + options.session, options.session, dds::Purpose::kServe,
+                           dds::Repeat::kSoon);
   if (!node) return tl::unexpected(node.error());
   auto session = node->writer<SessionMessage>("session");
   auto scheduled = node->writer<ScheduledInputMessage>("scheduled inputs");

@@ -166,6 +166,7 @@ Result<Server> Server::start(const ServerOptions& options, engine::Simulation& s
   dds.domain = options.domain;
   dds.profile = options.profile;
   dds.session = options.session;
+  dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config->frame_rate_hz, config->window_ceiling, *largest);
   auto keeping = host::Keeping::begin(
       {options.checkpoint_dir, options.checkpoint_interval_s, options.checkpoint_required}, simulation,

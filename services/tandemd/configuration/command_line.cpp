@@ -77,6 +77,7 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("engine_fd", &Config::set_engine_fd);
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
+  flags.add("secure", &Config::mutable_secure);
   flags.add("profile", &Config::mutable_profile);
   flags.add("codec", &Config::mutable_codec);
   flags.add("predictor", &Config::mutable_predictor);

@@ -278,6 +278,7 @@ Result<Options> checked(const ServerConfig& config) {
   options.users = config.users();
   if (config.has_session()) options.session = config.session();
   options.domain = config.domain();
+  options.secure = config.secure();
   if (config.has_profile()) {
     options.profile = config.profile();
     if (const auto good = transport::parse_profile(options.profile, transport::Side::kServer); !good)

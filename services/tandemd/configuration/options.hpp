@@ -37,6 +37,7 @@ struct Options : planning::ServiceWishes {
   std::uint32_t users = 0;  ///< users of that script; 0: the scene's number
 
   std::uint32_t domain = 0;
+  std::string secure;                ///< folder of its identity; empty: none
   std::string profile = {};          ///< of the network (deploy/dds); empty: CYCLONEDDS_URI decides
   std::optional<double> duration_s;  ///< empty: until stopped
 

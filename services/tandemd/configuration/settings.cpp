@@ -45,6 +45,8 @@ std::vector<Setting> session_settings(const Options& defaults) {
        "0 to 65535", "", "3"},
       {"domain", "DDS domain", fmt::format("0 to {}", transport::kMaxDomain),
        fmt::format("{}", defaults.domain), fmt::format("{}", defaults.domain)},
+      {"secure", "Identity of the server for DDS Security; those without one are then strangers",
+       "a folder that `tandem pki issue server` made", "none", quoted("/etc/tandem/identity")},
       {"profile", "The kind of network, with which CYCLONEDDS_URI is not used",
        "loopback, lan, wifi, wan or multihomed, with parameters behind a colon, as in lan:interface=eth0",
        "CYCLONEDDS_URI decides", quoted("lan")},

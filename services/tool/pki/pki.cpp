@@ -7,6 +7,11 @@ namespace tandem::tool {
 void add_pki(commandline::Command app, Run& run) {
   static const std::vector<AddPkiCommand> kCommands = {
       // One line for each, in the order that --help shows.
+      add_pki_init,    //
+      add_pki_issue,   //
+      add_pki_renew,   //
+      add_pki_revoke,  //
+      add_pki_show,    //
       add_pki_token_key,  //
       add_pki_token,      //
   };

@@ -40,6 +40,9 @@ struct ServedType {
 struct ServerOptions {
   std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
   std::uint32_t domain = 0;         ///< DDS domain, 0..230
+  /// Folder of the server's identity for DDS Security, made by `tandem pki issue server`. Empty: none, and
+  /// everybody on the network can join.
+  std::string secure = "";
   /// The kind of network, "NAME" or "NAME:key=value,..." (deploy/dds). Empty: CYCLONEDDS_URI decides. A
   /// process that also has clients on the domain starts its server first, and they have the same profile.
   std::string profile = {};

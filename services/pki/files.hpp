@@ -1,0 +1,20 @@
+#pragma once
+// Files that are whole or not there, and never seen by others while they are written.
+
+#include <string>
+
+#include "tandem/result.hpp"
+
+namespace tandem::pki {
+
+/// Who may read a file: 0600 or 0644, whatever the umask is.
+enum class Readers : unsigned { kOwner = 0600, kAll = 0644 };
+
+/// Writes `path` by way of a file beside it, which is on the disk before it gets the name. Errors: kIo.
+[[nodiscard]] Result<void> write_file(const std::string& path, const std::string& text, Readers readers);
+/// At most 1 MB. Errors: kIo.
+[[nodiscard]] Result<std::string> read_file(const std::string& path);
+/// A folder for its owner alone (0700); no effect if it exists. Errors: kIo.
+[[nodiscard]] Result<void> make_folder(const std::string& path);
+
+}  // namespace tandem::pki
