@@ -148,7 +148,7 @@ int main(int argc, char** argv) {
   }
   DdsOptions options;
   options.session = argv[2];
-  auto node = dds::Node::create(options, "flood", options.session);
+  auto node = dds::Node::create(options, "flood", options.session, dds::Purpose::kAct);
   if (!node) {
     std::fprintf(stderr, "flood: %s\n", node.error().message.c_str());
     return 1;

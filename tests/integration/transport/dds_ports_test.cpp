@@ -96,7 +96,8 @@ TEST_F(DdsPorts, DeltasOfASecondStreamAreInAPartitionOfTheirOwnAndSnapshotsInTha
   EXPECT_FALSE(server->joined(client->self(), kClient, 1)) << "it reads stream 0 alone";
   EXPECT_FALSE(server->joined(client->self(), kClient, 2));
   ASSERT_TRUE(server->open_client(kOther));
-  auto node = dds::Node::create(options_, "reader of stream 1", stream_partition(options_.session, 1));
+  auto node = dds::Node::create(options_, "reader of stream 1", stream_partition(options_.session, 1),
+                                dds::Purpose::kObserve);
   ASSERT_TRUE(node);
   auto deltas = node->reader<DeltaMessage>("deltas");
   auto snapshots = node->reader<SnapshotMessage>(

@@ -43,7 +43,8 @@ std::map<Frame, std::string> hashes(const std::filesystem::path& path) {
 class StreamReader {
  public:
   explicit StreamReader(const DdsOptions& options)
-      : node_(std::move(*dds::Node::create(options, "a client of stream 1", options.session))),
+      : node_(std::move(
+            *dds::Node::create(options, "a client of stream 1", options.session, dds::Purpose::kObserve))),
         ack_(std::move(*node_.writer<AckMessage>("acknowledgements"))),
         sessions_(std::move(*node_.reader<SessionMessage>("session"))),
         inputs_(std::move(*node_.reader<ScheduledInputMessage>("scheduled inputs"))),
