@@ -16,13 +16,18 @@ void SentInputs::carry_over(Frame frame) {
   next.last_number_ = last_number_;
   next.first_number_ = last_number_ + 1;
   next.doubts_ = std::move(doubts_);
-  for (const Acted& acted : acted_)
-    if (acted.frame > frame) next.doubts_.push_back({acted.number, 0, true});
+  for (const Acted& acted : acted_) {
+    if (acted.frame > frame) {
+      next.doubts_.push_back({acted.number, 0, acted.frame});
+    } else {
+      next.acted_.push_back(acted);  // the epoch after this one may take it back
+    }
+  }
   for (const Pending& input : pending_) {
     if (input.frame != 0 && input.frame <= frame) {
       next.pending_.push_back(input);  // it acted; this client has yet to see it
     } else {
-      next.doubts_.push_back({input.number, input.sent_ns, false});
+      next.doubts_.push_back({input.number, input.sent_ns, 0});
     }
   }
   constexpr std::size_t kMostDoubts = kMaxPending + kMaxActed;
@@ -49,8 +54,8 @@ void SentInputs::resolve(const Doubt& doubt, const transport::ReplyMessage& repl
   const bool decided = listed || (doubt.number <= reply.highest_input && reply.highest_input < first_number_);
   if (!decided) {
     outcomes.push_back({InputOutcome::Kind::kLost, doubt.number, 0, 0, 0});
-  } else if (doubt.told) {
-    return;
+  } else if (doubt.acted != 0) {
+    remember({doubt.number, doubt.acted});
   } else if (!listed) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, doubt.number, 0, 0, 0});
   } else if (entry->code != static_cast<std::uint32_t>(transport::Reason::kNone)) {
@@ -97,10 +102,14 @@ void SentInputs::settle(std::vector<InputOutcome>& outcomes) {
     const std::int64_t at_ns = exact.frame == input.frame ? exact.at_ns : last_applied_.at_ns;
     outcomes.push_back({InputOutcome::Kind::kActed, input.number, input.frame, 0,
                         std::max<std::int64_t>(0, at_ns - input.sent_ns)});
-    acted_.push_back({input.number, input.frame});
-    if (acted_.size() > kMaxActed) acted_.pop_front();
+    remember({input.number, input.frame});
     return true;
   });
+}
+
+void SentInputs::remember(const Acted& acted) {
+  acted_.push_back(acted);
+  if (acted_.size() > kMaxActed) acted_.pop_front();
 }
 
 bool SentInputs::settled() const {
@@ -113,7 +122,7 @@ void SentInputs::clear(std::vector<InputOutcome>& outcomes) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});
   }
   for (const Doubt& doubt : doubts_) {
-    if (!doubt.told) outcomes.push_back({InputOutcome::Kind::kUnknown, doubt.number, 0, 0, 0});
+    if (doubt.acted == 0) outcomes.push_back({InputOutcome::Kind::kUnknown, doubt.number, 0, 0, 0});
   }
   const std::uint64_t last_number = last_number_;
   *this = SentInputs();

@@ -65,13 +65,14 @@ class SentInputs {
   struct Doubt {
     std::uint64_t number = 0;
     std::int64_t sent_ns = 0;
-    bool told = false;  // as kActed
+    Frame acted = 0;  // the frame with which it was told as kActed; 0: it was not
   };
   struct Acted {
     std::uint64_t number = 0;
     Frame frame = 0;
   };
   void settle(std::vector<InputOutcome>& outcomes);
+  void remember(const Acted& acted);
   void resolve(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
   void resolve(const Doubt& doubt, const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
 

@@ -225,6 +225,25 @@ TEST_F(ContinuedTest, AnInputThatWaitedInTheCheckpointActsAndIsNotLost) {
   EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty());
 }
 
+// The server that took over ends at once, and the one before it goes on from its checkpoint.
+TEST_F(ContinuedTest, AnInputThatOneTakeoverKeptMayBeLostWithTheNextOne) {
+  join();
+  const Frame acts = server.frame() + 1;
+  for (int i = 0; i < 3; ++i) send();
+  answer({{1, acts, 0}, {2, acts + 1, 0}, {3, acts + 2, 0}}, 3);
+  for (int i = 0; i < 4; ++i) frame();
+  ASSERT_EQ(of_kind(InputOutcome::Kind::kActed), (Numbers{1, 2, 3}));
+  go_on_from(acts + 1);
+  answer({{1, acts, 0}, {2, acts + 1, 0}, {3, acts + 2, 0}}, 3);
+  EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty()) << "the third one waited and acts again";
+  server = FakeServer(3000);
+  server.session.continues_epoch = 1000;
+  server.session.continues_frame = acts;
+  join();
+  answer({{1, acts, 0}}, 1);
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), (Numbers{2, 3}));
+}
+
 TEST_F(ContinuedTest, AnUnansweredInputIsDecidedByTheFirstReplyOfAnAccount) {
   join();
   for (int i = 0; i < 4; ++i) send();
