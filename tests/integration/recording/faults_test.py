@@ -65,7 +65,7 @@ def wait_for(condition, what):
 def refusal(process, what):
     """The one line in which a program says why it ends; lines about the way into a session do not count."""
     _, errors = finish(process, what, 1)
-    lines = [line for line in errors.splitlines() if not re.search("waiting |found session|: stream |playing from", line)]
+    lines = [line for line in errors.splitlines() if not re.search(r"waiting |found session|stream \w+ \(|playing from", line)]
     assert len(lines) == 1, f"{what}: {errors}"
     return lines[0]
 
