@@ -171,7 +171,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   epoch_.reset();
   pictures_.clear();
   if (const auto shared = session_ ? shared_history(*session_, announcement.message) : std::nullopt) {
-    sent_.carry_over(*shared);
+    sent_.carry_over(*shared, session_->continues_epoch == announcement.message.epoch);
   } else {
     sent_.clear(outcomes_);
   }

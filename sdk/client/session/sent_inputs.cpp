@@ -11,11 +11,21 @@ void SentInputs::on_sent(std::int64_t now_ns, std::vector<InputOutcome>& outcome
   pending_.pop_front();
 }
 
-void SentInputs::carry_over(Frame frame) {
+void SentInputs::carry_over(Frame frame, bool returns) {
   SentInputs next;
   next.last_number_ = last_number_;
   next.first_number_ = last_number_ + 1;
-  next.doubts_ = std::move(doubts_);
+  if (returns) {
+    for (const Doubt& doubt : doubts_) {
+      if (doubt.acted != 0) {
+        next.remember({doubt.number, doubt.acted});
+      } else {
+        next.pending_.push_back({doubt.number, doubt.sent_ns, 0});
+      }
+    }
+  } else {
+    next.doubts_ = std::move(doubts_);
+  }
   for (const Acted& acted : acted_) {
     if (acted.frame > frame) {
       next.doubts_.push_back({acted.number, 0, acted.frame});

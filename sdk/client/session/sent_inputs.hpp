@@ -43,8 +43,9 @@ class SentInputs {
   void on_applied(Frame frame, std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
   /// An epoch begins whose world is that of the one before up to `frame`. What acted later, or was not
   /// answered, is in doubt until the first reply that comes from an account: it says what the server had
-  /// decided by then.
-  void carry_over(Frame frame);
+  /// decided by then. `returns`: it is the epoch that the one before continued. What was sent to it, and was
+  /// in doubt, may still reach it.
+  void carry_over(Frame frame, bool returns = false);
   /// A new epoch begins: unanswered inputs count as unknown. The numbers continue, because an earlier server
   /// that comes back remembers the outcomes of the numbers it knows.
   void clear(std::vector<InputOutcome>& outcomes);

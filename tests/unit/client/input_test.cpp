@@ -244,6 +244,26 @@ TEST_F(ContinuedTest, AnInputThatOneTakeoverKeptMayBeLostWithTheNextOne) {
   EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), (Numbers{2, 3}));
 }
 
+// Of two live servers the first one stays, and gets what was sent to it after all.
+TEST_F(ContinuedTest, AnInputToAServerThatTheClientComesBackToMayStillAct) {
+  join();
+  const Frame acts = server.frame() + 1;
+  for (int i = 0; i < 2; ++i) send();
+  answer({{1, acts, 0}}, 1);
+  for (int i = 0; i < 3; ++i) frame();
+  ASSERT_EQ(of_kind(InputOutcome::Kind::kActed), Numbers{1});
+  go_on_from(acts - 1);
+  EXPECT_EQ(send(), 3U);
+  server = FakeServer(1000);
+  join();
+  answer({{1, acts, 0}}, 1);
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{3}) << "only what was sent to the other server";
+  answer({{1, acts, 0}, {2, server.frame() + 1, 0}}, 2);
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kActed), (Numbers{1, 2}));
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{3});
+}
+
 TEST_F(ContinuedTest, AnUnansweredInputIsDecidedByTheFirstReplyOfAnAccount) {
   join();
   for (int i = 0; i < 4; ++i) send();
