@@ -27,7 +27,9 @@ void SentInputs::carry_over(Frame frame, bool returns) {
     next.doubts_ = std::move(doubts_);
   }
   for (const Acted& acted : acted_) {
-    if (acted.frame > frame) {
+    // What it sent before it came to the epoch that it leaves now is of the epoch that it comes back to.
+    const bool acted_there = returns && acted.number < first_number_;
+    if (acted.frame > frame && !acted_there) {
       next.doubts_.push_back({acted.number, 0, acted.frame});
     } else {
       next.acted_.push_back(acted);  // the epoch after this one may take it back

@@ -264,6 +264,23 @@ TEST_F(ContinuedTest, AnInputToAServerThatTheClientComesBackToMayStillAct) {
   EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{3});
 }
 
+TEST_F(ContinuedTest, AnInputThatActedWhereTheClientComesBackToIsNotInDoubt) {
+  join();
+  const Frame acts = server.frame() + 1;
+  send();
+  answer({{1, acts, 0}}, 1);
+  for (int i = 0; i < 3; ++i) frame();
+  ASSERT_EQ(of_kind(InputOutcome::Kind::kActed), Numbers{1});
+  go_on_from(acts - 1);
+  answer({{1, acts, 0}}, 1);
+  server = FakeServer(1000);
+  join();
+  EXPECT_EQ(send(), 2U);
+  answer({{2, 0, static_cast<std::uint32_t>(transport::Reason::kInvalid)}},
+         2);  // its ring has the first no more
+  EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty());
+}
+
 TEST_F(ContinuedTest, AnUnansweredInputIsDecidedByTheFirstReplyOfAnAccount) {
   join();
   for (int i = 0; i < 4; ++i) send();
