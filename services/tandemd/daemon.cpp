@@ -17,6 +17,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/network/interfaces.hpp"
 #include "sdk/transport/port.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
@@ -28,7 +29,6 @@
 #include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
-#include "services/system/own_networks.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
 #include "services/tandemd/restarts.hpp"
@@ -134,7 +134,8 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
 /// Once: on a network, anybody may do what SECURITY.md says of strangers.
 void warn_without_security(const Options& options) {
   if (!options.secure.empty()) return;
-  const std::vector<std::string> networks = system::networks_in_use();
+  std::vector<std::string> networks = transport::own_udp_addresses();
+  std::erase_if(networks, &transport::is_loopback);
   if (networks.empty()) return;
   spdlog::warn(
       "without --secure, everybody who reaches {} can watch this session, act in it and pretend to be its server; "

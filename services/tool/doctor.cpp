@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/transport/clock.hpp"
+#include "sdk/transport/network/interfaces.hpp"
 #include "sdk/transport/secure/identity_folder.hpp"
 #include "sdk/transport/secure/openssl.hpp"
 #include "sdk/transport/units.hpp"
@@ -100,7 +101,7 @@ void add_doctor(commandline::Command app, Run& run) {
       std::vector<std::string> networks;
       for (const auto& each : facts.participants)
         if (each.own) networks = each.addresses;
-      std::erase_if(networks, [](const std::string& address) { return address.starts_with("127."); });
+      std::erase_if(networks, &transport::is_loopback);
       facts.security.push_back(judge_security(options->secure, networks));
       return print(judge(facts), options->json);
     };

@@ -37,7 +37,7 @@ OF_TANDEMD = (
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/logging", "services/system", "services/workers"]
+    + ["services/logging", "services/workers", "sdk/transport/network"]
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
     + DOOR
     + HOST
@@ -128,7 +128,7 @@ EDGES = {
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
-    + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/secure"]
+    + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,
     "services/lab/measures": OF_LAB,
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],

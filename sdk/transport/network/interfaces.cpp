@@ -48,6 +48,26 @@ std::string dotted(const sockaddr_in& address) {
   return ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text) != nullptr ? text : "";
 }
 
+/// What a UDP socket is bound to; empty for "any" and for other descriptors.
+std::string udp_address_of(int descriptor) {
+  int type = 0;
+  socklen_t length = sizeof type;
+  if (::getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM) return {};
+  sockaddr_storage bound{};
+  length = sizeof bound;
+  if (::getsockname(descriptor, static_cast<sockaddr*>(static_cast<void*>(&bound)), &length) != 0) return {};
+  if (bound.ss_family == AF_INET) {
+    sockaddr_in v4{};
+    std::memcpy(&v4, &bound, sizeof v4);
+    return v4.sin_addr.s_addr == htonl(INADDR_ANY) ? std::string() : dotted(v4);
+  }
+  sockaddr_in6 v6{};
+  std::memcpy(&v6, &bound, sizeof v6);
+  if (bound.ss_family != AF_INET6 || IN6_IS_ADDR_UNSPECIFIED(&v6.sin6_addr)) return {};
+  char text[INET6_ADDRSTRLEN] = {};
+  return ::inet_ntop(AF_INET6, &v6.sin6_addr, text, sizeof text) != nullptr ? text : "";
+}
+
 }  // namespace
 
 std::vector<Interface> interfaces() {
@@ -137,20 +157,14 @@ std::vector<std::string> own_udp_addresses() {
   std::vector<std::string> addresses;
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", none)) {
-    const int descriptor = std::atoi(entry.path().filename().c_str());
-    sockaddr_in local{};
-    socklen_t length = sizeof local;
-    int type = 0;
-    socklen_t type_length = sizeof type;
-    if (::getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &type_length) != 0 || type != SOCK_DGRAM ||
-        ::getsockname(descriptor, static_cast<sockaddr*>(static_cast<void*>(&local)), &length) != 0 ||
-        local.sin_family != AF_INET || local.sin_addr.s_addr == htonl(INADDR_ANY)) {
-      continue;
-    }
-    addresses.push_back(dotted(local));
+    std::string address = udp_address_of(std::atoi(entry.path().filename().c_str()));
+    if (!address.empty() && std::ranges::find(addresses, address) == addresses.end())
+      addresses.push_back(std::move(address));
   }
   return addresses;
 }
+
+bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
 
 std::string list_of(const std::vector<Interface>& all) {
   std::string list;

@@ -31,8 +31,12 @@ struct Interface {
 /// Whether another program of this machine has the UDP port. `shared`: those that share it do not count.
 [[nodiscard]] bool udp_port_taken(std::uint32_t port, bool shared);
 
-/// The addresses to which the UDP sockets of this process are bound, besides "any".
+/// The IPv4 and IPv6 addresses to which the UDP sockets of this process are bound, each once, besides "any".
+/// Cyclone DDS binds the socket that it sends from to the address of its interface.
 [[nodiscard]] std::vector<std::string> own_udp_addresses();
+
+/// Whether an address, as own_udp_addresses() writes it, is of this machine alone.
+[[nodiscard]] bool is_loopback(const std::string& address);
 
 /// "eth0 10.0.0.1, lo 127.0.0.1".
 [[nodiscard]] std::string list_of(const std::vector<Interface>& all);
