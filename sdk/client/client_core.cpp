@@ -69,6 +69,7 @@ std::int64_t ClientCore::poll(Now now) {
   last_poll_ns_ = now.steady_ns;
   poll_began_ns_ = measure();
   server_alive_ = port_.server_alive();
+  tell_trouble();
   if (epoch_ != nullptr && epoch_->played->joining() &&
       (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
     epoch_->silence_ns = 0;
@@ -114,6 +115,13 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
   }
   // The result is never in the past and never causes a busy loop, whatever the estimates are.
   return std::max(due, now.steady_ns + kMillisecond / 2);
+}
+
+void ClientCore::tell_trouble() {
+  std::string trouble = port_.trouble();
+  if (trouble == trouble_) return;
+  trouble_ = std::move(trouble);
+  if (!trouble_.empty()) log(LogLevel::kWarning, trouble_);
 }
 
 // Acknowledgements are rare if the server does not wait for them (idl/STATES.md, "Acknowledgements"), because
@@ -396,7 +404,7 @@ ClientStatus ClientCore::status() const {
   out.phase = phase();
   out.client_id = options_.id;
   out.server_alive = server_alive_;
-  out.reason = refusal_;
+  out.reason = trouble_.empty() ? refusal_ : trouble_;
   out.refused_messages += port_.dropped();
   if (session_) {
     out.scene = session_->scene;
@@ -407,7 +415,7 @@ ClientStatus ClientCore::status() const {
   if (epoch_->reply) {
     out.role = epoch_->reply->role == transport::Role::kParticipant ? ClientRole::kParticipant
                                                                     : ClientRole::kObserver;
-    out.reason = describe(epoch_->reply->reason);
+    if (trouble_.empty()) out.reason = describe(epoch_->reply->reason);
   }
   out.lead = epoch_->lead;
   out.stream = chooser_->chosen().name;

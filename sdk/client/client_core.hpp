@@ -147,6 +147,7 @@ class ClientCore {
 
   // client_core.cpp: sessions, acknowledgements, input, status
   void leave_silent(std::int64_t since_ns);
+  void tell_trouble();
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   void adopt_names(std::vector<transport::BodyName> names);
@@ -240,6 +241,7 @@ class ClientCore {
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   transport::ParticipantId session_from_;
   std::string refusal_;                   ///< why the session is not playable
+  std::string trouble_;                   ///< the port's, as it was told last
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
   std::optional<StreamChooser> chooser_;  ///< chooses among the streams of that session
   std::optional<double> own_step_ns_;     ///< empty until it was measured

@@ -1,6 +1,7 @@
 #pragma once
 // The transport port: what a server and a client need from a publish-subscribe middleware. Implementations:
-// dds/ (Cyclone DDS) and simulated/ (in memory, with seeded loss, delay and reordering).
+// dds/ (Cyclone DDS), websocket/ (clients of a gateway) and simulated/ (in memory, with seeded loss, delay
+// and reordering).
 
 #include <chrono>
 #include <cstdint>
@@ -117,6 +118,8 @@ class ClientPort {
   virtual void pass_over_session(PassOver until) = 0;
   /// False if the writer of the session's announcement is gone (the server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;
+  /// Why no session can be heard of, in one line for people; empty: the transport knows of nothing.
+  [[nodiscard]] virtual std::string trouble() { return {}; }
 
   /// Subscribes to the deltas of `stream`, one of the session's, with its limits, in addition to the streams
   /// that are open. With the first stream of an epoch it also subscribes to scheduled inputs, to replies to

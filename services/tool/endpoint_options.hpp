@@ -23,16 +23,17 @@ inline void add_domain_options(commandline::Command command, std::uint32_t& doma
   });
 }
 
+/// Why the text is no session's name; empty: it is one.
+inline std::string refusal_of_session(const std::string& name) {
+  const auto ok = transport::check_session_name(name);
+  return ok ? std::string() : ok.error().message;
+}
+
 /// These and --session. All outlive `command`.
 inline void add_endpoint_options(commandline::Command command, std::uint32_t& domain, std::string& profile,
                                  std::string& session, transport::Side side = transport::Side::kClient) {
   add_domain_options(command, domain, profile, side);
-  command.add_option("--session", session, "Session name")
-      .check([](const std::string& name) {
-        const auto ok = transport::check_session_name(name);
-        return ok ? std::string() : ok.error().message;
-      })
-      .show_default();
+  command.add_option("--session", session, "Session name").check(refusal_of_session).show_default();
 }
 
 /// `secure` outlives `command`.

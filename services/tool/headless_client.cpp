@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cinttypes>
+#include <fstream>
 
 #include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
+#include "sdk/client/api/ports.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -48,22 +50,27 @@ Result<void> HeadlessClient::open() {
     if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
   }
   client::CoreOptions core;
-  core.session = options_.session;
+  core.session = options_.session.empty() && options_.url.empty() ? "default" : options_.session;
   core.id = client::random_client_id();
   core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options_.lead;
   core.prefer = options_.prefer;
   core.measure_ns = transport::steady_ns;
   core.log = [this](LogLevel level, std::string_view line) { tell(level, std::string(line)); };
-  transport::DdsOptions dds;
-  dds.domain = options_.domain;
-  dds.profile = options_.profile;
-  dds.session = options_.session;
-  dds.client = core.id;
-  dds.secure = options_.secure;
-  dds.acts = !options_.observe;
-  if (options_.observe) dds.lease = transport::DdsOptions::kObserverLease;
-  auto port = transport::make_dds_client_port(dds);
+  tandem_options where = TANDEM_OPTIONS_INIT;
+  where.domain = options_.domain;
+  where.profile = options_.profile.c_str();
+  where.secure = options_.secure.c_str();
+  where.role = options_.observe ? TANDEM_OBSERVER : TANDEM_PARTICIPANT;
+  if (!options_.url.empty()) where.url = options_.url.c_str();
+  std::string token;
+  if (!options_.token_file.empty()) {
+    std::ifstream file(options_.token_file);
+    if (!(file >> token)) return fail(ErrorCode::kIo, "no token could be read from " + options_.token_file);
+  }
+  where.token = token.c_str();
+  where.tls_ca = options_.tls_ca.c_str();
+  auto port = api::open_port(where, core.session, core.id);
   if (!port) return tl::unexpected<Error>(port.error());
   port_ = std::move(*port);
   if (!options_.profile.empty() && options_.index == 0)
@@ -119,11 +126,20 @@ void HeadlessClient::run(const std::atomic<bool>& stop, TurnListener* listener) 
   finish();
 }
 
+std::string HeadlessClient::place() const {
+  if (!options_.url.empty()) {
+    return options_.session.empty() ? "the gateway's session"
+                                    : fmt::format("session '{}' of the gateway", options_.session);
+  }
+  return fmt::format("session '{}' on domain {}", options_.session.empty() ? "default" : options_.session,
+                     options_.domain);
+}
+
 void HeadlessClient::finish() {
   if (core_->statistics().frames_applied == 0) {
     const std::string reason = core_->status().reason;
-    failure_ = fmt::format("never played in session '{}' on domain {}{}", options_.session, options_.domain,
-                           reason.empty() ? ": no server found or no frame came" : ": " + reason);
+    failure_ = fmt::format("never played in {}: {}", place(),
+                           reason.empty() ? "no server found or no frame came" : reason);
   }
   if (hash_log_) {
     const bool written = std::ferror(hash_log_.get()) == 0 && std::fflush(hash_log_.get()) == 0;
@@ -191,10 +207,9 @@ void HeadlessClient::tell_waiting(client::Now now) {
   told_ns_ = now.steady_ns;
   const double waited_s = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
   if (phase == ClientPhase::kSearching) {
-    tell(LogLevel::kInfo, fmt::format("waiting for a server of session '{}' on domain {} ({:.0f} s)",
-                                      options_.session, options_.domain, waited_s));
+    tell(LogLevel::kInfo, fmt::format("waiting for a server of {} ({:.0f} s)", place(), waited_s));
   } else {
-    tell(LogLevel::kInfo, fmt::format("waiting to join session '{}' ({:.0f} s)", options_.session, waited_s));
+    tell(LogLevel::kInfo, fmt::format("waiting to join {} ({:.0f} s)", place(), waited_s));
   }
 }
 

@@ -22,7 +22,9 @@ struct HeadlessOptions {
   std::uint32_t domain = 0;
   std::string secure;        ///< folder of its identity; empty: none
   std::string profile = {};  ///< of the network; see DdsOptions
-  std::string session = "default";
+  std::string session;       ///< empty: "default", and any of a gateway
+  std::string url, tls_ca;   ///< of a gateway instead of DDS; see tandem_options
+  std::string token_file;    ///< empty: none
   bool observe = false;
   std::uint32_t lead = 1;
   std::optional<double> timeout_s;              ///< until the first applied frame; empty: waits for ever
@@ -81,6 +83,8 @@ class HeadlessClient final : public client::CoreListener {
 
   explicit HeadlessClient(HeadlessOptions options) : options_(std::move(options)) {}
   Result<void> open();
+  /// Where it looks for a session, for people.
+  [[nodiscard]] std::string place() const;
   Result<void> load_script(double dt_s);
   void on_session(const transport::SessionMessage& session) override;
   void on_names(const transport::SessionMessage& session) override;

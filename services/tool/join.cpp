@@ -10,8 +10,8 @@
 
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"
+#include "services/tool/client_options.hpp"
 #include "services/tool/commands.hpp"
-#include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
 #include "services/tool/print_error.hpp"
 
@@ -78,8 +78,7 @@ void add_join(commandline::Command app, Run& run) {
       app.add_subcommand("join", "Joins a session as a client that draws nothing.");
   const auto options = std::make_shared<JoinOptions>();
   HeadlessOptions& client = options->client;
-  add_endpoint_options(command, client.domain, client.profile, client.session);
-  add_secure_option(command, client.secure);
+  add_client_options(command, client);
   command.add_flag("--observe", client.observe,
                    "Join as an observer: the server does not wait for this client");
   command
@@ -92,7 +91,6 @@ void add_join(commandline::Command app, Run& run) {
   command.add_option("--lead", client.lead, "Frames to simulate beyond the last delta")
       .range(0, 1)
       .show_default();
-  add_prefer_option(command, client.prefer);
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       .positive();
   command.add_option("--hash-log", client.hash_log,

@@ -7,8 +7,8 @@
 
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"
+#include "services/tool/client_options.hpp"
 #include "services/tool/commands.hpp"
-#include "services/tool/endpoint_options.hpp"
 #include "services/tool/headless_client.hpp"
 #include "services/tool/log_options.hpp"
 #include "services/tool/record_metrics.hpp"
@@ -100,10 +100,8 @@ void add_record(commandline::Command app, Run& run) {
   const auto options = std::make_shared<RecordOptions>();
   HeadlessOptions& client = options->client;
   command.add_option("file", client.capture, "File to write, FILE.mcap").required();
-  add_endpoint_options(command, client.domain, client.profile, client.session);
-  add_secure_option(command, client.secure);
   client.prefer = "bandwidth";
-  add_prefer_option(command, client.prefer);
+  add_client_options(command, client);
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       .positive();
   command

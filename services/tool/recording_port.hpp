@@ -25,6 +25,7 @@ class RecordingPort final : public transport::ClientPort {
   }
   void pass_over_session(transport::PassOver until) override { port_->pass_over_session(until); }
   [[nodiscard]] bool server_alive() override { return port_->server_alive(); }
+  [[nodiscard]] std::string trouble() override { return port_->trouble(); }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId client) override {
     return port_->open_stream(session, stream, client);

@@ -8,10 +8,10 @@
 #include "sdk/client/api/clients.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
+#include "sdk/client/api/ports.hpp"
 #include "sdk/client/api/structs.hpp"
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 
 namespace tandem::api {
@@ -33,19 +33,20 @@ static_assert(TANDEM_LOG_INFO == static_cast<int>(LogLevel::kInfo) &&
               TANDEM_LOG_WARNING == static_cast<int>(LogLevel::kWarning) &&
               TANDEM_LOG_ERROR == static_cast<int>(LogLevel::kError));
 
+// A gateway has one session, and any will do.
 const char* session_of(const tandem_options& options) {
-  return options.session != nullptr ? options.session : "default";
+  if (options.session != nullptr) return options.session;
+  return options.url != nullptr ? "" : "default";
 }
 
 tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
   if (theirs != nullptr) {
     if (const auto read = read_struct(theirs, ours); read != TANDEM_OK) return read;
   }
-  if (const auto named = transport::check_session_name(session_of(ours)); !named)
-    return refuse(named.error());
-  if (ours.domain > transport::kMaxDomain) {
-    return refuse(TANDEM_INVALID_ARGUMENT, "a DDS domain must be 0 to 230");
+  if (ours.session != nullptr) {
+    if (const auto named = transport::check_session_name(ours.session); !named) return refuse(named.error());
   }
+  if (ours.domain > kMaxDomain) return refuse(TANDEM_INVALID_ARGUMENT, "a DDS domain must be 0 to 230");
   if (ours.role != TANDEM_OBSERVER && ours.role != TANDEM_PARTICIPANT) {
     return refuse(TANDEM_INVALID_ARGUMENT, "a role must be TANDEM_OBSERVER or TANDEM_PARTICIPANT");
   }
@@ -149,15 +150,7 @@ tandem_result tandem_join(const tandem_options* options, tandem_client* client) 
     tandem_options ours = TANDEM_OPTIONS_INIT;
     if (const auto read = read_options(options, ours); read != TANDEM_OK) return read;
     auto core = core_options(ours);
-    transport::DdsOptions dds;
-    dds.domain = ours.domain;
-    if (ours.profile != nullptr) dds.profile = ours.profile;
-    dds.session = core.session;
-    dds.client = core.id;
-    if (ours.secure != nullptr) dds.secure = ours.secure;
-    dds.acts = ours.role == TANDEM_PARTICIPANT;
-    if (ours.role == TANDEM_OBSERVER) dds.lease = transport::DdsOptions::kObserverLease;
-    auto port = transport::make_dds_client_port(dds);
+    auto port = open_port(ours, core.session, core.id);
     if (!port) return refuse(port.error());
     return add_client(ours, std::move(core), std::move(*port), nullptr, client);
   });

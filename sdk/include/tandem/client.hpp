@@ -27,8 +27,8 @@ namespace tandem {
 
 /// Options of Client::connect().
 struct ClientOptions {
-  std::string session = "default";  ///< 1..64 characters of [A-Za-z0-9._-]
-  std::uint32_t domain = 0;         ///< DDS domain, 0..230
+  std::string session = {};  ///< 1..64 characters of [A-Za-z0-9._-]; empty: "default", and any of a `url`
+  std::uint32_t domain = 0;  ///< DDS domain, 0..230
   ClientRole role = ClientRole::kParticipant;
   std::uint32_t lead = 1;  ///< frames to simulate beyond the last delta; clamped to what the session allows
   /// True: the client has a thread that does its work. False: the application calls update() at least once a
@@ -45,6 +45,8 @@ struct ClientOptions {
   std::string profile = {};
   /// Folder of this program's identity for DDS Security; see tandem_options::secure. Empty: none.
   std::string secure = {};
+  /// Join over a gateway instead of DDS; see tandem_options::url, `token` and `tls_ca`. Empty: DDS.
+  std::string url = {}, token = {}, tls_ca = {};
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
   /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -147,11 +149,15 @@ struct SampleOptions {
 class Client {
  public:
   /// Starts looking for the session. Returns at once, even if there is no server. Errors: kInvalidArgument
-  /// (session name, domain, lead), kTransport (DDS could not start).
+  /// (session name, domain, lead, URL), kTransport (DDS could not start), kIo (`tls_ca`), kUnsupported (see
+  /// tandem_join()).
   [[nodiscard]] static Result<Client> connect(const ClientOptions& options) {
     Client client;
     tandem_options c = TANDEM_OPTIONS_INIT;
-    c.session = options.session.c_str();
+    if (!options.session.empty()) c.session = options.session.c_str();
+    if (!options.url.empty()) c.url = options.url.c_str();
+    c.token = options.token.c_str();
+    c.tls_ca = options.tls_ca.c_str();
     c.domain = options.domain;
     c.secure = options.secure.c_str();
     c.role = static_cast<tandem_role>(options.role);

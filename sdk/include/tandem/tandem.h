@@ -147,7 +147,7 @@ typedef void (*tandem_log)(void* user, tandem_log_level level, const char* line)
 typedef struct tandem_options {
   uint32_t size;
   uint32_t domain;     /**< DDS domain, 0..230 */
-  const char* session; /**< 1..64 characters of [A-Za-z0-9._-]; null: "default" */
+  const char* session; /**< 1..64 characters of [A-Za-z0-9._-]; null: "default", or with `url` the gateway's */
   tandem_role role;
   uint32_t lead; /**< frames to simulate beyond the last delta, 0 or 1; clamped to what the session allows */
   /** 1: the client has a thread that does its work. 0: the application calls tandem_update() at least once a
@@ -171,16 +171,24 @@ typedef struct tandem_options {
   /** DDS Security: the folder of this program's identity, which `tandem pki issue` made. Null or empty: none. With
    * an observer's identity a client can only join as an observer. */
   const char* secure;
+  /** Join over a gateway instead of DDS: "wss://HOST[:PORT]/" or "ws://...", over the Internet, NAT and proxies. It is
+   * the address of the viewer's page, which may begin with https or http. Null: DDS. A gateway has one session, so a
+   * null `session` takes any; `domain`, `profile` and `secure` are not used. The connection is made in the background
+   * by a thread of its own, and again whenever it ends. */
+  const char* url;
+  const char* token;  /**< for a gateway that asks for one. Null or "": what stands behind '#' in `url` */
+  const char* tls_ca; /**< PEM file that a gateway's certificate is checked by. Null or "": the system's */
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL }
 
 /** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults
  * @param client   the new client, to be closed by tandem_leave()
- * @return also TANDEM_TRANSPORT (DDS could not start; an interface of the profile is not there) and
- * TANDEM_IO (a file in `secure`; if one is not good, TANDEM_INVALID_ARGUMENT and a text with file and cure) */
+ * @return also TANDEM_TRANSPORT (DDS could not start; an interface of the profile is not there),
+ * TANDEM_IO (a file in `secure`; if one is not good, TANDEM_INVALID_ARGUMENT and a text with file and cure; `tls_ca`) and
+ * TANDEM_UNSUPPORTED (this library was built without DDS, or without libwebsockets for `url`) */
 TANDEM_API tandem_result tandem_join(const tandem_options* options, tandem_client* client) TANDEM_NOEXCEPT;
 
 /** Leaves the session and frees everything that the client holds. Waits for calls of other threads with this

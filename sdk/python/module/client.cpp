@@ -48,12 +48,20 @@ void log_line(void* user, tandem_log_level level, const char* line) {
 /// A client and its log function.
 class Connection {
  public:
-  Connection(std::uint32_t domain, const std::string& session, tandem_role role, std::uint32_t lead,
+  Connection(std::uint32_t domain, const py::object& session, tandem_role role, std::uint32_t lead,
              bool background, bool echo, const std::string& prefer, const std::string& profile,
-             const std::string& secure, const py::object& log) {
+             const std::string& secure, const std::string& url, const std::string& token,
+             const std::string& tls_ca, const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
-    options.session = session.c_str();
+    std::string name;
+    if (!session.is_none()) {
+      name = session.cast<std::string>();
+      options.session = name.c_str();
+    }
+    if (!url.empty()) options.url = url.c_str();
+    options.token = token.c_str();
+    options.tls_ca = tls_ca.c_str();
     options.role = role;
     options.lead = lead;
     options.background = background ? 1 : 0;
@@ -311,8 +319,9 @@ PYBIND11_MODULE(_client, m) {
   m.def("version", &tandem_version);
   m.def("clock_ns", &tandem_clock_ns);
   py::class_<Connection>(m, "Connection")
-      .def(py::init<std::uint32_t, const std::string&, tandem_role, std::uint32_t, bool, bool,
-                    const std::string&, const std::string&, const std::string&, const py::object&>())
+      .def(py::init<std::uint32_t, const py::object&, tandem_role, std::uint32_t, bool, bool,
+                    const std::string&, const std::string&, const std::string&, const std::string&,
+                    const std::string&, const std::string&, const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
       .def("prefer", &Connection::prefer)

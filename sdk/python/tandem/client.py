@@ -92,7 +92,7 @@ class Client:
 
     def __init__(
         self,
-        session: str = "default",
+        session: Optional[str] = None,
         domain: int = 0,
         *,
         observe: bool = False,
@@ -102,11 +102,14 @@ class Client:
         prefer: str = "auto",
         profile: str = "",
         secure: str = "",
+        url: str = "",
+        token: str = "",
+        tls_ca: str = "",
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
 
-        session     1..64 characters of [A-Za-z0-9._-]
+        session     1..64 characters of [A-Za-z0-9._-]; None: "default", or with `url` the gateway's session
         domain      DDS domain, 0..230
         observe     only watch: the server never waits for this client, and refuses its input
         lead        frames to simulate beyond the last delta, 0 or 1; the session may allow less
@@ -118,17 +121,23 @@ class Client:
                     "multihomed:interface=NAME,interface=NAME"; the same for all clients of a process on a domain. With
                     one, the variable CYCLONEDDS_URI is not used
         secure      folder of this program's identity for DDS Security, made by `tandem pki issue`; empty: none
+        url         join over a gateway instead of DDS: "wss://HOST[:PORT]/" or "ws://HOST[:PORT]/", also the address of the
+                    viewer's page; the connection is made, and made again, in the background
+        token       for a gateway that asks for one; empty: what stands behind "#" in the url
+        tls_ca      PEM file that a gateway's certificate is checked by; empty: the system's
         log         gets a LogLevel and a line for a human
 
-        Also raises TRANSPORT (DDS could not start).
+        Also raises TRANSPORT (DDS could not start), IO (`tls_ca`) and UNSUPPORTED (built without libwebsockets).
         """
         role = Role.OBSERVER if observe else Role.PARTICIPANT
         if log is not None and not callable(log):
             raise TypeError("log must be a function of a level and a line")
-        _no_nul(session, "a session's name")
+        if session is not None:
+            _no_nul(session, "a session's name")
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
         self._connection = _client.Connection(
-            domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"), told
+            domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"),
+            _no_nul(url, "a url"), _no_nul(token, "a token"), _no_nul(tls_ca, "a file"), told,
         )
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)

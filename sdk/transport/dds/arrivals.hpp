@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "sdk/transport/cdr.hpp"
-#include "sdk/transport/dds/doorbell.hpp"
+#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
 #include "sdk/transport/limits.hpp"
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "sdk/transport/dds/doorbell.hpp"
+#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/dds/entity.hpp"
 #include "sdk/transport/session_book.hpp"
 

@@ -72,7 +72,7 @@ TANDEM_EXPORT(create) Instance* tandem_create(std::uint64_t id, std::uint32_t ro
 
 /// Room for the input of the next call; null for more than a message may have.
 TANDEM_EXPORT(input) std::byte* tandem_input(Instance* instance, std::size_t size) {
-  if (size > WebPort::kMaxMessageBytes) return nullptr;
+  if (size > transport::WebPort::kMaxMessageBytes) return nullptr;
   instance->input.resize(size);
   return instance->input.data();
 }

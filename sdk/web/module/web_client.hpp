@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
-#include "sdk/web/module/web_port.hpp"
+#include "sdk/transport/websocket/web_port.hpp"
 #include "tandem/client_types.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::web {
 
-/// The client of every other transport on a WebPort, and what JavaScript asks of it, as JSON and arrays. Not
-/// thread-safe.
+/// The client of every other transport on a transport::WebPort, and what JavaScript asks of it, as JSON and
+/// arrays. Not thread-safe.
 class WebClient final : private client::CoreListener {
  public:
   struct Options {
@@ -35,8 +35,8 @@ class WebClient final : private client::CoreListener {
   WebClient(WebClient&&) = delete;
   WebClient& operator=(WebClient&&) = delete;
 
-  [[nodiscard]] WebPort& port() { return port_; }
-  [[nodiscard]] const WebPort& port() const { return port_; }
+  [[nodiscard]] transport::WebPort& port() { return port_; }
+  [[nodiscard]] const transport::WebPort& port() const { return port_; }
   [[nodiscard]] const client::ClientCore& core() const { return core_; }
 
   /// Takes what the port received and does what is due. Returns the steady time at which it wants to be
@@ -78,7 +78,7 @@ class WebClient final : private client::CoreListener {
   template <class Fill>
   void add_event(const char* type, Fill&& fill);
 
-  WebPort port_;
+  transport::WebPort port_;
   client::ClientCore core_;
   std::string events_;
   std::vector<std::uint8_t> corrected_;

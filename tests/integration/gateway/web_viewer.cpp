@@ -15,7 +15,7 @@
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/units.hpp"
-#include "sdk/web/module/web_port.hpp"
+#include "sdk/transport/websocket/web_port.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/json/json.hpp"
 
@@ -217,7 +217,7 @@ class Viewer final : private client::CoreListener {
   }
 
   Options options_;
-  web::WebPort port_;
+  transport::WebPort port_;
   client::ClientCore core_;
   std::array<lws_protocols, 2> protocols_{};
   lws_context* context_ = nullptr;

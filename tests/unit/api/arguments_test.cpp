@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/client/api/browsers.hpp"
+#include "sdk/client/api/browsing/browsers.hpp"
 #include "tests/support/playground/playground.hpp"
 
 namespace tandem::api {

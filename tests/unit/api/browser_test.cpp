@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/client/api/browsers.hpp"
+#include "sdk/client/api/browsing/browsers.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::api {

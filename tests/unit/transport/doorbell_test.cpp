@@ -1,11 +1,11 @@
-#include "sdk/transport/dds/doorbell.hpp"
+#include "sdk/transport/doorbell.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <thread>
 
-namespace tandem::transport::dds {
+namespace tandem::transport {
 namespace {
 
 constexpr std::chrono::hours kForever{1};
@@ -51,4 +51,4 @@ TEST(Doorbell, EachRingOfAnotherThreadIsHeard) {
 }
 
 }  // namespace
-}  // namespace tandem::transport::dds
+}  // namespace tandem::transport

@@ -157,7 +157,7 @@ Browser::Browser(Stage& stage, std::string name, ClientSettings settings, Gatewa
 Browser::~Browser() = default;
 
 void Browser::on_start() {
-  port_ = std::make_unique<web::WebPort>();
+  port_ = std::make_unique<transport::WebPort>();
   witness_ = std::make_unique<Witness>(stage_, name(), Witness::Of::kViewer);
   client::CoreOptions options;
   options.id = next_id_++;

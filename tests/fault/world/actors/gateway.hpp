@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/web/module/web_port.hpp"
+#include "sdk/transport/websocket/web_port.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/session_client.hpp"
 #include "tests/fault/world/actors/client.hpp"
@@ -101,7 +101,7 @@ class Browser final : public Actor {
   std::shared_ptr<Connection> connection_;
   std::int64_t connect_at_ns_ = 0;
   std::int64_t connected_ns_ = 0;
-  std::unique_ptr<web::WebPort> port_;
+  std::unique_ptr<transport::WebPort> port_;
   std::unique_ptr<Witness> witness_;
   std::unique_ptr<client::ClientCore> core_;
   std::int64_t due_ns_ = 0, next_input_ns_ = 0;

@@ -7,7 +7,7 @@
 #include <atomic>
 #include <chrono>
 
-namespace tandem::transport::dds {
+namespace tandem::transport {
 
 /// One or more rings end one wait. It is a semaphore, because that enters the kernel once to wake and once to
 /// wait, and only if a thread really waits; the mutex of a condition variable takes two more calls.
@@ -51,4 +51,4 @@ class Doorbell {
   std::atomic<bool> rung_ = false;
 };
 
-}  // namespace tandem::transport::dds
+}  // namespace tandem::transport

@@ -1,4 +1,4 @@
-#include "sdk/client/api/browser.hpp"
+#include "sdk/client/api/browsing/browser.hpp"
 
 #include "sdk/client/session/session_check.hpp"
 

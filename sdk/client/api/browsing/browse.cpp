@@ -4,7 +4,7 @@
 #include <iterator>
 
 #include "sdk/client/api/boundary.hpp"
-#include "sdk/client/api/browsers.hpp"
+#include "sdk/client/api/browsing/browsers.hpp"
 #include "sdk/client/api/structs.hpp"
 #include "sdk/transport/clock.hpp"
 

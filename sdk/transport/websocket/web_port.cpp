@@ -1,12 +1,10 @@
-#include "sdk/web/module/web_port.hpp"
+#include "sdk/transport/websocket/web_port.hpp"
 
 #include <algorithm>
 #include <string>
 #include <variant>
 
-namespace tandem::web {
-
-using transport::Received;
+namespace tandem::transport {
 
 void WebPort::connected() {
   disconnected();
@@ -28,7 +26,7 @@ void WebPort::disconnected() {
 }
 
 Result<void> WebPort::receive(std::span<const std::byte> bytes) {
-  auto message = bytes.size() <= kMaxMessageBytes ? transport::read_gateway_envelope(bytes, limits_)
+  auto message = bytes.size() <= kMaxMessageBytes ? read_gateway_envelope(bytes, limits_)
                                                   : fail(ErrorCode::kMalformed, "a message above 128 MiB");
   Result<void> accepted;
   if (!message) {
@@ -40,43 +38,41 @@ Result<void> WebPort::receive(std::span<const std::byte> bytes) {
   return accepted;
 }
 
-std::optional<transport::Bytes> WebPort::next_message() {
+std::optional<Bytes> WebPort::next_message() {
   if (out_.empty()) return std::nullopt;
-  transport::Bytes message = std::move(out_.front());
+  Bytes message = std::move(out_.front());
   out_.pop_front();
   return message;
 }
 
-Result<void> WebPort::accept(transport::SessionMessage&& message, std::size_t /*size*/) {
+Result<void> WebPort::accept(SessionMessage&& message, std::size_t /*size*/) {
   session_ = std::move(message);
   server_alive_ = true;
   return {};
 }
-Result<void> WebPort::accept(transport::DeltaMessage&& message, std::size_t size) {
+Result<void> WebPort::accept(DeltaMessage&& message, std::size_t size) {
   return put(deltas_, std::move(message), size);
 }
-Result<void> WebPort::accept(transport::ScheduledInputMessage&& message, std::size_t size) {
+Result<void> WebPort::accept(ScheduledInputMessage&& message, std::size_t size) {
   return put(inputs_, std::move(message), size);
 }
-Result<void> WebPort::accept(transport::SnapshotMessage&& message, std::size_t size) {
+Result<void> WebPort::accept(SnapshotMessage&& message, std::size_t size) {
   return put(snapshots_, std::move(message), size);
 }
-Result<void> WebPort::accept(transport::ReplyMessage&& message, std::size_t size) {
+Result<void> WebPort::accept(ReplyMessage&& message, std::size_t size) {
   return put(replies_, std::move(message), size);
 }
-Result<void> WebPort::accept(transport::ServerStatusMessage&& message, std::size_t /*size*/) {
+Result<void> WebPort::accept(ServerStatusMessage&& message, std::size_t /*size*/) {
   server_status_ = std::move(message);
   status_is_new_ = true;
   return {};
 }
-Result<void> WebPort::accept(const transport::AbsentMessage& /*message*/, std::size_t /*size*/) {
+Result<void> WebPort::accept(const AbsentMessage& /*message*/, std::size_t /*size*/) {
   server_alive_ = false;
   session_.reset();
   return {};
 }
-Result<void> WebPort::accept(const transport::UnknownMessage& /*message*/, std::size_t /*size*/) {
-  return {};
-}
+Result<void> WebPort::accept(const UnknownMessage& /*message*/, std::size_t /*size*/) { return {}; }
 
 template <class M>
 Result<void> WebPort::put(Queue<M>& queue, M&& message, std::size_t size) {
@@ -90,13 +86,13 @@ Result<void> WebPort::put(Queue<M>& queue, M&& message, std::size_t size) {
   return {};
 }
 
-void WebPort::take_sessions(std::vector<Received<transport::SessionMessage>>& out) {
+void WebPort::take_sessions(std::vector<Received<SessionMessage>>& out) {
   if (session_) out.push_back({*std::exchange(session_, std::nullopt), gateway_});
 }
 
 // The gateway sends what it follows itself; there is nothing to subscribe to.
-Result<void> WebPort::open_stream(const transport::SessionMessage& session,
-                                  const transport::StreamMessage& stream, transport::ClientId /*client*/) {
+Result<void> WebPort::open_stream(const SessionMessage& session, const StreamMessage& stream,
+                                  ClientId /*client*/) {
   if (epoch_ != session.epoch) close_streams();
   epoch_ = session.epoch;
   streams_[stream.id.id] = {.max_delta_bytes = stream.max_delta_bytes,
@@ -151,12 +147,12 @@ void move_all(Q& queue, std::vector<Received<M>>& out) {
 
 }  // namespace
 
-void WebPort::take(std::vector<Received<transport::DeltaMessage>>& out) { move_all(deltas_, out); }
-void WebPort::take(std::vector<Received<transport::ScheduledInputMessage>>& out) { move_all(inputs_, out); }
-void WebPort::take(std::vector<Received<transport::SnapshotMessage>>& out) { move_all(snapshots_, out); }
-void WebPort::take(std::vector<Received<transport::ReplyMessage>>& out) { move_all(replies_, out); }
+void WebPort::take(std::vector<Received<DeltaMessage>>& out) { move_all(deltas_, out); }
+void WebPort::take(std::vector<Received<ScheduledInputMessage>>& out) { move_all(inputs_, out); }
+void WebPort::take(std::vector<Received<SnapshotMessage>>& out) { move_all(snapshots_, out); }
+void WebPort::take(std::vector<Received<ReplyMessage>>& out) { move_all(replies_, out); }
 
-void WebPort::take(std::vector<Received<transport::ServerStatusMessage>>& out) {
+void WebPort::take(std::vector<Received<ServerStatusMessage>>& out) {
   if (status_is_new_) out.push_back({*server_status_, gateway_});
   status_is_new_ = false;
 }
@@ -170,8 +166,8 @@ Result<void> WebPort::send(const M& message) {
   return {};
 }
 
-Result<void> WebPort::write(const transport::AckMessage& message) { return send(message); }
-Result<void> WebPort::write(const transport::InputMessage& message) { return send(message); }
-Result<void> WebPort::write(const transport::ClientStatusMessage& message) { return send(message); }
+Result<void> WebPort::write(const AckMessage& message) { return send(message); }
+Result<void> WebPort::write(const InputMessage& message) { return send(message); }
+Result<void> WebPort::write(const ClientStatusMessage& message) { return send(message); }
 
-}  // namespace tandem::web
+}  // namespace tandem::transport

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "sdk/client/api/browser.hpp"
+#include "sdk/client/api/browsing/browser.hpp"
 #include "sdk/client/api/registry.hpp"
 #include "tandem/tandem.h"
 

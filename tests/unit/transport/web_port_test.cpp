@@ -1,21 +1,19 @@
-#include "sdk/web/module/web_port.hpp"
+#include "sdk/transport/websocket/web_port.hpp"
 
 #include <gtest/gtest.h>
 
-namespace tandem::web {
+namespace tandem::transport {
 namespace {
 
-using transport::Received;
-
 template <class M>
-transport::Bytes envelope(const M& message) {
-  transport::Bytes bytes;
-  transport::write_envelope(message, bytes);
+Bytes envelope(const M& message) {
+  Bytes bytes;
+  write_envelope(message, bytes);
   return bytes;
 }
 
-transport::SessionMessage session(Epoch epoch = 5) {
-  transport::SessionMessage message;
+SessionMessage session(Epoch epoch = 5) {
+  SessionMessage message;
   message.session = "arena";
   message.epoch = epoch;
   message.capacity = 1;
@@ -26,15 +24,15 @@ transport::SessionMessage session(Epoch epoch = 5) {
   return message;
 }
 
-transport::DeltaMessage delta(std::size_t payload_bytes = 10) {
-  transport::DeltaMessage message;
+DeltaMessage delta(std::size_t payload_bytes = 10) {
+  DeltaMessage message;
   message.frame = 7;
   message.payload.resize(payload_bytes);
   return message;
 }
 
-transport::AckMessage ack() {
-  transport::AckMessage message;
+AckMessage ack() {
+  AckMessage message;
   message.client = 1;
   return message;
 }
@@ -42,7 +40,7 @@ transport::AckMessage ack() {
 template <class M>
 std::vector<Received<M>> take(WebPort& port) {
   std::vector<Received<M>> out;
-  if constexpr (std::is_same_v<M, transport::SessionMessage>) {
+  if constexpr (std::is_same_v<M, SessionMessage>) {
     port.take_sessions(out);
   } else {
     port.take(out);
@@ -55,7 +53,7 @@ class WebPortTest : public ::testing::Test {
   void open() {
     port.connected();
     ASSERT_TRUE(port.receive(envelope(session())));
-    ASSERT_EQ(take<transport::SessionMessage>(port).size(), 1U);
+    ASSERT_EQ(take<SessionMessage>(port).size(), 1U);
     ASSERT_TRUE(port.open_stream(session(), session().streams[0], 1));
   }
   WebPort port;
@@ -66,37 +64,37 @@ TEST_F(WebPortTest, AnAnnouncementIsTakenOnceAndTheServerLives) {
   EXPECT_FALSE(port.server_alive());
   ASSERT_TRUE(port.receive(envelope(session())));
   EXPECT_TRUE(port.server_alive());
-  const auto taken = take<transport::SessionMessage>(port);
+  const auto taken = take<SessionMessage>(port);
   ASSERT_EQ(taken.size(), 1U);
   EXPECT_EQ(taken[0].message.epoch, 5U);
-  EXPECT_TRUE(take<transport::SessionMessage>(port).empty());
+  EXPECT_TRUE(take<SessionMessage>(port).empty());
 }
 
 TEST_F(WebPortTest, MessagesOfAStreamAreTakenOnceItIsOpen) {
   port.connected();
   ASSERT_TRUE(port.receive(envelope(delta())));
   open();
-  EXPECT_TRUE(take<transport::DeltaMessage>(port).empty()) << "from before it was open";
+  EXPECT_TRUE(take<DeltaMessage>(port).empty()) << "from before it was open";
   ASSERT_TRUE(port.receive(envelope(delta())));
-  const auto taken = take<transport::DeltaMessage>(port);
+  const auto taken = take<DeltaMessage>(port);
   ASSERT_EQ(taken.size(), 1U);
   EXPECT_EQ(taken[0].message, delta());
-  EXPECT_TRUE(take<transport::DeltaMessage>(port).empty());
+  EXPECT_TRUE(take<DeltaMessage>(port).empty());
   port.close_streams();
   ASSERT_TRUE(port.receive(envelope(delta())));
-  EXPECT_TRUE(take<transport::DeltaMessage>(port).empty());
+  EXPECT_TRUE(take<DeltaMessage>(port).empty());
 }
 
 TEST_F(WebPortTest, SnapshotsComeWhileTheyAreOpenAlone) {
   open();
-  transport::SnapshotMessage part;
+  SnapshotMessage part;
   part.total_bytes = 3;
   part.bytes.resize(3);
   ASSERT_TRUE(port.receive(envelope(part)));
-  EXPECT_TRUE(take<transport::SnapshotMessage>(port).empty());
+  EXPECT_TRUE(take<SnapshotMessage>(port).empty());
   ASSERT_TRUE(port.open_snapshots(0));
   ASSERT_TRUE(port.receive(envelope(part)));
-  EXPECT_EQ(take<transport::SnapshotMessage>(port).size(), 1U);
+  EXPECT_EQ(take<SnapshotMessage>(port).size(), 1U);
 }
 
 TEST_F(WebPortTest, LimitsOfTheStreamHold) {
@@ -108,28 +106,28 @@ TEST_F(WebPortTest, LimitsOfTheStreamHold) {
 
 TEST_F(WebPortTest, AQueueThatIsFullDropsAndCounts) {
   port.connected();
-  transport::StreamMessage stream = session().streams[0];
+  StreamMessage stream = session().streams[0];
   stream.max_delta_bytes = 40U << 20U;
   ASSERT_TRUE(port.open_stream(session(), stream, 1));
-  const transport::Bytes large = envelope(delta(40U << 20U));
+  const Bytes large = envelope(delta(40U << 20U));
   EXPECT_TRUE(port.receive(large));
   EXPECT_EQ(port.receive(large).error().code, ErrorCode::kCapacity);
   EXPECT_EQ(port.dropped(), 1U);
-  EXPECT_EQ(take<transport::DeltaMessage>(port).size(), 1U);
+  EXPECT_EQ(take<DeltaMessage>(port).size(), 1U);
   EXPECT_TRUE(port.receive(large)) << "there is room again";
 }
 
 TEST_F(WebPortTest, EachConnectionIsAnotherParticipant) {
   open();
   ASSERT_TRUE(port.receive(envelope(delta())));
-  const auto first = take<transport::DeltaMessage>(port)[0].from;
+  const auto first = take<DeltaMessage>(port)[0].from;
   ASSERT_TRUE(port.receive(envelope(delta())));
   port.disconnected();
   EXPECT_FALSE(port.server_alive());
-  EXPECT_TRUE(take<transport::DeltaMessage>(port).empty()) << "of the old connection";
+  EXPECT_TRUE(take<DeltaMessage>(port).empty()) << "of the old connection";
   open();
   ASSERT_TRUE(port.receive(envelope(delta())));
-  EXPECT_NE(take<transport::DeltaMessage>(port)[0].from, first);
+  EXPECT_NE(take<DeltaMessage>(port)[0].from, first);
 }
 
 TEST_F(WebPortTest, WritesAreQueuedInOrderWhileThereIsAServer) {
@@ -138,13 +136,13 @@ TEST_F(WebPortTest, WritesAreQueuedInOrderWhileThereIsAServer) {
   EXPECT_FALSE(port.write(ack())) << "nothing of an older session may go out";
   open();
   EXPECT_TRUE(port.write(ack()));
-  transport::InputMessage input;
+  InputMessage input;
   input.client = 1;
   EXPECT_TRUE(port.write(input));
   EXPECT_EQ(port.next_message(), envelope(ack()));
   EXPECT_EQ(port.next_message(), envelope(input));
   EXPECT_FALSE(port.next_message());
-  ASSERT_TRUE(port.receive(envelope(transport::AbsentMessage{})));
+  ASSERT_TRUE(port.receive(envelope(AbsentMessage{})));
   EXPECT_FALSE(port.server_alive());
   EXPECT_FALSE(port.write(ack()));
 }
@@ -158,14 +156,14 @@ TEST_F(WebPortTest, WhatNobodySendsIsBounded) {
 TEST_F(WebPortTest, BytesThatAreNoMessageAreCountedAndUnknownKindsSkipped) {
   open();
   EXPECT_FALSE(port.receive({}));
-  EXPECT_FALSE(port.receive(transport::Bytes(5, std::byte{2})));
-  EXPECT_TRUE(port.receive(transport::Bytes(5, std::byte{14})));
+  EXPECT_FALSE(port.receive(Bytes(5, std::byte{2})));
+  EXPECT_TRUE(port.receive(Bytes(5, std::byte{14})));
   EXPECT_EQ(port.dropped(), 2U);
 }
 
 TEST_F(WebPortTest, TheServersStatusIsThatOfTheConnection) {
   open();
-  transport::ServerStatusMessage status;
+  ServerStatusMessage status;
   status.session = "arena";
   status.frame = 9;
   ASSERT_TRUE(port.receive(envelope(status)));
@@ -176,4 +174,4 @@ TEST_F(WebPortTest, TheServersStatusIsThatOfTheConnection) {
 }
 
 }  // namespace
-}  // namespace tandem::web
+}  // namespace tandem::transport
