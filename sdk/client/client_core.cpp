@@ -179,9 +179,10 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   epoch_.reset();
   pictures_.clear();
   if (const auto shared = session_ ? shared_history(*session_, announcement.message) : std::nullopt) {
-    sent_.carry_over(*shared, session_->continues_epoch == announcement.message.epoch);
+    sent_.carry_over(announcement.message.epoch, *shared,
+                     session_->continues_epoch == announcement.message.epoch);
   } else {
-    sent_.clear(outcomes_);
+    sent_.clear(announcement.message.epoch, outcomes_);
   }
   session_ = announcement.message;
   session_from_ = announcement.from;
@@ -217,7 +218,7 @@ void ClientCore::refuse(const Error& why) {
   join_attempts_ = join_attempt();
   epoch_.reset();
   pictures_.clear();
-  sent_.clear(outcomes_);
+  sent_.clear(0, outcomes_);
   ++statistics_.refused_messages;
   refusal_ = why.message;
   log(LogLevel::kError, refusal_);

@@ -212,7 +212,9 @@ void Host::Impl::claim_name() {
     state = State::kRefused;
     return;
   }
-  if (now_ns - *first_poll_ns < config.claim_ns || !outbox.push(source->session())) return;
+  const bool afresh = source->session().continues_epoch == 0;
+  const std::int64_t claims_ns = config.claim_ns + (afresh ? claim.gives_ns() : 0);
+  if (now_ns - *first_poll_ns < claims_ns || !outbox.push(source->session())) return;
   state = State::kWaiting;
   claim.announced(now_ns);
   last_look_ns = now_ns;
@@ -473,7 +475,7 @@ void Host::Impl::publish_status() {
 void Host::Impl::plan_wake() {
   wake_ns = now_ns + kLongestWakeNs;
   const auto at = [this](std::int64_t ns) { wake_ns = std::min(wake_ns, ns); };
-  if (state == State::kClaiming) at(*first_poll_ns + config.claim_ns);
+  if (state == State::kClaiming) at(std::max(*first_poll_ns + config.claim_ns, now_ns + kShortWakeNs));
   if (succession.stopped()) at(now_ns + kShortWakeNs);
   if (under_way) {
     if (source->next_descriptor() < 0) at(now_ns + kMillisecond);

@@ -28,11 +28,12 @@ constexpr std::uint32_t kMostBefore = 8;
 
 }  // namespace
 
-void Standby::Journal::add(transport::JournalMessage&& entry, transport::ClientId self) {
+void Standby::Journal::add(transport::JournalMessage&& entry, transport::ClientId self, std::uint64_t held) {
   if (!entries.empty() && entry.number <= entries.back().number) return;
   if (entries.size() >= kMostEntries || bytes >= kMostJournalBytes) return;
   ended = entry.state == transport::JournalState::kLast;
   handed_over = ended && entry.successor == self;
+  if (entry.number <= held) return;
   bytes += size_of(entry);
   entries.push_back(std::move(entry));
 }
@@ -126,8 +127,11 @@ void Standby::take_journal() {
     if (!from_live(entry.epoch, from)) continue;
     silence_.broken();
     received_bytes_ += size_of(entry);
-    Journal& journal = checkpoint_ == nullptr || holds_the_live() ? journal_ : fresh_;
-    journal.add(std::move(entry), options_.id);
+    if (holds_the_live()) {  // a checkpoint may overtake the entries that it covers
+      journal_.add(std::move(entry), options_.id, checkpoint_->journal);
+    } else {
+      (checkpoint_ == nullptr ? journal_ : fresh_).add(std::move(entry), options_.id);
+    }
     news_ = true;
   }
 }

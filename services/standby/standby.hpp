@@ -142,7 +142,8 @@ class Standby {
     bool handed_over = false;  // the last one names this server
     bool ended = false;        // the last one is that of a handover, to whomever
 
-    void add(transport::JournalMessage&& entry, transport::ClientId self);
+    /// `held`: the number of the last entry that the checkpoint covers; none up to it is kept.
+    void add(transport::JournalMessage&& entry, transport::ClientId self, std::uint64_t held = 0);
     void forget_to(std::uint64_t number);
   };
   Journal journal_;  // of the epoch of the checkpoint

@@ -5,41 +5,40 @@
 namespace tandem::client {
 
 void SentInputs::on_sent(std::int64_t now_ns, std::vector<InputOutcome>& outcomes) {
-  pending_.push_back({++last_number_, now_ns, 0});
+  pending_.push_back({++last_number_, now_ns, 0, epoch_});
   if (pending_.size() <= kMaxPending) return;
   outcomes.push_back({InputOutcome::Kind::kUnknown, pending_.front().number, 0, 0, 0});
   pending_.pop_front();
 }
 
-void SentInputs::carry_over(Frame frame, bool returns) {
+void SentInputs::carry_over(Epoch entered, Frame frame, bool returns) {
   SentInputs next;
+  next.epoch_ = entered;
   next.last_number_ = last_number_;
   next.first_number_ = last_number_ + 1;
-  if (returns) {
-    for (const Doubt& doubt : doubts_) {
-      if (doubt.acted != 0) {
-        next.remember({doubt.number, doubt.acted});
-      } else {
-        next.pending_.push_back({doubt.number, doubt.sent_ns, 0});
-      }
+  for (const Doubt& doubt : doubts_) {
+    if (doubt.of != entered) {
+      next.doubts_.push_back(doubt);
+    } else if (doubt.acted != 0) {
+      next.remember({doubt.number, doubt.acted, doubt.of});
+    } else {
+      next.pending_.push_back({doubt.number, doubt.sent_ns, 0, doubt.of});
     }
-  } else {
-    next.doubts_ = std::move(doubts_);
   }
   for (const Acted& acted : acted_) {
-    // What it sent before it came to the epoch that it leaves now is of the epoch that it comes back to.
-    const bool acted_there = returns && acted.number < first_number_;
+    // The epoch that is left has what acted before it from the epoch that it continues.
+    const bool acted_there = acted.of == entered || (returns && acted.number < first_number_);
     if (acted.frame > frame && !acted_there) {
-      next.doubts_.push_back({acted.number, 0, acted.frame});
+      next.doubts_.push_back({acted.number, 0, acted.frame, acted.of});
     } else {
       next.acted_.push_back(acted);  // the epoch after this one may take it back
     }
   }
   for (const Pending& input : pending_) {
-    if (input.frame != 0 && input.frame <= frame) {
-      next.pending_.push_back(input);  // it acted; this client has yet to see it
+    if (input.of == entered || (input.frame != 0 && input.frame <= frame)) {
+      next.pending_.push_back(input);  // this client has yet to see it
     } else {
-      next.doubts_.push_back({input.number, input.sent_ns, 0});
+      next.doubts_.push_back({input.number, input.sent_ns, 0, input.of});
     }
   }
   constexpr std::size_t kMostDoubts = kMaxPending + kMaxActed;
@@ -67,13 +66,13 @@ void SentInputs::resolve(const Doubt& doubt, const transport::ReplyMessage& repl
   if (!decided) {
     outcomes.push_back({InputOutcome::Kind::kLost, doubt.number, 0, 0, 0});
   } else if (doubt.acted != 0) {
-    remember({doubt.number, doubt.acted});
+    remember({doubt.number, doubt.acted, doubt.of});
   } else if (!listed) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, doubt.number, 0, 0, 0});
   } else if (entry->code != static_cast<std::uint32_t>(transport::Reason::kNone)) {
     outcomes.push_back({InputOutcome::Kind::kRefused, doubt.number, 0, entry->code, 0});
   } else {
-    pending_.push_back({doubt.number, doubt.sent_ns, std::max<Frame>(1, entry->frame)});
+    pending_.push_back({doubt.number, doubt.sent_ns, std::max<Frame>(1, entry->frame), doubt.of});
   }
 }
 
@@ -114,7 +113,7 @@ void SentInputs::settle(std::vector<InputOutcome>& outcomes) {
     const std::int64_t at_ns = exact.frame == input.frame ? exact.at_ns : last_applied_.at_ns;
     outcomes.push_back({InputOutcome::Kind::kActed, input.number, input.frame, 0,
                         std::max<std::int64_t>(0, at_ns - input.sent_ns)});
-    remember({input.number, input.frame});
+    remember({input.number, input.frame, epoch_});
     return true;
   });
 }
@@ -129,7 +128,7 @@ bool SentInputs::settled() const {
   return doubts_.empty() && std::none_of(pending_.begin(), pending_.end(), is_earlier);
 }
 
-void SentInputs::clear(std::vector<InputOutcome>& outcomes) {
+void SentInputs::clear(Epoch entered, std::vector<InputOutcome>& outcomes) {
   for (const Pending& input : pending_) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});
   }
@@ -138,6 +137,7 @@ void SentInputs::clear(std::vector<InputOutcome>& outcomes) {
   }
   const std::uint64_t last_number = last_number_;
   *this = SentInputs();
+  epoch_ = entered;
   last_number_ = last_number;
   first_number_ = last_number + 1;
 }

@@ -43,12 +43,12 @@ class SentInputs {
   void on_applied(Frame frame, std::int64_t now_ns, std::vector<InputOutcome>& outcomes);
   /// An epoch begins whose world is that of the one before up to `frame`. What acted later, or was not
   /// answered, is in doubt until the first reply that comes from an account: it says what the server had
-  /// decided by then. `returns`: it is the epoch that the one before continued. What was sent to it, and was
-  /// in doubt, may still reach it.
-  void carry_over(Frame frame, bool returns = false);
-  /// A new epoch begins: unanswered inputs count as unknown. The numbers continue, because an earlier server
-  /// that comes back remembers the outcomes of the numbers it knows.
-  void clear(std::vector<InputOutcome>& outcomes);
+  /// decided by then. But what was sent to `entered` when the client was there before may still reach it.
+  /// `returns`: it is the epoch that the one before continued.
+  void carry_over(Epoch entered, Frame frame, bool returns = false);
+  /// A new epoch begins, or none: unanswered inputs count as unknown. The numbers continue, because an
+  /// earlier server that comes back remembers the outcomes of the numbers it knows.
+  void clear(Epoch entered, std::vector<InputOutcome>& outcomes);
   [[nodiscard]] std::size_t pending() const { return pending_.size(); }
   /// True if the outcome of every input of earlier epochs is known.
   [[nodiscard]] bool settled() const;
@@ -58,6 +58,7 @@ class SentInputs {
     std::uint64_t number = 0;
     std::int64_t sent_ns = 0;
     Frame frame = 0;  ///< 0 until the reply names it
+    Epoch of = 0;     ///< that it was sent to
   };
   struct Applied {
     Frame frame = 0;
@@ -67,16 +68,19 @@ class SentInputs {
     std::uint64_t number = 0;
     std::int64_t sent_ns = 0;
     Frame acted = 0;  // the frame with which it was told as kActed; 0: it was not
+    Epoch of = 0;     // that it was sent to, or acted in
   };
   struct Acted {
     std::uint64_t number = 0;
     Frame frame = 0;
+    Epoch of = 0;  // in which it acted
   };
   void settle(std::vector<InputOutcome>& outcomes);
   void remember(const Acted& acted);
   void resolve(const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
   void resolve(const Doubt& doubt, const transport::ReplyMessage& reply, std::vector<InputOutcome>& outcomes);
 
+  Epoch epoch_ = 0;
   std::uint64_t last_number_ = 0;
   std::uint64_t first_number_ = 1;  // of this epoch
   std::deque<Pending> pending_;

@@ -235,7 +235,8 @@ void Fabric::send(Index pair, const Sample& sample) {
   travelling.due_ns += squeezed_ns.value_or(0);
   if (!squeezed_ns) {
     if (!kRules[writer.topic].reliable) return;
-    if (random_.chance(model.lost_for_good)) {
+    const bool given_up = writer.topic != kTopic<SessionMessage> && random_.chance(model.lost_for_good);
+    if (given_up) {
       ++counts_.lost_for_good;
       return;
     }

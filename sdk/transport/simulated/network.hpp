@@ -22,7 +22,9 @@ struct LinkModel {
   /// A lost sample of a reliable topic is sent again after this time, if it is still kept. Empty: the reader
   /// asks kNackNs after a later sample could have shown the gap, and both ways take as long as their links.
   std::optional<std::int64_t> repair_ns = {};
-  double lost_for_good = 0;  ///< chance that a lost sample of a reliable topic is never repaired
+  /// Chance that a lost sample of a reliable topic is never repaired. Announcements always are, in the end:
+  /// nobody writes them again, and their writer keeps them.
+  double lost_for_good = 0;
   /// A bottleneck that all samples pass, also those of other paths that name the same one; samples that it
   /// drops are lost. Null: no bottleneck.
   std::shared_ptr<Bottleneck> bottleneck = nullptr;

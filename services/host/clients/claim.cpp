@@ -76,6 +76,9 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
     return std::ranges::none_of(others_, [&](const Other& o) { return o.from == entry.first; });
   });
   has_successor_ = std::ranges::any_of(others_, [this](const Other& other) { return continues_ours(other); });
+  has_heir_ = std::ranges::any_of(others_, [this](const Other& other) {
+    return other.from != self_ && other.message.server_role == transport::ServerRole::kStandby;
+  });
   has_rival_ = false;
   for (const Other& other : others_) {
     if (other.from == self_ || other.message.server_role != transport::ServerRole::kLive) continue;

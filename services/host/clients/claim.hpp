@@ -33,6 +33,9 @@ class Claim {
   /// Epochs that are closer than this do not tell which server was first.
   static constexpr std::int64_t kOlderMs = 2000;
 
+  /// The time that a server which starts afresh gives one that stands by. That one learns only with a lease
+  /// that its live server was killed, and then takes over.
+  static constexpr std::int64_t kHeirNs = 5'000'000'000;
   /// The time for a server to leave after it has handed over.
   static constexpr std::int64_t kIgnoredNs = 5'000'000'000;
 
@@ -50,6 +53,9 @@ class Claim {
   [[nodiscard]] bool has_rival() const { return has_rival_; }
   /// True if, at the last check(), a live server that may do so continued this server's epoch.
   [[nodiscard]] bool has_successor() const { return has_successor_; }
+  /// How much longer a server that starts afresh must claim, as of the last check(): kHeirNs if a server
+  /// stands by, as that one holds the session's world.
+  [[nodiscard]] std::int64_t gives_ns() const { return has_heir_ ? kHeirNs : 0; }
   /// Notes an acknowledgement, whatever its content.
   void acknowledged(Epoch epoch, const transport::ParticipantId& from, std::int64_t now_ns);
   /// Returns kConflict, naming the other server, if this server has to give way. A server that this one does
@@ -74,7 +80,7 @@ class Claim {
   std::optional<std::int64_t> announced_ns_;
   std::optional<transport::ParticipantId> ignored_;
   std::function<bool(const transport::ParticipantId&)> may_succeed_;
-  bool has_successor_ = false, has_rival_ = false;
+  bool has_successor_ = false, has_rival_ = false, has_heir_ = false;
   std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
                                                                 // kFollowedNs
   std::map<transport::ParticipantId, std::int64_t> behind_since_;

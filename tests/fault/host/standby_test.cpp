@@ -59,6 +59,27 @@ TEST(Standby, WhenTheServerDiesNoFrameIsLostAndClientsPlayOnWithin3Seconds) {
   });
 }
 
+// As a service without a folder for checkpoints is.
+TEST(Standby, AServerThatIsStartedAgainAtOnceBeginsNoNewWorld) {
+  for_seeds(10, [](std::uint64_t seed) {
+    Dice dice(seed);
+    Cast cast(seed);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    cast.add_client();
+    cast.run_ms(3000 + static_cast<std::int64_t>(dice.below(1500)));
+    const Frame last = live.host->frame();
+    cast.kill(live);
+    cast.run_ms(static_cast<std::int64_t>(dice.below(1000)));
+    const Server& again = cast.add_live();
+    cast.run_ms(3000);
+    ASSERT_NE(other.host, nullptr);
+    EXPECT_EQ(other.host->session().continues_frame, last);
+    EXPECT_EQ(again.host, nullptr) << "it sees who is live, and ends";
+    EXPECT_TRUE(cast.all_play(other));
+  });
+}
+
 TEST(Standby, EveryInputActsOnceOrIsToldAsLost) {
   std::size_t acted_before = 0, lost = 0;
   for_seeds(25, [&](std::uint64_t seed) {

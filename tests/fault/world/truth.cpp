@@ -7,10 +7,13 @@
 namespace tandem::world {
 
 std::string Truth::begin(Epoch epoch, Epoch continues_epoch, Frame continues_frame) {
-  if (lineages_.contains(epoch)) return "epoch " + std::to_string(epoch) + " was there before";
+  if (const Lineage* known = this->lineage(epoch); known != nullptr && known->announced)
+    return "epoch " + std::to_string(epoch) + " was there before";
+  std::erase_if(hashes_, [epoch](const auto& entry) { return entry.first.epoch == epoch; });
   Lineage lineage{.continues_epoch = continues_epoch,
                   .continues_frame = continues_frame,
                   .last = continues_frame,
+                  .announced = false,
                   .acted = {}};
   if (continues_epoch != 0) {
     const Lineage* before = this->lineage(continues_epoch);
@@ -20,7 +23,13 @@ std::string Truth::begin(Epoch epoch, Epoch continues_epoch, Frame continues_fra
     for (const auto& [value, frame] : before->acted)
       if (frame <= continues_frame) lineage.acted.emplace(value, frame);
   }
-  lineages_.emplace(epoch, std::move(lineage));
+  lineages_.insert_or_assign(epoch, std::move(lineage));
+  return {};
+}
+
+std::string Truth::announce(Epoch epoch) {
+  if (std::exchange(lineages_.at(epoch).announced, true))
+    return "epoch " + std::to_string(epoch) + " is announced by a second server";
   return {};
 }
 

@@ -16,13 +16,17 @@ struct Lineage {
   Epoch continues_epoch = 0;
   Frame continues_frame = 0;
   Frame last = 0;                 ///< the newest frame that was made
+  bool announced = false;         ///< clients may know of it
   std::map<double, Frame> acted;  ///< by the value that makes each input unique
 };
 
 class Truth {
  public:
-  /// A server begins an epoch. Returns what is wrong with that; empty if nothing is.
+  /// A server begins an epoch. Returns what is wrong with that; empty if nothing is. An epoch that was never
+  /// announced may begin again: nobody knows of it.
   [[nodiscard]] std::string begin(Epoch epoch, Epoch continues_epoch, Frame continues_frame);
+  /// A server announces the epoch that it began. Returns what is wrong.
+  [[nodiscard]] std::string announce(Epoch epoch);
   /// An input acted in the engine. Returns what is wrong.
   [[nodiscard]] std::string act(Epoch epoch, double value, Frame frame);
   void made(Epoch epoch, Frame frame);

@@ -1,33 +1,14 @@
 """Faults that are really made, and the alert that each of them fires."""
 
-import ctypes
-import os
 import shutil
 import signal
 import subprocess
 
 from programs import Prometheus, get, values, wait_for
 
+from hang import Hang
+
 SMALL_DISK = "mount -t tmpfs -o size=16m tmpfs {folder} && exec {command}"
-
-
-class Hang:
-    """The first thread of a process stands still. The others go on, as those of DDS and the metrics do."""
-
-    SEIZE, INTERRUPT, DETACH, ANY_THREAD = 0x4206, 0x4207, 17, 0x40000000
-
-    def __init__(self, process):
-        self.pid = process.pid
-        self.libc = ctypes.CDLL(None, use_errno=True)
-        self.libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
-
-    def __enter__(self):
-        for request in (self.SEIZE, self.INTERRUPT):
-            assert self.libc.ptrace(request, self.pid, None, None) == 0, os.strerror(ctypes.get_errno())
-        os.waitpid(self.pid, self.ANY_THREAD)
-
-    def __exit__(self, *_):
-        self.libc.ptrace(self.DETACH, self.pid, None, None)
 
 
 def of(address, series):

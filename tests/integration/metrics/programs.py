@@ -19,6 +19,8 @@ LOOPBACK = (
     f"</General><Discovery><Tag>metrics-test-{os.getpid()}</Tag></Discovery></Domain></CycloneDDS>"
 )
 ENVIRONMENT = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
+SUPPORT = pathlib.Path(__file__).resolve().parents[2] / "support"
+sys.path.insert(0, str(SUPPORT / "hang"))
 DEPLOYED = pathlib.Path(__file__).resolve().parents[3] / "deploy" / "metrics"
 RULES = ("recording.rules.yml", "alerts.rules.yml")
 

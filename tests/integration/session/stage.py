@@ -14,8 +14,9 @@ LOOPBACK = (
     '<CycloneDDS><Domain id="any"><General><Interfaces><NetworkInterface name="lo" multicast="true"/>'
     "</Interfaces></General><Discovery><Tag>{tag}</Tag></Discovery></Domain></CycloneDDS>"
 )
-REFERENCE = pathlib.Path(__file__).resolve().parents[2] / "reference"
-sys.path.insert(0, str(REFERENCE))
+TESTS = pathlib.Path(__file__).resolve().parents[2]
+REFERENCE = TESTS / "reference"
+sys.path[:0] = [str(REFERENCE), str(TESTS / "support" / "hang")]
 LIMIT_S = 90  # of any one wait; a busy machine is slow
 
 

@@ -281,6 +281,31 @@ TEST_F(ContinuedTest, AnInputThatActedWhereTheClientComesBackToIsNotInDoubt) {
   EXPECT_TRUE(of_kind(InputOutcome::Kind::kLost).empty());
 }
 
+// Two servers went on from the same one, and the client comes back to the one that it left.
+TEST_F(ContinuedTest, AnInputToAServerThatTheClientLeftForItsSiblingMayStillAct) {
+  const auto sibling = [&](Epoch epoch) {
+    server = FakeServer(epoch);
+    server.session.continues_epoch = 500;
+    server.session.continues_frame = 1;
+    join();
+  };
+  sibling(1000);
+  const Frame acts = server.frame() + 1;
+  for (int i = 0; i < 2; ++i) send();
+  answer({{1, acts, 0}}, 1);
+  for (int i = 0; i < 3; ++i) frame();
+  ASSERT_EQ(of_kind(InputOutcome::Kind::kActed), Numbers{1});
+  sibling(2000);
+  EXPECT_EQ(send(), 3U);
+  sibling(1000);
+  answer({}, 0);
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{3}) << "only what was sent to the other server";
+  answer({{2, server.frame() + 1, 0}}, 2);
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kActed), (Numbers{1, 2}));
+  EXPECT_EQ(of_kind(InputOutcome::Kind::kLost), Numbers{3});
+}
+
 TEST_F(ContinuedTest, AnUnansweredInputIsDecidedByTheFirstReplyOfAnAccount) {
   join();
   for (int i = 0; i < 4; ++i) send();

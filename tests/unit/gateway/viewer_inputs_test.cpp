@@ -174,7 +174,7 @@ class ViewersWord {
   }
   void hear(const ReplyMessage& reply) { inputs_.on_reply(reply, out_); }
   void plays(Frame frame) { inputs_.on_applied(frame, kStart, out_); }
-  void enters(Frame shared) { inputs_.carry_over(shared); }
+  void enters(Epoch epoch, Frame shared) { inputs_.carry_over(epoch, shared); }
   [[nodiscard]] std::map<std::uint64_t, client::InputOutcome::Kind> words() const {
     std::map<std::uint64_t, client::InputOutcome::Kind> words;
     for (const auto& outcome : out_) words[outcome.number] = outcome.kind;
@@ -202,7 +202,7 @@ TEST_F(ViewerInputs, AfterATakeoverAViewerHearsWhatTheServerSaysOfItsInputs) {
   session.continues_frame = 30;
   world.settled = false;
   gateway.on_session(session);
-  viewer.enters(30);
+  viewer.enters(kEpoch + 1, 30);
   auto joining = ack(1, Phase::kJoining);
   joining.epoch = kEpoch + 1;
   EXPECT_FALSE(say(id, joining));
@@ -237,7 +237,7 @@ TEST_F(ViewerInputs, AGravityThatWaitsInTheGatewayIsLostWithTheServer) {
   session.continues_epoch = kEpoch;
   session.continues_frame = 30;
   gateway.on_session(session);
-  viewer.enters(30);
+  viewer.enters(kEpoch + 1, 30);
   acts(1, 30);
   auto joining = ack(1, Phase::kJoining);
   joining.epoch = kEpoch + 1;

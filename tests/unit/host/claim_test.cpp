@@ -44,13 +44,27 @@ TEST(Claim, ASecondServerSeesTheFirstAndRefusesNamingIt) {
   EXPECT_TRUE(bench.port.order.empty());
 }
 
-TEST(Claim, AServerThatStandsByHasNoClaim) {
+TEST(Claim, AServerThatStandsByHasNoClaimButTheTimeToTakeOver) {
   Bench bench(claiming_config());
   auto standby = rival(-60'000, 0x0B);
   standby.message.server_role = transport::ServerRole::kStandby;
   bench.port.rivals.push_back(standby);
   bench.poll();
-  bench.run_ms(1000);
+  bench.run_ms(5400);
+  EXPECT_EQ(bench.host->state(), Host::State::kClaiming);
+  bench.run_ms(200);
+  EXPECT_EQ(bench.host->state(), Host::State::kRunning);
+}
+
+TEST(Claim, AServerThatGoesOnFromACheckpointDoesNotWaitForOneThatStandsBy) {
+  HostConfig config = claiming_config();
+  config.continues_epoch = 1;
+  Bench bench(std::move(config));
+  auto standby = rival(-60'000, 0x0B);
+  standby.message.server_role = transport::ServerRole::kStandby;
+  bench.port.rivals.push_back(standby);
+  bench.poll();
+  bench.run_ms(600);
   EXPECT_EQ(bench.host->state(), Host::State::kRunning);
 }
 

@@ -257,6 +257,21 @@ TEST(Simulated, TheLossModelCanDropForGood) {
   EXPECT_TRUE(std::is_sorted(got.begin(), got.end()));
 }
 
+TEST(Simulated, AnAnnouncementIsNotLostForGood) {
+  NetworkOptions options;
+  options.link.loss = 0.9;
+  options.link.lost_for_good = 1;
+  Pair pair(NetworkOptions{});
+  pair.run(1000 * kMs);
+  pair.network.set_all_links(options.link);
+  ASSERT_TRUE(pair.server->write(session(kEpoch + 1)));
+  pair.run(10'000 * kMs);
+  std::vector<Received<SessionMessage>> sessions;
+  pair.client->take_sessions(sessions);
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].message.epoch, kEpoch + 1);
+}
+
 TEST(Simulated, StatusIsBestEffortAndOnlyEverLost) {
   Pair pair(NetworkOptions{});
   LinkModel lossy;

@@ -344,6 +344,8 @@ void Server::on_poll() {
     return;
   }
   if (host_->state() != told_state_) {
+    if (told_state_ == host::Host::State::kClaiming)
+      if (const std::string wrong = stage_.truth.announce(epoch_); !wrong.empty()) blame("one world", wrong);
     told_state_ = host_->state();
     last_frame_ns_ = stage_.now_ns;
     if (told_state_ == host::Host::State::kRunning) {

@@ -55,7 +55,7 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"squat", 0.4, 0, 0, 0, 0},
 }};
 
-/// Somebody starts anew: then an announcement must not be lost for good, as nobody repeats it.
+/// Somebody starts anew. A world has these or losses for good, so that it shows what either does alone.
 bool starts_anew(FaultKind kind) {
   return kind == FaultKind::kCrash || kind == FaultKind::kLeave || kind == FaultKind::kPower ||
          kind == FaultKind::kTornWrite || kind == FaultKind::kNewcomer || kind == FaultKind::kHandover ||
