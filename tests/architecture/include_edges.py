@@ -115,7 +115,7 @@ EDGES = {
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
-    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system", "services/tokens"],
+    "services/gateway/doors": ["public/result.hpp", "sdk/transport/units.hpp", "services/accounts", "services/system", "services/tokens"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
