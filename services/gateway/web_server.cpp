@@ -16,6 +16,7 @@
 #include "services/gateway/doors/certificate.hpp"
 #include "services/gateway/doors/listener.hpp"
 #include "services/gateway/doors/visits.hpp"
+#include "services/gateway/web_connection.hpp"
 #include "services/gateway/web_request.hpp"
 #include "services/system/descriptor.hpp"
 
@@ -50,31 +51,6 @@ std::int64_t wall_s() {
       .count();
 }
 
-/// One WebSocket connection.
-struct Connection {
-  ViewerId id = 0;
-  std::optional<Refusal> refused;
-  std::vector<std::byte> message;  // the received part of the current message
-  AccountPtr account;
-};
-
-/// A response that is being sent.
-struct Exchange {
-  std::string own;        // the body, if it was made for this response
-  std::string_view body;  // the rest of the body
-};
-
-// libwebsockets keeps plain memory for a connection, which holds one pointer to our object.
-template <class T>
-T*& slot(void* user) {
-  return *static_cast<T**>(user);
-}
-
-template <class T>
-void drop(void* user) {
-  if (user != nullptr) delete std::exchange(slot<T>(user), nullptr);
-}
-
 }  // namespace
 
 struct WebServer::Impl {
@@ -106,7 +82,7 @@ struct WebServer::Impl {
   void turn_away(const system::Descriptor& connection, TurnedAway why);
   static Visit& visit(lws* wsi) { return *static_cast<Visit*>(lws_get_opaque_user_data(wsi)); }
   void ask(lws* wsi) { visits.ask(visit(wsi), header(wsi, WSI_TOKEN_X_FORWARDED_FOR)); }
-  void end_slow(std::int64_t now_ns);
+  void end_unwanted(std::int64_t now_ns);
 
   // HTTP
   int respond(lws* wsi, void* user, std::string_view path);
@@ -114,7 +90,7 @@ struct WebServer::Impl {
                 bool compressed, std::string_view cookie = {});
   int log_in(lws* wsi, void* user);
   int send_body(lws* wsi, void* user);
-  static int complete(lws* wsi);
+  static int complete(lws* wsi, const Exchange& exchange);
   static int confirm_upgrade(lws* wsi);
 
   // WebSocket
@@ -191,17 +167,24 @@ void WebServer::Impl::turn_away(const system::Descriptor& connection, TurnedAway
   if (!encrypted && told.take(steady_ns())) say_too_many(connection);
 }
 
-void WebServer::Impl::end_slow(std::int64_t now_ns) {
+void WebServer::Impl::end_unwanted(std::int64_t now_ns) {
   visits.list_waiting(listed);
   for (const Visit* const by : listed) lws_callback_on_writable(by->wsi);
+  const auto end_listed = [&](TurnedAway why, bool also_greeted) {
+    for (const Visit* const by : listed) {
+      if (also_greeted || !by->greeted) handler.turned_away(why);
+      lws_set_timeout(by->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
+    }
+  };
   visits.list_slow(now_ns, listed);
-  for (const Visit* const by : listed) {
-    if (!by->greeted) handler.turned_away(TurnedAway::kSlow);
-    lws_set_timeout(by->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
-  }
+  end_listed(TurnedAway::kSlow, false);
+  visits.list_floods(
+      now_ns, [](const Visit& by) { return received_bytes(lws_get_socket_fd(by.wsi)); }, listed);
+  end_listed(TurnedAway::kBytes, true);
 }
 
-int WebServer::Impl::complete(lws* wsi) {
+int WebServer::Impl::complete(lws* wsi, const Exchange& exchange) {
+  if (exchange.last) return -1;
   Visits::answered(visit(wsi), steady_ns());
   return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
 }
@@ -223,10 +206,12 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
                                                 &at, end) == 0 &&
                     add("cache-control:", cache) && (!compressed || add("content-encoding:", "gzip")) &&
                     (cookie.empty() || add("set-cookie:", cookie)) &&
+                    (!exchange.last || add("connection:", "close")) &&
                     (!strict || add("strict-transport-security:", kStrictTransport)) &&
                     lws_finalize_write_http_header(wsi, start, &at, end) == 0;
   if (!good) return -1;
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty()) return complete(wsi);
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty())
+    return complete(wsi, exchange);
   lws_callback_on_writable(wsi);
   return 0;
 }
@@ -262,6 +247,7 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
       lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 || lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
   if (!visit(wsi).account->requests.take(steady_ns())) {
     handler.turned_away(TurnedAway::kRequests);
+    exchange.last = true;  // who sends many at once is not answered each
     return say(kTooManyRequests, "too many requests from your address\n", "text/plain");
   }
   if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
@@ -292,7 +278,7 @@ int WebServer::Impl::send_body(lws* wsi, void* user) {
   if (lws_write(wsi, buffer.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) <
       static_cast<int>(size))
     return -1;
-  if (last) return complete(wsi);
+  if (last) return complete(wsi, exchange);
   lws_callback_on_writable(wsi);
   return 0;
 }
@@ -507,7 +493,7 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
   self.let_go();
   self.end_silent();
   const std::int64_t now_ns = steady_ns();
-  self.end_slow(now_ns);
+  self.end_unwanted(now_ns);
   if (self.ticks++ % 10 == 0) {
     self.visits.forget(now_ns);
     self.end_over();

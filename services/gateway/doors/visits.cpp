@@ -61,6 +61,20 @@ void Visits::list_slow(std::int64_t now_ns, std::vector<Visit*>& out) {
   }
 }
 
+// TCP counts what no handler of messages sees: pings, and bodies of requests that are refused.
+void Visits::list_floods(std::int64_t now_ns, const std::function<std::uint64_t(const Visit&)>& received_by,
+                         std::vector<Visit*>& out) {
+  constexpr auto kShare = static_cast<std::uint64_t>(kReceivedPerSecond / 10);
+  out.clear();
+  for (const auto& [key, visit] : visits_) {
+    const std::uint64_t received = received_by(*visit);
+    const std::uint64_t more = received - std::min(visit->received, received);
+    visit->received = received;
+    visit->account->received.spend(static_cast<double>(more));
+    if (more > kShare && !visit->account->received.has(now_ns)) out.push_back(visit.get());
+  }
+}
+
 void Visits::list_waiting(std::vector<Visit*>& out) {
   out.clear();
   for (const auto& [key, visit] : visits_) {

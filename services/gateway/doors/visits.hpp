@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -27,6 +28,7 @@ struct Visit {
   bool greeted = false;             ///< has shaken hands
   bool waits_for_bytes = false;     ///< a file goes on when its address may have more
   std::int64_t due_ns = INT64_MAX;  ///< ended then, unless the headers of a request came
+  std::uint64_t received = 0;       ///< bytes, when they were last counted
 };
 
 /// Keeps all visits, and counts them in the accounts of their addresses. Not thread-safe.
@@ -53,6 +55,11 @@ class Visits {
 
   /// Lists the visits whose time is over, once each. Replaces `out`.
   void list_slow(std::int64_t now_ns, std::vector<Visit*>& out);
+  /// Counts what came by each since the last call, and lists those by which more came than their share while
+  /// their address is over its limit. Call it ten times a second. `received_by`: bytes since its start.
+  /// Replaces `out`.
+  void list_floods(std::int64_t now_ns, const std::function<std::uint64_t(const Visit&)>& received_by,
+                   std::vector<Visit*>& out);
   /// Lists the visits whose file waited, once for each wait. Replaces `out`.
   void list_waiting(std::vector<Visit*>& out);
   /// Forgets addresses that are gone and would be treated as new ones.

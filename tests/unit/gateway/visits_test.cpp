@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace tandem::gateway {
 namespace {
 
@@ -126,6 +128,37 @@ TEST_F(VisitsTest, ThroughAProxyJoinAsLongAsTheClientHasPlaces) {
   EXPECT_FALSE(visits.join(second, 0));
   visits.leave(&second);
   EXPECT_EQ(first.account->connections, 1U) << "it was never counted";
+}
+
+TEST_F(VisitsTest, ByWhichTooMuchComesAreListedWhileTheirAddressIsOverItsLimit) {
+  Visits visits(DoorLimits{.connections = 4}, 6, {});  // 64 KiB a second, 256 KiB at once
+  Visit& flood = arrived(visits, kOne);
+  visits.ask(flood, "");
+  Visit& quiet = arrived(visits, kOne);
+  visits.ask(quiet, "");
+  Visit& other = arrived(visits, kOther);
+  std::uint64_t received = 0;
+  std::vector<Visit*> list;
+  const auto tick = [&](std::int64_t now_ns) {
+    visits.list_floods(
+        now_ns, [&](const Visit& visit) { return &visit == &flood || &visit == &other ? received : 0; },
+        list);
+  };
+  received = 250 * 1024;
+  tick(0);
+  EXPECT_TRUE(list.empty()) << "a burst";
+  received = 500 * 1024;
+  tick(kSecond / 10);
+  EXPECT_EQ(list.size(), 2U);
+  EXPECT_EQ(std::ranges::count(list, &quiet), 0);
+  EXPECT_EQ(visits.arrive(kOne, kSecond / 10).error(), TurnedAway::kBytes);
+  EXPECT_TRUE(visits.arrive(key("192.0.2.3"), kSecond / 10)) << "nobody else is kept out";
+  tick(kSecond);
+  EXPECT_TRUE(list.empty()) << "nothing more came";
+  visits.leave(&flood);
+  visits.leave(&other);
+  visits.forget(5 * kSecond);
+  EXPECT_TRUE(visits.arrive(kOne, 5 * kSecond)) << "it was paid back";
 }
 
 TEST_F(VisitsTest, WhoseFilesWaitAreListedOnceEach) {
