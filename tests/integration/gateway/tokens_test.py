@@ -173,6 +173,11 @@ def bad_tokens(stage):
     ends("--token-key", public)  # everybody can write it
     ends("--token-key", key)  # the secret one
     ends("--token-key", stage.folder / "missing")
+    authority = stage.folder / "pki"
+    pki(stage, "init", "--dir", authority)
+    pki(stage, "issue", "gateway", "web", "--dir", authority)
+    (authority / "web" / "key.pem").chmod(0o644)
+    ends("--secure", authority / "web")  # a key of DDS Security that the world can read
     cert, its_key = certificate(stage, "cert")
     _, foreign = certificate(stage, "foreign")
     ends("--tls-cert", cert, "--tls-key", foreign)
