@@ -144,10 +144,10 @@ TEST_F(VisitsTest, ByWhichTooMuchComesAreListedWhileTheirAddressIsOverItsLimit) 
         now_ns, [&](const Visit& visit) { return &visit == &flood || &visit == &other ? received : 0; },
         list);
   };
-  received = 250 * 1024;
+  received = 250'000;
   tick(0);
   EXPECT_TRUE(list.empty()) << "a burst";
-  received = 500 * 1024;
+  received = 500'000;
   tick(kSecond / 10);
   EXPECT_EQ(list.size(), 2U);
   EXPECT_EQ(std::ranges::count(list, &quiet), 0);
