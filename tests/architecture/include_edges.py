@@ -109,7 +109,8 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
-    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "sdk/transport/secure", "services/system"],
+    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "sdk/transport/secure"]
+    + ["services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd/configuration": OF_TANDEMD,
