@@ -41,7 +41,7 @@ class Passage {
 
  private:
   struct Flying {
-    std::size_t part;
+    std::size_t part = 0;
     TransferWindow::Sent sent;
   };
 

@@ -76,10 +76,10 @@ Result<Folder::Found> Folder::newest(const std::function<Result<void>(const Chec
 
 Result<void> Folder::write_whole(const std::string& file, std::span<const std::byte> bytes) {
   const std::string unfinished = file + ".part";
-  const auto written = disk_->write(unfinished, bytes)
-                           .and_then([&] { return disk_->sync(unfinished); })
-                           .and_then([&] { return disk_->rename(unfinished, file); })
-                           .and_then([&] { return disk_->sync_folder(); });
+  auto written = disk_->write(unfinished, bytes)
+                     .and_then([&] { return disk_->sync(unfinished); })
+                     .and_then([&] { return disk_->rename(unfinished, file); })
+                     .and_then([&] { return disk_->sync_folder(); });
   if (!written) static_cast<void>(disk_->remove(unfinished));  // a full disk needs the room
   return written;
 }

@@ -41,7 +41,6 @@ tl::unexpected<Error> malformed(std::string why) { return fail(ErrorCode::kMalfo
 /// Appends to a vector.
 class Writer {
  public:
-  static constexpr bool kReads = false;
   explicit Writer(std::vector<std::byte>& out) : out_(&out) {}
 
   void bytes(const void* from, std::size_t size) {
@@ -78,7 +77,6 @@ class Writer {
 /// Reads what a writer wrote. Beyond the end it reads nothing, and ok() is false.
 class Reader {
  public:
-  static constexpr bool kReads = true;
   explicit Reader(std::span<const std::byte> in) : in_(in) {}
 
   template <class T>

@@ -69,6 +69,7 @@ class Command {
   Option add_choice(const std::string& name, T& variable, const std::map<std::string, T>& values,
                     const std::string& help) {
     std::vector<std::string> names;
+    names.reserve(values.size());
     for (const auto& [text, value] : values) names.push_back(text);
     const auto set = [&variable, values](const std::string& text) { variable = values.at(text); };
     return add_option_function<std::string>(name, set, help).one_of(names);

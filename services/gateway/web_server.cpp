@@ -27,7 +27,7 @@ static_assert(Outgoing::kHeadroom >= LWS_PRE);
 
 constexpr const char* kSubprotocol = "tandem.2";
 constexpr std::string_view kPath = "/tandem";
-constexpr std::size_t kChunkBytes = 16 * 1024;  // of a file
+constexpr std::size_t kChunkBytes = std::size_t{16} << 10U;  // of a file
 constexpr int kRefusedSeconds = 5, kFileSeconds = 30;
 // Taken or turned away at once, before those that are in are served.
 constexpr int kArrivalsAtOnce = 128;

@@ -1,6 +1,9 @@
 #include "services/metrics/process_series.hpp"
 
 #include <dirent.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -54,13 +57,19 @@ void describe_process(Page& page) {
   std::ifstream("/proc/self/statm") >> pages >> resident;
   page.gauge("process_resident_memory_bytes", "Memory of the process that is in use",
              resident * static_cast<double>(sysconf(_SC_PAGESIZE)));
+#ifdef __GLIBC__
+  // What stays here and not above is room that the heap keeps for later.
+  const struct mallinfo2 heap = mallinfo2();
+  page.gauge("tandem_heap_bytes", "Memory that the program has allocated and not freed",
+             static_cast<double>(heap.uordblks) + static_cast<double>(heap.hblkhd));
+#endif
   page.gauge("process_open_fds", "Open files and sockets", open_files());
   rlimit limit{};
   getrlimit(RLIMIT_NOFILE, &limit);
   page.gauge("process_max_fds", "Maximum number of open files and sockets",
              static_cast<double>(limit.rlim_cur));
-  static const double kStarted = start_time_s();
-  page.gauge("process_start_time_seconds", "Start of the process, since 1970", kStarted);
+  static const double started_s = start_time_s();
+  page.gauge("process_start_time_seconds", "Start of the process, since 1970", started_s);
 }
 
 }  // namespace tandem::metrics

@@ -47,7 +47,7 @@ class Script {
     const Tilting* tilting = nullptr;  // either this
     const Poking* poking = nullptr;    // or that
     double next_s = 0;
-    Random random;
+    Random random{0};
     engine::Vec3 held{};  // the gravity of before
     bool over = false;
   };

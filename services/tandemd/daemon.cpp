@@ -418,7 +418,8 @@ int run_daemon(Options options, SignalWatch& signals) {
   const Stage stage{options, served, hashes, metrics, service, signals};
   for (bool first = true;; first = false) {
     const std::int64_t began_ns = steady_ns();
-    auto config = planning::plan_server(served.world, options.choice, options);
+    auto config =
+        planning::plan_server(served.world, static_cast<const planning::Wishes&>(options.choice), options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
     std::optional<End> end;

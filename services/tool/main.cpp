@@ -1,5 +1,5 @@
-// The command line tool: join, record, replay, checkpoint, handover, engine-check, bench, export, top, doctor,
-// pki. Exit 0 done, 1 failed, 2 wrong usage.
+// The command line tool: join, record, replay, checkpoint, handover, engine-check, bench, export, top,
+// doctor, pki. Exit 0 done, 1 failed, 2 wrong usage.
 
 #include <cstdio>
 #include <exception>
@@ -21,19 +21,20 @@ int main(int argc, char** argv) {
   app.require_subcommand();
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong usage. With --json, stdout holds one JSON object.");
   tandem::tool::Run run;
-  tandem::tool::add_join(app, run);
-  tandem::tool::add_record(app, run);
-  tandem::tool::add_replay(app, run);
-  tandem::tool::add_checkpoint(app, run);
-  tandem::tool::add_handover(app, run);
-  tandem::tool::add_engine_check(app, run);
+  const tandem::commandline::Command& command = app;
+  tandem::tool::add_join(command, run);
+  tandem::tool::add_record(command, run);
+  tandem::tool::add_replay(command, run);
+  tandem::tool::add_checkpoint(command, run);
+  tandem::tool::add_handover(command, run);
+  tandem::tool::add_engine_check(command, run);
 #ifdef TANDEM_LAB
-  tandem::tool::add_bench(app, run);
-  tandem::tool::add_export(app, run);
+  tandem::tool::add_bench(command, run);
+  tandem::tool::add_export(command, run);
 #endif
-  tandem::tool::add_top(app, run);
-  tandem::tool::add_doctor(app, run);
-  tandem::tool::add_pki(app, run);
+  tandem::tool::add_top(command, run);
+  tandem::tool::add_doctor(command, run);
+  tandem::tool::add_pki(command, run);
 #ifndef TANDEM_LAB
   if (argc > 1 && (argv[1] == std::string("bench") || argv[1] == std::string("export"))) {
     std::fprintf(stderr,

@@ -33,7 +33,8 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
     : playback_(&playback), seeks_(&seeks), clock_ns_(config.clock_ns), session_(playback.session()) {
   transport::StreamMessage stream = playback.stream();
   stream.id = {};
-  session_.streams.assign(1, std::move(stream));
+  session_.streams.clear();
+  session_.streams.push_back(std::move(stream));
   session_.session = config.session;
   session_.epoch = config.epoch;
   session_.frame_rate_hz = config.frame_rate_hz;

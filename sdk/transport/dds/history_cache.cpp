@@ -7,7 +7,7 @@
 namespace tandem::transport::dds {
 
 // No sample is kept: reading finds nothing, and there is nothing to update.
-constinit const dds_rhc_ops HistoryCache::kOps = [] {
+constinit const dds_rhc_ops HistoryCache::operations = [] {
   dds_rhc_ops ops{};
   ops.rhc_ops.store = &HistoryCache::store;
   ops.rhc_ops.unregister_wr = [](ddsi_rhc*, const ddsi_writer_info*) {};
@@ -27,7 +27,7 @@ constinit const dds_rhc_ops HistoryCache::kOps = [] {
 }();
 
 HistoryCache::HistoryCache(OnSample call, void* argument) : dds_rhc{}, call_(call), argument_(argument) {
-  common.ops = &kOps;
+  common.ops = &operations;
 }
 
 bool HistoryCache::store(ddsi_rhc* self, const ddsi_writer_info* writer, ddsi_serdata* sample,

@@ -31,7 +31,7 @@ class HistoryCache : public dds_rhc {
   static dds_return_t associate(dds_rhc* self, dds_reader* reader, const ddsi_sertype* type,
                                 ddsi_tkmap* instances);
   static void free(ddsi_rhc* self);
-  static const dds_rhc_ops kOps;
+  static const dds_rhc_ops operations;
 
   void hold(ddsi_tkmap_instance* instance);
 

@@ -7,6 +7,7 @@
 
 #include "sdk/transport/dds/convert.hpp"
 #include "sdk/transport/dds/entity.hpp"
+#include "sdk/transport/limits.hpp"
 
 namespace tandem::transport::dds {
 
@@ -36,7 +37,10 @@ struct Topic<SessionMessage> {
 template <>
 struct Topic<DeltaMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemDelta_desc; }
-  static constexpr TopicQos kQos{true, false, 64, 64, 64};  // the options set the depth
+  // The options set the depth. Cyclone asks the readers of a keep-last writer for acknowledgements only when
+  // it pauses, so its history would always be full; the lifespan keeps it at what a slow reader may want.
+  static constexpr TopicQos kQos{
+      true, false, 64, 64, 64, 0, static_cast<dds_duration_t>(kHistorySeconds* DDS_NSECS_IN_SEC)};
 };
 template <>
 struct Topic<ScheduledInputMessage> {

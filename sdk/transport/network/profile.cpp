@@ -21,9 +21,9 @@ struct Count {
   std::size_t least = 0, most = 0;
 };
 struct Rule {
-  const char* name;
+  const char* name = nullptr;
   Count interfaces;
-  bool wide_area;  ///< takes server, external and index
+  bool wide_area = false;  ///< takes server, external and index
 };
 constexpr Rule kRules[] = {{"loopback", {0, 0}, false},
                            {"lan", {0, 1}, false},
@@ -280,8 +280,12 @@ std::string describe(const Profile& resolved, Side side, std::uint32_t domain, c
     const std::string address = server.substr(0, server.find(':'));
     const auto source = machine.source_address_to(address);
     if (!source || !is_private(*source) || is_private(address)) continue;
-    return text + "; " + *source + " is private and " + address +
-           " is not: if NAT is between, the server cannot answer without external=ADDRESS, the address that it sees";
+    return text.append("; ")
+        .append(*source)
+        .append(" is private and ")
+        .append(address)
+        .append(
+            " is not: if NAT is between, the server cannot answer without external=ADDRESS, the address that it sees");
   }
   return text;
 }

@@ -40,12 +40,12 @@ class Member {
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
   template <class M>
-  Fabric::Index writer(std::uint32_t depth = 1, std::string partition = {}) {
-    return fabric_->add_writer(self_, kTopic<M>, depth, std::move(partition));
+  Fabric::Index writer(std::uint32_t depth = 1, const std::string& partition = {}) {
+    return fabric_->add_writer(self_, kTopic<M>, depth, partition);
   }
   template <class M>
-  Fabric::Index reader(std::uint32_t depth = 1, std::vector<std::string> partitions = {{}}) {
-    return fabric_->add_reader(self_, kTopic<M>, depth, std::move(partitions));
+  Fabric::Index reader(std::uint32_t depth = 1, const std::vector<std::string>& partitions = {{}}) {
+    return fabric_->add_reader(self_, kTopic<M>, depth, partitions);
   }
   template <class M>
   void take(Fabric::Index reader, const Limits& limits, std::vector<Received<M>>& out) {

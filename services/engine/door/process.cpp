@@ -57,11 +57,13 @@ Result<Process> Process::start(const std::string& command,
   for (char** variable = environ; *variable != nullptr; ++variable) {
     const std::string_view text(*variable);
     bool replaced = false;
-    for (const auto& [name, value] : environment) replaced = replaced || text.starts_with(name + "=");
+    const std::string_view named = text.substr(0, text.find('='));
+    for (const auto& [name, value] : environment) replaced = replaced || named == name;
     if (!replaced) variables.emplace_back(text);
   }
-  for (const auto& [name, value] : environment) variables.push_back(name + "=" + value);
+  for (const auto& [name, value] : environment) variables.emplace_back(name).append("=").append(value);
   std::vector<char*> list;
+  list.reserve(variables.size() + 1);
   for (std::string& variable : variables) list.push_back(variable.data());
   list.push_back(nullptr);
   const pid_t parent = ::getpid();

@@ -194,8 +194,8 @@ bool Server::run_for(double seconds) {
 }
 
 const Error& Server::error() const {
-  static const Error kMovedFrom{ErrorCode::kOutOfOrder, "the server was moved from"};
-  return impl_ == nullptr ? kMovedFrom : impl_->error;
+  static const Error moved_from{ErrorCode::kOutOfOrder, "the server was moved from"};
+  return impl_ == nullptr ? moved_from : impl_->error;
 }
 
 Result<std::uint64_t> Server::inject(const engine::Input& input) {

@@ -131,8 +131,8 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
 
 bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now) {
   const struct {
-    Phase phase;
-    std::uint32_t stream, attempt;
+    Phase phase = {};
+    std::uint32_t stream = 0, attempt = 0;
     std::optional<std::uint32_t> next_stream;
   } before{account.phase, account.stream, account.attempt, account.next_stream};
   account.attempt = ack.join_attempt;

@@ -39,8 +39,8 @@ void quantise_block(const float* __restrict x, std::size_t count, double scale, 
 // value that changes between its check and its use would be converted unchecked.
 void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
                      std::span<std::int32_t> out, std::span<std::int32_t> off) {
-  std::array<float, kBlock>
-      block;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
+  std::array<float, kBlock> block;
   for (std::size_t first = 0; first < in.size(); first += kBlock) {
     const std::size_t count = std::min(kBlock, in.size() - first);
     std::memcpy(block.data(), in.data() + first, count * sizeof(float));

@@ -139,7 +139,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   idl::ServerConfig config;
   std::string path;
   bool json = false, check = false, print = false;
-  add_flags(app, config);
+  add_flags(static_cast<const commandline::Command&>(app), config);
   app.add_option("--config", path,
                  "Configuration file (protobuf text); flags override it. --print-config shows its form");
   app.add_flag("--check-config", check,

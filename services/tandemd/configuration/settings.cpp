@@ -20,6 +20,7 @@ namespace {
 
 std::string stream_keys() {
   std::vector<std::string_view> keys;
+  keys.reserve(std::size(planning::kStreamOptions));
   for (const planning::StreamOption& option : planning::kStreamOptions) keys.push_back(option.key);
   return fmt::format("{}", fmt::join(keys, ", "));
 }

@@ -196,7 +196,8 @@ def hour(stage, minutes, _):
             "recorder: memory after ten minutes",
             "grows by less than 1 %",
             f"after {warm_s / 60:.1f} minutes: " + ", ".join(
-                f"{name} {grown[name]:+.1f} % of {watch.memory[name][-1][1] / 1024:.1f} MB" for name in grown),
+                f"{name} {grown[name]:+.1f} % of {watch.memory[name][-1][1] / 1024:.1f} MB" for name in grown)
+            + f"; what the server has allocated {growth_percent(watch.heap, warm_s):+.1f} % of {watch.heap[-1][1] / 1024:.1f} MB",
             flat,
         ),
         (

@@ -112,6 +112,7 @@ class Watch:
         self.server, self.port, self.programs = server, port, programs
         self.late = self.own = 0  # frames above 50 ms, and those of them that the scheduler does not explain
         self.memory = {name: [] for name in programs}
+        self.heap = []  # kB that the server has allocated, at these seconds
         self.fault = None
         self.first = self.last = read_page(port)
         self.began = time.monotonic()
@@ -142,6 +143,7 @@ class Watch:
             since = time.monotonic() - self.began
             if since >= next_memory:
                 next_memory = since + 5
+                self.heap.append((since, total(page, "tandem_heap_bytes") / 1024))
                 for name, program in self.programs.items():
                     self.memory[name].append((since, program.resident_kb()))
 
