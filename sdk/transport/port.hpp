@@ -62,6 +62,8 @@ class ServerPort {
                                     std::uint32_t stream) = 0;
   /// True if the participant still has a live acknowledgement writer.
   [[nodiscard]] virtual bool alive(const ParticipantId& participant) = 0;
+  /// True if the participant has a writer of inputs. With DDS Security an observer cannot have one.
+  [[nodiscard]] virtual bool acts(const ParticipantId& /*participant*/) { return true; }
   /// True if the participant has ended: it said so, or was silent for longer than its lease.
   [[nodiscard]] virtual bool ended(const ParticipantId& participant) = 0;
   /// Number of samples refused for their size or shape since the start.

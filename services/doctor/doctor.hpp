@@ -9,6 +9,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/network/interfaces.hpp"
 #include "sdk/transport/network/profile.hpp"
+#include "sdk/transport/secure/identity_folder.hpp"
 
 namespace tandem::doctor {
 
@@ -58,17 +59,21 @@ struct MachineFacts {
   std::vector<Path> paths;
   std::vector<transport::HeardParticipant> participants;  ///< of the domain, with our own
 
-  std::vector<Check> security;  ///< what else was found, about the files of DDS Security
+  std::string secure;                                   ///< the folder of an identity; empty: none
+  std::optional<transport::secure::Identity> identity;  ///< empty: none, or identity_fault says why
+  std::string identity_fault;                           ///< names file and cure
 };
 
 /// Looks at this machine, and joins the DDS domain for some seconds. Sends one datagram per interface to a
 /// multicast group with a time to live of 0, so that it never leaves the host, and a few empty ones to
 /// servers that the profile names, to learn the MTU on the way. A profile that names a server is that of a
-/// client. `profile` is good (parse_profile()), or empty.
-[[nodiscard]] MachineFacts machine_facts(std::uint32_t domain, const std::string& profile);
+/// client. `profile` is good (parse_profile()), or empty. `secure`: the folder of an identity, as which it
+/// joins the domain if that is good; empty: none.
+[[nodiscard]] MachineFacts machine_facts(std::uint32_t domain, const std::string& profile,
+                                         const std::string& secure = {});
 
-/// Judges the facts: configuration, interfaces, multicast, buffers, limits, MTU, clock, ports, peers, and
-/// what is in `security`.
+/// Judges the facts: configuration, interfaces, multicast, buffers, limits, MTU, clock, ports, peers and
+/// security.
 [[nodiscard]] std::vector<Check> judge(const MachineFacts& facts);
 
 }  // namespace tandem::doctor

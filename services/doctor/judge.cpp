@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "sdk/transport/secure/openssl.hpp"
 #include "services/doctor/doctor.hpp"
 
 namespace tandem::doctor {
@@ -18,6 +19,7 @@ constexpr std::uint64_t kWantedOpenFiles = 256;
 constexpr std::uint32_t kHeaderBytes = 28;  // of IPv4 and UDP
 constexpr int kEthernetMtu = 1500;
 constexpr std::int64_t kYear2024 = 1'704'067'200;
+constexpr std::int64_t kRenewBeforeS = std::int64_t{7} * 86'400;
 // What DDS uses of the ports of a domain: 0 and 1 for multicast, 10 and more for programs at known ports.
 constexpr std::uint32_t kPortsOfDomain = 250;
 
@@ -268,22 +270,44 @@ Check judge_peers(const MachineFacts& facts) {
   return {"peers", Verdict::kGood, detail.empty() ? "nobody else is on the domain now" : detail, ""};
 }
 
+Check judge_security(const MachineFacts& facts) {
+  if (!facts.identity_fault.empty()) return {"security", Verdict::kFailure, facts.identity_fault, ""};
+  if (facts.identity) {
+    const transport::secure::Identity& identity = *facts.identity;
+    std::string detail = fmt::format("{} {}, until {}", identity.role.empty() ? "identity" : identity.role,
+                                     identity.name, transport::secure::date_text(identity.not_after_s));
+    if (identity.not_after_s - facts.clock_s > kRenewBeforeS)
+      return {"security", Verdict::kGood, std::move(detail), ""};
+    return {"security", Verdict::kWarning, std::move(detail),
+            fmt::format(
+                "it ends soon, and its peers then leave it: tandem pki renew {}, and start the program again",
+                identity.name)};
+  }
+  std::vector<std::string> networks;
+  for (const HeardParticipant& each : facts.participants)
+    if (each.own) networks = each.addresses;
+  std::erase_if(networks, &transport::is_loopback);
+  if (networks.empty()) return {"security", Verdict::kGood, "none, and DDS uses no network", ""};
+  return {"security", Verdict::kWarning,
+          fmt::format("without --secure, everybody who reaches {} can watch, act and pretend to be a server",
+                      joined(networks)),
+          "make identities with `tandem pki`, and give each program its own: --secure DIR"};
+}
+
 }  // namespace
 
 std::vector<Check> judge(const MachineFacts& facts) {
-  std::vector<Check> checks = {
-      judge_configuration(facts),
-      judge_interfaces(facts),
-      judge_multicast(facts),
-      judge_buffer("receive buffer", "net.core.rmem_max", facts.receive_buffer_max_bytes),
-      judge_buffer("send buffer", "net.core.wmem_max", facts.send_buffer_max_bytes),
-      judge_files(facts),
-      judge_mtu(facts),
-      judge_clock(facts),
-      judge_ports(facts),
-      judge_peers(facts)};
-  checks.insert(checks.end(), facts.security.begin(), facts.security.end());
-  return checks;
+  return {judge_configuration(facts),
+          judge_interfaces(facts),
+          judge_multicast(facts),
+          judge_buffer("receive buffer", "net.core.rmem_max", facts.receive_buffer_max_bytes),
+          judge_buffer("send buffer", "net.core.wmem_max", facts.send_buffer_max_bytes),
+          judge_files(facts),
+          judge_mtu(facts),
+          judge_clock(facts),
+          judge_ports(facts),
+          judge_peers(facts),
+          judge_security(facts)};
 }
 
 }  // namespace tandem::doctor

@@ -179,11 +179,24 @@ void look_at_ports(MachineFacts& facts) {
   if (port != 0 && transport::udp_port_taken(port, !wan)) facts.port_in_use = port;
 }
 
+void look_at_identity(MachineFacts& facts, const std::string& secure) {
+  facts.secure = secure;
+  if (secure.empty()) return;
+  auto identity = transport::secure::check_identity_folder(secure, facts.clock_s);
+  if (identity) {
+    facts.identity = std::move(*identity);
+  } else {
+    facts.identity_fault = identity.error().message;
+  }
+}
+
 void look_at_domain(MachineFacts& facts, const std::string& profile) {
   if (!facts.domain_fault.empty()) return;
   const std::size_t wanted = facts.profile ? facts.profile->servers.size() : 0;
+  const transport::DdsOptions options{
+      .domain = facts.domain, .profile = profile, .secure = facts.identity ? facts.secure : std::string()};
   auto heard = transport::listen_for_participants(
-      facts.domain, profile, facts.side, wanted > 0 ? kPatienceOverWan : kPatience,
+      options, facts.side, wanted > 0 ? kPatienceOverWan : kPatience,
       [wanted](const auto& all) { return wanted > 0 && all.size() > wanted; });
   if (!heard) {
     facts.domain_fault = heard.error().message;
@@ -194,7 +207,7 @@ void look_at_domain(MachineFacts& facts, const std::string& profile) {
 
 }  // namespace
 
-MachineFacts machine_facts(std::uint32_t domain, const std::string& profile) {
+MachineFacts machine_facts(std::uint32_t domain, const std::string& profile, const std::string& secure) {
   MachineFacts facts;
   facts.domain = domain;
   facts.profile_text = profile;
@@ -217,6 +230,7 @@ MachineFacts machine_facts(std::uint32_t domain, const std::string& profile) {
   facts.clock_synchronised = ::adjtimex(&clock) != TIME_ERROR && (clock.status & STA_UNSYNC) == 0;
   facts.clock_s = std::time(nullptr);
   look_at_profile(facts, profile);
+  look_at_identity(facts, secure);
   look_at_ports(facts);
   look_at_domain(facts, profile);
   return facts;

@@ -8,7 +8,6 @@
 #include <array>
 #include <chrono>
 #include <cstring>
-#include <map>
 #include <unordered_map>
 #include <utility>
 
@@ -16,6 +15,8 @@
 #include "sdk/transport/units.hpp"
 #include "services/gateway/doors/certificate.hpp"
 #include "services/gateway/doors/listener.hpp"
+#include "services/gateway/doors/visits.hpp"
+#include "services/gateway/web_connection.hpp"
 #include "services/gateway/web_request.hpp"
 #include "services/system/descriptor.hpp"
 
@@ -27,7 +28,7 @@ static_assert(Outgoing::kHeadroom >= LWS_PRE);
 constexpr const char* kSubprotocol = "tandem.2";
 constexpr std::string_view kPath = "/tandem";
 constexpr std::size_t kChunkBytes = std::size_t{16} << 10U;  // of a file
-constexpr int kRefusedSeconds = 5, kFileSeconds = 30, kHandshakeSeconds = 3, kKeptSeconds = 15;
+constexpr int kRefusedSeconds = 5, kFileSeconds = 30;
 // Taken or turned away at once, before those that are in are served.
 constexpr int kArrivalsAtOnce = 128;
 // Told by HTTP that they are turned away, a second; the rest just end.
@@ -50,42 +51,6 @@ std::int64_t wall_s() {
       .count();
 }
 
-/// One connection from its start on. Handshake: until the headers of the first request are there.
-struct Visit {
-  lws* wsi = nullptr;
-  AccountPtr account;               // of the peer, or of the client behind a trusted proxy
-  AddressKey peer{}, client{};      // the client is another one behind a trusted proxy
-  bool counted = false;             // in `account`
-  bool greeted = false;             // has shaken hands
-  bool waits_for_bytes = false;     // a file goes on when its address may have more
-  std::int64_t due_ns = INT64_MAX;  // ended then, unless the headers of a request came
-};
-
-/// One WebSocket connection.
-struct Connection {
-  ViewerId id = 0;
-  std::optional<Refusal> refused;
-  std::vector<std::byte> message;  // the received part of the current message
-  AccountPtr account;
-};
-
-/// A response that is being sent.
-struct Exchange {
-  std::string own;        // the body, if it was made for this response
-  std::string_view body;  // the rest of the body
-};
-
-// libwebsockets keeps plain memory for a connection, which holds one pointer to our object.
-template <class T>
-T*& slot(void* user) {
-  return *static_cast<T**>(user);
-}
-
-template <class T>
-void drop(void* user) {
-  if (user != nullptr) delete std::exchange(slot<T>(user), nullptr);
-}
-
 }  // namespace
 
 struct WebServer::Impl {
@@ -93,16 +58,11 @@ struct WebServer::Impl {
       : site(the_site),
         handler(the_handler),
         listener(std::move(the_listener)),
-        doors(options.doors),
-        most(options.connections),
+        visits(options.doors, options.connections, options.trusted_proxies),
         encrypted(!options.tls_cert.empty()),
         tls_cert(options.tls_cert),
         tls_key(options.tls_key),
-        heads(options.origins) {
-    for (const std::string& proxy : options.trusted_proxies) {
-      if (const auto key = address_key(proxy)) trusted.push_back(*key);
-    }
-  }
+        heads(options.origins) {}
   ~Impl() {
     if (context != nullptr) lws_context_destroy(context);
   }
@@ -121,13 +81,8 @@ struct WebServer::Impl {
   void arrive(system::Descriptor connection, const sockaddr_storage& peer);
   void turn_away(const system::Descriptor& connection, TurnedAway why);
   static Visit& visit(lws* wsi) { return *static_cast<Visit*>(lws_get_opaque_user_data(wsi)); }
-  void greet(Visit& visit);
-  void leave(const Visit* visit);
-  void find_account(lws* wsi);
-  void end_slow(std::int64_t now_ns);
-  [[nodiscard]] bool is_trusted(const AddressKey& peer) const {
-    return std::ranges::find(trusted, peer) != trusted.end();
-  }
+  void ask(lws* wsi) { visits.ask(visit(wsi), header(wsi, WSI_TOKEN_X_FORWARDED_FOR)); }
+  void end_unwanted(std::int64_t now_ns);
 
   // HTTP
   int respond(lws* wsi, void* user, std::string_view path);
@@ -135,7 +90,7 @@ struct WebServer::Impl {
                 bool compressed, std::string_view cookie = {});
   int log_in(lws* wsi, void* user);
   int send_body(lws* wsi, void* user);
-  static int complete(lws* wsi);
+  static int complete(lws* wsi, const Exchange& exchange);
   static int confirm_upgrade(lws* wsi);
 
   // WebSocket
@@ -159,22 +114,20 @@ struct WebServer::Impl {
   const Site& site;
   Handler& handler;
   Listener listener;
-  Doors doors;
-  const std::size_t most;  // connections
+  Visits visits;
   const bool encrypted;
   const std::string tls_cert, tls_key;
   const SafeHeads heads;
   ssl_ctx_st* tls = nullptr;  // of libwebsockets
-  std::vector<AddressKey> trusted;
   accounts::TokenBucket told = kTold;
-  std::map<const Visit*, std::unique_ptr<Visit>> visits;
   lws_vhost* vhost = nullptr;
   lws* entrance = nullptr;  // of the listener
   int ticks = 0;
   lws_context* context = nullptr;
   std::array<lws_protocols, 3> protocols{};
   std::unordered_map<ViewerId, lws*> connections;
-  std::vector<ViewerId> ids;  // kept to reuse its memory
+  std::vector<ViewerId> ids;   // kept to reuse its memory
+  std::vector<Visit*> listed;  // likewise
   Tick tick;
 };
 
@@ -193,29 +146,19 @@ void WebServer::Impl::take_arrivals() {
 }
 
 void WebServer::Impl::arrive(system::Descriptor connection, const sockaddr_storage& peer) {
-  const std::int64_t now_ns = steady_ns();
-  auto made = std::make_unique<Visit>();
-  Visit& by = *made;
-  by.peer = address_key(reinterpret_cast<const sockaddr&>(peer)).value_or(AddressKey{});
-  by.client = by.peer;
-  by.account = doors.of(by.peer);
-  by.due_ns = now_ns + kHandshakeSeconds * kSecond;
-  if (visits.size() >= most) return turn_away(connection, TurnedAway::kFull);
-  if (!is_trusted(by.peer)) {
-    if (const auto why = doors.arrive(*by.account, now_ns)) return turn_away(connection, *why);
-    by.counted = true;
-  }
-  visits.emplace(&by, std::move(made));
+  const auto key = address_key(reinterpret_cast<const sockaddr&>(peer)).value_or(AddressKey{});
+  const auto arrived = visits.arrive(key, steady_ns());
+  if (!arrived) return turn_away(connection, arrived.error());
   lws_adopt_desc_t adopt{};
   adopt.vh = vhost;
   adopt.type = static_cast<lws_adoption_type>(LWS_ADOPT_SOCKET | LWS_ADOPT_HTTP | LWS_ADOPT_ALLOW_SSL);
   adopt.fd.sockfd = connection.release();  // closed by libwebsockets, also if it refuses it
-  adopt.opaque = &by;
+  adopt.opaque = *arrived;
   lws* const wsi = lws_adopt_descriptor_vhost_via_info(&adopt);
   if (wsi != nullptr) {
-    by.wsi = wsi;
+    (*arrived)->wsi = wsi;
   } else {
-    leave(&by);  // unless that has happened
+    visits.leave(*arrived);  // unless that has happened
   }
 }
 
@@ -224,39 +167,25 @@ void WebServer::Impl::turn_away(const system::Descriptor& connection, TurnedAway
   if (!encrypted && told.take(steady_ns())) say_too_many(connection);
 }
 
-void WebServer::Impl::greet(Visit& visit) {
-  visit.due_ns = INT64_MAX;
-  if (std::exchange(visit.greeted, true) || !visit.counted) return;
-  Doors::greeted(*visit.account);
+void WebServer::Impl::end_unwanted(std::int64_t now_ns) {
+  visits.list_waiting(listed);
+  for (const Visit* const by : listed) lws_callback_on_writable(by->wsi);
+  const auto end_listed = [&](TurnedAway why, bool also_greeted) {
+    for (const Visit* const by : listed) {
+      if (also_greeted || !by->greeted) handler.turned_away(why);
+      lws_set_timeout(by->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
+    }
+  };
+  visits.list_slow(now_ns, listed);
+  end_listed(TurnedAway::kSlow, false);
+  visits.list_floods(
+      now_ns, [](const Visit& by) { return received_bytes(lws_get_socket_fd(by.wsi)); }, listed);
+  end_listed(TurnedAway::kBytes, true);
 }
 
-// Each request through a proxy may be another client's.
-void WebServer::Impl::find_account(lws* wsi) {
-  Visit& by = visit(wsi);
-  if (by.counted) return;
-  by.client = client_address(by.peer, header(wsi, WSI_TOKEN_X_FORWARDED_FOR), trusted);
-  by.account = doors.of(by.client);
-}
-
-void WebServer::Impl::leave(const Visit* visit) {
-  const auto found = visits.find(visit);
-  if (found == visits.end()) return;
-  if (visit->counted) Doors::leave(*visit->account, visit->greeted);
-  visits.erase(found);
-}
-
-void WebServer::Impl::end_slow(std::int64_t now_ns) {
-  for (const auto& [key, by] : visits) {
-    if (std::exchange(by->waits_for_bytes, false)) lws_callback_on_writable(by->wsi);
-    if (now_ns < by->due_ns) continue;
-    by->due_ns = INT64_MAX;
-    if (!by->greeted) handler.turned_away(TurnedAway::kSlow);
-    lws_set_timeout(by->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
-  }
-}
-
-int WebServer::Impl::complete(lws* wsi) {
-  visit(wsi).due_ns = steady_ns() + kKeptSeconds * kSecond;
+int WebServer::Impl::complete(lws* wsi, const Exchange& exchange) {
+  if (exchange.last) return -1;
+  Visits::answered(visit(wsi), steady_ns());
   return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
 }
 
@@ -277,10 +206,12 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
                                                 &at, end) == 0 &&
                     add("cache-control:", cache) && (!compressed || add("content-encoding:", "gzip")) &&
                     (cookie.empty() || add("set-cookie:", cookie)) &&
+                    (!exchange.last || add("connection:", "close")) &&
                     (!strict || add("strict-transport-security:", kStrictTransport)) &&
                     lws_finalize_write_http_header(wsi, start, &at, end) == 0;
   if (!good) return -1;
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty()) return complete(wsi);
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0 || exchange.body.empty())
+    return complete(wsi, exchange);
   lws_callback_on_writable(wsi);
   return 0;
 }
@@ -298,7 +229,7 @@ int WebServer::Impl::log_in(lws* wsi, void* user) {
   }
   exchange.body = exchange.own;
   if (!pass) return send_head(wsi, user, HTTP_STATUS_UNAUTHORIZED, "text/plain", "no-store", false);
-  const bool safe = encrypted || (is_trusted(visit(wsi).peer) && proxy_says_https(wsi));
+  const bool safe = encrypted || (visits.is_trusted(visit(wsi).peer) && proxy_says_https(wsi));
   const std::int64_t lasts_s = pass->over_s == 0 ? 0 : std::max<std::int64_t>(pass->over_s - wall_s(), 1);
   const std::string cookie = pass->key == 0 ? "" : cookie_of(wsi, token, lasts_s, safe);
   return send_head(wsi, user, HTTP_STATUS_OK, "text/plain", "no-store", false, cookie);
@@ -316,6 +247,7 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
       lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 || lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
   if (!visit(wsi).account->requests.take(steady_ns())) {
     handler.turned_away(TurnedAway::kRequests);
+    exchange.last = true;  // who sends many at once is not answered each
     return say(kTooManyRequests, "too many requests from your address\n", "text/plain");
   }
   if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
@@ -346,7 +278,7 @@ int WebServer::Impl::send_body(lws* wsi, void* user) {
   if (lws_write(wsi, buffer.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) <
       static_cast<int>(size))
     return -1;
-  if (last) return complete(wsi);
+  if (last) return complete(wsi, exchange);
   lws_callback_on_writable(wsi);
   return 0;
 }
@@ -360,11 +292,10 @@ int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, 
       of(wsi).take_arrivals();
       return 0;
     case LWS_CALLBACK_WSI_DESTROY:
-      of(wsi).leave(static_cast<const Visit*>(lws_get_opaque_user_data(wsi)));
+      of(wsi).visits.leave(static_cast<const Visit*>(lws_get_opaque_user_data(wsi)));
       return 0;
     case LWS_CALLBACK_HTTP:
-      of(wsi).greet(visit(wsi));
-      of(wsi).find_account(wsi);
+      of(wsi).ask(wsi);
       return of(wsi).respond(wsi, user, {static_cast<const char*>(in), len});
     case LWS_CALLBACK_HTTP_WRITEABLE:
       return of(wsi).send_body(wsi, user);
@@ -373,7 +304,7 @@ int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, 
       drop<Exchange>(user);
       return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
-      of(wsi).greet(visit(wsi));
+      of(wsi).ask(wsi);
       return confirm_upgrade(wsi);
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
       return -1;  // asked for by the name of this protocol
@@ -403,14 +334,11 @@ int WebServer::Impl::open(lws* wsi, void* user) {
                            .inputs = {}};
   auto connection = std::make_unique<Connection>();
   Visit& by = visit(wsi);
-  if (!by.counted) {
-    find_account(wsi);
-    by.counted = doors.arrive_behind_proxy(*by.account);
-  }
+  const bool may_join = visits.join(by, steady_ns());
   connection->account = by.account;
   request.inputs = {by.account, &by.account->inputs};
   request.address = address_text(by.client);
-  if (!by.counted || !by.account->joins.take(steady_ns())) {
+  if (!may_join) {
     connection->refused = Refusal::kAddressJoins;
     handler.refused(*connection->refused);
   } else {
@@ -565,9 +493,9 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
   self.let_go();
   self.end_silent();
   const std::int64_t now_ns = steady_ns();
-  self.end_slow(now_ns);
+  self.end_unwanted(now_ns);
   if (self.ticks++ % 10 == 0) {
-    self.doors.forget(now_ns);
+    self.visits.forget(now_ns);
     self.end_over();
   }
   lws_rx_flow_control(self.entrance, LWS_RXFLOW_REASON_APPLIES_ENABLE | LWS_RXFLOW_REASON_USER_BOOL |
@@ -598,8 +526,8 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
   info.headers = impl->heads.list();
   info.fd_limit_per_thread = static_cast<unsigned>(options.connections + kOwnDescriptors);
   info.retry_and_idle_policy = &kIdlePolicy;
-  info.timeout_secs = kHandshakeSeconds;
-  info.keepalive_timeout = kKeptSeconds;
+  info.timeout_secs = Visits::kHandshakeNs / kSecond;
+  info.keepalive_timeout = Visits::kKeptNs / kSecond;
   info.server_string = "tandem-gateway";
   info.alpn = "http/1.1";
   if (!options.tls_cert.empty()) {

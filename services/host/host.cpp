@@ -242,7 +242,7 @@ void Host::Impl::receive() {
   // While the session is handed over, inputs wait: this server may have to go on.
   if (!succession.stopped()) port->take(input_samples);
   port->take(acks);
-  for (const auto& ack : acks) digest(ack);
+  for (auto& ack : acks) digest(roster.with_role(ack, *port));
   for (const auto& input : input_samples) digest(input);
 }
 

@@ -7,11 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/network/interfaces.hpp"
-#include "sdk/transport/secure/identity_folder.hpp"
-#include "sdk/transport/secure/openssl.hpp"
-#include "sdk/transport/units.hpp"
 #include "services/doctor/doctor.hpp"
 #include "services/json/json.hpp"
 #include "services/tool/commands.hpp"
@@ -22,23 +17,6 @@ namespace {
 
 using doctor::Check;
 using doctor::Verdict;
-
-/// `networks`: addresses, not of loopback, that DDS uses.
-Check judge_security(const std::string& secure, const std::vector<std::string>& networks) {
-  if (!secure.empty()) {
-    const auto identity = transport::secure::check_identity_folder(secure, transport::wall_ns() / kSecond);
-    if (!identity) return {"security", Verdict::kFailure, identity.error().message, ""};
-    return {"security", Verdict::kGood,
-            fmt::format("{} {}, until {}", identity->role, identity->name,
-                        transport::secure::date_text(identity->not_after_s)),
-            ""};
-  }
-  if (networks.empty()) return {"security", Verdict::kGood, "none, and DDS uses no network", ""};
-  return {"security", Verdict::kWarning,
-          fmt::format("without --secure, everybody who reaches {} can watch, act and pretend to be a server",
-                      fmt::join(networks, ", ")),
-          "make identities with `tandem pki`, and give each program its own: --secure DIR"};
-}
 
 const char* word(Verdict verdict) {
   switch (verdict) {
@@ -78,8 +56,8 @@ int print(const std::vector<Check>& checks, bool json) {
 void add_doctor(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "doctor",
-      "Checks configuration, interfaces, multicast, buffers, MTU, clock, ports and who is on the domain, and suggests "
-      "changes.");
+      "Checks configuration, interfaces, multicast, buffers, MTU, clock, ports, who is on the domain and an identity, and "
+      "suggests changes.");
   struct Options {
     bool json = false;
     std::uint32_t domain = 0;
@@ -97,12 +75,7 @@ void add_doctor(commandline::Command app, Run& run) {
       "sessions cannot work at all, and with 0 if there are only warnings.");
   command.on_chosen([options, &run] {
     run = [options] {
-      doctor::MachineFacts facts = doctor::machine_facts(options->domain, options->profile);
-      std::vector<std::string> networks;
-      for (const auto& each : facts.participants)
-        if (each.own) networks = each.addresses;
-      std::erase_if(networks, &transport::is_loopback);
-      facts.security.push_back(judge_security(options->secure, networks));
+      const auto facts = doctor::machine_facts(options->domain, options->profile, options->secure);
       return print(judge(facts), options->json);
     };
   });

@@ -111,13 +111,14 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
-    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "services/system"],
+    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "sdk/transport/secure"]
+    + ["services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
-    "services/gateway/doors": ["public/result.hpp", "services/accounts", "services/system", "services/tokens"],
+    "services/gateway/doors": ["public/result.hpp", "sdk/transport/units.hpp", "services/accounts", "services/system", "services/tokens"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]

@@ -202,14 +202,15 @@ Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& optio
   auto node = Node::create(options, "tandem client " + to_hex(options.client), options.session,
                            options.acts ? dds::Purpose::kAct : dds::Purpose::kObserve);
   if (!node) return tl::unexpected(node.error());
-  auto ack = node->writer<AckMessage>("acknowledgements");
-  if (!ack) return tl::unexpected(ack.error());
+  // First, as a server takes a client without it for an observer.
   std::optional<Writer<InputMessage>> input;
   if (node->may_act()) {
     auto made = node->writer<InputMessage>("inputs");
     if (!made) return tl::unexpected(made.error());
     input.emplace(std::move(*made));
   }
+  auto ack = node->writer<AckMessage>("acknowledgements");
+  if (!ack) return tl::unexpected(ack.error());
   auto status = node->writer<ClientStatusMessage>("client status");
   if (!status) return tl::unexpected(status.error());
   auto servers = dds::Announcements::create(*node);

@@ -103,9 +103,10 @@ struct HeardParticipant {
 };
 
 /// Joins the domain as "tandem doctor", without a topic of ours, and listens until `enough` says so or for
-/// `patience`. Returns the participants there are then, itself included; at most 256. Errors: as a port's.
+/// `patience`. Of `options` counts what says where and as whom. Returns the participants there are then,
+/// itself included; at most 256. Errors: as a port's.
 [[nodiscard]] Result<std::vector<HeardParticipant>> listen_for_participants(
-    std::uint32_t domain, const std::string& profile, Side side, std::chrono::nanoseconds patience,
+    const DdsOptions& options, Side side, std::chrono::nanoseconds patience,
     const std::function<bool(const std::vector<HeardParticipant>&)>& enough);
 
 /// What --help says of --profile.

@@ -4,6 +4,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
 #include "sdk/transport/dds/entity.hpp"
+#include "sdk/transport/dds/security.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -68,15 +69,20 @@ std::vector<HeardParticipant> read_all(dds_entity_t reader, const dds_guid_t& se
 }  // namespace
 
 Result<std::vector<HeardParticipant>> listen_for_participants(
-    std::uint32_t domain, const std::string& profile, Side side, std::chrono::nanoseconds patience,
+    const DdsOptions& options, Side side, std::chrono::nanoseconds patience,
     const std::function<bool(const std::vector<HeardParticipant>&)>& enough) {
   using dds::own;
   const auto use = dds::DomainUse::acquire(
-      domain, side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom, profile);
+      options.domain, side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom, options.profile);
   if (!use) return tl::unexpected(use.error());
   const dds::Qos named(dds_create_qos());
   dds_qset_entity_name(named.get(), "tandem doctor");
-  const auto participant = own(dds_create_participant(domain, named.get(), nullptr), "the participant");
+  if (!options.secure.empty()) {
+    const auto identity = dds::use_identity(options.secure, dds::Purpose::kWatch, named.get());
+    if (!identity) return tl::unexpected(identity.error());
+  }
+  const auto participant =
+      own(dds_create_participant(options.domain, named.get(), nullptr), "the participant");
   if (!participant) return tl::unexpected(participant.error());
   const auto reader =
       own(dds_create_reader(participant->get(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),

@@ -116,6 +116,9 @@ class DdsServerPort final : public ServerPort {
   [[nodiscard]] bool alive(const ParticipantId& participant) override {
     return endpoints_.ack.alive(participant) || endpoints_.input.alive(participant);
   }
+  [[nodiscard]] bool acts(const ParticipantId& participant) override {
+    return endpoints_.input.state_of(participant) != WriterState::kGone;
+  }
   [[nodiscard]] bool ended(const ParticipantId& participant) override {
     return endpoints_.ack.state_of(participant) == WriterState::kGone &&
            endpoints_.input.state_of(participant) == WriterState::kGone;

@@ -88,11 +88,13 @@ AddressAccount::AddressAccount(const DoorLimits& limits)
       requests(per_second(limits, 2), per_second(limits, 8)),
       joins(limits.joins_per_minute / 60, limits.joins_per_minute),
       bytes(limits.bytes_per_second, kBurstSeconds * limits.bytes_per_second),
-      inputs(limits.inputs_per_second, limits.inputs_per_second) {}
+      inputs(limits.inputs_per_second, limits.inputs_per_second),
+      received(per_second(limits, kReceivedPerSecond),
+               kBurstSeconds * per_second(limits, kReceivedPerSecond)) {}
 
 bool AddressAccount::rested(std::int64_t now_ns) {
   return connections == 0 && arrivals.full(now_ns) && requests.full(now_ns) && joins.full(now_ns) &&
-         bytes.full(now_ns) && inputs.full(now_ns);
+         bytes.full(now_ns) && inputs.full(now_ns) && received.full(now_ns);
 }
 
 AccountPtr Doors::of(const AddressKey& address) {
@@ -102,6 +104,7 @@ AccountPtr Doors::of(const AddressKey& address) {
 }
 
 std::optional<TurnedAway> Doors::arrive(AddressAccount& account, std::int64_t now_ns) const {
+  if (!account.received.has(now_ns)) return TurnedAway::kBytes;
   if (account.connections >= limits_.connections) return TurnedAway::kConnections;
   if (account.handshakes >= std::max<std::size_t>(limits_.connections / 4, 1)) return TurnedAway::kHandshakes;
   if (!account.arrivals.take(now_ns)) return TurnedAway::kArrivals;

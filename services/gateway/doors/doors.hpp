@@ -34,9 +34,12 @@ using AddressKey = std::array<std::uint8_t, 16>;
 [[nodiscard]] AddressKey client_address(const AddressKey& peer, std::string_view forwarded_for,
                                         std::span<const AddressKey> trusted);
 
+/// Bytes from each connection that an address may have; a burst of 4 s. A viewer sends a tenth of it.
+inline constexpr double kReceivedPerSecond = 16 * 1024;
+
 struct DoorLimits {
   /// At a time; a quarter of them may be in a handshake, half may come and twice as many requests may be
-  /// made in a second.
+  /// made in a second, and each may send kReceivedPerSecond.
   std::size_t connections = 64;
   double joins_per_minute = 120;               ///< of viewers; also the maximum burst
   double bytes_per_second = 16 * 1024 * 1024;  ///< of files to it and messages from it; burst of 4 s
@@ -52,8 +55,9 @@ enum class TurnedAway : std::uint8_t {
   kSlow,
   kFull,
   kDescriptors,
+  kBytes,
 };
-inline constexpr std::array<std::string_view, 7> kTurnedAway{
+inline constexpr std::array<std::string_view, 8> kTurnedAway{
     "too many connections of an address",
     "too many handshakes of an address",
     "connections of an address came too fast",
@@ -61,10 +65,11 @@ inline constexpr std::array<std::string_view, 7> kTurnedAway{
     "handshake took too long",
     "too many connections",
     "no file descriptor was free",
+    "too many bytes from an address",
 };
 /// The same as values of a label.
 inline constexpr std::array<std::string_view, kTurnedAway.size()> kTurnedAwayLabels{
-    "connections", "handshakes", "arrivals", "requests", "slow", "full", "descriptors",
+    "connections", "handshakes", "arrivals", "requests", "slow", "full", "descriptors", "bytes",
 };
 
 /// What one address has, and what it may still do.
@@ -74,6 +79,7 @@ struct AddressAccount {
 
   std::size_t connections = 0, handshakes = 0;
   accounts::TokenBucket arrivals, requests, joins, bytes, inputs;
+  accounts::TokenBucket received;  ///< bytes of all kinds from it, also those that make no message
 };
 using AccountPtr = std::shared_ptr<AddressAccount>;
 

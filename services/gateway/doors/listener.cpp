@@ -3,8 +3,8 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/tcp.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -107,6 +107,12 @@ void say_too_many(const system::Descriptor& connection) {
 void keep_little_unsent(int connection) {
   setsockopt(connection, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
   setsockopt(connection, SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
+}
+
+std::uint64_t received_bytes(int connection) {
+  tcp_info info{};
+  socklen_t size = sizeof info;
+  return getsockopt(connection, IPPROTO_TCP, TCP_INFO, &info, &size) == 0 ? info.tcpi_bytes_received : 0;
 }
 
 std::size_t connections_that_fit(std::size_t wanted) {

@@ -43,6 +43,9 @@ void say_too_many(const system::Descriptor& connection);
 /// Limits how much of a connection waits in the kernel, so that what is sent next is decided late.
 void keep_little_unsent(int connection);
 
+/// The bytes that came by a TCP connection since its start; 0 if that is not known.
+[[nodiscard]] std::uint64_t received_bytes(int connection);
+
 /// Raises the process's limit of descriptors, as far as it may, to what so many connections need. Returns how
 /// many connections fit.
 [[nodiscard]] std::size_t connections_that_fit(std::size_t wanted);

@@ -151,6 +151,17 @@ bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, b
   return !expected || (account.stream != before.stream && account.stream != before.next_stream);
 }
 
+// Looked up until it acts, because that takes as long as there are clients.
+transport::Received<transport::AckMessage>& Roster::with_role(transport::Received<transport::AckMessage>& ack,
+                                                              transport::ServerPort& port) {
+  if (ack.message.role_wanted != Role::kParticipant) return ack;
+  const auto known = peers_.find(ack.from);
+  const bool acts = (known != peers_.end() && known->second.acts) || port.acts(ack.from);
+  if (known != peers_.end()) known->second.acts = acts;
+  if (!acts) ack.message.role_wanted = Role::kObserver;
+  return ack;
+}
+
 Account* Roster::find(transport::ClientId id, const transport::ParticipantId& from, Reason& reason) {
   const auto known = accounts_.find(id);
   if (known == accounts_.end()) {

@@ -79,6 +79,7 @@ struct Peer {
   accounts::Budget inputs;                                            ///< see engine::InputBudget
   accounts::TokenBucket snapshots_again = accounts::kSnapshotsAgain;  ///< snapshots after the first one of
                                                                       ///< each account
+  bool acts = false;                                                  ///< it had a writer of inputs
 };
 
 /// The stream that the client is joining, from outside or from another stream.
@@ -137,6 +138,10 @@ class Roster {
   /// acknowledgement leaves a known account as it was.
   transport::Reason acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
                                 const PublishTimes& times, const Now& now);
+  /// Makes it an observer's, if its participant cannot send inputs. Otherwise who may only watch could make
+  /// all wait for it.
+  transport::Received<transport::AckMessage>& with_role(transport::Received<transport::AckMessage>& ack,
+                                                        transport::ServerPort& port);
   /// The account of `id` if it belongs to `from`; otherwise null, and `reason` is kForeignClient or
   /// kNotPlaying.
   Account* find(transport::ClientId id, const transport::ParticipantId& from, transport::Reason& reason);

@@ -5,6 +5,7 @@ crowds_test.py SCENARIO --tandemd PATH --tandem PATH --gateway PATH --viewer PAT
 """
 
 import argparse
+import contextlib
 import resource
 import sys
 import tempfile
@@ -75,6 +76,21 @@ def descriptors(stage):
         raise Failed("no viewer comes in afterwards")
 
 
+def endless(connection, flood):
+    """Sends it again and again for 10 s at most. Whether the other end ends the connection."""
+    connection.settimeout(0.5)
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        try:
+            connection.sendall(flood)
+        except TimeoutError:
+            with contextlib.suppress(TimeoutError):
+                connection.recv(1 << 20)
+        except OSError:
+            return True
+    return False
+
+
 def limits(stage):
     """An address behind a trusted proxy has limits of its own; who is no proxy is not believed; requests get 429."""
     stage.gateway("gateway", "--trusted-proxy", "127.0.0.5", "--address-connections", 4, "--address-joins", 6)
@@ -109,6 +125,15 @@ def limits(stage):
             if b"HTTP/1.1 429" in answer:
                 break
         expect(b"HTTP/1.1 429" in answer, True, "the last of many requests")
+    for source, flood, what in (
+        ("127.0.0.9", b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n" * 1000, "who asks without end"),
+        ("127.0.0.10", b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000000\r\n\r\n" + bytes(1 << 20), "who posts a gigabyte"),
+    ):
+        with crowds.connect(stage.port, source, 5) as connection:
+            expect(endless(connection, flood), True, f"{what} is ended")
+    connection, _ = crowds.open_viewer(stage.port, "127.0.0.11", b"")
+    with connection:
+        expect(endless(connection, bytes((0x89, 0x80, 0, 0, 0, 0)) * 10_000), True, "a viewer that sends pings without end is ended")
     began = time.monotonic()
     with crowds.connect(stage.port, "127.0.0.8", 10) as slow:
         slow.sendall(b"GET / HTTP/1.1\r\n")
@@ -120,6 +145,7 @@ def limits(stage):
     held += idle
     health = stage.health()
     print(f"  {health['turned_away']}")
+    expect(health["turned_away"]["too many bytes from an address"] >= 1, True, "floods counted")
     expect(health["refused"]["too many connections or joins from this address"], 2, "refusals counted")
     for connection in held:
         connection.close()

@@ -5,6 +5,7 @@ tokens_test.py SCENARIO --tandemd PATH --tandem PATH --gateway PATH --viewer PAT
 """
 
 import argparse
+import base64
 import json
 import os
 import pathlib
@@ -13,6 +14,7 @@ import ssl
 import subprocess
 import sys
 import tempfile
+import time
 import urllib.error
 import urllib.request
 
@@ -46,6 +48,16 @@ def key_pair(stage, name):
 
 def token(stage, key, role, *more, expires="1h"):
     return pki(stage, "token", "--key", key, "--role", role, "--expires", expires, *more)
+
+
+def signed(stage, key, **claims):
+    """A token that `tandem pki token` would not make, with a good signature."""
+    url = lambda data: base64.urlsafe_b64encode(data).decode().rstrip("=")  # noqa: E731
+    text = url(b'{"alg":"EdDSA","typ":"JWT"}') + "." + url(json.dumps(claims).encode())
+    message = stage.folder / "message"
+    message.write_text(text)
+    made = subprocess.run(["openssl", "pkeyutl", "-sign", "-rawin", "-inkey", key, "-in", message], check=True, capture_output=True)
+    return f"{text}.{url(made.stdout)}"
 
 
 def close_code(stage, query="", head=""):
@@ -119,12 +131,17 @@ def bad_tokens(stage):
     other, _ = key_pair(stage, "other")
     stage.gateway("gateway", "--token-key", public)
     good = token(stage, key, "act")
+    now_s = int(time.time())
     for text, reason, what in (
         ("", "token missing or wrong", "none"),
         (token(stage, other, "act"), "token missing or wrong", "of another key"),
         (good[:-1], "token missing or wrong", "cut short"),
         (token(stage, key, "act", "--from", "1d"), "token not valid yet: is a clock wrong?", "of tomorrow"),
         (token(stage, key, "act", "--session", "other"), "token of another session", "of another session"),
+        (signed(stage, key, role="act", exp=now_s - 61), "token expired", "expired"),
+        (signed(stage, key, role="act", exp=now_s + 60, nbf=now_s + 86_400), "token not valid yet: is a clock wrong?", "by a clock off by a day"),
+        (signed(stage, key, role="admin", exp=now_s + 60), "token of a role that does not exist", "of a role that does not exist"),
+        (signed(stage, other, role="admin", exp=now_s - 61), "token missing or wrong", "of another key, which hears nothing more"),
         ("A" * 1500, "token missing or wrong", "of 1,500 characters"),
     ):
         expect(close_code(stage, f"?token={text}"), (4001, reason), what)
@@ -132,7 +149,9 @@ def bad_tokens(stage):
     expect(close_code(stage, head=f"Authorization: Bearer {'A' * 1_000_000}\r\n")[0], "", "a megabyte in a header")
     expect(close_code(stage, f"?token={good}"), (0, ""), "a good one")
     counted = stage.health()["refused"]
-    expect(counted["token missing or wrong"], 4, "counted as wrong")
+    expect(counted["token missing or wrong"], 5, "counted as wrong")
+    expect(counted["token expired"], 1, "counted as expired")
+    expect(counted["token of a role that does not exist"], 1, "counted as of no role")
     expect(counted["token of another session"], 1, "counted as another session's")
     pki(stage, "token", "--key", key, "--role", "admin", "--expires", "1h", code=2)
     pki(stage, "token", "--key", key, "--role", "act", "--expires", "forever", code=2)
@@ -154,6 +173,11 @@ def bad_tokens(stage):
     ends("--token-key", public)  # everybody can write it
     ends("--token-key", key)  # the secret one
     ends("--token-key", stage.folder / "missing")
+    authority = stage.folder / "pki"
+    pki(stage, "init", "--dir", authority)
+    pki(stage, "issue", "gateway", "web", "--dir", authority)
+    (authority / "web" / "key.pem").chmod(0o644)
+    ends("--secure", authority / "web")  # a key of DDS Security that the world can read
     cert, its_key = certificate(stage, "cert")
     _, foreign = certificate(stage, "foreign")
     ends("--tls-cert", cert, "--tls-key", foreign)

@@ -1,5 +1,6 @@
 // A client that does what no client does: it tries to write and to read every topic of a session, and to
-// speak for a client that plays. Prints what it could as one JSON object.
+// speak for a client that plays. It also asks for a participant's place under an id of its own, keeps up for
+// half of its time, and then makes all wait. Prints what it could as one JSON object.
 //   intruder SESSION IDENTITY SECONDS      IDENTITY: a folder for DDS Security; -: none
 
 #include <atomic>
@@ -57,6 +58,16 @@ InputMessage gravity() {
   return out;
 }
 
+AckMessage own_place() {
+  AckMessage out;
+  out.client = 0xBAD;
+  out.protocol_version = kProtocolVersion;
+  out.phase = Phase::kPlaying;
+  out.role_wanted = Role::kParticipant;
+  out.join_attempt = 1;
+  return out;
+}
+
 SessionMessage session(const std::string& name) {
   SessionMessage out;
   out.session = name;
@@ -98,7 +109,10 @@ int main(int argc, char** argv) {
         act(acks);
     act(client_status), act(journal), act(checkpoints), act(standby), act(commands);
   };
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(std::atof(argv[3]));
+  Door<AckMessage> place(node, own_place());
+  const auto begin = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> time(std::atof(argv[3]));
+  const auto end = begin + time;
   while (std::chrono::steady_clock::now() < end) {
     node.wait(std::chrono::milliseconds(50));
     each([](auto& door) { door.listen(); });
@@ -109,6 +123,10 @@ int main(int argc, char** argv) {
       acks.forged().phase = Phase::kJoining;
       acks.forged().protocol_version = kProtocolVersion;
     }
+    place.forged().epoch = inputs.forged().epoch;
+    if (!server_status.heard().empty() && std::chrono::steady_clock::now() < begin + time / 2)
+      place.forged().applied = server_status.heard().back().message.frame;
+    if (place.forged().applied > 0) place.write();
     inputs.forged().number += 1;
     each([](auto& door) { door.write(); });
   }

@@ -22,6 +22,7 @@ TOPICS = {
 }  # fmt: skip
 PUSH = "inputs {{ time_s: {:.2f} push {{ centre {{ y: 5 }} radius_m: 3 velocity_change {{ y: 1 }} }} }}\n"
 SECONDS = 6  # an intruder stays for so long
+OWN_ID = "0000000000000bad"  # of the intruder, when it speaks for itself
 
 
 def pki(stage, *words, folder="pki"):
@@ -79,12 +80,15 @@ def watched(stage, identities, intruder_identity):
     time.sleep(1)
     reports = [each.stop() for each in (honest, observer)]
     totals = server.stop()
+    roles = [role for role in ("participant", "observer") if server.first(f"client {OWN_ID} plays as {role}") is not None]
+    said["plays as"], said["delayed"] = " and ".join(roles), server.first(f"client {OWN_ID} delayed the others") is not None
     for report in reports:
         expect(report["frames_applied"] > 30 and not report["hash_mismatches"], f"a client did not play: {report}")
         expect(report["epochs"] == 1 and not report["resyncs"], f"a client followed another: {report}")
     lost = reports[0]["inputs_sent"] - reports[0]["inputs_acted"]
     expect(reports[0]["inputs_sent"] > 10 and lost <= 1, f"{lost} of {reports[0]['inputs_sent']} honest inputs lost")
-    print(f"  writes {sorted(writes(said))}, matched {matched(said)}, received {received(said)}; server refused "
+    print(f"  writes {sorted(writes(said))}, matched {matched(said)}, received {received(said)}; "
+          f"plays as {said['plays as'] or 'nobody'}; server refused "
           f"{totals['refused_inputs']} inputs and {totals['refused_messages']} messages")  # fmt: skip
     return said, totals
 
@@ -136,13 +140,16 @@ def a_participant_writes_its_own_topics_only(stage):
     expect(writes(said) == {"TandemAck", "TandemInput", "TandemClientStatus"}, "a participant writes more")
     expect(said["victim"] and matched(said).get("TandemInput"), "the intruder did not try")
     expect(totals["refused_inputs"] + totals["refused_messages"] > 0, "what it forged was not refused")
+    expect(said["plays as"] == "participant" and said["delayed"], "it did not try to make all wait")
 
 
 def an_observer_cannot_send_input(stage):
+    """Nor can it make the others wait, though it asks for a participant's place."""
     identities = authorities(stage)
     pki(stage, "issue", "observer", "mallory")
     said, _ = watched(stage, identities, identities / "mallory")
     expect(writes(said) == {"TandemAck", "TandemClientStatus"}, "an observer writes more")
+    expect(said["plays as"] == "observer" and not said["delayed"], "an observer had a participant's place")
     asked = stage.start(stage.options.tandem, "join", "--secure", identities / "mallory", "--timeout", 5)
     asked.wait_for("join as an observer", 10)
 

@@ -45,8 +45,10 @@ class DdsPorts : public ::testing::Test {
     EXPECT_TRUE(client.open_stream(session, session.streams[0], kClient));
     EXPECT_TRUE(client.open_snapshots(0));
     EXPECT_TRUE(server.open_client(kClient));
-    EXPECT_TRUE(
-        eventually([&] { return server.joined(client.self(), kClient, 0) && server.alive(client.self()); }));
+    EXPECT_TRUE(eventually([&] {
+      return server.joined(client.self(), kClient, 0) && server.alive(client.self()) &&
+             server.acts(client.self());
+    }));
     return session;
   }
   /// The next `count` messages of a type.

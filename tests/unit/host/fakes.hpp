@@ -149,6 +149,7 @@ class FakePort final : public transport::ServerPort {
     return stream < open_stream_count && client_writers.contains(client) && !unmatched.contains(id);
   }
   [[nodiscard]] bool alive(const transport::ParticipantId& id) override { return !dead.contains(id); }
+  [[nodiscard]] bool acts(const transport::ParticipantId& id) override { return !mute.contains(id); }
   [[nodiscard]] bool ended(const transport::ParticipantId& id) override { return gone.contains(id); }
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
@@ -184,7 +185,7 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::JournalMessage> journal;
   std::vector<transport::CheckpointMessage> checkpoints;
   std::set<transport::ClientId> standby_writers;
-  std::set<transport::ParticipantId> unmatched, dead, gone;
+  std::set<transport::ParticipantId> unmatched, dead, gone, mute;
   std::vector<transport::SessionMessage> sessions;
   std::vector<transport::DeltaMessage> deltas;
   std::vector<transport::ScheduledInputMessage> scheduled;

@@ -205,6 +205,39 @@ TEST_F(JoinTest, ARoleAndPhaseAreConfirmedByReplies) {
   EXPECT_EQ(bench.last_reply(1)->phase, Phase::kPlaying);
 }
 
+TEST_F(JoinTest, WhoCannotSendInputsIsAnObserverWhateverItWants) {
+  bench.port.mute.insert(participant(1));
+  bench.enter(1);
+  bench.run_ms(20);
+  ASSERT_NE(bench.last_reply(1), nullptr);
+  EXPECT_EQ(bench.last_reply(1)->role, Role::kObserver);
+  const Frame before = bench.host->frame();
+  bench.run_ms(600);  // silent
+  EXPECT_GT(bench.host->frame(), before + 10) << "nobody waits for it";
+  bench.port.mute.clear();
+  bench.playing(1, bench.host->frame());
+  bench.run_ms(20);
+  EXPECT_EQ(bench.last_reply(1)->role, Role::kParticipant) << "its writer was found later";
+}
+
+TEST_F(JoinTest, WhoComesFirstUnderAnIdKeepsItsOwnerOutUntilItIsGone) {
+  bench.port.acks.push_back({bench.ack(1, Phase::kJoining, 0), participant(9)});
+  bench.run_ms(20);
+  const std::uint64_t refused = bench.host->totals().refused_messages;
+  const std::size_t replies = bench.port.replies.size();
+  bench.joining(1);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().refused_messages, refused + 1);
+  EXPECT_EQ(bench.port.replies.size(), replies) << "the reply would reach the other";
+  bench.port.dead.insert(participant(9));
+  bench.port.gone.insert(participant(9));
+  bench.run_ms(2000);
+  bench.joining(1, 2);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.host->totals().refused_messages, refused + 1);
+  EXPECT_GT(bench.port.replies.size(), replies);
+}
+
 TEST_F(JoinTest, WithoutAChangeARoundOfRepliesGoesOutOnceASecondAndEchoesTheClock) {
   bench.enter(1);
   bench.on_ms = [this] { bench.playing(1, bench.host->frame()); };

@@ -3,12 +3,16 @@
 #include <gmock/gmock.h>
 
 #include <cstdlib>
+#include <ctime>
+#include <filesystem>
 
 #include "services/doctor/configuration.hpp"
+#include "services/pki/authority.hpp"
 
 namespace tandem::doctor {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -23,6 +27,9 @@ MachineFacts good_machine() {
   facts.first_ephemeral_port = 32768;
   facts.last_ephemeral_port = 60999;
   facts.participants = {{"tandem doctor", "host", {"10.0.0.2"}, true}};
+  facts.secure = "/bob";
+  facts.identity =
+      transport::secure::Identity{"/bob", "bob", "participant", facts.clock_s + 30 * pki::kDay, true};
   return facts;
 }
 
@@ -178,10 +185,89 @@ TEST(Doctor, shows_no_control_characters_of_strangers) {
   EXPECT_EQ(check(facts, "peers").detail, "a?[2Jb?");
 }
 
-TEST(Doctor, shows_what_was_found_about_security) {
+TEST(Doctor, warns_of_a_network_without_security) {
   MachineFacts facts = good_machine();
-  facts.security = {{"security files", Verdict::kFailure, "key.pem can be read by all", "chmod 600 key.pem"}};
-  EXPECT_EQ(check(facts, "security files").verdict, Verdict::kFailure);
+  facts.secure.clear();
+  facts.identity.reset();
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kWarning);
+  EXPECT_THAT(check(facts, "security").detail, HasSubstr("reaches 10.0.0.2 can"));
+  EXPECT_THAT(check(facts, "security").advice, HasSubstr("--secure"));
+  facts.participants = {{"tandem doctor", "host", {"127.0.0.1"}, true}};
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kGood) << "nobody reaches loopback";
+}
+
+TEST(Doctor, tells_whose_identity_it_is_and_when_it_ends) {
+  MachineFacts facts = good_machine();
+  EXPECT_EQ(check(facts, "security").detail, "participant bob, until 2027-02-14 08:00:00 UTC");
+  facts.clock_s += 24 * 86'400;
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kWarning);
+  EXPECT_THAT(check(facts, "security").advice, HasSubstr("tandem pki renew bob"));
+}
+
+/// An identity that is good now, with its authority.
+class DoctorOfIdentity : public ::testing::Test {
+ protected:
+  DoctorOfIdentity() {
+    std::string pattern = ::testing::TempDir() + "doctorXXXXXX";
+    root_ = ::mkdtemp(pattern.data());
+    const std::int64_t now_s = std::time(nullptr);
+    auto authority = pki::Authority::init(root_, now_s);
+    EXPECT_TRUE(authority->issue(pki::Role::kParticipant, "bob", 30 * pki::kDay, now_s));
+    EXPECT_TRUE(authority->issue(pki::Role::kServer, "alpha", 30 * pki::kDay, now_s));
+    EXPECT_TRUE(authority->issue(pki::Role::kObserver, "old", pki::kDay, now_s - 2 * pki::kDay));
+    EXPECT_TRUE(authority->issue(pki::Role::kObserver, "early", pki::kDay, now_s + pki::kDay));
+    EXPECT_TRUE(authority->issue(pki::Role::kObserver, "thief", pki::kDay, now_s));
+    EXPECT_TRUE(authority->revoke("thief", now_s));
+  }
+  ~DoctorOfIdentity() override { std::filesystem::remove_all(root_); }
+  DoctorOfIdentity(const DoctorOfIdentity&) = delete;
+  DoctorOfIdentity& operator=(const DoctorOfIdentity&) = delete;
+  DoctorOfIdentity(DoctorOfIdentity&&) = delete;
+  DoctorOfIdentity& operator=(DoctorOfIdentity&&) = delete;
+
+  [[nodiscard]] std::string file(const std::string& name) const { return root_ + "/bob/" + name; }
+  /// A failure in one line that names the file and a cure.
+  void expect_failure(const std::string& name, const std::string& part, const std::string& cure) const {
+    // Without a domain, for which it would wait.
+    const MachineFacts facts = machine_facts(0, "lan:interface=nowhere0", root_ + "/" + name);
+    const Check said = check(facts, "security");
+    EXPECT_EQ(said.verdict, Verdict::kFailure) << name << ": " << said.detail;
+    EXPECT_THAT(said.detail, AllOf(HasSubstr(part), HasSubstr(cure), Not(HasSubstr("\n"))));
+  }
+
+  std::string root_;
+};
+
+TEST_F(DoctorOfIdentity, JoinsTheDomainWithOneThatIsGood) {
+  const MachineFacts facts = machine_facts(0, "loopback", root_ + "/bob");
+  EXPECT_EQ(facts.domain_fault, "");
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kGood);
+  EXPECT_THAT(check(facts, "security").detail, HasSubstr("participant bob, until 2"));
+}
+
+TEST_F(DoctorOfIdentity, NamesTheFileThatIsMissing) {
+  std::filesystem::remove(file("permissions.p7s"));
+  expect_failure("bob", "permissions.p7s", "copy the whole folder");
+  expect_failure("nobody", "nobody", "tandem pki");
+}
+
+TEST_F(DoctorOfIdentity, NamesTheKeyThatOthersCanRead) {
+  std::filesystem::permissions(file("key.pem"), std::filesystem::perms(0644));
+  expect_failure("bob", "key.pem", "chmod 600");
+}
+
+TEST_F(DoctorOfIdentity, NamesTheFileThatIsCutShortOrAnothers) {
+  std::filesystem::resize_file(file("identity.pem"), 100);
+  expect_failure("bob", "identity.pem", "copy the whole folder");
+  std::filesystem::copy_file(root_ + "/alpha/identity.pem", file("identity.pem"),
+                             std::filesystem::copy_options::overwrite_existing);
+  expect_failure("bob", "bob", "copy the whole folder");
+}
+
+TEST_F(DoctorOfIdentity, NamesTheOneThatIsExpiredOrEarlyOrRevoked) {
+  expect_failure("old", "identity.pem", "tandem pki renew old");
+  expect_failure("early", "identity.pem", "set the clock");
+  expect_failure("thief", "identity.pem", "revoked");
 }
 
 TEST(Doctor, knows_xml) {
@@ -198,7 +284,7 @@ TEST(Doctor, knows_xml) {
 TEST(Doctor, can_look_at_this_machine) {
   const MachineFacts facts = machine_facts(0, "loopback");
   EXPECT_GT(facts.open_files_limit, 0U);
-  EXPECT_EQ(judge(facts).size(), 10U);
+  EXPECT_EQ(judge(facts).size(), 11U);
   EXPECT_EQ(facts.domain_fault, "");
   EXPECT_EQ(facts.max_message_bytes, 65'500U);
 }
