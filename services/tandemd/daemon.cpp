@@ -117,7 +117,7 @@ class ScriptSender {
 };
 
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
-                                                         const Options& options,
+                                                         const Options& options, Metrics& metrics,
                                                          const std::atomic<bool>& stop) {
   const auto largest = host::largest_delta_bytes(config.streams);
   if (!largest) return tl::unexpected(largest.error());
@@ -128,6 +128,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
   dds.stop = &stop;
+  if (options.metrics) dds.repeated_bytes = &metrics.repeated_bytes();
   return transport::make_dds_server_port(dds);
 }
 
@@ -428,7 +429,7 @@ int run_daemon(Options options, SignalWatch& signals) {
                                                             &log_line, &steady_ns);
       if (!keeping) return report_error(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
-      auto port = open_port(*config, options, signals.stop());
+      auto port = open_port(*config, options, metrics, signals.stop());
       if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
         warn_without_security(options);
