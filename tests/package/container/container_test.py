@@ -10,6 +10,7 @@ Exit 0 passed, 1 failed, 77 not run: needs root and the packages of the section 
 """
 
 import argparse
+import json
 import os
 import pathlib
 import shutil
@@ -79,12 +80,18 @@ def check_closed(pod):
     assert pod.containers["server"].can_write("/var/lib/tandemd/x")
 
 
+def as_podman_runs(command):
+    """Version 4.3."""
+    return " ".join(command) + " || exit 1"
+
+
 def check_probes(pod, described):
     for container in described["spec"]["containers"]:
         for kind in ("livenessProbe", "readinessProbe"):
             if kind in container:
                 command, seconds = container[kind]["exec"]["command"], container[kind]["timeoutSeconds"]
-                wait_for(lambda c=command, s=seconds, n=container["name"]: pod.containers[n].run(c, s * 10)[0] == 0, f"{container['name']}: {kind}")
+                for words in (command, ["/bin/sh", "-c", as_podman_runs(command)]):
+                    wait_for(lambda c=words, s=seconds, n=container["name"]: pod.containers[n].run(c, s * 10)[0] == 0, f"{container['name']}: {kind}")
 
 
 def play(pod):
@@ -161,8 +168,8 @@ def run_root(options, folder):
     check_refusals()
     roots = folder / "roots"
     subprocess.run([DEPLOYED / "build", *options.more, "--roots", roots], check=True)
-    check_root(roots / "tandem", ["tandemd", "tandem-gateway"])
-    check_root(roots / "prometheus", ["prometheus", "promtool"])
+    check_root(roots / "tandem", ["tandemd", "tandem-gateway", "dash"])
+    check_root(roots / "prometheus", ["prometheus", "promtool", "dash"])
     megabytes = measure(roots / "tandem") / 1e6
     assert megabytes < MOST_MB, f"{megabytes:.1f} MB"
     print(f"the image of server and gateway has {megabytes:.1f} MB", flush=True)
@@ -175,6 +182,21 @@ def last_line(done):
     return ((done.stdout + done.stderr).strip().splitlines() or ["no word"])[-1]
 
 
+def check_made(podman):
+    """podman has understood each field that closes a container, and the probes."""
+    from manifest import load
+
+    described, _ = load(DEPLOYED / "pod.yaml")
+    for container in described["spec"]["containers"]:
+        found = json.loads(podman("inspect", f"tandem-arena-{container['name']}").stdout)[0]
+        settings, host = found["Config"], found["HostConfig"]
+        assert settings["User"] == "10001:10001" and host["ReadonlyRootfs"] and "no-new-privileges" in host["SecurityOpt"], found
+        assert settings["Entrypoint"] in (container["command"], " ".join(container["command"])) and settings["Cmd"] == container["args"], found
+        assert " ".join(settings["Healthcheck"]["Test"][1:]) == as_podman_runs(container["livenessProbe"]["exec"]["command"]), settings
+        assert {mount["Destination"] for mount in found["Mounts"]} == {mount["mountPath"] for mount in container.get("volumeMounts", [])}, found
+    print("podman makes the pod, with users, roots, volumes and probes as the manifest says")
+
+
 def run_podman(options, folder):
     (folder / "storage.conf").write_text(
         f'[storage]\ndriver = "vfs"\ngraphroot = "{folder}/graph"\nrunroot = "{folder}/run"\n', "utf-8"
@@ -184,9 +206,19 @@ def run_podman(options, folder):
     subprocess.run([DEPLOYED / "build", *options.more], check=True)
     subprocess.run(["podman", "image", "ls"], check=True)
     podman = lambda *words: subprocess.run(["podman", *map(str, words)], capture_output=True, text=True, check=False)  # noqa: E731
-    trial = podman("run", "--rm", "--network", "none", "localhost/tandem:latest", "--version")
+    if (trial := podman("pod", "create")).returncode != 0:
+        print(f"not run: podman cannot make a pod here: {last_line(trial)}")
+        return NOT_RUN
+    podman("pod", "rm", trial.stdout.strip())
+    made = podman("play", "kube", "--start=false", DEPLOYED / "pod.yaml")
+    try:
+        assert made.returncode == 0, last_line(made)
+        check_made(podman)
+    finally:
+        podman("play", "kube", "--down", DEPLOYED / "pod.yaml")
+    trial = podman("run", "--rm", "--network", "none", "--no-healthcheck", "localhost/tandem:latest", "--version")
     if trial.returncode != 0:
-        print(f"not run: podman cannot start a container here: {last_line(trial)}")
+        print(f"podman made the pod, but it was not run: no container can be started here: {last_line(trial)}")
         return NOT_RUN
     try:
         played = podman("play", "kube", DEPLOYED / "pod.yaml")
