@@ -29,6 +29,7 @@
 #include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
+#include "services/tandemd/configuration/rehearsal.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
 #include "services/tandemd/restarts.hpp"
@@ -412,6 +413,7 @@ int run_daemon(Options options, SignalWatch& signals) {
   if (!served.session.empty() && options.session == Options().session) options.session = served.session;
   if (const auto named = transport::check_session_name(options.session); !named)
     return report_error(named.error(), 2);
+  if (const auto good = check_identity(options); !good) return report_error(good.error(), 2);
   HashLog hashes;
   Metrics metrics;
   Service service;
