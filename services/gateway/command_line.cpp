@@ -13,6 +13,7 @@
 #include "sdk/transport/port.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/gateway/doors/admission.hpp"
+#include "services/metrics/probe.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -133,6 +134,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
         const auto address = metrics::read_address(text);
         return address ? std::string() : address.error().message;
       });
+  std::string question;
+  app.add_option("--probe", question, metrics::kProbeHelp);
   app.add_choice("--log-format", options.log.format,
                  {{"text", logging::Format::kText}, {"json", logging::Format::kJson}},
                  "How lines of the log look: for people and journald, or one JSON object each [text]");
@@ -153,6 +156,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       .show_default();
   add_doors(app, options.web);
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
+  if (!question.empty())
+    return {.options = std::nullopt, .exit_code = metrics::probe("tandem-gateway", question)};
   if (options.token_file.empty()) options.token_file = credential("token");
   if (const std::string key = credential("token-key"); options.token_keys.empty() && !key.empty())
     options.token_keys = {key};

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "sdk/client/api/client_id.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/gateway/doors/listener.hpp"
 #include "services/gateway/service.hpp"
@@ -51,6 +52,8 @@ int run(const Options& options, SignalWatch& signals) {
   dds.profile = options.profile;
   dds.session = options.session;
   dds.secure = options.secure;
+  // By this id `tandem top` knows whose viewers are whose.
+  dds.client = client::random_client_id();
   dds.stop = &signals.stop();
   auto port = transport::make_dds_client_port(dds);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
@@ -58,7 +61,7 @@ int run(const Options& options, SignalWatch& signals) {
     spdlog::info("{}",
                  transport::describe_dds_profile(options.domain, options.profile, transport::Side::kClient));
 
-  Service service(options, std::move(*secrets), **port, signals);
+  Service service(options, std::move(*secrets), dds.client, **port, signals);
   if (options.metrics) {
     if (const auto served = service.serve_metrics(*options.metrics, options.session); !served)
       return signals.finish(report_error(served.error(), 1));

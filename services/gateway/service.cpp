@@ -7,7 +7,6 @@
 #include <chrono>
 #include <utility>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/transport/clock.hpp"
 #include "services/json/json.hpp"
@@ -43,11 +42,11 @@ Refusal refusal_of(tokens::Denial denial) {
   return Refusal::kToken;
 }
 
-client::CoreOptions core_options(const Options& options) {
+client::CoreOptions core_options(const Options& options, transport::ClientId id) {
   client::CoreOptions core;
   core.session = options.session;
   core.prefer = options.prefer;
-  core.id = client::random_client_id();
+  core.id = id;
   core.log = [](LogLevel level, std::string_view line) {
     constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
     spdlog::log(kLevels[static_cast<std::size_t>(level)], line);
@@ -63,12 +62,13 @@ std::string_view phase_name(ClientPhase phase) {
 
 }  // namespace
 
-Service::Service(const Options& options, Secrets secrets, transport::ClientPort& port, SignalWatch& signals)
+Service::Service(const Options& options, Secrets secrets, transport::ClientId id, transport::ClientPort& port,
+                 SignalWatch& signals)
     : options_(options),
       port_(port),
       signals_(signals),
       admission_(std::move(secrets), options.origins, options.session),
-      client_(core_options(options), port),
+      client_(core_options(options, id), port),
       gateway_(options.limits, client_) {}
 
 void Service::follow(const std::stop_token& stop, WebServer& server) {

@@ -29,7 +29,9 @@ namespace tandem::gateway {
 class Service final : public WebServer::Handler {
  public:
   /// `port` and `signals` must outlive it.
-  Service(const Options& options, Secrets secrets, transport::ClientPort& port, SignalWatch& signals);
+  /// `id` is that of the gateway as a client of the session, by which the port is known, too.
+  Service(const Options& options, Secrets secrets, transport::ClientId id, transport::ClientPort& port,
+          SignalWatch& signals);
 
   /// Follows the session, in a thread of its own.
   void follow(const std::stop_token& stop, WebServer& server);

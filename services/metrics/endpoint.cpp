@@ -1,13 +1,10 @@
 #include "services/metrics/endpoint.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +20,7 @@
 #include "services/accounts/token_bucket.hpp"
 #include "services/metrics/process_series.hpp"
 #include "services/metrics/request.hpp"
+#include "services/metrics/socket_address.hpp"
 #include "services/system/descriptor.hpp"
 
 namespace tandem::metrics {
@@ -30,12 +28,6 @@ namespace {
 
 using system::Descriptor;
 using transport::steady_ns;
-
-union SocketAddress {
-  sockaddr any;
-  sockaddr_in v4;
-  sockaddr_in6 v6;
-};
 
 tl::unexpected<Error> refuse(const Address& address, const char* what) {
   return fail(ErrorCode::kIo,
@@ -45,18 +37,7 @@ tl::unexpected<Error> refuse(const Address& address, const char* what) {
 /// Listens, and sets the port that was taken.
 Result<Descriptor> listen_at(Address& address) {
   SocketAddress at{};
-  socklen_t size = 0;
-  if (address.host.find(':') == std::string::npos) {
-    at.v4.sin_family = AF_INET;
-    at.v4.sin_port = htons(address.port);
-    inet_pton(AF_INET, address.host.c_str(), &at.v4.sin_addr);
-    size = sizeof(at.v4);
-  } else {
-    at.v6.sin6_family = AF_INET6;
-    at.v6.sin6_port = htons(address.port);
-    inet_pton(AF_INET6, address.host.c_str(), &at.v6.sin6_addr);
-    size = sizeof(at.v6);
-  }
+  socklen_t size = to_socket_address(address, at);
   Descriptor fd(socket(at.any.sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (fd.get() < 0) return refuse(address, "socket");
   const int yes = 1;

@@ -166,6 +166,8 @@ Result<void> check_service(const ServiceWishes& service) {
   if (service.lead > 1) return wrong("lead: must be 0 or 1");
   if (service.client_limit < 1 || service.client_limit > kMostClients)
     return wrong(fmt::format("client-limit: must be 1 to {}", kMostClients));
+  if (service.wait_for > service.client_limit)
+    return wrong(fmt::format("wait-for: must be 0 to {}, as no more clients may come", service.client_limit));
   if (service.window && (*service.window < 1 || *service.window > most_ahead))
     return wrong(fmt::format("window: must be 1 to {} frames, or auto", most_ahead));
   if (service.rate_hz && !(*service.rate_hz >= 1 && *service.rate_hz <= 1000))

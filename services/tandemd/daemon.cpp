@@ -29,6 +29,7 @@
 #include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/scenes/script.hpp"
+#include "services/tandemd/configuration/rehearsal.hpp"
 #include "services/tandemd/console.hpp"
 #include "services/tandemd/metrics.hpp"
 #include "services/tandemd/restarts.hpp"
@@ -117,7 +118,7 @@ class ScriptSender {
 };
 
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
-                                                         const Options& options,
+                                                         const Options& options, Metrics& metrics,
                                                          const std::atomic<bool>& stop) {
   const auto largest = host::largest_delta_bytes(config.streams);
   if (!largest) return tl::unexpected(largest.error());
@@ -128,6 +129,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   dds.secure = options.secure;
   dds.delta_depth = transport::delta_depth(config.frame_rate_hz, config.window_ceiling, *largest);
   dds.stop = &stop;
+  if (options.metrics) dds.repeated_bytes = &metrics.repeated_bytes();
   return transport::make_dds_server_port(dds);
 }
 
@@ -411,6 +413,7 @@ int run_daemon(Options options, SignalWatch& signals) {
   if (!served.session.empty() && options.session == Options().session) options.session = served.session;
   if (const auto named = transport::check_session_name(options.session); !named)
     return report_error(named.error(), 2);
+  if (const auto good = check_identity(options); !good) return report_error(good.error(), 2);
   HashLog hashes;
   Metrics metrics;
   Service service;
@@ -429,7 +432,7 @@ int run_daemon(Options options, SignalWatch& signals) {
                                                             &log_line, &steady_ns);
       if (!keeping) return report_error(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
-      auto port = open_port(*config, options, signals.stop());
+      auto port = open_port(*config, options, metrics, signals.stop());
       if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
         warn_without_security(options);

@@ -153,6 +153,8 @@ void describe_queue(Page& page, const FiguresNow& figures) {
   page.gauge("tandem_queue_frames", "Frames that wait to be sent", figures.moment.queued_frames);
   page.count("tandem_write_failures_total", "Writes that DDS refused, most of them repeated",
              static_cast<double>(figures.write_failures));
+  page.count("tandem_repeated_bytes_total", "Bytes of deltas that DDS sent again, as a client lacked them",
+             static_cast<double>(figures.repeated_bytes));
 }
 
 }  // namespace
@@ -266,6 +268,7 @@ void Metrics::watch(const Host& host, const host::Publisher& publisher, const ho
       figures_.moment = host.present();
     }
     figures_.write_failures = publisher.failures();
+    figures_.repeated_bytes = repeated_bytes_.load(std::memory_order_relaxed);
     figures_.publish_took = publisher.durations();
     rate_.saw(figures_.totals.frames, now_ns);
     figures_.frame_rate_hz = rate_.per_second();

@@ -1,6 +1,7 @@
 #pragma once
 // The metrics and the health of tandemd: --metrics.
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -51,7 +52,7 @@ struct FiguresNow {
   double frame_rate_hz = 0;  ///< as achieved over the last three seconds
   host::HostTotals totals;
   host::HostMoment moment;
-  std::uint64_t write_failures = 0;
+  std::uint64_t write_failures = 0, repeated_bytes = 0;
   DurationBuckets::Counts frame_took, step_took, publish_took;
   std::vector<DurationBuckets::Counts> predict_took, encode_took;  ///< by stream
 };
@@ -67,6 +68,8 @@ class Metrics {
   void watch(const host::Host& host, const host::Publisher& publisher, const host::Keeping& keeping,
              bool produced, std::int64_t now_ns);
   void watch(const standby::Standby& standby, std::int64_t now_ns);
+  /// For DdsOptions.
+  [[nodiscard]] std::atomic<std::uint64_t>& repeated_bytes() { return repeated_bytes_; }
 
  private:
   void count_frame(const host::FrameReport& report);
@@ -78,6 +81,7 @@ class Metrics {
 
   SessionFacts facts_;
   FiguresNow figures_;  // of the polling thread
+  std::atomic<std::uint64_t> repeated_bytes_{0};
   metrics::RateWatch rate_;
   std::int64_t next_ns_ = 0, next_moment_ns_ = 0;
   std::optional<std::int64_t> began_ns_;  // to serve the session

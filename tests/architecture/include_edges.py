@@ -37,7 +37,7 @@ OF_TANDEMD = (
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/logging", "services/workers", "sdk/transport/network"]
+    + ["services/logging", "services/workers", "sdk/transport/network", "sdk/transport/secure"]
     + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
     + DOOR
     + HOST

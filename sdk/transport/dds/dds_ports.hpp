@@ -41,6 +41,9 @@ struct DdsOptions {
   std::chrono::nanoseconds write_timeout = std::chrono::seconds(2);
   /// If this is not null and set, writes are not repeated any more. It must outlive the port.
   const std::atomic<bool>* stop = nullptr;
+  /// Server ports: if this is not null, the bytes of deltas that were sent again, as a reader lacked them,
+  /// are added to it once a second. It must outlive the port.
+  std::atomic<std::uint64_t>* repeated_bytes = nullptr;
   /// DDS Security: folder of this program's identity, which `tandem pki issue` made. Empty: none, unless
   /// CYCLONEDDS_URI has one.
   std::string secure = {};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/commandline/commandline.hpp"
+#include "services/metrics/probe.hpp"
 #include "services/planning/number.hpp"
 #include "services/tandemd/configuration/config.hpp"
 #include "services/tandemd/configuration/config_file.hpp"
@@ -137,7 +138,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "and SIGTERM stop the server cleanly. At SIGHUP it reads --config again, changes client_limit, "
       "stall_timeout and checkpoint_interval, and names what needs a restart; without --config, SIGHUP stops it.");
   idl::ServerConfig config;
-  std::string path;
+  std::string path, question;
   bool json = false, check = false, print = false;
   add_flags(static_cast<const commandline::Command&>(app), config);
   app.add_option("--config", path,
@@ -146,8 +147,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
                "Check configuration and scene as a start does, say what is wrong, and exit");
   app.add_flag("--print-config", print,
                "Print the configuration in force as a file, with what each field means and takes, and exit");
+  app.add_option("--probe", question, metrics::kProbeHelp);
   app.add_flag("--json", json, "Print one JSON object on stdout at the end");
   if (const auto code = app.parse(argc, argv)) return ended(*code);
+  if (!question.empty()) return ended(metrics::probe("tandemd", question));
   Places places;
   const idl::ServerConfig flags = config;
   if (!path.empty()) {

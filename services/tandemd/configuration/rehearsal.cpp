@@ -1,12 +1,24 @@
 #include "services/tandemd/configuration/rehearsal.hpp"
 
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/secure/identity_folder.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/planning/plan.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
 
+Result<void> check_identity(const Options& options) {
+  if (options.secure.empty()) return {};
+  const auto identity =
+      transport::secure::check_identity_folder(options.secure, transport::wall_ns() / kSecond);
+  if (!identity) return tl::unexpected(placed(options.places, "secure", identity.error()));
+  return {};
+}
+
 Result<void> rehearse(const Options& options) {
+  if (const auto good = check_identity(options); !good) return good;
   if (options.engine) return {};  // it says what it simulates when it comes
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return tl::unexpected(placed(options.places, "scene", scene.error()));

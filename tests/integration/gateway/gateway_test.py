@@ -62,17 +62,31 @@ def check_viewer(stage, name, servers, least, report, resyncs=0):
     print(f"  joined in {report['join_ms']:.0f} ms, round trip {report['round_trip_ms']:.1f} ms")
 
 
+def check_top(stage, count):
+    """`tandem top`, which hears DDS alone, shows each viewer and whose it is."""
+    command = [stage.options.tandem, "top", "--once", "--json", "--listen", "4", *stage.common]
+    done = subprocess.run(command, capture_output=True, text=True, env=stage.environment, timeout=60, check=True)
+    clients = json.loads(done.stdout)["clients"]
+    shown = [client for client in clients if "gateway" in client]
+    if len(shown) != count or len({client["gateway"] for client in shown}) != 1:
+        raise Failed(f"{len(shown)} viewers are shown: {clients}")
+    if shown[0]["gateway"] not in {client["client"] for client in clients if "gateway" not in client}:
+        raise Failed(f"the gateway is not shown: {clients}")
+
+
 def viewers(stage):
     """Two viewers with inputs, one that sleeps, one that comes late, a client of DDS: all hold the server's state."""
     stage.server("server")
     stage.gateway("gateway")
     stage.client("native")
-    stage.viewer("tilts", "--seconds", 14, "--input-every", 0.21)
-    stage.viewer("pushes", "--seconds", 14, "--input-every", 0.35)
+    stage.viewer("tilts", "--seconds", 18, "--input-every", 0.21)
+    stage.viewer("pushes", "--seconds", 18, "--input-every", 0.35)
     stage.viewer("sleeps", "--seconds", 60, "--sleep-after", 1, log=False)
     stage.wait(lambda: stage.health()["viewers"] == 3 and stage.health()["phase"] == "playing", "three viewers")
     stage.wait(lambda: len(stage.hashes("tilts")) > 100, "100 frames")
-    stage.viewer("late", "--seconds", 8)
+    stage.viewer("late", "--seconds", 12)
+    stage.wait(lambda: stage.health()["viewers"] == 4, "four viewers")
+    check_top(stage, 4)
     reports = {name: stage.end(name) for name in ("tilts", "pushes", "late")}
     health = stage.health()
     check_report(stage.stop("native"))

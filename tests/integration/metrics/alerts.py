@@ -12,6 +12,8 @@ SERVER = 'job="tandemd",instance="127.0.0.1:9730"'
 GATEWAY = 'job="tandem-gateway",instance="127.0.0.1:9731"'
 RECORDER = 'job="tandem-recorder",instance="127.0.0.1:9732"'
 
+REPEATED = f"tandem_repeated_bytes_total{{{SERVER}}}"
+
 # Series to its first value and what a step of normal play adds. A client comes back and is demoted once an hour, and the
 # recorder joined again once: normal play is not perfect.
 NORMAL = {
@@ -28,6 +30,10 @@ NORMAL = {
     f'tandem_server_state{{{SERVER},state="waiting"}}': (0, 0),
     f"tandem_repeated_demotions_total{{{SERVER}}}": (1, 0),
     f"tandem_rejoins_total{{{SERVER}}}": (1, 0),
+    f"tandem_frames_total{{{SERVER}}}": (0, 150),
+    f'tandem_payload_bytes_total{{{SERVER},stream="thin"}}': (0, 30_000),
+    f'tandem_payload_bytes_total{{{SERVER},stream="rich"}}': (0, 20_000),
+    REPEATED: (0, 1_300),  # 2 %, as on a radio
     f"tandem_client_server_alive{{{GATEWAY}}}": (1, 0),
     f"tandem_client_frames_applied_total{{{GATEWAY}}}": (0, 150),
     f"tandem_client_hash_mismatches_total{{{GATEWAY}}}": (0, 0),
@@ -58,8 +64,9 @@ FAULTS = [
     ("TandemNoSpace", {f"tandem_recorder_disk_free_bytes{{{RECORDER}}}": (2e9, 0),
                        f"tandem_recorder_written_bytes_total{{{RECORDER}}}": (1e9, 1e8)}),
     ("TandemNoSpace", {f"tandem_recorder_file_good{{{RECORDER}}}": (0, 0)}),
-    ("TandemLinkLoss", {f"tandem_client_resyncs_total{{{RECORDER}}}": (2, 1)}),
-    ("TandemLinkLoss", {f"tandem_rejoins_total{{{SERVER}}}": (4, 0)}),
+    ("TandemLinkLoss", {REPEATED: (1_300 * HOUR, 13_000)}),
+    ("TandemRejoins", {f"tandem_client_resyncs_total{{{RECORDER}}}": (2, 1)}),
+    ("TandemRejoins", {f"tandem_rejoins_total{{{SERVER}}}": (4, 0)}),
 ]  # fmt: skip
 # An alert that is no fault's of the issue, and may take longer.
 SLOW_FAULTS = [("TandemNotReady", {f"tandem_ready{{{GATEWAY}}}": (0, 0)}, 75)]
@@ -75,6 +82,8 @@ HARMLESS = [
     },
     # --rate max
     {f"tandem_frame_rate_target_hertz{{{SERVER}}}": (0, 0)},
+    # A link that was cut for half a minute is back.
+    {REPEATED: (1_300 * HOUR + 400_000, 1_300)},
     # One more demotion, one more join.
     {f"tandem_repeated_demotions_total{{{SERVER}}}": (2, 0), f"tandem_rejoins_total{{{SERVER}}}": (2, 0)},
 ]

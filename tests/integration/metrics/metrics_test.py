@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A live session, a gateway and a recorder, scraped by Debian's Prometheus on loopback; deploy/metrics is checked on the way.
 
-metrics_test.py rules|session|faults|strangers --tandemd PATH --tandem PATH --gateway PATH --wrong-hashes PATH    Exit 0 passed, 1 failed, 77 no Prometheus.
+metrics_test.py rules|session|faults|links|strangers --tandemd PATH --tandem PATH --gateway PATH --wrong-hashes PATH    Exit 0 passed, 1 failed, 77 not run.
 """
 
 import argparse
@@ -18,6 +18,7 @@ import time
 
 import alerts
 import faults
+import links
 from programs import DEPLOYED, ENVIRONMENT, LIMIT_S, RULES, Prometheus, Stage, checked, get, values, wait_for
 
 NOT_RUN = 77
@@ -98,6 +99,7 @@ def run_session(stage):
     for job in ("tandem-gateway", "tandem-recorder"):
         wait_for(lambda at=places[job]: get(at, "/readyz")[0] == 503, f"{job} without frames")
         assert get(places[job], "/healthz")[0] == 200
+    prometheus.wait_for_alert("TandemNotReady")
     stage.signal("server", signal.SIGCONT)
     for job, address in places.items():
         wait_for(lambda at=address: get(at, "/readyz")[0] == 200, f"{job} ready again")
@@ -213,9 +215,12 @@ def run_strangers(stage):
     assert rate_hz > 28, f"{rate_hz:.1f} frames/s under a flood of scrapes"
 
 
+SCENARIOS = {"rules": run_rules, "session": run_session, "faults": faults.run, "links": links.run, "strangers": run_strangers}
+
+
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("scenario", choices=("rules", "session", "faults", "strangers"))
+    parser.add_argument("scenario", choices=SCENARIOS)
     parser.add_argument("--tandemd", required=True)
     parser.add_argument("--tandem", required=True)
     parser.add_argument("--gateway", required=True)
@@ -225,8 +230,7 @@ def main():
         print("not run: the package prometheus is missing")
         return NOT_RUN
     with tempfile.TemporaryDirectory() as folder, Stage(options, folder) as stage:
-        {"rules": run_rules, "session": run_session, "faults": faults.run, "strangers": run_strangers}[options.scenario](stage)
-    return 0
+        return SCENARIOS[options.scenario](stage) or 0
 
 
 if __name__ == "__main__":

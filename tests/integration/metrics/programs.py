@@ -56,24 +56,29 @@ class Stage:
 
     def __init__(self, options, folder):
         self.options, self.folder, self.processes = options, pathlib.Path(folder), {}
+        self.uri = LOOPBACK  # CYCLONEDDS_URI of what starts from now on
 
     def __enter__(self):
         return self
 
     def __exit__(self, kind, *_):
-        for process in self.processes.values():
-            if process.poll() is None:
-                process.kill()  # also ends what is stopped
-                process.wait()
+        self.end()
         if kind is not None:
             for log in sorted(self.folder.glob("*.err")):
                 print(f"--- {log.stem}\n{log.read_text(errors='replace')[-2000:]}", file=sys.stderr)
 
+    def end(self):
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.kill()  # also ends what is stopped
+                process.wait()
+
     def start(self, name, *command):
         with open(self.folder / f"{name}.err", "wb") as log:
             self.processes[name] = subprocess.Popen(
-                list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=log, env=ENVIRONMENT
-            )
+                list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=log,
+                env={**ENVIRONMENT, "CYCLONEDDS_URI": self.uri},
+            )  # fmt: skip
 
     def log(self, name):
         return (self.folder / f"{name}.err").read_text(errors="replace")
@@ -112,8 +117,10 @@ class Prometheus:
         folder.mkdir()
         config = (DEPLOYED / "prometheus.yml").read_text("utf-8")
         for job, default in (("tandemd", 9730), ("tandem-gateway", 9731), ("tandem-recorder", 9732)):
-            assert f"127.0.0.1:{default}" in config
-            config = config.replace(f"127.0.0.1:{default}", places[job])
+            target = f'      - targets: ["127.0.0.1:{default}"]'
+            assert target in config
+            config = config.replace(target, target.replace(f"127.0.0.1:{default}", places[job]) if job in places else "")
+        config = re.sub(r"(?m)^    static_configs:\n\n", "    static_configs: []\n", config)
         config = re.sub(r"(?m)^  (\w+_interval|scrape_timeout): .*", r"  \1: 1s", config)
         (folder / "prometheus.yml").write_text(config, "utf-8")
         for name in RULES:

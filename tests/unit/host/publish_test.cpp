@@ -192,6 +192,19 @@ TEST(Publish, StatusGoesOutOnceASecondWithReadableFigures) {
   EXPECT_EQ(status.delta_bytes, bench.host->totals().payload_bytes);
 }
 
+// 24 bytes of position and velocity, 16 of orientation and 12 of angular velocity.
+TEST(Publish, WhatIsRawCountsHowBodiesTurn) {
+  Bench bench(turning_config());
+  bench.poll();
+  bench.enter(1, transport::Role::kObserver);
+  bench.port.statuses.clear();
+  bench.run_ms(3000);
+  ASSERT_FALSE(bench.port.statuses.empty());
+  const auto& status = bench.port.statuses.back();
+  ASSERT_GT(status.bodies, 0U);
+  EXPECT_NEAR(status.raw_mbit_per_s, status.bodies * 52 * 8 * status.frame_rate_hz / 1048576, 1e-6);
+}
+
 TEST(Publish, StatusTellsBytesByKind) {
   Bench bench;
   bench.poll();
