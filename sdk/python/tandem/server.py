@@ -78,7 +78,7 @@ class Frame:
 
 class Server:
     """Streams a simulation that runs here. Starts `tandemd`, unless `tandemd --engine` started this program, or `door` is the path of
-    its `--engine-socket`.
+    its `--engine-socket`, or `tcp:HOST:PORT` of its `--engine-listen` on another machine, with the `token` of its `--engine-token`.
 
     `dt`: seconds of a step. `turns`: bodies have orientations. `gravity_limit`, `push_limit`: the largest input of a user, None: refused;
     `application_limit`: bytes. `save()` returns bytes and `load(bytes)` the columns for `Frame.write()`, or None if they are of another
@@ -88,8 +88,8 @@ class Server:
 
     def __init__(self, capacity, dt, *, session="default", domain=0, types=(), name="python", dtype=np.float32, turns=False,
                  gravity=(0, 0, 0), damping=0, up="y", threshold=None, extent=None, gravity_limit=1000, push_limit=1000,
-                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, options=(), tandemd=None):  # fmt: skip
-        self._process, self._socket, self._columns = None, None, {}
+                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, token=None, options=(), tandemd=None):  # fmt: skip
+        self._process, self._socket, self._columns, self._slot = None, None, {}, b""
         self._save, self._load, self._births = save, load, None
         wanted = {"threshold": threshold, "extent": extent, "input gravity": gravity_limit, "input push": push_limit, "input application": application_limit}
         lines = ["engine 1.0", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
@@ -97,7 +97,12 @@ class Server:
                  f"save {int(save is not None and load is not None)}", f"step_limit {step_limit}",
                  *(f"{key} {value}" for key, value in wanted.items() if value is not None),
                  *(each._line() for each in types), *hello]  # fmt: skip
-        self._connect(door or os.environ.get("TANDEM_DOOR"), session, domain, options, tandemd)
+        door = door or os.environ.get("TANDEM_DOOR")
+        self._remote = door is not None and door.startswith("tcp:")
+        if self._remote:
+            lines[0] = "engine 1.1"
+            lines += ["memory inline", f"token {token or os.environ.get('TANDEM_DOOR_TOKEN', '-')}"]
+        self._connect(door, session, domain, options, tandemd)
         try:
             self._send(_HELLO, "\n".join(lines).encode() + b"\n")
             self._take_layout()
@@ -108,6 +113,13 @@ class Server:
     def _connect(self, door, session, domain, options, tandemd):
         if door is not None and door.startswith("fd:"):
             self._socket = socket.socket(fileno=int(door[3:]))
+            return
+        if self._remote:
+            host, _, port = door[4:].rpartition(":")
+            self._socket = socket.create_connection((host.strip("[]"), int(port)), 10)
+            self._socket.settimeout(None)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             return
         if door is not None:
             self._socket = socket.socket(socket.AF_UNIX)
@@ -133,15 +145,19 @@ class Server:
         body = self._receive(length)
         if kind != _LAYOUT:
             self._fail(kind, body)
-        numbers, columns = {}, []
+        numbers, columns, inline = {}, [], False
         for line in body.decode().splitlines():
             key, *values = line.split()
             if key == "column":
                 columns.append((values[0], values[1], int(values[2]), int(values[3])))
             elif values and values[0].isdigit():
                 numbers[key] = int(values[0])
-        memory = mmap.mmap(fds[0], numbers["bytes"])  # lives as long as an array on it
-        os.close(fds[0])
+            inline = inline or (key == "memory" and values == ["inline"])
+        if inline:
+            memory = self._slot = bytearray(numbers["slot_bytes"])
+        else:
+            memory = mmap.mmap(fds[0], numbers["bytes"])  # lives as long as an array on it
+            os.close(fds[0])
         self.capacity, padded = numbers["capacity"], numbers["padded"]
         self._head = np.frombuffer(memory, np.uint64, 3, numbers["first"])
         dtypes = {"f32": np.float32, "f64": np.float64, "u8": np.uint8, "u16": np.uint16}
@@ -175,11 +191,12 @@ class Server:
                 self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), 0), number)
             elif kind == _SAVE:
                 data = bytes(self._save())
-                pathlib.Path(body.decode()).write_bytes(data)
-                self._send(_SAVED, struct.pack("<Q", len(data)))
+                if not self._remote:
+                    pathlib.Path(body.decode()).write_bytes(data)
+                self._send(_SAVED, struct.pack("<Q", len(data)), data if self._remote else b"")
             elif kind == _LOAD:
                 number = struct.unpack_from("<Q", body)[0]
-                columns = self._load(pathlib.Path(body[8:].decode()).read_bytes())
+                columns = self._load(body[8:] if self._remote else pathlib.Path(body[8:].decode()).read_bytes())
                 if columns is not None:
                     self._write(dict(columns), columns.get("alive"), ())
                 self._answer(_LOADED, struct.pack("<QII", number, columns is not None, 0), number)
@@ -207,16 +224,18 @@ class Server:
 
     def _answer(self, kind, body, number):
         self._head[:] = number
-        self._send(kind, body)
+        self._send(kind, body, self._slot)
 
-    def _send(self, kind, body):
+    def _send(self, kind, body, tail=b""):
         try:
-            self._socket.sendall(struct.pack("<II", kind, len(body)) + body)
+            self._socket.sendall(struct.pack("<II", kind, len(body) + len(tail)) + body)
+            if tail:
+                self._socket.sendall(tail)
         except OSError:
             self._check_over()
 
     def _receive(self, count):
-        held = b""
+        held = bytearray()
         while len(held) < count:
             try:
                 got = self._socket.recv(count - len(held))
@@ -225,7 +244,7 @@ class Server:
             if not got:
                 raise Error(Result.IO, "the server ended before it took this engine; its own lines say why")
             held += got
-        return held
+        return bytes(held)
 
     def _message(self):
         """The next message; (None, b"") if the server is gone."""

@@ -5,6 +5,7 @@ import contextlib
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -137,6 +138,35 @@ class Server(unittest.TestCase):
             self.assertGreater(client.scene().continues_frame, 0)
             self.assertEqual(client.status().hash_mismatches, 0)
             self.assertIsNone(process.poll())
+
+    def test_an_engine_on_another_machine_shows_a_token_and_is_saved(self):
+        script, token = pathlib.Path(self.folder) / "counter.py", pathlib.Path(self.folder) / "token"
+        script.write_text(COUNTER, encoding="utf-8")
+        token.write_text("0123456789abcdef\n", encoding="utf-8")
+        token.chmod(0o600)
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        command = [os.environ["TANDEMD"], "--engine-listen", f"127.0.0.1:{port}", "--engine-token", token, *stage.common("counter"),
+                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2]  # fmt: skip
+        with running(self.folder, "tandemd", command) as (_, text):
+            wait_for("the port", lambda: f"waits for an engine at tcp:127.0.0.1:{port}" in text())
+            engine = lambda shown: running(self.folder, f"engine_{shown}", ["env", f"TANDEM_DOOR=tcp:127.0.0.1:{port}", f"TANDEM_DOOR_TOKEN={shown}",
+                                                                          sys.executable, "-B", script])  # fmt: skip
+            with engine("0123456789abcdeX") as (stranger, said):
+                stranger.wait(stage.LIMIT_S)
+                self.assertIn("did not show the token", said())
+            with engine("0123456789abcdef") as (first, _), tandem.Client("counter", domain=stage.DOMAIN) as client:
+                client.wait_until_playing(stage.LIMIT_S)
+                epoch = client.status().epoch
+                wait_for("frames", lambda: client.sample().frame > 30)
+                first.kill()
+                wait_for("the line", lambda: "the engine hung up" in text())
+                wait_for("another wait", lambda: text().count("waits for an engine") == 2)
+                with engine("0123456789abcdef") as (_, said):
+                    wait_for("another epoch", lambda: client.status().epoch > epoch and client.status().phase == tandem.Phase.PLAYING)
+                    self.assertIn("loaded", said())
+                    self.assertGreater(client.scene().continues_frame, 0)
+                    self.assertEqual(client.status().hash_mismatches, 0)
 
     def test_what_the_server_refuses_is_an_error_here(self):
         with self.assertRaises(tandem.Error) as raised:

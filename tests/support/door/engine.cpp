@@ -174,6 +174,15 @@ bool misbehave(std::string_view mode) {
   if (mode == "wrong-slot") return done(engine.frame, 9, 24);
   if (mode == "wrong-size") return done(engine.frame, 0, 23);
   if (mode == "stale") return done(engine.frame, 0, 24);  // without the slot's head
+  if (mode == "inline-stale" || mode == "inline-long") {
+    std::vector<unsigned char> slot(engine.slot_bytes + (mode == "inline-long" ? 8 : 0));
+    std::memcpy(slot.data(), engine.memory, engine.slot_bytes);
+    unsigned char body[24] = {};
+    std::memcpy(body, &engine.frame, 8);
+    return tandem_engine_send(&engine, TANDEM_ENGINE_DONE, body, sizeof body, slot.data(), slot.size()) == 0;
+  }
+  if (mode == "inline-half")
+    return tandem_engine_send(&engine, TANDEM_ENGINE_DONE, engine.memory, 24, engine.memory, 100) == 0;
   if (mode == "twice") return tandem_engine_done(&engine, 0) + tandem_engine_done(&engine, 0) == 0;
   if (mode == "unknown") return tandem_engine_send(&engine, 77, "x", 1, nullptr, 0) == 0;
   if (mode == "huge") {
@@ -212,6 +221,7 @@ int small(const std::string& mode, std::uint64_t from) {
   if (mode == "exit-early") return 4;
   std::string hello = "name small\ncapacity 17\ndt 0.03125\nturns 1\nstep_limit 1\ninput application 8\n";
   if (mode == "capacity") hello = "name small\ncapacity 99999999\ndt 0.03125\n";
+  if (mode == "shared") hello += "memory shared\n";
   if (mode == "no-dt") hello = "name small\ncapacity 17\n";
   if (tandem_engine_open(&engine, hello.c_str()) != 0) return complain();
   if (mode == "no-start") return ::pause();
