@@ -137,8 +137,6 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
   if (config.has_scene() || config.has_bodies())
     return refuse(flag, "the engine says what it simulates: leave out scene and bodies");
   if (config.scripted() || config.has_users()) return refuse(flag, "only scenes have scripts");
-  if (config.standby())
-    return refuse(flag, "conflicts with standby: a server with such an engine cannot stand by");
   options.engine = std::move(way);
   return {};
 }

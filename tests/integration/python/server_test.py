@@ -168,6 +168,42 @@ class Server(unittest.TestCase):
                     self.assertGreater(client.scene().continues_frame, 0)
                     self.assertEqual(client.status().hash_mismatches, 0)
 
+    def stands_by(self, script, name, *options):
+        return running(self.folder, name, [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}",
+                                           *stage.common("counter"), *options])  # fmt: skip
+
+    def test_a_server_with_an_engine_stands_by_and_takes_over_when_the_engine_of_the_live_one_dies(self):
+        script = pathlib.Path(self.folder) / "counter.py"
+        script.write_text(COUNTER, encoding="utf-8")
+        one = lambda text: int(wait_for("the engine", lambda: text().partition(", process ")[2].partition(":")[0]))
+        with self.stands_by(script, "live") as (live, said), tandem.Client("counter", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            with self.stands_by(script, "standby", "--standby") as (standby, told):
+                wait_for("the standby", lambda: "loaded" in told())
+                os.kill(one(told), signal.SIGKILL)  # its own engine, while it stands by
+                wait_for("another engine", lambda: told().count("loaded") >= 2 and "the engine hung up" in told())
+                wait_for("frames", lambda: client.sample().frame > 90)
+                time.sleep(1.5)  # it holds a checkpoint again
+                epoch = client.status().epoch
+                os.kill(one(said), signal.SIGKILL)
+                wait_for("a takeover", lambda: "takes over from epoch" in told())
+                wait_for("another epoch", lambda: client.status().epoch > epoch and client.status().phase == tandem.Phase.PLAYING)
+                self.assertGreater(client.scene().continues_frame, 60)
+                self.assertNotIn("goes on from the checkpoint, and", told())
+                self.assertEqual(client.status().hash_mismatches, 0)
+                live.wait(stage.LIMIT_S)  # it finds the other one
+                self.assertIn("already has a server", said())
+                self.assertIsNone(standby.poll())
+
+    def test_an_engine_that_does_not_save_is_told_so(self):
+        script = pathlib.Path(self.folder) / "counter.py"
+        script.write_text(COUNTER.replace('save=lambda: str(state["frame"]).encode(), load=load, ', ""), encoding="utf-8")
+        with self.stands_by(script, "standby", "--standby") as (process, text):
+            self.assertEqual(process.wait(stage.LIMIT_S), 2, text())
+            self.assertIn("does not save", text())
+        with self.stands_by(script, "live") as (_, text):
+            wait_for("the warning", lambda: "the world begins anew at frame 0" in text())
+
     def test_what_the_server_refuses_is_an_error_here(self):
         with self.assertRaises(tandem.Error) as raised:
             tandem.Server(0, 1 / 30, options=stage.common("refused"))

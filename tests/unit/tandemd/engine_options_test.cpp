@@ -46,7 +46,7 @@ TEST(EngineOptions, ComeInOneWayAndWithoutAScene) {
   EXPECT_THAT(refusal(config), HasSubstr("only scenes have scripts"));
   config.set_scripted(false);
   config.set_standby(true);
-  EXPECT_THAT(refusal(config), HasSubstr("standby"));
+  EXPECT_TRUE(check_config(config).has_value()) << "its engine loads what the live server's saves";
 }
 
 TEST(EngineOptions, ANetworkNeedsATokenThatNobodyElseReads) {
