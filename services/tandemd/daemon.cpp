@@ -378,7 +378,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
 
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
 tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
-                                           std::int64_t ran_ns, const End& end,
+                                           Metrics& metrics, std::int64_t ran_ns, const End& end,
                                            const std::atomic<bool>& stop) {
   // A server that stands by takes over meanwhile, and this one then finds it.
   constexpr std::int64_t kTakeoverNs = 4 * kSecond;
@@ -396,12 +396,16 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
                  static_cast<double>(*wait_ns) * 1e-9);
     const std::int64_t until_ns = steady_ns() + *wait_ns;
-    while (steady_ns() < until_ns && !stop) {
+    const auto idle = [&] {
       service.watch(steady_ns());
+      metrics.miss_engine(steady_ns());
+    };
+    while (steady_ns() < until_ns && !stop) {
+      idle();
       std::this_thread::sleep_for(std::chrono::milliseconds{20});
     }
     if (stop) return tl::unexpected(0);
-    auto served = open_world(options, stop);
+    auto served = open_world(options, stop, idle);
     if (served) return std::move(*served);
     if (stop) return tl::unexpected(0);
     report_error(served.error().error, 1);
@@ -427,12 +431,14 @@ int run_daemon(Options options, SignalWatch& signals) {
   Service service;
   Restarts restarts;
   bool stands_by = options.standby;
+  const engine::door::Door* door = nullptr;  // that the metrics follow
   const Stage stage{options, served, stands_by, hashes, metrics, service, signals};
   for (bool first = true;; first = false) {
     const std::int64_t began_ns = steady_ns();
     auto config = planning::plan_server(served.world, options.choice, options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
+    if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));
     std::optional<End> end;
     {
       auto keeping = stands_by ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
@@ -462,7 +468,8 @@ int run_daemon(Options options, SignalWatch& signals) {
     // A server that lost its engine goes on as the live one, unless another has taken over.
     stands_by = options.standby && !(end->next == End::Next::kAnotherEngine && end->was_live);
     if (end->next != End::Next::kAnotherEngine) continue;
-    auto next = next_engine(options, restarts, service, steady_ns() - began_ns, *end, signals.stop());
+    auto next =
+        next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop());
     if (!next) return signals.finish(next.error());
     served = std::move(*next);
   }

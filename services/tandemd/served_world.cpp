@@ -43,9 +43,11 @@ tl::unexpected<NotOpened> refuse(Error error, std::string field, int exit_code) 
   return tl::unexpected(NotOpened{std::move(error), std::move(field), exit_code});
 }
 
-tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop) {
+tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop,
+                                                     const std::function<void()>& idle) {
   engine::door::Options door{.way = *options.engine};
   door.stop = &stop;
+  door.idle = idle;
   door.log = [](const std::string& line, bool warning) {
     spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
   };
@@ -66,11 +68,13 @@ tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, con
         hello.name);
   spdlog::info("engine {}, process {}: {} slots, {:g} s a step", hello.name, (*opened)->engine_process(),
                hello.capacity, hello.dt_s);
+  const engine::door::Door* const there = opened->get();
   return ServedWorld{.world = world_of(hello),
                      .session = hello.session,
                      .engine = "door:" + hello.name,
                      .scene = std::nullopt,
-                     .simulation = std::move(*opened)};
+                     .simulation = std::move(*opened),
+                     .door = there};
 }
 
 }  // namespace
@@ -101,8 +105,9 @@ planning::World world_of(const Hello& hello) {
   return world;
 }
 
-tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop) {
-  if (options.engine) return wait_for_engine(options, stop);
+tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop,
+                                                const std::function<void()>& idle) {
+  if (options.engine) return wait_for_engine(options, stop, idle);
   auto scene = scenes::load_scene(options.scene);
   if (!scene) return refuse(scene.error(), "scene", 2);
   auto simulation =

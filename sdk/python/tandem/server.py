@@ -8,6 +8,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 
 import mmap
 import numpy as np
@@ -187,8 +188,9 @@ class Server:
             elif kind == _STEP:
                 number, slot, _ = struct.unpack("<QII", body)
                 frame, inputs = Frame(self, number, inputs), []
+                began_ns = time.monotonic_ns()
                 yield frame
-                self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), 0), number)
+                self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), time.monotonic_ns() - began_ns), number)
             elif kind == _SAVE:
                 data = bytes(self._save())
                 if not self._remote:

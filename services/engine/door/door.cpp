@@ -88,6 +88,13 @@ class Session final : public Door {
 
   [[nodiscard]] const Hello& hello() const override { return talk_.hello(); }
   [[nodiscard]] int engine_process() const override { return channel_.peer(); }
+  [[nodiscard]] Figures figures() const override {
+    constexpr std::uint64_t kMostNs = 1ULL << 62U;
+    return {.trip_ns = trip_.count(),
+            .step_ns = static_cast<std::int64_t>(std::min(talk_.done().step_ns, kMostNs)),
+            .slow = told_slow_,
+            .stopped = told_stopped_};
+  }
   [[nodiscard]] std::uint32_t capacity() const override { return hello().capacity; }
   [[nodiscard]] double dt_s() const override { return hello().dt_s; }
   [[nodiscard]] Vec3 gravity() const override { return gravity_; }
@@ -142,6 +149,7 @@ class Session final : public Door {
   std::uint64_t frame_ = 0;
   Clock::time_point asked_ = Clock::now();
   Clock::time_point attended_{};
+  std::chrono::nanoseconds trip_{0};
   bool told_slow_ = false, told_stopped_ = false;
   std::optional<Error> failure_;
   // save() is const for the world that it saves, but the engine has to be asked.
@@ -255,6 +263,7 @@ Result<void> Session::wait_for_engine() {
   while (!channel_.open()) {
     if (options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed))
       return fail(ErrorCode::kTimeout, "stopped before an engine came");
+    options_.idle();
     answer_door();
     if (failure_) return tl::unexpected(*failure_);
     if (channel_.open()) break;
@@ -299,6 +308,7 @@ void Session::pump() {
     }
     if (!*message) return;
     const bool answers_step = talk_.state() == State::kStep;
+    if (answers_step) trip_ = Clock::now() - asked_;
     const bool brings_bodies = answers_step || talk_.state() == State::kLoad;
     if (auto taken = talk_.take((*message)->type, (*message)->body); !taken) return shut(taken.error());
     if (told_slow_ || told_stopped_) {

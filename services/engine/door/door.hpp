@@ -37,6 +37,16 @@ struct Options {
   /// "engine: ".
   std::function<void(const std::string& line, bool warning)> log = [](const std::string&, bool) {};
   const std::atomic<bool>* stop = nullptr;  ///< ends a wait for an engine
+  /// Called at least every 50 ms while an engine is awaited, which may take for ever.
+  std::function<void()> idle = [] {};
+};
+
+/// How an engine does.
+struct Figures {
+  std::int64_t trip_ns = 0;  ///< of the last step, from the question to the answer
+  std::int64_t step_ns = 0;  ///< of the last step, as the engine says; 0: it does not say
+  bool slow = false;         ///< the step under way takes more than half of its limit
+  bool stopped = false;      ///< by a signal
 };
 
 /// A simulation whose engine has said START. Steps can be waited for. Its checkpoints are the engine's files.
@@ -52,6 +62,7 @@ class Door : public Simulation {
   [[nodiscard]] virtual const Hello& hello() const = 0;
   /// The process that speaks; 0: not known.
   [[nodiscard]] virtual int engine_process() const = 0;
+  [[nodiscard]] virtual Figures figures() const = 0;
 };
 
 }  // namespace tandem::engine::door

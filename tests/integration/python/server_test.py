@@ -4,6 +4,7 @@
 import contextlib
 import os
 import pathlib
+import re
 import signal
 import socket
 import subprocess
@@ -11,6 +12,7 @@ import sys
 import tempfile
 import time
 import unittest
+import urllib.request
 
 import stage
 
@@ -68,6 +70,15 @@ def running(folder, name, command):
                 process.kill()
 
 
+def metrics_of(log):
+    """The page of metrics, at the address that the log names."""
+    address = re.search(r"http://[0-9.]+:[0-9]+", log)
+    if not address:
+        return ""
+    with urllib.request.urlopen(address[0] + "/metrics", timeout=5) as page:
+        return page.read().decode()
+
+
 class Server(unittest.TestCase):
     def setUp(self):
         self.folder = self.enterContext(tempfile.TemporaryDirectory())
@@ -119,7 +130,7 @@ class Server(unittest.TestCase):
         script = pathlib.Path(self.folder) / "counter.py"
         script.write_text(COUNTER, encoding="utf-8")
         command = [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}", *stage.common("counter"),
-                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2]  # fmt: skip
+                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2, "--metrics", "0"]  # fmt: skip
         with running(self.folder, "tandemd", command) as (process, text), tandem.Client("counter", domain=stage.DOMAIN) as client:
             client.wait_until_playing(stage.LIMIT_S)
             epoch = client.status().epoch
@@ -128,6 +139,7 @@ class Server(unittest.TestCase):
             os.kill(int(engine), signal.SIGSTOP)
             wait_for("the line", lambda: "is stopped in frame" in text())
             held = client.sample().frame
+            wait_for("its state", lambda: 'tandem_engine_state{state="stopped"} 1' in metrics_of(text()))
             os.kill(int(engine), signal.SIGCONT)
             wait_for("it to go on", lambda: client.sample().frame > held + 5)
             self.assertEqual(client.status().epoch, epoch)
@@ -138,6 +150,11 @@ class Server(unittest.TestCase):
             self.assertGreater(client.scene().continues_frame, 0)
             self.assertEqual(client.status().hash_mismatches, 0)
             self.assertIsNone(process.poll())
+            page = wait_for("a restart", lambda: (lambda page: page if "tandem_engine_restarts_total 1" in page else "")(metrics_of(text())))
+            self.assertIn('tandem_engine_info{engine="counter"} 1', page)
+            self.assertIn('tandem_engine_state{state="serves"} 1', page)
+            count = page.partition("tandem_engine_round_trip_seconds_count ")[2].partition("\n")[0]
+            self.assertGreater(float(count), 30)
 
     def test_an_engine_on_another_machine_shows_a_token_and_is_saved(self):
         script, token = pathlib.Path(self.folder) / "counter.py", pathlib.Path(self.folder) / "token"
