@@ -1,9 +1,11 @@
 """A simulation in numpy, streamed by a server: the door of `idl/ENGINE.md`."""
 
+import ctypes
 import dataclasses
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -84,13 +86,16 @@ class Server:
     `dt`: seconds of a step. `turns`: bodies have orientations. `gravity_limit`, `push_limit`: the largest input of a user, None: refused;
     `application_limit`: bytes. `save()` returns bytes and `load(bytes)` the columns for `Frame.write()`, or None if they are of another
     world; with both the server can keep checkpoints. `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
-    `options`: further flags of tandemd. Errors: `tandem.Error`.
+    `options`: further flags of tandemd. `view`: also starts `tandem-gateway` for browsers of this machine; `url` is where they look.
+    Errors: `tandem.Error`.
     """
+
+    url = None  #: of the viewer, with `view`
 
     def __init__(self, capacity, dt, *, session="default", domain=0, types=(), name="python", dtype=np.float32, turns=False,
                  gravity=(0, 0, 0), damping=0, up="y", threshold=None, extent=None, gravity_limit=1000, push_limit=1000,
-                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, token=None, options=(), tandemd=None):  # fmt: skip
-        self._process, self._socket, self._columns, self._slot = None, None, {}, b""
+                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, token=None, options=(), tandemd=None, view=False):  # fmt: skip
+        self._process, self._viewer, self._socket, self._columns, self._slot = None, None, None, {}, b""
         self._save, self._load, self._births = save, load, None
         wanted = {"threshold": threshold, "extent": extent, "input gravity": gravity_limit, "input push": push_limit, "input application": application_limit}
         lines = ["engine 1.0", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
@@ -107,6 +112,8 @@ class Server:
         try:
             self._send(_HELLO, "\n".join(lines).encode() + b"\n")
             self._take_layout()
+            if view:
+                self._start_viewer(session, domain, [str(word) for word in options])
         except BaseException:
             self.close()
             raise
@@ -135,6 +142,20 @@ class Server:
             flags = [word for flag, value in defaults.items() if flag not in options for word in (flag, value)]
             command = [program, "--engine-fd", theirs.fileno(), *flags, *options]
             self._process = subprocess.Popen(list(map(str, command)), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
+
+    def _start_viewer(self, session, domain, options):
+        program = os.environ.get("TANDEM_GATEWAY") or shutil.which("tandem-gateway")
+        if program is None:
+            raise Error(Result.IO, "tandem-gateway is not in the PATH: install it, or leave out view=True")
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        flags = {"--session": session, "--domain": domain, "--port": port}
+        shared = ("--session", "--domain", "--secure", "--profile")  # with tandemd
+        flags.update((flag, value) for flag, value in zip(options, options[1:]) if flag in shared)
+        with_this = lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG: it ends with this process
+        self._viewer = subprocess.Popen([program, *(str(word) for flag in flags.items() for word in flag)],
+                                        stdin=subprocess.DEVNULL, preexec_fn=with_this)  # fmt: skip
+        self.url = f"http://127.0.0.1:{port}/"
 
     def _take_layout(self):
         try:
@@ -270,16 +291,18 @@ class Server:
         raise Error(Result.UNSUPPORTED, f"the server sent a message of type {kind}")
 
     def close(self):
-        """Ends the session, and waits for the `tandemd` that this started."""
+        """Ends the session, and waits for the programs that this started."""
         if self._socket is not None:
             self._socket.close()
-        if self._process is not None:
+        if self._viewer is not None:
+            self._viewer.terminate()
+        for process in filter(None, (self._process, self._viewer)):
             try:
-                self._process.wait(5)
+                process.wait(5)
             except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
-        self._socket, self._process = None, None
+                process.kill()
+                process.wait()
+        self._socket, self._process, self._viewer = None, None, None
 
     def __enter__(self):
         return self

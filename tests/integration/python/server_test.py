@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 import unittest
+import urllib.error
 import urllib.request
 
 import stage
@@ -79,6 +80,16 @@ def metrics_of(log):
         return page.read().decode()
 
 
+def answers(url):
+    """Whether something is there; it may have no files of a viewer."""
+    try:
+        return urllib.request.urlopen(url, timeout=5).status
+    except urllib.error.HTTPError as error:
+        return error.code
+    except OSError:
+        return None
+
+
 class Server(unittest.TestCase):
     def setUp(self):
         self.folder = self.enterContext(tempfile.TemporaryDirectory())
@@ -93,6 +104,21 @@ class Server(unittest.TestCase):
             stage.tool("join", *stage.common("boids"), "--timeout", stage.LIMIT_S, "--seconds", 2, "--json")
             self.assertIsNone(process.poll(), text())
             process.send_signal(signal.SIGINT)
+
+    @unittest.skipUnless(os.environ.get("TANDEM_GATEWAY"), "the gateway was not built")
+    def test_the_cloth_hangs_together_and_a_viewer_is_there(self):
+        command = [sys.executable, "-B", EXAMPLES / "cloth.py", *stage.common("cloth")]
+        with running(self.folder, "cloth", command) as (process, text), tandem.Client("cloth", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            url = wait_for("the address", lambda: text().partition("look at ")[2].partition("\n")[0])
+            wait_for("the gateway", lambda: answers(url))
+            wait_for("frames", lambda: client.sample().frame > 120)
+            position = client.sample().positions
+            self.assertLess(float(abs(position).max()), 15)
+            self.assertGreater(float(position[:, 1].min()), -12)
+            process.send_signal(signal.SIGINT)
+            process.wait(stage.LIMIT_S)
+            self.assertIsNone(answers(url), "the gateway ended with it")
 
     def play_counter(self, *options):
         script = pathlib.Path(self.folder) / "counter.py"
