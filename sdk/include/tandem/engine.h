@@ -91,7 +91,7 @@ typedef struct tandem_engine {
 } tandem_engine;
 
 static inline int tandem_engine_fail(tandem_engine* e, const char* what) {
-  if (e->error[0] == 0) strncat(e->error, what, sizeof e->error - 1);
+  if (e->error[0] == 0) snprintf(e->error, sizeof e->error, "%.255s", what);
   return -1;
 }
 
