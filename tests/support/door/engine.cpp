@@ -8,6 +8,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -206,6 +207,35 @@ bool misbehave(std::string_view mode) {
       return true;
     }();
     return !started;
+  }
+  if (mode == "scribble-all") {
+    static const bool started = [] {
+      std::thread([] {
+        // Over all of it, also what says where things are: bytes, numbers that are none, and long runs.
+        std::mt19937 random(11);
+        const std::uint64_t bytes = engine.memory_bytes;
+        for (;;) {
+          unsigned char* const at = engine.memory + random() % (bytes - 64);
+          const std::uint32_t what = random() % 8;
+          if (what == 0) {
+            std::memset(at, static_cast<int>(random() % 256), random() % 64);
+          } else if (what < 4) {
+            constexpr std::uint32_t kOdd[] = {0x7F800000, 0xFF800000, 0x7FC00000, 0x7F7FFFFF, 1, 0x80000000};
+            std::memcpy(at, &kOdd[random() % 6], 4);
+          } else {
+            *at = static_cast<unsigned char>(random());
+          }
+          // Else hardly a frame were whole.
+          if (random() % 64 == 0) std::this_thread::sleep_for(std::chrono::microseconds{50});
+        }
+      }).detach();
+      return true;
+    }();
+    return !started;
+  }
+  if (mode == "flap") {
+    auto* const alive = static_cast<std::uint8_t*>(tandem_engine_column(&engine, "alive", 0));
+    for (std::uint32_t s = 0; s < kSmall; ++s) alive[s] = static_cast<std::uint8_t>(1 + engine.frame % 2);
   }
   if (mode == "nan") value("position", 1, 3) = std::numeric_limits<float>::quiet_NaN();
   if (mode == "far") value("position", 2, 4) = 1e30F;

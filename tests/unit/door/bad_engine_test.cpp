@@ -6,7 +6,6 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 
 #include <filesystem>
 
@@ -195,24 +194,6 @@ TEST(Door, AScribblingProcessMakesWrongBodiesAndNothingElse) {
     }
   }
   EXPECT_GT(frames, 0);
-}
-
-std::size_t descriptors() {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}));
-}
-
-TEST(Door, TwoHundredRestartsLeakNoDescriptorAndNoProcess) {
-  { auto warm = open_small("exit 2"); }
-  const std::size_t before = descriptors();
-  for (int i = 0; i < 200; ++i) {
-    auto door = open_small(i % 2 == 0 ? "exit 2" : "good");
-    ASSERT_TRUE(door.has_value()) << door.error().message;
-    (*door)->step();
-    (*door)->step();
-    EXPECT_EQ((*door)->failure().empty(), i % 2 == 1);
-  }
-  EXPECT_EQ(descriptors(), before);
-  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "no child is left";
 }
 
 }  // namespace
