@@ -67,6 +67,9 @@ struct Checkpoint {
   std::uint64_t last_input = 0;          ///< number of the last scheduled input that was issued
   std::vector<Scheduled> scheduled;      ///< consecutive numbers up to last_input, ascending by frame
   std::vector<engine::Input> immediate;  ///< inputs of the next frame, in the order of arrival
+  /// Inputs of the frame after that. Only a takeover has them, if the live server ended while a step was under
+  /// way; no file does.
+  std::vector<engine::Input> later;
   std::vector<ClientState> clients;
   std::uint64_t journal = 0;  ///< number of the last journal entry before the frame was over; not in the file
   std::vector<std::byte> engine_state;  ///< of Simulation::save()

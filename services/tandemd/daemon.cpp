@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -308,12 +309,15 @@ struct End {
   enum class Next : std::uint8_t { kExit, kStandBy, kAnotherEngine };
   Next next = Next::kExit;
   int exit_code = 0;
+  bool was_live = false;      ///< it did not stand by any more
+  bool had_standbys = false;  ///< another server may take over now
 };
 
 /// What stays from one life of a server to the next: it may stand by again, or go on with another engine.
 struct Stage {
   Options& options;  ///< with what was read again
   const ServedWorld& served;
+  const bool& stands_by;  ///< this life begins so
   HashLog& hashes;
   Metrics& metrics;
   Service& service;
@@ -325,9 +329,11 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   SignalWatch& signals = stage.signals;
   engine::Simulation& simulation = *stage.served.simulation;
   const auto exits = [&signals](int code) { return End{End::Next::kExit, signals.finish(code)}; };
-  if (options.standby) {
+  if (stage.stands_by) {
     const auto takes_over =
         stand_by(options, simulation, port, config, keeping, stage.service, stage.metrics, signals.stop());
+    if (!takes_over && !simulation.failure().empty())
+      return {End::Next::kAnotherEngine, report_error({ErrorCode::kIo, simulation.failure()}, 1)};
     if (!takes_over) return exits(report_error(takes_over.error(), 1));
     if (!*takes_over) return exits(0);
   }
@@ -353,7 +359,8 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
                               stage.service, options, signals.stop());
   if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
     publisher.flush();  // what was made reaches the clients before the writers are gone
-    return {End::Next::kAnotherEngine, report_error(*(*host)->error(), 1)};
+    return {End::Next::kAnotherEngine, report_error(*(*host)->error(), 1), true,
+            (*host)->wants_checkpoints()};
   }
   if (ending == Ending::kRefused && options.standby) {
     spdlog::warn("{}; this one stands by again", (*host)->error()->message);
@@ -373,10 +380,14 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
 
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
 tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
-                                           std::int64_t ran_ns, int exit_code,
+                                           Metrics& metrics, std::int64_t ran_ns, const End& end,
                                            const std::atomic<bool>& stop) {
+  // A server that stands by takes over meanwhile, and this one then finds it.
+  constexpr std::int64_t kTakeoverNs = 4 * kSecond;
+  const int exit_code = end.exit_code;
   for (;;) {
-    const auto wait_ns = restarts.wait_after_ns(ran_ns);
+    auto wait_ns = restarts.wait_after_ns(ran_ns);
+    if (wait_ns && end.had_standbys) wait_ns = std::max(*wait_ns, kTakeoverNs);
     // An inherited socket leads to one engine only.
     if (options.engine->descriptor >= 0) return tl::unexpected(exit_code);
     if (!wait_ns) {
@@ -387,12 +398,16 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
                  static_cast<double>(*wait_ns) * 1e-9);
     const std::int64_t until_ns = steady_ns() + *wait_ns;
-    while (steady_ns() < until_ns && !stop) {
+    const auto idle = [&] {
       service.watch(steady_ns());
+      metrics.miss_engine(steady_ns());
+    };
+    while (steady_ns() < until_ns && !stop) {
+      idle();
       std::this_thread::sleep_for(std::chrono::milliseconds{20});
     }
     if (stop) return tl::unexpected(0);
-    auto served = open_world(options, stop);
+    auto served = open_world(options, stop, idle);
     if (served) return std::move(*served);
     if (stop) return tl::unexpected(0);
     report_error(served.error().error, 1);
@@ -418,18 +433,21 @@ int run_daemon(Options options, SignalWatch& signals) {
   Metrics metrics;
   Service service;
   Restarts restarts;
-  const Stage stage{options, served, hashes, metrics, service, signals};
+  bool stands_by = options.standby;
+  const engine::door::Door* door = nullptr;  // that the metrics follow
+  const Stage stage{options, served, stands_by, hashes, metrics, service, signals};
   for (bool first = true;; first = false) {
     const std::int64_t began_ns = steady_ns();
     auto config =
         planning::plan_server(served.world, static_cast<const planning::Wishes&>(options.choice), options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
+    if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));
     std::optional<End> end;
     {
-      auto keeping = options.standby ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
-                                     : host::Keeping::begin(options.checkpoint, *served.simulation, *config,
-                                                            &log_line, &steady_ns);
+      auto keeping = stands_by ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
+                               : host::Keeping::begin(options.checkpoint, *served.simulation, *config,
+                                                      &log_line, &steady_ns);
       if (!keeping) return report_error(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
       auto port = open_port(*config, options, metrics, signals.stop());
@@ -451,9 +469,11 @@ int run_daemon(Options options, SignalWatch& signals) {
     }
     if (end->next == End::Next::kExit) return end->exit_code;
     logging::set_context(options.session, 0);
+    // A server that lost its engine goes on as the live one, unless another has taken over.
+    stands_by = options.standby && !(end->next == End::Next::kAnotherEngine && end->was_live);
     if (end->next != End::Next::kAnotherEngine) continue;
     auto next =
-        next_engine(options, restarts, service, steady_ns() - began_ns, end->exit_code, signals.stop());
+        next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop());
     if (!next) return signals.finish(next.error());
     served = std::move(*next);
   }

@@ -173,6 +173,7 @@ SessionFacts facts_of(const host::HostConfig& config, const std::string& session
 
 void describe(Page& page, const SessionFacts& facts, const FiguresNow& figures) {
   describe_server(page, facts, figures);
+  if (figures.engine) describe(page, *figures.engine);
   if (figures.standby) return describe_standby(page, *figures.standby);
   if (figures.totals.streams.size() != facts.streams.size()) return;  // it starts
   describe_session(page, facts, figures);
@@ -197,6 +198,7 @@ void Metrics::count_frame(const host::FrameReport& report) {
   const auto ns = [](double ms) { return static_cast<std::int64_t>(ms * 1e6); };
   figures_.frame_took.add(ns(report.frame_ms));
   figures_.step_took.add(ns(report.step_ms));
+  engine_.count_step();
   for (const host::DeltaReport& delta : report.deltas) {
     figures_.predict_took[delta.stream].add(delta.predict_ns);
     figures_.encode_took[delta.stream].add(delta.encode_ns);
@@ -232,6 +234,20 @@ void Metrics::note_checkpoints(const host::Keeping& keeping, std::int64_t now_ns
   if (checkpoints) figures_.checkpoint_age_s = checkpoints->age_s.value_or(seconds(now_ns - *began_ns_));
 }
 
+void Metrics::begin_engine(const engine::door::Door& door) {
+  engine_.begin(door);
+  figures_.engine = engine_.now();
+}
+
+void Metrics::miss_engine(std::int64_t now_ns) {
+  engine_.lost();
+  if (!endpoint_) return;
+  figures_.engine = engine_.now();
+  figures_.state = Host::State::kEnded;
+  latest_.offer(figures_);
+  health_.beat(now_ns, "its engine ended, and another one is awaited");
+}
+
 void Metrics::watch(const standby::Standby& standby, std::int64_t now_ns) {
   if (!endpoint_) return;
   began_ns_.reset();
@@ -244,6 +260,7 @@ void Metrics::watch(const standby::Standby& standby, std::int64_t now_ns) {
     figures_.checkpoint_interval_s = 0;
     figures_.checkpoint_age_s.reset();
     if (const auto age_ns = standby.checkpoint_age_ns(now_ns)) figures_.checkpoint_age_s = seconds(*age_ns);
+    if (figures_.engine) figures_.engine = engine_.now();
     latest_.offer(figures_);
   }
   const char* const missing = standby.follows() == 0 ? "it has found no live server to stand by for"
@@ -272,6 +289,7 @@ void Metrics::watch(const Host& host, const host::Publisher& publisher, const ho
     figures_.publish_took = publisher.durations();
     rate_.saw(figures_.totals.frames, now_ns);
     figures_.frame_rate_hz = rate_.per_second();
+    if (figures_.engine) figures_.engine = engine_.now();
     latest_.offer(figures_);
   }
   health_.beat(now_ns, obstacle(host, publisher));

@@ -17,6 +17,7 @@
 #include "services/metrics/latest.hpp"
 #include "services/metrics/rate_watch.hpp"
 #include "services/standby/standby.hpp"
+#include "services/tandemd/engine_metrics.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {
@@ -55,6 +56,7 @@ struct FiguresNow {
   std::uint64_t write_failures = 0, repeated_bytes = 0;
   DurationBuckets::Counts frame_took, step_took, publish_took;
   std::vector<DurationBuckets::Counts> predict_took, encode_took;  ///< by stream
+  std::optional<EngineNow> engine;                                 ///< in another process
 };
 /// The page of such figures, apart from what metrics/ adds for every program.
 void describe(metrics::Page& page, const SessionFacts& facts, const FiguresNow& figures);
@@ -70,6 +72,10 @@ class Metrics {
   void watch(const standby::Standby& standby, std::int64_t now_ns);
   /// For DdsOptions.
   [[nodiscard]] std::atomic<std::uint64_t>& repeated_bytes() { return repeated_bytes_; }
+  /// Follow an engine in another process: it serves.
+  void begin_engine(const engine::door::Door& door);
+  /// It serves no longer. Call also while another one is awaited, instead of watch().
+  void miss_engine(std::int64_t now_ns);
 
  private:
   void count_frame(const host::FrameReport& report);
@@ -82,6 +88,7 @@ class Metrics {
   SessionFacts facts_;
   FiguresNow figures_;  // of the polling thread
   std::atomic<std::uint64_t> repeated_bytes_{0};
+  EngineWatch engine_;
   metrics::RateWatch rate_;
   std::int64_t next_ns_ = 0, next_moment_ns_ = 0;
   std::optional<std::int64_t> began_ns_;  // to serve the session

@@ -43,22 +43,38 @@ tl::unexpected<NotOpened> refuse(Error error, std::string field, int exit_code) 
   return tl::unexpected(NotOpened{std::move(error), std::move(field), exit_code});
 }
 
-tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop) {
+tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop,
+                                                     const std::function<void()>& idle) {
   engine::door::Options door{.way = *options.engine};
   door.stop = &stop;
+  door.idle = idle;
   door.log = [](const std::string& line, bool warning) {
     spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
   };
   auto opened = engine::door::Door::open(std::move(door));
   if (!opened) return refuse(opened.error(), "", 1);
   const Hello& hello = (*opened)->hello();
+  if (!hello.saves && options.standby)
+    return refuse(
+        {ErrorCode::kUnsupported,
+         fmt::format(
+             "the engine {} does not save (its HELLO has no `save 1`), so no server of it can stand by",
+             hello.name)},
+        "standby", 2);
+  if (!hello.saves)
+    spdlog::warn(
+        "the engine {} does not save (its HELLO has no `save 1`): whenever it ends, the world begins anew at frame 0, and no "
+        "server can stand by",
+        hello.name);
   spdlog::info("engine {}, process {}: {} slots, {:g} s a step", hello.name, (*opened)->engine_process(),
                hello.capacity, hello.dt_s);
+  const engine::door::Door* const there = opened->get();
   return ServedWorld{.world = world_of(hello),
                      .session = hello.session,
                      .engine = "door:" + hello.name,
                      .scene = std::nullopt,
-                     .simulation = std::move(*opened)};
+                     .simulation = std::move(*opened),
+                     .door = there};
 }
 
 }  // namespace
@@ -89,8 +105,9 @@ planning::World world_of(const Hello& hello) {
   return world;
 }
 
-tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop) {
-  if (options.engine) return wait_for_engine(options, stop);
+tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop,
+                                                const std::function<void()>& idle) {
+  if (options.engine) return wait_for_engine(options, stop, idle);
   auto scene = scenes::load_scene(options.scene);
   if (!scene) return refuse(scene.error(), "scene", 2);
   auto simulation =

@@ -2,6 +2,7 @@
 // What a server simulates: a scene with the engine linked in, or an engine in another process.
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@ struct ServedWorld {
   std::string engine;                  ///< its name, as checkpoints keep it
   std::optional<scenes::Scene> scene;  ///< empty: an engine in another process
   std::unique_ptr<engine::Simulation> simulation;
+  const engine::door::Door* door = nullptr;  ///< the simulation, if it is an engine in another process
 };
 
 /// A failure of open_world().
@@ -29,9 +31,9 @@ struct NotOpened {
   int exit_code = 2;
 };
 
-/// Loads the scene, or waits for the engine; `stop` ends the wait.
-[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(const Options& options,
-                                                              const std::atomic<bool>& stop);
+/// Loads the scene, or waits for the engine; `stop` ends the wait, and `idle` is called meanwhile.
+[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(
+    const Options& options, const std::atomic<bool>& stop, const std::function<void()>& idle = [] {});
 
 /// What the planner needs to know of an engine that said `hello`.
 [[nodiscard]] planning::World world_of(const engine::door::Hello& hello);

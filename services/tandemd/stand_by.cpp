@@ -61,6 +61,7 @@ Result<bool> stand_by(Options& options, engine::Simulation& simulation, transpor
                options.domain);
   while (!(*standby)->poll(steady_ns())) {
     if (stop.load(std::memory_order_relaxed)) return false;
+    if (std::string why = simulation.failure(); !why.empty()) return fail(ErrorCode::kIo, std::move(why));
     log_notices(**standby);
     service.watch(**standby, options.session, steady_ns());
     service.reload(options, config, keeping, steady_ns());

@@ -23,6 +23,7 @@ using engine::door::Hello;
 struct Options {
   std::vector<std::string> command;
   std::uint32_t frames = 60;
+  bool network = false;
 };
 
 /// What was found, each kind of it once.
@@ -156,6 +157,7 @@ int run_check(const Options& options) {
   Findings findings;
   engine::door::Options way;
   way.way.command = command_of(options.command);
+  if (options.network) way.way.host = "127.0.0.1";
   way.log = [](const std::string& line, bool) { fmt::print("{}\n", line); };
   auto opened = Door::open(std::move(way));
   if (!opened) {
@@ -204,6 +206,8 @@ void add_engine_check(commandline::Command app, Run& run) {
                   "The engine and its arguments, after --; one word is a line for sh")
       .required();
   command.add_option("--frames", options->frames, "Frames to ask for").range(2U, 1'000'000U).show_default();
+  command.add_flag("--network", options->network,
+                   "Have the engine connect over TCP, as one on another machine does");
   command.footer("Exits with 1 if the engine breaks a rule of idl/ENGINE.md.");
   command.on_chosen([options, &run] { run = [options] { return run_check(*options); }; });
 }

@@ -29,6 +29,8 @@ void require_sane(const Conversation& talk) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Reader reader;
   Conversation talk;
+  const bool remote = size % 2 == 1;  // the engine is on another machine
+  if (remote) talk.set_remote();
   std::uint64_t frame = 0;
   for (std::size_t at = 0; at < size;) {
     const auto room = reader.room();
@@ -49,8 +51,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     if (before == State::kHello) {
       require_sane(talk);
-      if (talk.layout().slot_bytes < 1U << 20U) reader.set_limit(talk.limit());
     }
+    if (before == State::kSave)
+      tandem::fuzz::require(talk.saved().size() == (remote ? talk.saved_bytes() : 0));
+    if (talk.layout().in_line && !talk.slot().empty())
+      tandem::fuzz::require(talk.slot().size() == talk.layout().slot_bytes);
     if (talk.state() != State::kIdle) continue;
     // The next question, by what is left of the bytes.
     ++frame;
@@ -61,6 +66,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else {
       talk.ask_step(frame);
     }
+    if (talk.layout().slot_bytes < 1U << 20U) reader.set_limit(talk.limit());
   }
   return 0;
 }

@@ -17,15 +17,15 @@
        tandem_engine e;
        if (tandem_engine_open(&e, "name mine\ncapacity 100\ndt 0.0333\ninput gravity 50\n") != 0) return complain(e.error);
        float* x = tandem_engine_column(&e, "position", 0);
-       ... fill all columns ...
-       tandem_engine_start(&e);
+       ... fill all columns ...; tandem_engine_start(&e);
        for (;;) switch (tandem_engine_next(&e)) {
          case TANDEM_ENGINE_INPUT: ... e.kind, e.values, e.count ...; break;
          case TANDEM_ENGINE_STEP: ... step by dt, fill all columns ...; tandem_engine_done(&e, 0); break;
          default: return tandem_engine_close(&e);   (the server ended, or e.error says what is wrong)
        }
 
-   The functions return 0, or -1 with a line in e.error; not thread-safe. They wait without using the processor. */
+   The functions return 0, or -1 with a line in e.error; not thread-safe. They wait without using the processor. An engine
+   may run on another machine than its server: TANDEM_DOOR is then tcp:HOST:PORT, and TANDEM_DOOR_TOKEN the server's token. */
 #ifndef TANDEM_ENGINE_H
 #define TANDEM_ENGINE_H
 
@@ -33,6 +33,8 @@
 #define _GNU_SOURCE /* MSG_CMSG_CLOEXEC; include this header first, or define it yourself */
 #endif
 #include <errno.h>
+#include <netdb.h>
+#include <netinet/tcp.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -40,7 +42,6 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
-#include <sys/uio.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -77,38 +78,35 @@ typedef struct tandem_engine {
   uint32_t kind, count;
   const double* values;
   const unsigned char* bytes;
-  const char* path; /* TANDEM_ENGINE_SAVE, _LOAD: the file to write or read */
+  const char* path; /* TANDEM_ENGINE_SAVE, _LOAD: the file to write or read, on this machine */
   /* The layout. An axis of a column is `padded` elements long, of which the first `capacity` count. */
   uint32_t capacity, padded, slots, is_inline;
   uint64_t first, slot_bytes, memory_bytes;
   uint32_t columns;
   tandem_engine_column_info column[TANDEM_ENGINE_COLUMNS];
   unsigned char* memory;
-  int fd;
+  int fd, is_remote;
+  char file[256]; /* is_remote: holds what is saved and loaded, which the messages bring */
   union { uint64_t align; unsigned char bytes[TANDEM_ENGINE_BODY + 8]; } body;
 } tandem_engine;
 
 static inline int tandem_engine_fail(tandem_engine* e, const char* what) {
-  if (e->error[0] == 0) strncat(e->error, what, sizeof e->error - 1);
+  if (e->error[0] == 0) snprintf(e->error, sizeof e->error, "%.255s", what);
   return -1;
 }
 
-static inline int tandem_engine_send(tandem_engine* e, uint32_t type, const void* body, size_t bytes, const void* tail,
-                                     size_t tail_bytes) {
+static inline int tandem_engine_send(tandem_engine* e, uint32_t type, const void* body, size_t bytes, const void* tail, size_t tail_bytes) {
   uint32_t head[2];
   struct iovec part[3];
   struct msghdr message;
   head[0] = type;
   head[1] = TANDEM_ENGINE_AS(uint32_t, bytes + tail_bytes);
-  part[0].iov_base = head;
-  part[0].iov_len = sizeof head;
+  part[0].iov_base = head, part[0].iov_len = sizeof head;
   memcpy(&part[1].iov_base, &body, sizeof body); /* iov_base is not const */
-  part[1].iov_len = bytes;
   memcpy(&part[2].iov_base, &tail, sizeof tail);
-  part[2].iov_len = tail_bytes;
+  part[1].iov_len = bytes, part[2].iov_len = tail_bytes;
   memset(&message, 0, sizeof message);
-  message.msg_iov = part;
-  message.msg_iovlen = 3;
+  message.msg_iov = part, message.msg_iovlen = 3;
   while (message.msg_iovlen > 0) {
     const ssize_t sent = sendmsg(e->fd, &message, MSG_NOSIGNAL);
     size_t left;
@@ -138,10 +136,8 @@ static inline int tandem_engine_receive(tandem_engine* e, void* to, size_t bytes
     struct cmsghdr* c;
     ssize_t got;
     memset(&message, 0, sizeof message);
-    part.iov_base = TANDEM_ENGINE_AS(unsigned char*, to) + held;
-    part.iov_len = bytes - held;
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
+    part.iov_base = TANDEM_ENGINE_AS(unsigned char*, to) + held, part.iov_len = bytes - held;
+    message.msg_iov = &part, message.msg_iovlen = 1;
     if (passed != NULL) {
       message.msg_control = control.space;
       message.msg_controllen = sizeof control.space;
@@ -156,14 +152,37 @@ static inline int tandem_engine_receive(tandem_engine* e, void* to, size_t bytes
   return 0;
 }
 
+static inline int tandem_engine_make_file(tandem_engine* e) {
+  const char* const folder = getenv("TMPDIR");
+  snprintf(e->file, sizeof e->file, "%.200s/tandem-door-XXXXXX", folder != NULL ? folder : "/tmp");
+  return mkstemp(e->file);
+}
+
+/* Receives a LOAD from another machine, and puts a path in its place. Returns the type, or -1. */
+static inline int tandem_engine_take_file(tandem_engine* e, uint32_t* bytes) {
+  unsigned char* const at = e->body.bytes + 8;
+  uint32_t left = *bytes - 8, part;
+  const int fd = tandem_engine_make_file(e);
+  int good = fd >= 0 && tandem_engine_receive(e, e->body.bytes, 8, NULL) == 0;
+  for (; good && left > 0; left -= part) {
+    part = left < TANDEM_ENGINE_BODY - 8 ? left : TANDEM_ENGINE_BODY - 8;
+    good = tandem_engine_receive(e, at, part, NULL) == 0 && write(fd, at, part) == TANDEM_ENGINE_AS(ssize_t, part);
+  }
+  if (fd >= 0) close(fd);
+  *bytes = 9;
+  memcpy(at, e->file, sizeof e->file);
+  return good ? TANDEM_ENGINE_LOAD : tandem_engine_fail(e, "what is to be loaded cannot be written to a file");
+}
+
 /* Receives a message into e->body, with a 0 behind it. Returns its type, or -1. */
 static inline int tandem_engine_message(tandem_engine* e, uint32_t* bytes, int* passed) {
   uint32_t head[2];
   if (tandem_engine_receive(e, head, sizeof head, passed) != 0) return -1;
+  *bytes = head[1];
+  if (head[0] == TANDEM_ENGINE_LOAD && e->is_remote && head[1] >= 8) return tandem_engine_take_file(e, bytes);
   if (head[1] > TANDEM_ENGINE_BODY) return tandem_engine_fail(e, "the server sent a message that is too long");
   if (tandem_engine_receive(e, e->body.bytes, head[1], NULL) != 0) return -1;
   e->body.bytes[head[1]] = 0;
-  *bytes = head[1];
   if (head[0] == TANDEM_ENGINE_ERROR) return tandem_engine_fail(e, TANDEM_ENGINE_AT(char*, e->body.bytes));
   return TANDEM_ENGINE_AS(int, head[0]);
 }
@@ -212,20 +231,15 @@ static inline int tandem_engine_close(tandem_engine* e) {
   if (e->memory != NULL && e->is_inline) free(e->memory);
   if (e->memory != NULL && !e->is_inline) munmap(e->memory, e->memory_bytes);
   if (e->fd >= 0) close(e->fd);
-  e->memory = NULL;
-  e->fd = -1;
+  e->memory = NULL, e->fd = -1;
   return e->error[0] == 0 ? 0 : 1;
 }
 
-/* Says HELLO on a socket that is connected to a server. `hello`: lines as idl/ENGINE.md lists them, without the first
-   one. The columns are there afterwards; types, velocities and so on begin as zeros: nobody lives. */
-static inline int tandem_engine_open_fd(tandem_engine* e, int fd, const char* hello) {
-  static const char version[] = "engine 1.0\n";
+/* Says HELLO, of which `first` are the first lines. */
+static inline int tandem_engine_greet(tandem_engine* e, const char* first, const char* hello) {
   uint32_t bytes = 0;
   int memory = -1, type;
-  memset(e, 0, offsetof(tandem_engine, body));
-  e->fd = fd;
-  if (tandem_engine_send(e, TANDEM_ENGINE_HELLO, version, sizeof version - 1, hello, strlen(hello)) != 0) return -1;
+  if (tandem_engine_send(e, TANDEM_ENGINE_HELLO, first, strlen(first), hello, strlen(hello)) != 0) return -1;
   type = tandem_engine_message(e, &bytes, &memory);
   if (type < 0) return -1;
   if (type != TANDEM_ENGINE_LAYOUT || tandem_engine_read_layout(e) != 0) return tandem_engine_fail(e, "the server did not answer HELLO with LAYOUT");
@@ -243,7 +257,38 @@ static inline int tandem_engine_open_fd(tandem_engine* e, int fd, const char* he
   return 0;
 }
 
-/* The same, with the server that the environment variable TANDEM_DOOR names: a path, or fd:N. */
+/* Says HELLO on a socket that is connected to a server. `hello`: lines as idl/ENGINE.md lists them, without the first
+   one. The columns are there afterwards; types, velocities and so on begin as zeros: nobody lives. */
+static inline int tandem_engine_open_fd(tandem_engine* e, int fd, const char* hello) {
+  memset(e, 0, offsetof(tandem_engine, body)), e->fd = fd;
+  return tandem_engine_greet(e, "engine 1.1\n", hello);
+}
+
+static inline int tandem_engine_open_port(tandem_engine* e, const char* place, const char* hello) {
+  const char* const token = getenv("TANDEM_DOOR_TOKEN");
+  const int one = 1;
+  char host[256], port[16], first[320];
+  struct addrinfo wanted, *found = NULL, *each;
+  e->is_remote = 1;
+  memset(&wanted, 0, sizeof wanted), wanted.ai_socktype = SOCK_STREAM;
+  if ((sscanf(place, "[%255[^]]]:%15s", host, port) != 2 && sscanf(place, "%255[^:]:%15s", host, port) != 2) ||
+      getaddrinfo(host, port, &wanted, &found) != 0)
+    return tandem_engine_fail(e, "the host in TANDEM_DOOR is not known");
+  for (each = found; each != NULL && e->fd < 0; each = each->ai_next) {
+    e->fd = socket(each->ai_family, SOCK_STREAM, 0);
+    if (e->fd >= 0 && connect(e->fd, each->ai_addr, each->ai_addrlen) == 0) continue;
+    if (e->fd >= 0) close(e->fd);
+    e->fd = -1;
+  }
+  freeaddrinfo(found);
+  if (e->fd < 0) return tandem_engine_fail(e, "no server listens at TANDEM_DOOR");
+  setsockopt(e->fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
+  setsockopt(e->fd, SOL_SOCKET, SO_KEEPALIVE, &one, sizeof one);
+  snprintf(first, sizeof first, "engine 1.1\nmemory inline\ntoken %.260s\n", token != NULL ? token : "-");
+  return tandem_engine_greet(e, first, hello);
+}
+
+/* The same, with the server that the environment variable TANDEM_DOOR names: a path, fd:N or tcp:HOST:PORT. */
 static inline int tandem_engine_open(tandem_engine* e, const char* hello) {
   const char* const door = getenv("TANDEM_DOOR");
   struct sockaddr_un address;
@@ -251,6 +296,7 @@ static inline int tandem_engine_open(tandem_engine* e, const char* hello) {
   memset(e, 0, offsetof(tandem_engine, body));
   e->fd = -1;
   if (door == NULL) return tandem_engine_fail(e, "TANDEM_DOOR is not set: start this program with tandemd --engine");
+  if (strncmp(door, "tcp:", 4) == 0) return tandem_engine_open_port(e, door + 4, hello);
   if (strncmp(door, "fd:", 3) == 0) return tandem_engine_open_fd(e, atoi(door + 3), hello);
   memset(&address, 0, sizeof address);
   address.sun_family = AF_UNIX;
@@ -286,7 +332,8 @@ static inline int tandem_engine_next(tandem_engine* e) {
   const unsigned char* const body = e->body.bytes;
   if (type < 0 || type == TANDEM_ENGINE_BYE) return type;
   if (type == TANDEM_ENGINE_SAVE) {
-    e->path = TANDEM_ENGINE_AT(const char*, body);
+    e->path = e->is_remote ? e->file : TANDEM_ENGINE_AT(const char*, body);
+    if (e->is_remote) close(tandem_engine_make_file(e));
     return type;
   }
   if (bytes >= 8) memcpy(&e->frame, body, 8);
@@ -313,15 +360,22 @@ static inline int tandem_engine_next(tandem_engine* e) {
 static inline int tandem_engine_done(tandem_engine* e, uint32_t colliding) {
   unsigned char body[24];
   memset(body, 0, sizeof body);
-  memcpy(body, &e->frame, 8);
-  memcpy(body + 8, &e->slot, 4);
-  memcpy(body + 12, &colliding, 4);
+  memcpy(body, &e->frame, 8), memcpy(body + 8, &e->slot, 4), memcpy(body + 12, &colliding, 4);
   return tandem_engine_answer(e, TANDEM_ENGINE_DONE, body, sizeof body, 1);
 }
 
 /* The file at e->path is written; `bytes` is its size, 0: there is nothing to save. */
 static inline int tandem_engine_saved(tandem_engine* e, uint64_t bytes) {
-  return tandem_engine_answer(e, TANDEM_ENGINE_SAVED, &bytes, sizeof bytes, 0);
+  FILE* const file = e->is_remote ? fopen(e->file, "rb") : NULL;
+  void* const data = e->is_remote ? malloc(bytes + 1) : NULL;
+  int sent;
+  if (!e->is_remote) return tandem_engine_answer(e, TANDEM_ENGINE_SAVED, &bytes, sizeof bytes, 0);
+  if (data == NULL || file == NULL || fread(data, 1, bytes, file) != bytes) bytes = 0;
+  if (file != NULL) fclose(file);
+  unlink(e->file);
+  sent = tandem_engine_send(e, TANDEM_ENGINE_SAVED, &bytes, sizeof bytes, data, bytes);
+  free(data);
+  return sent;
 }
 
 /* The file at e->path is read, and the columns hold its frame; or it is of another world, and nothing changed. */
@@ -330,6 +384,7 @@ static inline int tandem_engine_loaded(tandem_engine* e, int loaded) {
   memset(body, 0, sizeof body);
   memcpy(body, &e->frame, 8);
   body[8] = loaded != 0;
+  if (e->is_remote) unlink(e->file);
   return tandem_engine_answer(e, TANDEM_ENGINE_LOADED, body, sizeof body, 1);
 }
 

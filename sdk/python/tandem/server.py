@@ -1,13 +1,16 @@
 """A simulation in numpy, streamed by a server: the door of `idl/ENGINE.md`."""
 
+import ctypes
 import dataclasses
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import struct
 import subprocess
 import sys
+import time
 
 import mmap
 import numpy as np
@@ -78,18 +81,21 @@ class Frame:
 
 class Server:
     """Streams a simulation that runs here. Starts `tandemd`, unless `tandemd --engine` started this program, or `door` is the path of
-    its `--engine-socket`.
+    its `--engine-socket`, or `tcp:HOST:PORT` of its `--engine-listen` on another machine, with the `token` of its `--engine-token`.
 
     `dt`: seconds of a step. `turns`: bodies have orientations. `gravity_limit`, `push_limit`: the largest input of a user, None: refused;
     `application_limit`: bytes. `save()` returns bytes and `load(bytes)` the columns for `Frame.write()`, or None if they are of another
     world; with both the server can keep checkpoints. `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
-    `options`: further flags of tandemd. Errors: `tandem.Error`.
+    `options`: further flags of tandemd. `view`: also starts `tandem-gateway` for browsers of this machine; `url` is where they look.
+    Errors: `tandem.Error`.
     """
+
+    url = None  #: of the viewer, with `view`
 
     def __init__(self, capacity, dt, *, session="default", domain=0, types=(), name="python", dtype=np.float32, turns=False,
                  gravity=(0, 0, 0), damping=0, up="y", threshold=None, extent=None, gravity_limit=1000, push_limit=1000,
-                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, options=(), tandemd=None):  # fmt: skip
-        self._process, self._socket, self._columns = None, None, {}
+                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, token=None, options=(), tandemd=None, view=False):  # fmt: skip
+        self._process, self._viewer, self._socket, self._columns, self._slot = None, None, None, {}, b""
         self._save, self._load, self._births = save, load, None
         wanted = {"threshold": threshold, "extent": extent, "input gravity": gravity_limit, "input push": push_limit, "input application": application_limit}
         lines = ["engine 1.0", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
@@ -97,10 +103,17 @@ class Server:
                  f"save {int(save is not None and load is not None)}", f"step_limit {step_limit}",
                  *(f"{key} {value}" for key, value in wanted.items() if value is not None),
                  *(each._line() for each in types), *hello]  # fmt: skip
-        self._connect(door or os.environ.get("TANDEM_DOOR"), session, domain, options, tandemd)
+        door = door or os.environ.get("TANDEM_DOOR")
+        self._remote = door is not None and door.startswith("tcp:")
+        if self._remote:
+            lines[0] = "engine 1.1"
+            lines += ["memory inline", f"token {token or os.environ.get('TANDEM_DOOR_TOKEN', '-')}"]
+        self._connect(door, session, domain, options, tandemd)
         try:
             self._send(_HELLO, "\n".join(lines).encode() + b"\n")
             self._take_layout()
+            if view:
+                self._start_viewer(session, domain, [str(word) for word in options])
         except BaseException:
             self.close()
             raise
@@ -108,6 +121,13 @@ class Server:
     def _connect(self, door, session, domain, options, tandemd):
         if door is not None and door.startswith("fd:"):
             self._socket = socket.socket(fileno=int(door[3:]))
+            return
+        if self._remote:
+            host, _, port = door[4:].rpartition(":")
+            self._socket = socket.create_connection((host.strip("[]"), int(port)), 10)
+            self._socket.settimeout(None)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             return
         if door is not None:
             self._socket = socket.socket(socket.AF_UNIX)
@@ -123,6 +143,20 @@ class Server:
             command = [program, "--engine-fd", theirs.fileno(), *flags, *options]
             self._process = subprocess.Popen(list(map(str, command)), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
 
+    def _start_viewer(self, session, domain, options):
+        program = os.environ.get("TANDEM_GATEWAY") or shutil.which("tandem-gateway")
+        if program is None:
+            raise Error(Result.IO, "tandem-gateway is not in the PATH: install it, or leave out view=True")
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        flags = {"--session": session, "--domain": domain, "--port": port}
+        shared = ("--session", "--domain", "--secure", "--profile")  # with tandemd
+        flags.update((flag, value) for flag, value in zip(options, options[1:]) if flag in shared)
+        with_this = lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG: it ends with this process
+        self._viewer = subprocess.Popen([program, *(str(word) for flag in flags.items() for word in flag)],
+                                        stdin=subprocess.DEVNULL, preexec_fn=with_this)  # fmt: skip
+        self.url = f"http://127.0.0.1:{port}/"
+
     def _take_layout(self):
         try:
             head, fds, _, _ = socket.recv_fds(self._socket, 8, 1)
@@ -133,15 +167,19 @@ class Server:
         body = self._receive(length)
         if kind != _LAYOUT:
             self._fail(kind, body)
-        numbers, columns = {}, []
+        numbers, columns, inline = {}, [], False
         for line in body.decode().splitlines():
             key, *values = line.split()
             if key == "column":
                 columns.append((values[0], values[1], int(values[2]), int(values[3])))
             elif values and values[0].isdigit():
                 numbers[key] = int(values[0])
-        memory = mmap.mmap(fds[0], numbers["bytes"])  # lives as long as an array on it
-        os.close(fds[0])
+            inline = inline or (key == "memory" and values == ["inline"])
+        if inline:
+            memory = self._slot = bytearray(numbers["slot_bytes"])
+        else:
+            memory = mmap.mmap(fds[0], numbers["bytes"])  # lives as long as an array on it
+            os.close(fds[0])
         self.capacity, padded = numbers["capacity"], numbers["padded"]
         self._head = np.frombuffer(memory, np.uint64, 3, numbers["first"])
         dtypes = {"f32": np.float32, "f64": np.float64, "u8": np.uint8, "u16": np.uint16}
@@ -171,15 +209,17 @@ class Server:
             elif kind == _STEP:
                 number, slot, _ = struct.unpack("<QII", body)
                 frame, inputs = Frame(self, number, inputs), []
+                began_ns = time.monotonic_ns()
                 yield frame
-                self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), 0), number)
+                self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), time.monotonic_ns() - began_ns), number)
             elif kind == _SAVE:
                 data = bytes(self._save())
-                pathlib.Path(body.decode()).write_bytes(data)
-                self._send(_SAVED, struct.pack("<Q", len(data)))
+                if not self._remote:
+                    pathlib.Path(body.decode()).write_bytes(data)
+                self._send(_SAVED, struct.pack("<Q", len(data)), data if self._remote else b"")
             elif kind == _LOAD:
                 number = struct.unpack_from("<Q", body)[0]
-                columns = self._load(pathlib.Path(body[8:].decode()).read_bytes())
+                columns = self._load(body[8:] if self._remote else pathlib.Path(body[8:].decode()).read_bytes())
                 if columns is not None:
                     self._write(dict(columns), columns.get("alive"), ())
                 self._answer(_LOADED, struct.pack("<QII", number, columns is not None, 0), number)
@@ -207,16 +247,18 @@ class Server:
 
     def _answer(self, kind, body, number):
         self._head[:] = number
-        self._send(kind, body)
+        self._send(kind, body, self._slot)
 
-    def _send(self, kind, body):
+    def _send(self, kind, body, tail=b""):
         try:
-            self._socket.sendall(struct.pack("<II", kind, len(body)) + body)
+            self._socket.sendall(struct.pack("<II", kind, len(body) + len(tail)) + body)
+            if tail:
+                self._socket.sendall(tail)
         except OSError:
             self._check_over()
 
     def _receive(self, count):
-        held = b""
+        held = bytearray()
         while len(held) < count:
             try:
                 got = self._socket.recv(count - len(held))
@@ -225,7 +267,7 @@ class Server:
             if not got:
                 raise Error(Result.IO, "the server ended before it took this engine; its own lines say why")
             held += got
-        return held
+        return bytes(held)
 
     def _message(self):
         """The next message; (None, b"") if the server is gone."""
@@ -249,16 +291,18 @@ class Server:
         raise Error(Result.UNSUPPORTED, f"the server sent a message of type {kind}")
 
     def close(self):
-        """Ends the session, and waits for the `tandemd` that this started."""
+        """Ends the session, and waits for the programs that this started."""
         if self._socket is not None:
             self._socket.close()
-        if self._process is not None:
+        if self._viewer is not None:
+            self._viewer.terminate()
+        for process in filter(None, (self._process, self._viewer)):
             try:
-                self._process.wait(5)
+                process.wait(5)
             except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
-        self._socket, self._process = None, None
+                process.kill()
+                process.wait()
+        self._socket, self._process, self._viewer = None, None, None
 
     def __enter__(self):
         return self

@@ -22,8 +22,10 @@ class Channel {
 
   [[nodiscard]] bool open() const { return socket_.open(); }
   [[nodiscard]] int descriptor() const { return socket_.get(); }
-  /// The process that connected; 0: not known.
+  /// The process that connected; 0: not known, or on another machine.
   [[nodiscard]] pid_t peer() const { return peer_; }
+  /// Who connected, for people.
+  [[nodiscard]] std::string from() const;
   Reader& reader() { return reader_; }
   /// Messages to send; flush() sends them.
   std::vector<std::byte>& out() { return out_; }
@@ -45,12 +47,15 @@ class Channel {
   int passed_ = -1;
 };
 
-/// Listens at a path that only this user can open, and removes it at its end. Not thread-safe.
+/// Listens at a path that only this user can open, which it removes at its end; or at a port. Not
+/// thread-safe.
 class Listener {
  public:
   Listener() = default;
   /// Errors: kIo (the path cannot be made), kConflict (somebody listens there).
   static Result<Listener> open(const std::string& path);
+  /// `host`: an address of IPv4 or IPv6 in numbers; port 0: any free one. Errors: kIo, kInvalidArgument.
+  static Result<Listener> open_port(const std::string& host, std::uint16_t port);
   Listener(Listener&& other) noexcept;
   Listener& operator=(Listener&& other) noexcept;
   Listener(const Listener&) = delete;
@@ -58,13 +63,17 @@ class Listener {
   ~Listener();
 
   [[nodiscard]] int descriptor() const { return socket_.get(); }
-  [[nodiscard]] const std::string& path() const { return path_; }
-  /// The next engine that knocked, if it is of this user. `told` gets a line about one that is not.
+  /// Where engines find it: a path, or tcp:HOST:PORT.
+  [[nodiscard]] const std::string& place() const { return place_; }
+  [[nodiscard]] bool is_port() const { return is_port_; }
+  /// The next engine that knocked; at a path, if it is of this user. `told` gets a line about one that is
+  /// not.
   [[nodiscard]] std::optional<Channel> accept(std::string& told);
 
  private:
   Descriptor socket_;
-  std::string path_;
+  std::string place_;
+  bool is_port_ = false;
 };
 
 }  // namespace tandem::engine::door

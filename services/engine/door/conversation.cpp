@@ -27,6 +27,7 @@ Result<void> Conversation::take(Type type, std::span<const std::byte> body) {
 
 Result<void> Conversation::answer(Type type, std::span<const std::byte> body) {
   slot_ = {};
+  saved_ = {};
   if (type == Type::kError)
     return fail(ErrorCode::kIo, fmt::format("the engine gave up {}: {}", where(), plain_line(body)));
   if (type == Type::kBye) return fail(ErrorCode::kIo, fmt::format("the engine said BYE {}", where()));
@@ -59,6 +60,8 @@ Result<void> Conversation::answer(Type type, std::span<const std::byte> body) {
   } else if (type == Type::kSaved) {
     const auto saved = parse_saved(body);
     if (!saved) return wrong_size();
+    saved_ = body.subspan(kSavedBytes);
+    if (saved_.size() != (remote_ ? *saved : 0)) return wrong_size();
     saved_bytes_ = *saved;
   } else {
     const auto loaded = parse_loaded(body);
@@ -110,6 +113,7 @@ std::string Conversation::where() const {
 }
 
 std::size_t Conversation::limit() const {
+  if (state_ == State::kSave && remote_) return kSavedBytes + kMaxSavedBytes;
   return kMaxBodyBytes + (state_ != State::kHello && layout_.in_line ? layout_.slot_bytes : 0);
 }
 

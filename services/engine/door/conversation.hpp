@@ -14,6 +14,8 @@ class Conversation {
  public:
   enum class State : std::uint8_t { kHello, kStart, kIdle, kStep, kSave, kLoad, kOver };
 
+  /// The engine is on another machine: what it saves comes in messages.
+  void set_remote() { remote_ = true; }
   /// Takes a message. Errors: kMalformed (it may not come now, or is wrong), kUnsupported (another version),
   /// kIo (the engine says that it ends, or why).
   [[nodiscard]] Result<void> take(Type type, std::span<const std::byte> body);
@@ -35,6 +37,8 @@ class Conversation {
   // The last answers.
   [[nodiscard]] const Done& done() const { return done_; }
   [[nodiscard]] std::uint64_t saved_bytes() const { return saved_bytes_; }
+  /// Those bytes, if the engine is on another machine; valid as long as the message.
+  [[nodiscard]] std::span<const std::byte> saved() const { return saved_; }
   [[nodiscard]] bool loaded() const { return loaded_; }
   /// The slot that came with the last answer, in the inline form; valid as long as the message.
   [[nodiscard]] std::span<const std::byte> slot() const { return slot_; }
@@ -49,6 +53,8 @@ class Conversation {
   std::uint64_t frame_ = 0;
   Done done_;
   std::uint64_t saved_bytes_ = 0;
+  std::span<const std::byte> saved_;
+  bool remote_ = false;
   bool loaded_ = false;
   std::span<const std::byte> slot_;
 };

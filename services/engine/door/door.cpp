@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,6 +17,7 @@
 #include <system_error>
 #include <utility>
 
+#include "services/engine/door/callers.hpp"
 #include "services/engine/door/channel.hpp"
 #include "services/engine/door/columns.hpp"
 #include "services/engine/door/conversation.hpp"
@@ -58,6 +60,13 @@ class Folder {
   std::string path_;
 };
 
+bool write_file(const std::string& path, std::span<const std::byte> bytes) {
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out.write(reinterpret_cast<const char*>(bytes.data()),  // NOLINT: as write() wants it
+            static_cast<std::streamsize>(bytes.size()));
+  return static_cast<bool>(out.flush());
+}
+
 // What a checkpoint holds in front of the engine's own bytes.
 struct Saved {
   std::uint64_t magic = 0x314f4f444d444e54;  // "TNDMDOO1"
@@ -79,6 +88,13 @@ class Session final : public Door {
 
   [[nodiscard]] const Hello& hello() const override { return talk_.hello(); }
   [[nodiscard]] int engine_process() const override { return channel_.peer(); }
+  [[nodiscard]] Figures figures() const override {
+    constexpr std::uint64_t kMostNs = 1ULL << 62U;
+    return {.trip_ns = trip_.count(),
+            .step_ns = static_cast<std::int64_t>(std::min(talk_.done().step_ns, kMostNs)),
+            .slow = told_slow_,
+            .stopped = told_stopped_};
+  }
   [[nodiscard]] std::uint32_t capacity() const override { return hello().capacity; }
   [[nodiscard]] double dt_s() const override { return hello().dt_s; }
   [[nodiscard]] Vec3 gravity() const override { return gravity_; }
@@ -98,12 +114,19 @@ class Session final : public Door {
 
  private:
   Result<void> connect();
+  Result<Listener> listen();
+  Result<void> start_command();
   Result<void> wait_for_engine();
+  /// Lets an engine in that knocks.
+  void answer_door();
   /// Sends and receives what is there; what comes changes talk_. After an error the door is shut: failure_.
   void pump();
   /// Takes the engine's output, turns strangers away, and says when the engine seems to stand still.
   void attend();
+  void turn_away_another();
   void save_into(std::vector<std::byte>& out);
+  /// Appends what the engine wrote.
+  bool read_saved(const std::string& file, std::vector<std::byte>& out);
   void read_slot(bool with_events);
   /// Waits until the question is answered. False: failure_.
   bool wait_for_answer(std::chrono::nanoseconds limit);
@@ -115,16 +138,18 @@ class Session final : public Door {
   Options options_;
   Folder folder_;
   Listener listener_;
+  std::optional<Callers> callers_;  // over the network
   Process process_;
   Channel channel_;
   Conversation talk_;
   Segment segment_;
-  std::vector<std::byte> own_;  // the slot, in the inline form
+  std::vector<std::byte> own_;  // the message with the slot, in the inline form
   std::optional<Columns> columns_;
   Vec3 gravity_{};
   std::uint64_t frame_ = 0;
   Clock::time_point asked_ = Clock::now();
   Clock::time_point attended_{};
+  std::chrono::nanoseconds trip_{0};
   bool told_slow_ = false, told_stopped_ = false;
   std::optional<Error> failure_;
   // save() is const for the world that it saves, but the engine has to be asked.
@@ -136,7 +161,8 @@ class Session final : public Door {
 Result<void> Session::begin() {
   if (auto connected = connect(); !connected) return connected;
   const auto failed = [this]() -> Result<void> { return tl::unexpected(*failure_); };
-  if (!wait_for_answer(seconds(options_.connect_limit_s))) return failed();  // HELLO
+  // Over the network its HELLO let the engine in.
+  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.connect_limit_s))) return failed();
   const Layout& layout = talk_.layout();
   std::string path;
   if (!layout.in_line) {
@@ -151,8 +177,6 @@ Result<void> Session::begin() {
     const std::string text = print_layout(layout, path);
     std::memcpy(segment_.bytes().data(), text.data(), std::min(text.size(), layout.first));
     channel_.pass(segment_.descriptor());
-  } else {
-    own_.resize(layout.slot_bytes);
   }
   gravity_ = hello().gravity;
   channel_.reader().set_limit(talk_.limit());
@@ -171,23 +195,67 @@ Result<void> Session::connect() {
     channel_ = Channel(Descriptor(way.descriptor));
     return {};
   }
-  std::string path = way.path;
-  if (!way.command.empty()) {
-    auto own = folder_.file("door");
-    if (!own) return tl::unexpected(own.error());
-    path = *own;
-  }
-  auto listener = Listener::open(path);
+  auto listener = listen();
   if (!listener) return tl::unexpected(listener.error());
   listener_ = std::move(*listener);
   if (!way.command.empty()) {
-    auto process = Process::start(way.command, {{"TANDEM_DOOR", path}});
-    if (!process) return tl::unexpected(process.error());
-    process_ = std::move(*process);
+    if (auto started = start_command(); !started) return started;
   } else {
-    options_.log(fmt::format("waits for an engine at {}", path), false);
+    options_.log(fmt::format("waits for an engine at {}", listener_.place()), false);
   }
   return wait_for_engine();
+}
+
+Result<Listener> Session::listen() {
+  const Way& way = options_.way;
+  if (!way.host.empty()) {
+    auto token = way.token.empty() ? make_token() : way.token;
+    if (!token) return tl::unexpected(token.error());
+    options_.way.token = *token;
+    callers_.emplace(*token, seconds(options_.connect_limit_s));
+    talk_.set_remote();
+    return Listener::open_port(way.host, way.port);
+  }
+  if (way.command.empty()) return Listener::open(way.path);
+  auto own = folder_.file("door");
+  if (!own) return tl::unexpected(own.error());
+  return Listener::open(*own);
+}
+
+Result<void> Session::start_command() {
+  const Way& way = options_.way;
+  std::vector<std::pair<std::string, std::string>> environment{{"TANDEM_DOOR", listener_.place()}};
+  if (!way.host.empty()) {
+    // An engine on another machine needs a name of this one.
+    if (way.host == "0.0.0.0" || way.host == "::") {
+      std::array<char, 256> name{};
+      ::gethostname(name.data(), name.size() - 1);
+      const std::string& place = listener_.place();
+      environment[0].second = fmt::format("tcp:{}{}", name.data(), place.substr(place.rfind(':')));
+    }
+    environment.emplace_back("TANDEM_DOOR_TOKEN", way.token);
+  }
+  auto process = Process::start(way.command, environment);
+  if (!process) return tl::unexpected(process.error());
+  process_ = std::move(*process);
+  return {};
+}
+
+void Session::answer_door() {
+  std::string told;
+  if (!callers_) {
+    if (auto channel = listener_.accept(told)) channel_ = std::move(*channel);
+    if (!told.empty()) options_.log(told, true);
+    return;
+  }
+  const Clock::time_point now = Clock::now();
+  while (auto channel = listener_.accept(told)) callers_->add(std::move(*channel), now);
+  std::vector<std::string> lines;
+  auto engine = callers_->poll(now, lines);
+  for (const std::string& line : lines) options_.log(line, true);
+  if (!engine) return;
+  channel_ = std::move(engine->channel);
+  if (auto taken = talk_.take(Type::kHello, engine->hello); !taken) shut(taken.error());
 }
 
 Result<void> Session::wait_for_engine() {
@@ -195,9 +263,9 @@ Result<void> Session::wait_for_engine() {
   while (!channel_.open()) {
     if (options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed))
       return fail(ErrorCode::kTimeout, "stopped before an engine came");
-    std::string told;
-    if (auto channel = listener_.accept(told)) channel_ = std::move(*channel);
-    if (!told.empty()) options_.log(told, true);
+    options_.idle();
+    answer_door();
+    if (failure_) return tl::unexpected(*failure_);
     if (channel_.open()) break;
     if (process_.started()) {
       attend();
@@ -209,7 +277,7 @@ Result<void> Session::wait_for_engine() {
       }
       if (failure_) return tl::unexpected(*failure_);
     }
-    wait_a_while(std::chrono::milliseconds{50});
+    wait_a_while(std::chrono::milliseconds{callers_ && !callers_->empty() ? 5 : 50});
   }
   asked_ = Clock::now();
   return {};
@@ -240,6 +308,7 @@ void Session::pump() {
     }
     if (!*message) return;
     const bool answers_step = talk_.state() == State::kStep;
+    if (answers_step) trip_ = Clock::now() - asked_;
     const bool brings_bodies = answers_step || talk_.state() == State::kLoad;
     if (auto taken = talk_.take((*message)->type, (*message)->body); !taken) return shut(taken.error());
     if (told_slow_ || told_stopped_) {
@@ -248,8 +317,8 @@ void Session::pump() {
                    false);
       told_slow_ = told_stopped_ = false;
     }
-    if (talk_.layout().in_line && !talk_.slot().empty())
-      std::memcpy(own_.data(), talk_.slot().data(), own_.size());
+    // The bodies stay where they arrived until the next ones are there.
+    if (!talk_.slot().empty()) own_ = channel_.reader().exchange(std::move(own_));
     if (brings_bodies && (answers_step || talk_.loaded())) read_slot(answers_step);
     if (failure_ || talk_.state() == State::kStart) return;
   }
@@ -258,7 +327,7 @@ void Session::pump() {
 void Session::read_slot(bool with_events) {
   const Layout& layout = talk_.layout();
   const std::span<const std::byte> slot =
-      layout.in_line ? std::span<const std::byte>(own_)
+      layout.in_line ? talk_.slot()
                      : std::span<const std::byte>(segment_.bytes()).subspan(layout.first, layout.slot_bytes);
   if (auto whole = check_slot(slot, talk_.frame()); !whole) return shut(whole.error());
   columns_->read(slot, with_events);
@@ -268,16 +337,7 @@ void Session::read_slot(bool with_events) {
 void Session::attend() {
   attended_ = Clock::now();
   for (const std::string& line : process_.read()) options_.log("engine: " + line, false);
-  std::string told;
-  if (channel_.open()) {
-    if (auto second = listener_.accept(told)) {
-      append(second->out(), Type::kError, std::string_view("this server has an engine already"));
-      static_cast<void>(second->flush());
-      told = fmt::format("process {} knocked at {}, but there is an engine already: refused", second->peer(),
-                         listener_.path());
-    }
-  }
-  if (!told.empty()) options_.log(told, true);
+  if (channel_.open()) turn_away_another();
   if (!busy() || !columns_) return;
   const auto waited = attended_ - asked_;
   if (!told_stopped_ && waited > std::chrono::milliseconds{300} && is_stopped(channel_.peer())) {
@@ -290,6 +350,23 @@ void Session::attend() {
                              hello().step_limit_s / 2, talk_.where(), hello().step_limit_s),
                  true);
   }
+}
+
+void Session::turn_away_another() {
+  constexpr std::string_view kWhy = "this server has an engine already";
+  std::string told;
+  auto another = listener_.accept(told);
+  if (another && callers_) {
+    std::vector<std::string> lines;
+    callers_->turn_away(*another, std::string(kWhy), attended_, lines);
+    if (!lines.empty()) told = lines.front();
+  } else if (another) {
+    append(another->out(), Type::kError, kWhy);
+    static_cast<void>(another->flush());
+    told = fmt::format("process {} knocked at {}, but there is an engine already: refused", another->peer(),
+                       listener_.place());
+  }
+  if (!told.empty()) options_.log(told, true);
 }
 
 Classification Session::classify(const Input& input) const {
@@ -402,55 +479,77 @@ bool Session::wait_for_answer(std::chrono::nanoseconds limit) {
 void Session::save_into(std::vector<std::byte>& out) {
   out.clear();
   if (!hello().saves || failure_ || busy()) return;
-  const auto file = folder_.file("save");
-  if (!file) return options_.log(file.error().message, true);
+  std::string file;
+  if (!callers_) {
+    auto place = folder_.file("save");
+    if (!place) return options_.log(place.error().message, true);
+    file = std::move(*place);
+  }
   talk_.ask_save();
-  append(channel_.out(), Type::kSave, *file);
+  channel_.reader().set_limit(talk_.limit());
+  append(channel_.out(), Type::kSave, file);
   asked_ = Clock::now();
-  if (!wait_for_answer(seconds(options_.start_limit_s)) || talk_.saved_bytes() == 0) return;
-  std::ifstream in(*file, std::ios::binary | std::ios::ate);
+  const bool saved = wait_for_answer(seconds(options_.start_limit_s)) && talk_.saved_bytes() > 0;
+  if (saved) {
+    const Saved head{.frame = frame_, .gravity = gravity_};
+    out.resize(sizeof head);
+    std::memcpy(out.data(), &head, sizeof head);
+    if (callers_) {
+      out.insert(out.end(), talk_.saved().begin(), talk_.saved().end());
+    } else if (!read_saved(file, out)) {
+      out.clear();
+    }
+  }
+  channel_.reader().set_limit(talk_.limit());
+}
+
+bool Session::read_saved(const std::string& file, std::vector<std::byte>& out) {
+  std::ifstream in(file, std::ios::binary | std::ios::ate);
   const auto bytes = in ? static_cast<std::uint64_t>(in.tellg()) : 0;
-  const Saved head{.frame = frame_, .gravity = gravity_};
   if (!in || bytes != talk_.saved_bytes()) {
     options_.log(
         fmt::format("the engine says that it saved {} bytes of frame {}, but there are {}: no checkpoint",
                     talk_.saved_bytes(), frame_, bytes),
         true);
-    return;
+    return false;
   }
-  out.resize(sizeof head + bytes);
-  std::memcpy(out.data(), &head, sizeof head);
+  const std::size_t begin = out.size();
+  out.resize(begin + bytes);
   in.seekg(0);
-  in.read(reinterpret_cast<char*>(out.data()) + sizeof head,  // NOLINT: as read() wants it
+  in.read(reinterpret_cast<char*>(out.data()) + begin,  // NOLINT: as read() wants it
           static_cast<std::streamsize>(bytes));
-  if (!in) out.clear();
   std::error_code ignored;
-  std::filesystem::remove(*file, ignored);
+  std::filesystem::remove(file, ignored);
+  return static_cast<bool>(in);
 }
 
 bool Session::load(std::span<const std::byte> bytes) {
   Saved head;
   const std::uint64_t magic = head.magic;
-  if (!hello().saves || failure_ || busy() || bytes.size() < sizeof head) return false;
+  if (!hello().saves || failure_ || bytes.size() < sizeof head) return false;
   std::memcpy(&head, bytes.data(), sizeof head);
   if (head.magic != magic) return false;
-  const auto file = folder_.file("load");
-  if (!file) return false;
-  {
-    std::ofstream out(*file, std::ios::binary | std::ios::trunc);
-    const auto rest = bytes.subspan(sizeof head);
-    out.write(reinterpret_cast<const char*>(rest.data()),  // NOLINT: as write() wants it
-              static_cast<std::streamsize>(rest.size()));
-    if (!out.flush()) return false;
+  // A server that stands by again may have left a step under way.
+  if (busy() && !wait_for_answer(seconds(hello().step_limit_s))) return false;
+  const auto rest = bytes.subspan(sizeof head);
+  std::string file;
+  if (callers_) {
+    if (rest.size() > kMaxSavedBytes) return false;
+    append_load(channel_.out(), head.frame, rest);
+  } else {
+    auto place = folder_.file("load");
+    if (!place || !write_file(*place, rest)) return false;
+    file = std::move(*place);
+    append_load(channel_.out(), head.frame, std::as_bytes(std::span(file)));
   }
   talk_.ask_load(head.frame);
-  append_load(channel_.out(), head.frame, *file);
   asked_ = Clock::now();
-  if (!wait_for_answer(seconds(options_.start_limit_s)) || !talk_.loaded()) return false;
+  const bool loaded = wait_for_answer(seconds(options_.start_limit_s)) && talk_.loaded();
+  std::error_code ignored;
+  if (!file.empty()) std::filesystem::remove(file, ignored);
+  if (!loaded) return false;
   frame_ = head.frame;
   gravity_ = head.gravity;
-  std::error_code ignored;
-  std::filesystem::remove(*file, ignored);
   return true;
 }
 
@@ -475,6 +574,7 @@ void Session::shut(const Error& error) {
   }
   failure_ = Error{error.code, std::move(line)};
   end();
+  listener_ = Listener();  // the next door opens at the same place
 }
 
 void Session::end() {
@@ -490,8 +590,14 @@ void Session::end() {
 
 Result<std::unique_ptr<Door>> Door::open(Options options) {
   const Way& way = options.way;
-  const int ways = (way.command.empty() ? 0 : 1) + (way.path.empty() ? 0 : 1) + (way.descriptor >= 0 ? 1 : 0);
+  const bool of_network = !way.host.empty();
+  const int ways = (way.command.empty() && !of_network ? 0 : 1) + (way.path.empty() ? 0 : 1) +
+                   (way.descriptor >= 0 ? 1 : 0);
   if (ways != 1) return fail(ErrorCode::kInvalidArgument, "an engine comes in one way");
+  if (of_network && (way.command.empty() || !way.token.empty())) {
+    if (std::string wrong = wrong_with_token(way.token); !wrong.empty())
+      return fail(ErrorCode::kInvalidArgument, std::move(wrong));
+  }
   auto session = std::make_unique<Session>(std::move(options));
   if (auto begun = session->begin(); !begun) return tl::unexpected(begun.error());
   return session;

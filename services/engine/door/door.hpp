@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "services/engine/door/wire.hpp"
 #include "tandem/result.hpp"
@@ -13,12 +14,20 @@
 
 namespace tandem::engine::door {
 
-/// How an engine comes to its server; one of the three is set.
+/// How an engine comes to its server: one of command, path, descriptor and host is set, or command and host.
 struct Way {
-  std::string command = {};  ///< started with sh(1); it finds the socket's path in TANDEM_DOOR
-  std::string path = {};     ///< of a socket at which the server waits for it
-  int descriptor = -1;       ///< a connected socket that the server inherited; it belongs to the door then
+  std::string command =
+      {};                 ///< started with sh(1); it finds the server in TANDEM_DOOR (and TANDEM_DOOR_TOKEN)
+  std::string path = {};  ///< of a socket at which the server waits for it
+  int descriptor = -1;    ///< a connected socket that the server inherited; it belongs to the door then
+  /// An address in numbers: the server waits there for an engine on any machine, in the inline form.
+  std::string host = {};
+  std::uint16_t port = 0;  ///< of `host`; 0: any free one
+  std::string token = {};  ///< what such an engine has to show; may be empty if there is a command
 };
+
+/// A token has 16 to 256 printable characters without blanks. Empty: `text` is one; otherwise what is wrong.
+[[nodiscard]] std::string wrong_with_token(std::string_view text);
 
 struct Options {
   Way way = {};
@@ -28,6 +37,16 @@ struct Options {
   /// "engine: ".
   std::function<void(const std::string& line, bool warning)> log = [](const std::string&, bool) {};
   const std::atomic<bool>* stop = nullptr;  ///< ends a wait for an engine
+  /// Called at least every 50 ms while an engine is awaited, which may take for ever.
+  std::function<void()> idle = [] {};
+};
+
+/// How an engine does.
+struct Figures {
+  std::int64_t trip_ns = 0;  ///< of the last step, from the question to the answer
+  std::int64_t step_ns = 0;  ///< of the last step, as the engine says; 0: it does not say
+  bool slow = false;         ///< the step under way takes more than half of its limit
+  bool stopped = false;      ///< by a signal
 };
 
 /// A simulation whose engine has said START. Steps can be waited for. Its checkpoints are the engine's files.
@@ -43,6 +62,7 @@ class Door : public Simulation {
   [[nodiscard]] virtual const Hello& hello() const = 0;
   /// The process that speaks; 0: not known.
   [[nodiscard]] virtual int engine_process() const = 0;
+  [[nodiscard]] virtual Figures figures() const = 0;
 };
 
 }  // namespace tandem::engine::door

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <type_traits>
+#include <utility>
 
 namespace tandem::engine::door {
 namespace {
@@ -17,6 +18,7 @@ constexpr std::array<std::string_view, 13> kNames{"",       "HELLO", "LAYOUT", "
 constexpr std::uint32_t kMostCapacity = kMaxBodies;
 constexpr std::size_t kMostTypes = 65535, kMostNameBytes = 64, kMostSolids = 10'000;
 constexpr double kFar = 1e9;
+constexpr std::size_t kMostAtOnce = std::size_t{16} << 20U;  // of bytes that are received
 
 template <class T>
 std::optional<T> number(std::string_view text) {
@@ -164,6 +166,9 @@ void read_line(std::string_view key, Line& line, Hello& hello) {
     hello.scene = line.name(0);
   } else if (key == "session") {
     hello.session = line.name(0);
+  } else if (key == "token") {
+    line.need(1, 1);
+    hello.token = line.word(0);
   } else if (key == "capacity") {
     hello.capacity = line.whole(0, 1, kMostCapacity);
   } else if (key == "dt") {
@@ -364,7 +369,7 @@ std::optional<Done> parse_done(std::span<const std::byte> body) {
 }
 
 std::optional<std::uint64_t> parse_saved(std::span<const std::byte> body) {
-  if (body.size() != kSavedBytes) return std::nullopt;
+  if (body.size() < kSavedBytes) return std::nullopt;
   return load<std::uint64_t>(body, 0);
 }
 
@@ -417,12 +422,11 @@ void append_step(std::vector<std::byte>& out, std::uint64_t frame, std::uint32_t
   store(out, std::uint32_t{0});
 }
 
-void append_load(std::vector<std::byte>& out, std::uint64_t frame, std::string_view path) {
+void append_load(std::vector<std::byte>& out, std::uint64_t frame, std::span<const std::byte> from) {
   store(out, static_cast<std::uint32_t>(Type::kLoad));
-  store(out, static_cast<std::uint32_t>(8 + path.size()));
+  store(out, static_cast<std::uint32_t>(8 + from.size()));
   store(out, frame);
-  const auto bytes = std::as_bytes(std::span(path));
-  out.insert(out.end(), bytes.begin(), bytes.end());
+  out.insert(out.end(), from.begin(), from.end());
 }
 
 Result<std::span<std::byte>> Reader::room() {
@@ -434,10 +438,16 @@ Result<std::span<std::byte>> Reader::room() {
       return malformed(fmt::format("its {} has {} bytes, but at most {} are allowed",
                                    name_of(static_cast<Type>(type)), length, limit_));
     wanted_ = kHeadBytes + length;
-    if (bytes_.size() < *wanted_) bytes_.resize(*wanted_);
   }
-  const std::size_t end = wanted_.value_or(kHeadBytes);
+  // A length alone costs no memory.
+  const std::size_t end = std::min(wanted_.value_or(kHeadBytes), held_ + kMostAtOnce);
+  if (bytes_.size() < end) bytes_.resize(end);
   return std::span(bytes_).subspan(held_, end - held_);
+}
+
+std::vector<std::byte> Reader::exchange(std::vector<std::byte> other) {
+  if (other.size() < kHeadBytes) other.resize(kHeadBytes);
+  return std::exchange(bytes_, std::move(other));
 }
 
 std::optional<Reader::Message> Reader::take() {

@@ -36,7 +36,9 @@ enum class Type : std::uint32_t {
 
 inline constexpr std::size_t kHeadBytes = 8;           ///< type and length of a message
 inline constexpr std::size_t kMaxBodyBytes = 1 << 16;  ///< of a message, without the slot of the inline form
-inline constexpr std::uint32_t kMajor = 1, kMinor = 0;
+/// Of what an engine on another machine saves.
+inline constexpr std::size_t kMaxSavedBytes = std::size_t{1} << 30U;
+inline constexpr std::uint32_t kMajor = 1, kMinor = 1;
 
 /// A type of bodies, as HELLO lists it.
 struct BodyType {
@@ -52,6 +54,7 @@ struct BodyType {
 struct Hello {
   std::string name = "engine";
   std::string scene, session;  ///< empty: not said
+  std::string token;           ///< of an engine that comes over the network; print_hello() leaves it out
   std::uint32_t capacity = 0;
   double dt_s = 0;
   std::uint32_t up_axis = 1;
@@ -115,6 +118,7 @@ struct Loaded {
 
 // Bodies of messages from the engine; empty if their size is wrong.
 [[nodiscard]] std::optional<Done> parse_done(std::span<const std::byte> body);
+/// Bytes that were saved; they follow behind kSavedBytes if the engine is on another machine.
 [[nodiscard]] std::optional<std::uint64_t> parse_saved(std::span<const std::byte> body);
 [[nodiscard]] std::optional<Loaded> parse_loaded(std::span<const std::byte> body);
 /// Text for a log: one line of at most 500 bytes, without control characters.
@@ -125,7 +129,8 @@ void append(std::vector<std::byte>& out, Type type, std::span<const std::byte> b
 void append(std::vector<std::byte>& out, Type type, std::string_view body);
 void append_input(std::vector<std::byte>& out, std::uint64_t frame, const Input& input);
 void append_step(std::vector<std::byte>& out, std::uint64_t frame, std::uint32_t slot);
-void append_load(std::vector<std::byte>& out, std::uint64_t frame, std::string_view path);
+/// `from`: the path of the file, or what is in it if the engine is on another machine.
+void append_load(std::vector<std::byte>& out, std::uint64_t frame, std::span<const std::byte> from);
 
 /// Cuts a stream of bytes into messages. It holds at most one message.
 class Reader {
@@ -143,6 +148,8 @@ class Reader {
   void filled(std::size_t bytes) { held_ += bytes; }
   /// The message that is whole now. Take it before the next room().
   [[nodiscard]] std::optional<Message> take();
+  /// Gives the memory of the message that was taken last, and goes on with `other`.
+  [[nodiscard]] std::vector<std::byte> exchange(std::vector<std::byte> other);
   /// Bytes of a message that is not whole.
   [[nodiscard]] std::size_t held() const { return held_; }
 

@@ -34,6 +34,7 @@ void LiveSource::capture(checkpoint::Checkpoint& out) const {
   for (const Waiting& waiting : scheduled_)
     out.scheduled.push_back({waiting.drive.number, waiting.drive.frame, waiting.input});
   out.immediate = immediate_;
+  out.later = later_;
   out.engine_state.clear();
   simulation_->save(out.engine_state);
 }
@@ -42,6 +43,7 @@ Result<void> LiveSource::go_on_from(const checkpoint::Checkpoint& checkpoint) {
   under_way_ = true;
   last_input_ = checkpoint.last_input;
   immediate_ = checkpoint.immediate;
+  later_ = checkpoint.later;
   for (const checkpoint::Scheduled& waiting : checkpoint.scheduled) {
     const engine::Classification effect = simulation_->classify(waiting.input);
     const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);

@@ -139,7 +139,7 @@ void LiveSource::begin_next() {
   for (const Waiting& waiting : scheduled_)
     if (waiting.drive.frame <= frame_ + 1) simulation_->apply(waiting.input);
   for (const engine::Input& input : immediate_) simulation_->apply(input);
-  immediate_.clear();
+  immediate_ = std::exchange(later_, {});
   stepping_ = true;
   simulation_->begin_step();
 }

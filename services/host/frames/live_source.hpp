@@ -114,6 +114,7 @@ class LiveSource final : public FrameSource {
   std::vector<MadeDelta> deltas_;         // of the current frame
   std::vector<Waiting> scheduled_;        // in the order of their numbers and so ascending by frame
   std::vector<engine::Input> immediate_;  // in the order of arrival
+  std::vector<engine::Input> later_;      // Checkpoint::later
   Frame scheduling_frame_ = 0;
   std::uint32_t scheduled_now_ = 0;                // for scheduling_frame_
   static constexpr std::size_t kMostRefusals = 4;  // told of a frame

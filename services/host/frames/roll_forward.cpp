@@ -63,7 +63,7 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
   if (!mirror) return tl::unexpected(mirror.error());
   mirror->restore(world.next_reuse, world.withheld);
   StateHasher hasher;
-  std::vector<engine::Input> later;
+  std::vector<engine::Input> later = std::move(world.later);
   for (const transport::JournalMessage& entry : journal) {
     for (const transport::InputDecision& decision : entry.decisions) decide(world, decision, later);
     if (entry.state == transport::JournalState::kNotMade) continue;
@@ -80,7 +80,7 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
       return fail(ErrorCode::kMismatch,
                   fmt::format("this machine makes another frame {} than the live server did", world.frame));
   }
-  world.immediate.insert(world.immediate.end(), later.begin(), later.end());
+  world.later = std::move(later);  // their senders were told so
   world.gravity = simulation.gravity();
   world.damping_per_s = simulation.damping_per_s();
   world.bodies = mirror->target().alive_count();

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <span>
 #include <string>
@@ -101,8 +102,11 @@ int play_scene(const std::string& name, std::uint32_t bodies) {
   if (!scene) return report("bench door", scene.error());
   auto simulation = scenes::make_simulation(*scene, bodies, 1, 1);
   if (!simulation) return report("bench door", simulation.error());
+  // With what clients predict with: otherwise the frames would have other corrections, and so other costs.
+  const engine::Vec3 g = (*simulation)->gravity();
   std::string hello =
-      fmt::format("name {}\ncapacity {}\ndt {}\nturns {:d}\n", name, bodies, scene->dt_s, scene->turns);
+      fmt::format("name {}\ncapacity {}\ndt {}\nturns {:d}\ngravity {} {} {}\ndamping {}\n", name, bodies,
+                  scene->dt_s, scene->turns, g[0], g[1], g[2], (*simulation)->damping_per_s());
   for (const scenes::BodyType& type : scene->types)
     hello += fmt::format("type {} {}\n", type.name, type.bounding_radius_m);
   return serve_door(
@@ -160,10 +164,29 @@ std::string numpy_command(const std::string& python, std::uint32_t bodies) {
       python, bodies);
 }
 
-/// Milliseconds of whole frames, as a server makes them: step, rounding, prediction, encoding.
-Result<std::vector<double>> frames_of(host::LiveSource& source, std::uint32_t frames) {
+/// Milliseconds of whole frames, as a server makes them: the step until its bodies are there; and the rest,
+/// which is rounding, prediction and encoding. The fastest tenth is what other programs did not disturb.
+struct Frames {
+  std::vector<double> whole_ms, step_ms, rest_ms;
+  std::vector<double> processor_ms;  // of a frame, of server and engine together; means of 20
+  std::vector<std::uint64_t> hashes;
+};
+
+// Of this thread, and of the engine's process if there is one.
+double processor_ms(int engine) {
+  const auto ms_of = [](clockid_t clock) {
+    timespec used{};
+    if (::clock_gettime(clock, &used) != 0) return 0.0;
+    return 1e3 * static_cast<double>(used.tv_sec) + 1e-6 * static_cast<double>(used.tv_nsec);
+  };
+  clockid_t theirs{};
+  const bool known = engine > 0 && ::clock_getcpuclockid(engine, &theirs) == 0;
+  return ms_of(CLOCK_THREAD_CPUTIME_ID) + (known ? ms_of(theirs) : 0);
+}
+
+Result<void> make_frames(host::LiveSource& source, int engine, std::uint32_t frames, Frames& into) {
   host::Outbox outbox({});
-  std::vector<double> took_ms;
+  const double began_ms = processor_ms(engine);
   for (std::uint32_t i = 0; i < frames; ++i) {
     const std::int64_t start_ns = steady_ns();
     source.begin_next();
@@ -171,10 +194,31 @@ Result<std::vector<double>> frames_of(host::LiveSource& source, std::uint32_t fr
       pollfd answer{.fd = source.next_descriptor(), .events = POLLIN, .revents = 0};
       ::poll(&answer, 1, 10);
     }
-    if (!source.next({}, outbox)) return tl::unexpected(*source.error());
-    took_ms.push_back(ms_since(start_ns));
+    const double step_ms = ms_since(start_ns);
+    const auto made = source.next({}, outbox);
+    if (!made) return tl::unexpected(*source.error());
+    into.whole_ms.push_back(ms_since(start_ns));
+    into.step_ms.push_back(step_ms);
+    into.rest_ms.push_back(into.whole_ms.back() - step_ms);
+    for (const host::MadeDelta& delta : made->deltas) into.hashes.push_back(delta.hash);
   }
-  return took_ms;
+  into.processor_ms.push_back((processor_ms(engine) - began_ms) / frames);
+  return {};
+}
+
+std::string text_of(const Frames& frames) {
+  return fmt::format("{:.3f} ms (fastest tenth {:.3f}; step {:.3f}, rest {:.3f}; processors {:.3f})",
+                     quantile(frames.whole_ms, 0.5), quantile(frames.whole_ms, 0.1),
+                     quantile(frames.step_ms, 0.5), quantile(frames.rest_ms, 0.5),
+                     quantile(frames.processor_ms, 0.5));
+}
+
+Json json_of(const Frames& frames) {
+  return {{"whole_ms", quantile(frames.whole_ms, 0.5)},
+          {"fastest_tenth_ms", quantile(frames.whole_ms, 0.1)},
+          {"step_ms", quantile(frames.step_ms, 0.5)},
+          {"rest_ms", quantile(frames.rest_ms, 0.5)},
+          {"processor_ms", quantile(frames.processor_ms, 0.5)}};
 }
 
 int run_door(const DoorOptions& options) {
@@ -218,20 +262,19 @@ int run_door(const DoorOptions& options) {
   if (!linked_frames || !door_frames)
     return report("bench door", linked_frames ? door_frames.error() : linked_frames.error());
   // In turns, so that both see the same machine.
-  std::vector<double> here, there;
+  Frames here, there;
   for (std::uint32_t done = 0; done < options.frames; done += 20) {
-    const auto a = frames_of(**linked_frames, 20);
-    const auto b = frames_of(**door_frames, 20);
+    const auto a = make_frames(**linked_frames, 0, 20, here);
+    const auto b = make_frames(**door_frames, (*door)->engine_process(), 20, there);
     if (!a || !b) return report("bench door", a ? b.error() : a.error());
-    here.insert(here.end(), a->begin(), a->end());
-    there.insert(there.end(), b->begin(), b->end());
   }
-  const double linked_ms = quantile(here, 0.5), door_ms = quantile(there, 0.5);
-  line(fmt::format(
-      "{} with {} bodies, whole frames: linked in {:.3f} ms, behind the door {:.3f} ms ({:+.1f} %)",
-      options.scene, options.scene_bodies, linked_ms, door_ms, 100 * (door_ms / linked_ms - 1)));
+  if (here.hashes != there.hashes)
+    return report("bench door", {ErrorCode::kMismatch, "the engine behind the door makes other frames"});
+  const double ratio = quantile(there.whole_ms, 0.5) / quantile(here.whole_ms, 0.5);
+  line(fmt::format("{} with {} bodies, whole frames: linked in {}, behind the door {}: {:+.1f} %",
+                   options.scene, options.scene_bodies, text_of(here), text_of(there), 100 * (ratio - 1)));
   if (options.json)
-    fmt::print("{}\n", Json{{"hand_over", rows}, {"linked_ms", linked_ms}, {"door_ms", door_ms}}.dump());
+    fmt::print("{}\n", Json{{"hand_over", rows}, {"linked", json_of(here)}, {"door", json_of(there)}}.dump());
   return 0;
 }
 

@@ -76,6 +76,8 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("engine", &Config::mutable_engine);
   flags.add("engine_socket", &Config::mutable_engine_socket);
   flags.add("engine_fd", &Config::set_engine_fd);
+  flags.add("engine_listen", &Config::mutable_engine_listen);
+  flags.add("engine_token", &Config::mutable_engine_token);
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
   flags.add("secure", &Config::mutable_secure);

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
+#include <sys/stat.h>
 
+#include <fstream>
 #include <limits>
 
 #include "sdk/core/codec/codec.hpp"
@@ -83,17 +85,51 @@ Result<void> read_standby(const ServerConfig& config, Options& options) {
   return {};
 }
 
+/// Reads where an engine on another machine comes, and what it has to show.
+Result<void> read_network(const ServerConfig& config, engine::door::Way& way) {
+  if (config.has_engine_token() && !config.has_engine_listen())
+    return refuse("engine-token", "needs engine-listen: only an engine on another machine shows a token");
+  if (!config.has_engine_listen()) return {};
+  const auto address = metrics::read_address(config.engine_listen());
+  if (!address) return refuse("engine-listen", address.error().message);
+  way.host = address->host;
+  way.port = address->port;
+  if (!config.has_engine_token()) {
+    if (config.has_engine()) return {};  // its command gets one
+    return refuse("engine-listen", "needs engine-token, because anybody can connect");
+  }
+  const std::string& path = config.engine_token();
+  struct stat there {};
+  std::ifstream file(path);
+  if (!file || ::stat(path.c_str(), &there) != 0) return refuse("engine-token", path + ": cannot be read");
+  if ((there.st_mode & 0077U) != 0)
+    return refuse("engine-token", fmt::format("{}: others can read it: chmod 600 {}", path, path));
+  std::getline(file, way.token);
+  if (const std::string wrong = engine::door::wrong_with_token(way.token); !wrong.empty())
+    return refuse("engine-token", fmt::format("{}: {}", path, wrong));
+  return {};
+}
+
 /// Reads how an engine in another process comes, and refuses what belongs to a scene.
 Result<void> read_engine(const ServerConfig& config, Options& options) {
   constexpr std::uint32_t kMostDescriptor = 65535;
-  const int ways =
-      (config.has_engine() ? 1 : 0) + (config.has_engine_socket() ? 1 : 0) + (config.has_engine_fd() ? 1 : 0);
+  const bool by_command_or_network = config.has_engine() || config.has_engine_listen();
+  const int ways = (by_command_or_network ? 1 : 0) + (config.has_engine_socket() ? 1 : 0) +
+                   (config.has_engine_fd() ? 1 : 0);
   const char* const flag = config.has_engine()          ? "engine"
+                           : config.has_engine_listen() ? "engine-listen"
                            : config.has_engine_socket() ? "engine-socket"
                                                         : "engine-fd";
+  engine::door::Way way{.command = config.engine(),
+                        .path = config.engine_socket(),
+                        .descriptor = config.has_engine_fd() ? static_cast<int>(config.engine_fd()) : -1};
+  if (auto good = read_network(config, way); !good) return good;
   if (ways == 0) return {};
   if (ways > 1)
-    return refuse(flag, "an engine comes in one way: give only one of engine, engine-socket and engine-fd");
+    return refuse(
+        flag,
+        "an engine comes in one way: give only one of engine (which may have engine-listen), engine-listen, "
+        "engine-socket and engine-fd");
   if (config.has_engine() && config.engine().empty()) return refuse(flag, "give a command");
   if (config.has_engine_socket() && config.engine_socket().empty()) return refuse(flag, "give a path");
   if (config.engine_fd() > kMostDescriptor)
@@ -101,12 +137,7 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
   if (config.has_scene() || config.has_bodies())
     return refuse(flag, "the engine says what it simulates: leave out scene and bodies");
   if (config.scripted() || config.has_users()) return refuse(flag, "only scenes have scripts");
-  if (config.standby())
-    return refuse(flag, "conflicts with standby: a server with such an engine cannot stand by");
-  options.engine =
-      engine::door::Way{.command = config.engine(),
-                        .path = config.engine_socket(),
-                        .descriptor = config.has_engine_fd() ? static_cast<int>(config.engine_fd()) : -1};
+  options.engine = std::move(way);
   return {};
 }
 

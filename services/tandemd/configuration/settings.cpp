@@ -44,6 +44,13 @@ std::vector<Setting> session_settings(const Options& defaults) {
       {"engine_fd",
        "Instead of a command: a descriptor that the server inherits and that is connected to the engine",
        "0 to 65535", "", "3"},
+      {"engine_listen",
+       "Where the server waits for an engine that runs on another machine; with a command, for the one that the command "
+       "starts there",
+       "ADDRESS:PORT, with an address in numbers", "", quoted("10.0.0.1:7400")},
+      {"engine_token",
+       "File with the token that such an engine has to show in TANDEM_DOOR_TOKEN; a command may do without",
+       "a path that nobody else can read", "", quoted("/etc/tandem/engine-token")},
       {"domain", "DDS domain", fmt::format("0 to {}", transport::kMaxDomain),
        fmt::format("{}", defaults.domain), fmt::format("{}", defaults.domain)},
       {"secure", "Identity of the server for DDS Security; those without one are then strangers",

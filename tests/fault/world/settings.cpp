@@ -72,6 +72,7 @@ Settings draw_settings(std::uint64_t seed, double seconds) {
   Dice dice(seed * 0xD1342543DE82EF95ULL + 1);
   Settings settings;
   settings.seed = seed;
+  settings.engine_process = has_engine_process(seed);
   settings.seconds = seconds;
   settings.frame_rate_hz = dice.chance(0.8) ? 30 : dice.chance(0.5) ? 20 : 60;
   settings.scene = fountain(dice);
@@ -106,6 +107,7 @@ std::string text_of(const Settings& settings) {
   for (const std::string& codec : settings.codecs) codecs += (codecs.empty() ? "" : ", ") + codec;
   std::string standbys;
   for (const std::uint32_t rank : settings.ranks) standbys += ", a standby of rank " + std::to_string(rank);
+  if (settings.engine_process) standbys += ", engines in processes of their own";
   if (settings.swaps) standbys += " (who is replaced stands by)";
   char text[320];
   std::snprintf(

@@ -50,12 +50,16 @@ struct Settings {
   bool records = false;
   bool has_gateway = false;
   std::vector<ClientSettings> viewers;  ///< of the gateway
+  bool engine_process = false;          ///< the engine of a server is another process
 
   static constexpr double kHealingS = 22;
 };
 
 /// In a line.
 [[nodiscard]] std::string text_of(const Settings& settings);
+
+/// One world in eight is such; nothing else of it is drawn differently.
+[[nodiscard]] constexpr bool has_engine_process(std::uint64_t seed) { return seed % 8 == 5; }
 
 [[nodiscard]] Settings draw_settings(std::uint64_t seed, double seconds);
 

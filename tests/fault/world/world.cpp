@@ -9,6 +9,7 @@
 #include "tests/fault/world/actors/client.hpp"
 #include "tests/fault/world/actors/gateway.hpp"
 #include "tests/fault/world/actors/recorder.hpp"
+#include "tests/fault/world/faults/engine_faults.hpp"
 #include "tests/support/dice/dice.hpp"
 
 namespace tandem::world {
@@ -136,8 +137,10 @@ class World {
 }  // namespace
 
 Plan plan_of(const RunOptions& options, const std::vector<FaultKind>& kinds) {
-  return draw_plan(options.seed,
-                   {.from_ms = 500, .until_ms = heal_ns(options.seconds) / kMs, .kinds = kinds});
+  const PlanWishes wishes{.from_ms = 500, .until_ms = heal_ns(options.seconds) / kMs, .kinds = kinds};
+  Plan plan = draw_plan(options.seed, wishes);
+  add_engine_faults(options.seed, wishes, plan);
+  return plan;
 }
 
 Outcome run_world(const RunOptions& options, const Plan& plan) { return World(options, plan).live(); }

@@ -4,12 +4,16 @@
 import contextlib
 import os
 import pathlib
+import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import urllib.error
+import urllib.request
 
 import stage
 
@@ -67,6 +71,25 @@ def running(folder, name, command):
                 process.kill()
 
 
+def metrics_of(log):
+    """The page of metrics, at the address that the log names."""
+    address = re.search(r"http://[0-9.]+:[0-9]+", log)
+    if not address:
+        return ""
+    with urllib.request.urlopen(address[0] + "/metrics", timeout=5) as page:
+        return page.read().decode()
+
+
+def answers(url):
+    """Whether something is there; it may have no files of a viewer."""
+    try:
+        return urllib.request.urlopen(url, timeout=5).status
+    except urllib.error.HTTPError as error:
+        return error.code
+    except OSError:
+        return None
+
+
 class Server(unittest.TestCase):
     def setUp(self):
         self.folder = self.enterContext(tempfile.TemporaryDirectory())
@@ -81,6 +104,21 @@ class Server(unittest.TestCase):
             stage.tool("join", *stage.common("boids"), "--timeout", stage.LIMIT_S, "--seconds", 2, "--json")
             self.assertIsNone(process.poll(), text())
             process.send_signal(signal.SIGINT)
+
+    @unittest.skipUnless(os.environ.get("TANDEM_GATEWAY"), "the gateway was not built")
+    def test_the_cloth_hangs_together_and_a_viewer_is_there(self):
+        command = [sys.executable, "-B", EXAMPLES / "cloth.py", *stage.common("cloth")]
+        with running(self.folder, "cloth", command) as (process, text), tandem.Client("cloth", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            url = wait_for("the address", lambda: text().partition("look at ")[2].partition("\n")[0])
+            wait_for("the gateway", lambda: answers(url))
+            wait_for("frames", lambda: client.sample().frame > 120)
+            position = client.sample().positions
+            self.assertLess(float(abs(position).max()), 15)
+            self.assertGreater(float(position[:, 1].min()), -12)
+            process.send_signal(signal.SIGINT)
+            process.wait(stage.LIMIT_S)
+            self.assertIsNone(answers(url), "the gateway ended with it")
 
     def play_counter(self, *options):
         script = pathlib.Path(self.folder) / "counter.py"
@@ -118,7 +156,7 @@ class Server(unittest.TestCase):
         script = pathlib.Path(self.folder) / "counter.py"
         script.write_text(COUNTER, encoding="utf-8")
         command = [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}", *stage.common("counter"),
-                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2]  # fmt: skip
+                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2, "--metrics", "0"]  # fmt: skip
         with running(self.folder, "tandemd", command) as (process, text), tandem.Client("counter", domain=stage.DOMAIN) as client:
             client.wait_until_playing(stage.LIMIT_S)
             epoch = client.status().epoch
@@ -127,6 +165,7 @@ class Server(unittest.TestCase):
             os.kill(int(engine), signal.SIGSTOP)
             wait_for("the line", lambda: "is stopped in frame" in text())
             held = client.sample().frame
+            wait_for("its state", lambda: 'tandem_engine_state{state="stopped"} 1' in metrics_of(text()))
             os.kill(int(engine), signal.SIGCONT)
             wait_for("it to go on", lambda: client.sample().frame > held + 5)
             self.assertEqual(client.status().epoch, epoch)
@@ -137,6 +176,76 @@ class Server(unittest.TestCase):
             self.assertGreater(client.scene().continues_frame, 0)
             self.assertEqual(client.status().hash_mismatches, 0)
             self.assertIsNone(process.poll())
+            page = wait_for("a restart", lambda: (lambda page: page if "tandem_engine_restarts_total 1" in page else "")(metrics_of(text())))
+            self.assertIn('tandem_engine_info{engine="counter"} 1', page)
+            self.assertIn('tandem_engine_state{state="serves"} 1', page)
+            count = page.partition("tandem_engine_round_trip_seconds_count ")[2].partition("\n")[0]
+            self.assertGreater(float(count), 30)
+
+    def test_an_engine_on_another_machine_shows_a_token_and_is_saved(self):
+        script, token = pathlib.Path(self.folder) / "counter.py", pathlib.Path(self.folder) / "token"
+        script.write_text(COUNTER, encoding="utf-8")
+        token.write_text("0123456789abcdef\n", encoding="utf-8")
+        token.chmod(0o600)
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        command = [os.environ["TANDEMD"], "--engine-listen", f"127.0.0.1:{port}", "--engine-token", token, *stage.common("counter"),
+                   "--checkpoint-dir", pathlib.Path(self.folder) / "kept", "--checkpoint-interval", 0.2]  # fmt: skip
+        with running(self.folder, "tandemd", command) as (_, text):
+            wait_for("the port", lambda: f"waits for an engine at tcp:127.0.0.1:{port}" in text())
+            engine = lambda shown: running(self.folder, f"engine_{shown}", ["env", f"TANDEM_DOOR=tcp:127.0.0.1:{port}", f"TANDEM_DOOR_TOKEN={shown}",
+                                                                          sys.executable, "-B", script])  # fmt: skip
+            with engine("0123456789abcdeX") as (stranger, said):
+                stranger.wait(stage.LIMIT_S)
+                self.assertIn("did not show the token", said())
+            with engine("0123456789abcdef") as (first, _), tandem.Client("counter", domain=stage.DOMAIN) as client:
+                client.wait_until_playing(stage.LIMIT_S)
+                epoch = client.status().epoch
+                wait_for("frames", lambda: client.sample().frame > 30)
+                first.kill()
+                wait_for("the line", lambda: "the engine hung up" in text())
+                wait_for("another wait", lambda: text().count("waits for an engine") == 2)
+                with engine("0123456789abcdef") as (_, said):
+                    wait_for("another epoch", lambda: client.status().epoch > epoch and client.status().phase == tandem.Phase.PLAYING)
+                    self.assertIn("loaded", said())
+                    self.assertGreater(client.scene().continues_frame, 0)
+                    self.assertEqual(client.status().hash_mismatches, 0)
+
+    def stands_by(self, script, name, *options):
+        return running(self.folder, name, [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}",
+                                           *stage.common("counter"), *options])  # fmt: skip
+
+    def test_a_server_with_an_engine_stands_by_and_takes_over_when_the_engine_of_the_live_one_dies(self):
+        script = pathlib.Path(self.folder) / "counter.py"
+        script.write_text(COUNTER, encoding="utf-8")
+        one = lambda text: int(wait_for("the engine", lambda: text().partition(", process ")[2].partition(":")[0]))
+        with self.stands_by(script, "live") as (live, said), tandem.Client("counter", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            with self.stands_by(script, "standby", "--standby") as (standby, told):
+                wait_for("the standby", lambda: "loaded" in told())
+                os.kill(one(told), signal.SIGKILL)  # its own engine, while it stands by
+                wait_for("another engine", lambda: told().count("loaded") >= 2 and "the engine hung up" in told())
+                wait_for("frames", lambda: client.sample().frame > 90)
+                time.sleep(1.5)  # it holds a checkpoint again
+                epoch = client.status().epoch
+                os.kill(one(said), signal.SIGKILL)
+                wait_for("a takeover", lambda: "takes over from epoch" in told())
+                wait_for("another epoch", lambda: client.status().epoch > epoch and client.status().phase == tandem.Phase.PLAYING)
+                self.assertGreater(client.scene().continues_frame, 60)
+                self.assertNotIn("goes on from the checkpoint, and", told())
+                self.assertEqual(client.status().hash_mismatches, 0)
+                live.wait(stage.LIMIT_S)  # it finds the other one
+                self.assertIn("already has a server", said())
+                self.assertIsNone(standby.poll())
+
+    def test_an_engine_that_does_not_save_is_told_so(self):
+        script = pathlib.Path(self.folder) / "counter.py"
+        script.write_text(COUNTER.replace('save=lambda: str(state["frame"]).encode(), load=load, ', ""), encoding="utf-8")
+        with self.stands_by(script, "standby", "--standby") as (process, text):
+            self.assertEqual(process.wait(stage.LIMIT_S), 2, text())
+            self.assertIn("does not save", text())
+        with self.stands_by(script, "live") as (_, text):
+            wait_for("the warning", lambda: "the world begins anew at frame 0" in text())
 
     def test_what_the_server_refuses_is_an_error_here(self):
         with self.assertRaises(tandem.Error) as raised:

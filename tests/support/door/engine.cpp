@@ -8,6 +8,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -174,6 +175,15 @@ bool misbehave(std::string_view mode) {
   if (mode == "wrong-slot") return done(engine.frame, 9, 24);
   if (mode == "wrong-size") return done(engine.frame, 0, 23);
   if (mode == "stale") return done(engine.frame, 0, 24);  // without the slot's head
+  if (mode == "inline-stale" || mode == "inline-long") {
+    std::vector<unsigned char> slot(engine.slot_bytes + (mode == "inline-long" ? 8 : 0));
+    std::memcpy(slot.data(), engine.memory, engine.slot_bytes);
+    unsigned char body[24] = {};
+    std::memcpy(body, &engine.frame, 8);
+    return tandem_engine_send(&engine, TANDEM_ENGINE_DONE, body, sizeof body, slot.data(), slot.size()) == 0;
+  }
+  if (mode == "inline-half")
+    return tandem_engine_send(&engine, TANDEM_ENGINE_DONE, engine.memory, 24, engine.memory, 100) == 0;
   if (mode == "twice") return tandem_engine_done(&engine, 0) + tandem_engine_done(&engine, 0) == 0;
   if (mode == "unknown") return tandem_engine_send(&engine, 77, "x", 1, nullptr, 0) == 0;
   if (mode == "huge") {
@@ -198,6 +208,35 @@ bool misbehave(std::string_view mode) {
     }();
     return !started;
   }
+  if (mode == "scribble-all") {
+    static const bool started = [] {
+      std::thread([] {
+        // Over all of it, also what says where things are: bytes, numbers that are none, and long runs.
+        std::mt19937 random(11);
+        const std::uint64_t bytes = engine.memory_bytes;
+        for (;;) {
+          unsigned char* const at = engine.memory + random() % (bytes - 64);
+          const std::uint32_t what = random() % 8;
+          if (what == 0) {
+            std::memset(at, static_cast<int>(random() % 256), random() % 64);
+          } else if (what < 4) {
+            constexpr std::uint32_t kOdd[] = {0x7F800000, 0xFF800000, 0x7FC00000, 0x7F7FFFFF, 1, 0x80000000};
+            std::memcpy(at, &kOdd[random() % 6], 4);
+          } else {
+            *at = static_cast<unsigned char>(random());
+          }
+          // Else hardly a frame were whole.
+          if (random() % 64 == 0) std::this_thread::sleep_for(std::chrono::microseconds{50});
+        }
+      }).detach();
+      return true;
+    }();
+    return !started;
+  }
+  if (mode == "flap") {
+    auto* const alive = static_cast<std::uint8_t*>(tandem_engine_column(&engine, "alive", 0));
+    for (std::uint32_t s = 0; s < kSmall; ++s) alive[s] = static_cast<std::uint8_t>(1 + engine.frame % 2);
+  }
   if (mode == "nan") value("position", 1, 3) = std::numeric_limits<float>::quiet_NaN();
   if (mode == "far") value("position", 2, 4) = 1e30F;
   if (mode == "norm") value("orientation", 0, 5) = 5;
@@ -212,6 +251,7 @@ int small(const std::string& mode, std::uint64_t from) {
   if (mode == "exit-early") return 4;
   std::string hello = "name small\ncapacity 17\ndt 0.03125\nturns 1\nstep_limit 1\ninput application 8\n";
   if (mode == "capacity") hello = "name small\ncapacity 99999999\ndt 0.03125\n";
+  if (mode == "shared") hello += "memory shared\n";
   if (mode == "no-dt") hello = "name small\ncapacity 17\n";
   if (tandem_engine_open(&engine, hello.c_str()) != 0) return complain();
   if (mode == "no-start") return ::pause();

@@ -6,7 +6,6 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 
 #include <filesystem>
 
@@ -44,26 +43,29 @@ class BadEngine : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BadEngine, GetsOneClearLine) { EXPECT_THAT(failure_of(GetParam().mode), HasSubstr(GetParam().said)); }
 
-INSTANTIATE_TEST_SUITE_P(
-    Modes, BadEngine,
-    ::testing::Values(
-        Case{"exit", "hung up in frame 3 (exit code 3)"}, Case{"crash", "its last words: the last word"},
-        Case{"hang", "did not answer for 1 s in frame 3"}, Case{"stop", "in frame 3: it is stopped"},
-        Case{"wrong-frame", "DONE is of frame 10 in frame 3"},
-        Case{"wrong-slot", "DONE is of slot 9, not 0 in frame 3"},
-        Case{"wrong-size", "wrong size of 23 bytes in frame 3"},
-        Case{"stale", "begun 2, frame 2, done 2 in frame 3"}, Case{"twice", "frame 3"},
-        Case{"unknown", "unknown type 77"}, Case{"huge", "DONE has 2147483647 bytes"},
-        Case{"half", "did not answer for 1 s in frame 3"},
-        Case{"error", "gave up in frame 3: the springs?[31m broke"}, Case{"punch", ""},
-        Case{"silent", "did not connect within 1 s"},
-        Case{"exit-early", "ended with exit code 4 before HELLO"}, Case{"no-start", "before START"},
-        Case{"capacity", "capacity: '99999999'"}, Case{"no-dt", "dt is missing"}),
-    [](const auto& mode) {
-      std::string name = mode.param.mode;
-      std::erase(name, '-');
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Modes, BadEngine,
+                         ::testing::Values(Case{"exit", "hung up in frame 3 (exit code 3)"},
+                                           Case{"crash", "its last words: the last word"},
+                                           Case{"hang", "did not answer for 1 s in frame 3"},
+                                           Case{"stop", "in frame 3: it is stopped"},
+                                           Case{"wrong-frame", "DONE is of frame 10 in frame 3"},
+                                           Case{"wrong-slot", "DONE is of slot 9, not 0 in frame 3"},
+                                           Case{"wrong-size", "wrong size of 23 bytes in frame 3"},
+                                           Case{"stale", "begun 2, frame 2, done 2 in frame 3"},
+                                           Case{"twice", "frame 3"}, Case{"unknown", "unknown type 77"},
+                                           Case{"huge", "DONE has 2147483647 bytes"},
+                                           Case{"half", "did not answer for 1 s in frame 3"},
+                                           Case{"error", "gave up in frame 3: the springs?[31m broke"},
+                                           Case{"punch", ""}, Case{"silent", "did not connect within 1 s"},
+                                           Case{"exit-early", "ended with exit code 4 before HELLO"},
+                                           Case{"no-start", "before START"},
+                                           Case{"capacity", "capacity: '99999999'"},
+                                           Case{"no-dt", "dt is missing"}),
+                         [](const auto& mode) {
+                           std::string name = mode.param.mode;
+                           std::erase(name, '-');
+                           return name;
+                         });
 
 // What a mirror says of a frame in which one body is wrong.
 std::string mirrored(const std::string& mode) {
@@ -192,24 +194,6 @@ TEST(Door, AScribblingProcessMakesWrongBodiesAndNothingElse) {
     }
   }
   EXPECT_GT(frames, 0);
-}
-
-std::size_t descriptors() {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}));
-}
-
-TEST(Door, TwoHundredRestartsLeakNoDescriptorAndNoProcess) {
-  { auto warm = open_small("exit 2"); }
-  const std::size_t before = descriptors();
-  for (int i = 0; i < 200; ++i) {
-    auto door = open_small(i % 2 == 0 ? "exit 2" : "good");
-    ASSERT_TRUE(door.has_value()) << door.error().message;
-    (*door)->step();
-    (*door)->step();
-    EXPECT_EQ((*door)->failure().empty(), i % 2 == 1);
-  }
-  EXPECT_EQ(descriptors(), before);
-  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "no child is left";
 }
 
 }  // namespace

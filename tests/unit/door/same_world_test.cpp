@@ -68,9 +68,12 @@ Played play_all(engine::Simulation& simulation, const HostConfig& config, Frame 
   return {std::move(port.deltas), std::move(port.scheduled), (*host)->error()};
 }
 
+// `lines`: further lines of HELLO; "tcp": none, but over the network.
 std::unique_ptr<engine::door::Door> open_door(const std::string& lines) {
-  auto door = engine::door::Door::open({.way = {.command = std::string(DOOR_ENGINE) + " particles " + kScene +
-                                                           " " + std::to_string(kBodies) + " 1 " + lines}});
+  const bool network = lines == "tcp";
+  const std::string command = std::string(DOOR_ENGINE) + " particles " + kScene + " " +
+                              std::to_string(kBodies) + " 1 " + (network ? "" : lines);
+  auto door = engine::door::Door::open({.way = {.command = command, .host = network ? "127.0.0.1" : ""}});
   EXPECT_TRUE(door.has_value()) << door.error().message;
   return door ? std::move(*door) : nullptr;
 }
@@ -96,12 +99,15 @@ TEST_P(SameWorld, BehindTheDoorAsLinkedIn) {
   EXPECT_EQ(there.scheduled.size(), here.scheduled.size());
 }
 
-INSTANTIATE_TEST_SUITE_P(Forms, SameWorld, ::testing::Values("", "float=64", "memory=inline"));
+INSTANTIATE_TEST_SUITE_P(Forms, SameWorld, ::testing::Values("", "float=64", "memory=inline", "tcp"));
 
-TEST(DoorCheckpoint, AnotherEngineGoesOnFromItToTheBit) {
+class DoorCheckpoint : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Forms, DoorCheckpoint, ::testing::Values("", "memory=inline", "tcp"));
+
+TEST_P(DoorCheckpoint, AnotherEngineGoesOnFromItToTheBit) {
   const auto scene = scenes::load_scene(kScene);
   ASSERT_TRUE(scene.has_value());
-  const auto first = open_door(""), second = open_door("");
+  const auto first = open_door(GetParam()), second = open_door(GetParam());
   ASSERT_TRUE(first && second);
   for (int i = 0; i < 40; ++i) {
     if (i == 10) first->apply(gravity(3));

@@ -185,6 +185,12 @@ TEST_F(SlowStepTest, AServerThatStandsByAppliesInputsOfTheJournalInTheirFrames) 
   ASSERT_TRUE(only.has_value()) << only.error().message;
   EXPECT_TRUE(other.applied.empty());
   EXPECT_EQ(only->immediate.size(), 1U) << "it waits for the next frame";
+  // If the live server ended in that step, its sender was told frame 12, and this server makes frame 11 anew.
+  FakeSimulation ended(4);
+  auto none = roll_forward(config, ended, from, std::vector{decided});
+  ASSERT_TRUE(none.has_value()) << none.error().message;
+  EXPECT_TRUE(none->immediate.empty());
+  EXPECT_EQ(none->later.size(), 1U);
   transport::JournalMessage next = made;
   next.frame = 12;
   FakeSimulation again(4);

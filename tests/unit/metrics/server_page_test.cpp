@@ -61,6 +61,20 @@ TEST(ServerPage, OfAServerThatStandsByTellsWhatItHolds) {
   EXPECT_EQ(value_of(page, "tandem_checkpoint_age_seconds"), 0.5);
 }
 
+TEST(ServerPage, TellsHowAnEngineInAnotherProcessDoes) {
+  FiguresNow figures;
+  figures.engine.emplace();
+  figures.engine->name = "lammps";
+  figures.engine->restarts = 3;
+  figures.engine->state = EngineNow::State::kStopped;
+  metrics::Page page;
+  describe(page, two_streams(), figures);
+  EXPECT_EQ(value_of(page, "tandem_engine_state", "stopped"), 1);
+  EXPECT_EQ(value_of(page, "tandem_engine_state", "serves"), 0);
+  EXPECT_EQ(value_of(page, "tandem_engine_restarts_total"), 3);
+  EXPECT_EQ(value_of(page, "tandem_engine_info", "lammps"), 1);
+}
+
 TEST(ServerPage, NamesEachStateOfTheHost) {
   using State = host::Host::State;
   const SessionFacts facts = two_streams();

@@ -1,6 +1,11 @@
 // Tests how an engine in another process is configured, and when it is started again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
 
 #include "services/tandemd/configuration/config.hpp"
 #include "services/tandemd/restarts.hpp"
@@ -41,7 +46,36 @@ TEST(EngineOptions, ComeInOneWayAndWithoutAScene) {
   EXPECT_THAT(refusal(config), HasSubstr("only scenes have scripts"));
   config.set_scripted(false);
   config.set_standby(true);
-  EXPECT_THAT(refusal(config), HasSubstr("standby"));
+  EXPECT_TRUE(check_config(config).has_value()) << "its engine loads what the live server's saves";
+}
+
+TEST(EngineOptions, ANetworkNeedsATokenThatNobodyElseReads) {
+  Config config;
+  config.set_engine_listen("127.0.0.1:0");
+  EXPECT_THAT(refusal(config), HasSubstr("needs engine-token"));
+  config.set_engine_listen("here:0");
+  EXPECT_THAT(refusal(config), HasSubstr("--engine-listen: must be PORT"));
+  config.set_engine_listen("127.0.0.1:0");
+  const std::string path = ::testing::TempDir() + "engine_token_" + std::to_string(::getpid());
+  config.set_engine_token(path);
+  EXPECT_THAT(refusal(config), HasSubstr("cannot be read"));
+  std::ofstream(path) << "a token of this test\n";
+  ::chmod(path.c_str(), 0644);
+  EXPECT_THAT(refusal(config), HasSubstr("others can read it"));
+  ::chmod(path.c_str(), 0600);
+  EXPECT_THAT(refusal(config), HasSubstr("without blanks"));
+  std::ofstream(path) << "0123456789abcdef\n";
+  const auto options = check_config(config);
+  ASSERT_TRUE(options.has_value()) << options.error().message;
+  EXPECT_EQ(options->engine->token, "0123456789abcdef");
+  EXPECT_EQ(options->engine->host, "127.0.0.1");
+  std::remove(path.c_str());
+  config.clear_engine_token();
+  config.set_engine("srun engine");
+  EXPECT_TRUE(check_config(config).has_value()) << "its command gets a token";
+  config.clear_engine_listen();
+  config.set_engine_token(path);
+  EXPECT_THAT(refusal(config), HasSubstr("needs engine-listen"));
 }
 
 TEST(EngineWorld, HasWhatTheEngineSaid) {

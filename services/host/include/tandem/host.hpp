@@ -7,12 +7,16 @@
 //     if (!server) return complain(server.error().message);
 //     while (server->poll()) {}
 //
+// Or, if your own loop steps the simulation, hand over its columns (tandem::Columns, at the end).
+//
 // EXPERIMENTAL: names may still change before 1.0. Link the library of the same version as this header.
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -163,6 +167,84 @@ class __attribute__((visibility("default"))) Server {
  private:
   struct Impl;
   explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What a loop of its own that hands over columns says of itself.
+struct ColumnsOptions {
+  std::uint32_t capacity = 0;  ///< slots, 1..engine::kMaxBodies
+  double dt_s = 1.0 / 60;      ///< seconds from one frame to the next
+  bool turns = false;          ///< bodies have orientations
+  engine::Vec3 gravity{};      ///< in force at the start; clients predict with it
+  double damping_per_s = 0;
+  // The largest inputs that the loop takes: length of gravity, length of a push's change of velocity, bytes.
+  // Empty: none of that kind.
+  std::optional<double> most_gravity = {}, most_push = {};
+  std::optional<std::size_t> most_bytes = {};
+  /// Both or none; with them there are checkpoints. load() fills the columns, or returns false and changes
+  /// nothing. They are called between hand_over() and the next wanted().
+  std::function<std::vector<std::byte>()> save = {};
+  std::function<bool(std::span<const std::byte>)> load = {};
+};
+
+/// A simulation that is not stepped by the server, but hands over its columns when they are there:
+///
+///     tandem::Columns columns({.capacity = 1000, .most_push = 50});
+///     fill(columns);                                             // the start frame
+///     auto server = tandem::Server::start(options, columns);
+///     while (server->poll()) {
+///       if (!columns.wanted()) continue;
+///       for (const tandem::engine::Input& input : columns.take_inputs()) act(input);
+///       compute();
+///       fill(columns);
+///       columns.hand_over();
+///     }
+///
+/// The server paces the loop: it wants a frame when one is due, and goes on with its clients until it is
+/// handed over. wanted(), take_inputs(), the columns and hand_over() may be used by another thread than that
+/// which polls, but only by one. Columns are written between wanted() and hand_over(), all of them.
+class __attribute__((visibility("default"))) Columns final : public engine::Simulation {
+ public:
+  explicit Columns(ColumnsOptions options);
+  ~Columns() override;
+  Columns(const Columns&) = delete;
+  Columns& operator=(const Columns&) = delete;
+  Columns(Columns&&) = delete;
+  Columns& operator=(Columns&&) = delete;
+
+  [[nodiscard]] std::span<float> position(std::size_t axis);
+  [[nodiscard]] std::span<float> velocity(std::size_t axis);
+  [[nodiscard]] std::span<float> orientation(std::size_t axis);  ///< x, y, z, w; empty unless bodies turn
+  [[nodiscard]] std::span<float> angular_velocity(std::size_t axis);  ///< rad / s; empty unless bodies turn
+  /// 0: dead, as all are at first. A change from one other value to another: another body is in the slot.
+  [[nodiscard]] std::span<std::uint8_t> alive();
+  [[nodiscard]] std::span<std::uint16_t> type();
+
+  /// A frame is due.
+  [[nodiscard]] bool wanted();
+  /// What acts in the frame that is due, in its order.
+  [[nodiscard]] std::vector<engine::Input> take_inputs();
+  /// The columns hold the frame that was wanted; if none was, nothing happens.
+  void hand_over();
+
+  // engine::Simulation, for the server.
+  [[nodiscard]] std::uint32_t capacity() const override;
+  [[nodiscard]] double dt_s() const override;
+  [[nodiscard]] engine::Vec3 gravity() const override;
+  [[nodiscard]] double damping_per_s() const override;
+  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override;
+  void apply(const engine::Input& input) override;
+  void step() override;
+  void begin_step() override;
+  [[nodiscard]] bool step_ready() override;
+  [[nodiscard]] int step_descriptor() const override;
+  [[nodiscard]] engine::Bodies bodies() const override;
+  [[nodiscard]] std::span<const engine::Event> events() const override;
+  void save(std::vector<std::byte>& out) const override;
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) override;
+
+ private:
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

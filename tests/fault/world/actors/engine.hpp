@@ -10,7 +10,7 @@
 
 namespace tandem::world {
 
-class WatchedEngine final : public engine::Simulation {
+class WatchedEngine : public engine::Simulation {
  public:
   explicit WatchedEngine(const engine::World& world) {
     auto made = engine::make_particles(world, 1);
@@ -39,6 +39,12 @@ class WatchedEngine final : public engine::Simulation {
   [[nodiscard]] std::span<const engine::Event> events() const override { return engine_->events(); }
   void save(std::vector<std::byte>& out) const override { engine_->save(out); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override { return engine_->load(bytes); }
+
+  // What the faults do to an engine that is another process.
+  virtual void die() {}
+  virtual void set_stopped(bool /*stopped*/) {}
+  /// Finishes the step under way now. False: it does not.
+  virtual bool finish_step() { return true; }
 
   Frame frame = 0;
   std::vector<std::pair<Frame, double>> acted;  ///< and the value that makes the input unique

@@ -8,6 +8,7 @@
 #include "services/checkpoint/format.hpp"
 #include "services/host/frames/going_on.hpp"
 #include "services/host/frames/roll_forward.hpp"
+#include "tests/fault/world/actors/door_engine.hpp"
 #include "tests/support/dice/dice.hpp"
 
 namespace tandem::world {
@@ -40,7 +41,8 @@ class Mounted final : public checkpoint::Disk {
 
 constexpr std::int64_t kSoundNs = 3 * kSecond;
 constexpr std::int64_t kServiceRestartNs = kSecond;  // as systemd does with a service that failed
-constexpr std::int64_t kOperatorNs = 6 * kSecond;    // without any live server
+constexpr std::int64_t kEngineRestartNs = kSecond / 2, kTakeoverNs = 4 * kSecond;
+constexpr std::int64_t kOperatorNs = 6 * kSecond;  // without any live server
 
 }  // namespace
 
@@ -88,7 +90,7 @@ void Server::on_start() {
 
 void Server::begin() {
   port_ = std::move(*stage_.network.make_server("default"));
-  engine_ = std::make_unique<WatchedEngine>(stage_.settings.scene);
+  engine_ = make_engine();
   host::HostConfig config = host_config(stage_.settings);
   config.epoch = static_cast<Epoch>(wall_ns() / kMs);
   made_ = std::make_unique<checkpoint::Keeper>(checkpoint::Settings{"disk", 1, false},
@@ -145,7 +147,7 @@ void Server::begin_host(host::HostConfig config) {
 
 void Server::stand_by() {
   port_ = std::move(*stage_.network.make_server("default"));
-  engine_ = std::make_unique<WatchedEngine>(stage_.settings.scene);
+  engine_ = make_engine();
   const host::HostConfig config = host_config(stage_.settings);
   made_ = std::make_unique<checkpoint::Keeper>(checkpoint::Settings{"disk", 1, false},
                                                std::make_unique<Mounted>(disk_), &Clock::shown,
@@ -259,6 +261,30 @@ void Server::check_start(const checkpoint::Start& start) {
                                   : " of a new world"));
 }
 
+std::unique_ptr<WatchedEngine> Server::make_engine() const {
+  if (stage_.settings.engine_process) return std::make_unique<DoorEngine>(stage_);
+  return std::make_unique<WatchedEngine>(stage_.settings.scene);
+}
+
+void Server::kill_engine() {
+  if (engine_) engine_->die();
+}
+
+void Server::set_engine_stopped(bool stopped) {
+  if (engine_) engine_->set_stopped(stopped);
+}
+
+bool Server::ends_with_engine() {
+  const std::string why = engine_->failure();
+  if (why.empty()) return false;
+  tell(why);
+  const bool others_wait = host_ && host_->wants_checkpoints();
+  if (host_) before_ = Before{epoch_, host_->frame(), last_frame_ns_, false, false};
+  drop();
+  ended(stage_.now_ns + (others_wait ? kTakeoverNs : kEngineRestartNs));
+  return true;
+}
+
 void Server::drop() {
   keeping_.reset();
   host_.reset();
@@ -295,7 +321,12 @@ void Server::lose_power(double kept) {
 
 void Server::on_leave() {
   if (host_ && host_->state() == host::Host::State::kRunning) {
-    const bool disk_well = disk_->fails_with.empty();
+    // It waits a second for the step under way; then there is no checkpoint of the end.
+    if (host_->frame_under_way() && engine_->finish_step()) {
+      if (host_->poll(steady_ns(), wall_ns())) note_frame();
+      note_acts();
+    }
+    const bool disk_well = disk_->fails_with.empty() && !host_->frame_under_way();
     keeping_->end(*host_);
     static_cast<void>(host::drain(host_->outbox(), *port_));
     before_ = Before{epoch_, host_->frame(), last_frame_ns_, true, disk_well};
@@ -314,7 +345,7 @@ std::int64_t Server::due_ns() const {
 
 void Server::on_poll() {
   if (write_at_ns_ && stage_.now_ns >= *write_at_ns_) write_checkpoint();
-  if (!up()) return;
+  if (!up() || ends_with_engine()) return;
   if (standby_) {
     const bool is_time = standby_->poll(steady_ns());
     for (const std::string& notice : standby_->take_notices()) tell(notice);
@@ -334,6 +365,7 @@ void Server::on_poll() {
   }
   last_poll_ns_ = stage_.now_ns;
   for (const std::string& notice : host_->take_notices()) tell(notice);
+  if (ends_with_engine()) return;
   const bool handed_over = host_->state() == host::Host::State::kHandedOver;
   if (host_->error() || handed_over) {
     tell(handed_over ? "is handed over" : "ends: " + host_->error()->message);

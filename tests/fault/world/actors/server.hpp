@@ -32,6 +32,8 @@ class Server final : public Actor {
   void keep_next_write_whole() { tear_.reset(); }
   void set_publishing(bool publishing);
   void change_quality(std::uint64_t salt);
+  void kill_engine();
+  void set_engine_stopped(bool stopped);
   void set_power_kept(double kept) { power_kept_ = kept; }
 
   [[nodiscard]] std::vector<transport::ParticipantId> participants() const override;
@@ -63,6 +65,9 @@ class Server final : public Actor {
   void note_acts();
   void write_checkpoint();
   void check_folder();
+  [[nodiscard]] std::unique_ptr<WatchedEngine> make_engine() const;
+  /// Ends with its engine, if that failed, and is started again with another one.
+  bool ends_with_engine();
   void drop();
   void lose_power(double kept);
   [[nodiscard]] std::optional<checkpoint::Moment> newest_on_disk() const;

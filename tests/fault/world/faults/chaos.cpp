@@ -228,6 +228,14 @@ void Chaos::begin(const Fault& fault) {
       active.fault.whom = static_cast<std::uint32_t>(server_index(fault.whom));
       server(fault.whom).set_hung(true);
       break;
+    case FaultKind::kEngineDies:
+      server(fault.whom).kill_engine();
+      server(fault.whom).disturb();
+      return;
+    case FaultKind::kEngineStops:
+      active.fault.whom = static_cast<std::uint32_t>(server_index(fault.whom));
+      server(fault.whom).set_engine_stopped(true);
+      break;
     case FaultKind::kHandover:
       active.operates = std::move(*stage_.network.make_commander("default"));
       active.speaks_at_ns = stage_.now_ns + 100 * kMs;
@@ -271,6 +279,7 @@ void Chaos::end(const Active& active) {
   }
   if (std::ranges::any_of(active_, still)) return;  // another one of this kind goes on
   if (fault.kind == FaultKind::kHang) whom.set_hung(false);
+  if (fault.kind == FaultKind::kEngineStops) server(fault.whom).set_engine_stopped(false);
   if (fault.kind == FaultKind::kPause) whom.set_paused(false);
   if (fault.kind == FaultKind::kDrift) whom.clock().set_drift(stage_.now_ns, 0);
   if (fault.kind == FaultKind::kStarve) whom.set_starved(0);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tests/fault/world/faults/engine_faults.hpp"
 #include "tests/support/dice/dice.hpp"
 
 namespace tandem::world {
@@ -53,6 +54,8 @@ constexpr std::array<Shape, kFaultKinds> kShapes{{
     {"repeat", 0.7, 0, 0, 0, 0},
     {"last-words", 1, 0.005, 0.12, 10, 120},
     {"squat", 0.4, 0, 0, 0, 0},
+    {"engine-dies", 0, 0, 0, 0, 0},  // these two are drawn in engine_faults.cpp
+    {"engine-stops", 0, 0, 0, 0, 0},
 }};
 
 /// Somebody starts anew. A world has these or losses for good, so that it shows what either does alone.
@@ -80,11 +83,12 @@ std::string text_of(const Fault& fault) {
 
 Plan draw_plan(std::uint64_t seed, const PlanWishes& wishes) {
   Dice dice(seed * 0x9E3779B97F4A7C15ULL + 3);
-  std::vector<FaultKind> kinds;
+  std::vector<FaultKind> kinds, drawn = wishes.kinds;
+  std::erase_if(drawn, of_an_engine);
   const double share = dice.uniform(0.15, 0.6);
-  for (const FaultKind kind : wishes.kinds)
+  for (const FaultKind kind : drawn)
     if (dice.chance(share)) kinds.push_back(kind);
-  if (kinds.empty() && !wishes.kinds.empty()) kinds.push_back(wishes.kinds[dice.below(wishes.kinds.size())]);
+  if (kinds.empty() && !drawn.empty()) kinds.push_back(drawn[dice.below(drawn.size())]);
   if (kinds.empty()) return {};
   if (std::ranges::find(kinds, FaultKind::kLostForGood) != kinds.end()) {
     if (dice.chance(0.3)) {

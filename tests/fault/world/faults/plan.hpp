@@ -44,8 +44,10 @@ enum class FaultKind : std::uint8_t {
   kRepeat,       ///< a client sends its last input again
   kLastWords,    ///< a burst of inputs of everybody, and after the duration the live server is killed
   kSquat,        ///< until the world ends, a participant says it is each client that a server knows
+  kEngineDies,   ///< of a server whose engine is another process
+  kEngineStops,  ///< for longer than its limit, or shorter
 };
-inline constexpr std::size_t kFaultKinds = 33;
+inline constexpr std::size_t kFaultKinds = 35;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
