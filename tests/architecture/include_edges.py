@@ -103,6 +103,8 @@ EDGES = {
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
     "services/engine/door": ["public/result.hpp", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"] + SIMULATION,
+    # A program of another licence: it includes one header, and no library of ours.
+    "services/engine/lammps": ["public/engine.h"],
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
@@ -145,6 +147,7 @@ OWNERS = [
     (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
+    (re.compile(r"^(lammps/|mpi\.h$)"), "LAMMPS and MPI", ["services/engine/lammps"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services", "tests/unit/logging"]),
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),

@@ -89,7 +89,8 @@ typedef struct tandem_engine {
 } tandem_engine;
 
 static inline int tandem_engine_fail(tandem_engine* e, const char* what) {
-  if (e->error[0] == 0) strncat(e->error, what, sizeof e->error - 1);
+  const size_t length = strlen(what), most = sizeof e->error - 1;
+  if (e->error[0] == 0) memcpy(e->error, what, length < most ? length : most); /* the last byte stays 0 */
   return -1;
 }
 
