@@ -132,16 +132,16 @@ void Facts::learn_fix(const Words& words) {
     if (!type) return;
     if (style == "pour") pours_[fix] = static_cast<int>(*type);
     const auto found = std::find(words.begin(), words.end(), "diam");
-    if (words.end() - found < 3) return;
-    std::vector<double> diameters;
-    const std::string& kind = *(found + 1);
+    std::vector<double> diameters{1};  // without a word
+    const std::string kind = words.end() - found < 3 ? "" : *(found + 1);
     if (kind == "one") diameters = numbers_behind(words, "one", 1);
     if (kind == "range") diameters = numbers_behind(words, "range", 2);
     if (kind == "poly") {
       const auto count = number(*(found + 2));
-      const auto pairs = !count || *count > 1000
+      const auto pairs = !count || *count < 0 || *count > 1000
                              ? std::vector<double>()
                              : numbers_behind(words, "poly", 1 + 2 * static_cast<std::size_t>(*count));
+      diameters.clear();
       for (std::size_t i = 1; i < pairs.size(); i += 2) diameters.push_back(pairs[i]);
     }
     if (diameters.empty()) return;

@@ -97,7 +97,7 @@ void World::look_at_kinds(const Script& script, const Options& options) {
     mass = ranks_.sum(mass);
     count = ranks_.sum(count);
     cubes = ranks_.sum(cubes);
-    if (const auto poured = script.facts().poured(t)) {
+    if (const auto poured = script.facts().poured(t); poured && radius != nullptr) {
       least = std::min(least, poured->least);
       most = std::max(most, poured->most);
     }

@@ -77,7 +77,8 @@ TEST(LammpsFacts, WallsOfRegionsAndTheirEnd) {
 
 TEST(LammpsFacts, PoursSayTheRadiiOfGrainsToCome) {
   const Facts facts = of({"fix p all pour 100 2 4767 region r diam range 0.8 1.2",
-                          "fix d all deposit 10 1 5 99 region r diam poly 2 0.5 0.7 0.9 0.3"});
+                          "fix q all pour 10 1 99 region r diam poly 2 0.5 0.7 0.9 0.3",
+                          "fix d all deposit 9 3 5 99 region r"});
   EXPECT_TRUE(facts.pours());
   ASSERT_TRUE(facts.poured(2));
   EXPECT_EQ(facts.poured(2)->least, 0.4);
@@ -85,6 +86,8 @@ TEST(LammpsFacts, PoursSayTheRadiiOfGrainsToCome) {
   ASSERT_TRUE(facts.poured(1));
   EXPECT_EQ(facts.poured(1)->least, 0.25);
   EXPECT_EQ(facts.poured(1)->most, 0.45);
+  ASSERT_TRUE(facts.poured(3));
+  EXPECT_EQ(facts.poured(3)->most, 0.5);
   EXPECT_FALSE(of({"fix d all deposit 10 1 5 99 region r"}).pours());
 }
 
