@@ -1,5 +1,5 @@
-// The command line tool: join, record, replay, checkpoint, handover, engine-check, bench, export, top, doctor,
-// pki. Exit 0 done, 1 failed, 2 wrong usage.
+// The command line tool: join, record, replay, checkpoint, handover, engine-check, serve-imd, bench, export, top,
+// doctor, pki. Exit 0 done, 1 failed, 2 wrong usage.
 
 #include <cstdio>
 #include <exception>
@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
   tandem::tool::add_checkpoint(app, run);
   tandem::tool::add_handover(app, run);
   tandem::tool::add_engine_check(app, run);
+  tandem::tool::add_serve_imd(app, run);
 #ifdef TANDEM_LAB
   tandem::tool::add_bench(app, run);
   tandem::tool::add_export(app, run);

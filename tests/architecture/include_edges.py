@@ -107,6 +107,7 @@ EDGES = {
     "services/engine/lammps": ["public/engine.h"],
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
+    "services/imd": ["public/engine.h", "public/result.hpp", "services/commandline"],
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
@@ -129,7 +130,7 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/doctor", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
+    + ["services/doctor", "services/imd", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
     + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,
     "services/lab/measures": OF_LAB,

@@ -75,6 +75,7 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("engine", &Config::mutable_engine);
   flags.add("engine_socket", &Config::mutable_engine_socket);
   flags.add("engine_fd", &Config::set_engine_fd);
+  flags.add("topology", &Config::mutable_topology);
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
   flags.add("secure", &Config::mutable_secure);

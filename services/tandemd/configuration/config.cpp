@@ -83,6 +83,17 @@ Result<void> read_standby(const ServerConfig& config, Options& options) {
   return {};
 }
 
+/// The command of an engine: what was given, or tandem-imd for the address of a simulation that speaks IMD.
+std::string engine_command(const ServerConfig& config) {
+  if (!config.engine().starts_with("imd://")) return config.engine();
+  const auto quoted = [](const std::string& word) {
+    std::string text = "'";
+    for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return text + "'";
+  };
+  return fmt::format("exec tandem-imd {} --topology {}", quoted(config.engine()), quoted(config.topology()));
+}
+
 /// Reads how an engine in another process comes, and refuses what belongs to a scene.
 Result<void> read_engine(const ServerConfig& config, Options& options) {
   constexpr std::uint32_t kMostDescriptor = 65535;
@@ -91,7 +102,11 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
   const char* const flag = config.has_engine()          ? "engine"
                            : config.has_engine_socket() ? "engine-socket"
                                                         : "engine-fd";
+  const bool imd = config.engine().starts_with("imd://");
+  if (config.has_topology() && !imd) return refuse("topology", "belongs to --engine imd://HOST:PORT");
   if (ways == 0) return {};
+  if (imd && config.topology().empty())
+    return refuse("topology", "imd:// needs a file that says what the atoms are");
   if (ways > 1)
     return refuse(flag, "an engine comes in one way: give only one of engine, engine-socket and engine-fd");
   if (config.has_engine() && config.engine().empty()) return refuse(flag, "give a command");
@@ -104,7 +119,7 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
   if (config.standby())
     return refuse(flag, "conflicts with standby: a server with such an engine cannot stand by");
   options.engine =
-      engine::door::Way{.command = config.engine(),
+      engine::door::Way{.command = engine_command(config),
                         .path = config.engine_socket(),
                         .descriptor = config.has_engine_fd() ? static_cast<int>(config.engine_fd()) : -1};
   return {};
