@@ -61,9 +61,9 @@ class DoorServer:
         if hasattr(self, "socket"):
             try:
                 self.send(BYE)
-                self.socket.close()
             except OSError:
                 pass
+            self.socket.close()
         try:
             self.exit_code = self.process.wait(LIMIT_S)
         except subprocess.TimeoutExpired:
