@@ -89,11 +89,12 @@ void help() {
   for (const Option& option : all())
     std::printf("  %s%s%s\n      %s\n", option.name, option.takes ? " " : "",
                 option.takes ? option.takes : "", option.about);
-  std::printf("  --help, --version\n\n%s\n", kNotes);
+  std::printf("  -h,--help\n  --version\n\n%s\n", kNotes);
 }
 
 void describe() {  // deploy/manual reads it
-  std::printf("program\ttandem-lammps\t%s\ncommand\t\t%s\t%s\n", TANDEM_VERSION, kAbout, kNotes);
+  std::printf("program\ttandem-lammps\ttandem-lammps %s\ncommand\t\t%s\t%s\n", TANDEM_VERSION, kAbout,
+              kNotes);
   std::printf("option\t\tscript\tFILE\t\trequired\t\tThe script of LAMMPS, as it is\n");
   for (const Option& option : all())
     std::printf("option\t\t%s\t%s\t%s\t\t%s\t%s\n", option.name, option.takes ? option.takes : "",
