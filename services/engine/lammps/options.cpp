@@ -87,9 +87,8 @@ const std::vector<Option>& all() {
 void help() {
   std::printf("%s\n\nUsage: tandem-lammps [OPTIONS] SCRIPT [-- ARGUMENTS OF LAMMPS]\n\n", kAbout);
   for (const Option& option : all())
-    std::printf("  %s%s%s\n      %s\n", option.name, option.takes ? " " : "",
-                option.takes ? option.takes : "", option.about);
-  std::printf("  -h,--help\n  --version\n\n%s\n", kNotes);
+    std::printf("  %s %s\n      %s\n", option.name, option.takes ? option.takes : "", option.about);
+  std::printf("  -h,--help  \n  --version  \n\n%s\n", kNotes);
 }
 
 void describe() {  // deploy/manual reads it
