@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "services/engine/lammps/lammps.hpp"
 
@@ -38,6 +40,27 @@ std::vector<std::uint8_t> read_file(const std::string& path) {
 
 void write_some(std::ofstream& out, const void* bytes, std::size_t count) {
   out.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
+}
+
+constexpr std::size_t kMostTimes = 1 << 16;
+
+/// Milliseconds since the last call.
+class Stopwatch {
+ public:
+  float lap_ms() {
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<float, std::milli>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+double median(std::vector<float>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
 }
 
 std::string text(const char* format, auto... values) {
@@ -128,6 +151,14 @@ void Stage::say_pace() const {
   std::fflush(stdout);
 }
 
+void Stage::say_times() {
+  if (steps_ == 0) return;
+  std::printf(
+      "%llu frames, medians: %.3g ms of LAMMPS, %.2g ms to bring the atoms together, %.2g ms to hand them over\n",
+      static_cast<unsigned long long>(steps_), median(steps_ms_), median(gather_ms_), median(hand_over_ms_));
+  std::fflush(stdout);
+}
+
 int Stage::play() {
   int opened = 1;
   if (ranks_.first()) opened = open() ? 1 : 0;
@@ -145,6 +176,7 @@ int Stage::play() {
     obey(order);
   }
   if (!ranks_.first()) return 0;
+  say_times();
   if (engine_->error[0] != 0) std::fprintf(stderr, "tandem-lammps: %s\n", engine_->error);
   return tandem_engine_close(engine_.get());
 }
@@ -175,19 +207,23 @@ void Stage::obey(const Order& order) {
 }
 
 void Stage::step() {
+  Stopwatch watch;
   const std::int64_t made = over_ ? 0 : script_.advance(world_->pace().every);
   if (made < world_->pace().every && !over_) {
     over_ = true;
     if (ranks_.first()) std::printf("the script is over: its atoms hold still\n");
   }
   ++steps_;
+  if (steps_ms_.size() < kMostTimes) steps_ms_.push_back(watch.lap_ms());
   write_columns();
   if (ranks_.first()) tandem_engine_done(engine_.get(), 0);
 }
 
 void Stage::write_columns() {
+  Stopwatch watch;
   const std::vector<Row>& rows = world_->gather();
   if (!ranks_.first()) return;
+  if (gather_ms_.size() < kMostTimes) gather_ms_.push_back(watch.lap_ms());
   ids_.resize(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) ids_[i] = rows[i].id;
   const std::span<const std::uint32_t> slots = slots_->assign(ids_);
@@ -220,6 +256,7 @@ void Stage::write_columns() {
   }
   void* const alive = tandem_engine_column(engine_.get(), "alive", 0);
   std::memcpy(alive, slots_->alive().data(), capacity);
+  if (hand_over_ms_.size() < kMostTimes) hand_over_ms_.push_back(watch.lap_ms());
   if (slots_->gone() > 0) {
     if (lost_ == 0)
       std::printf("frame %llu: %zu atoms are gone\n", static_cast<unsigned long long>(steps_),

@@ -36,6 +36,7 @@ class Stage {
   void load(const std::string& path);
   void write_columns();
   void say_pace() const;
+  void say_times();
 
   void* lammps_;
   const Ranks& ranks_;
@@ -48,6 +49,7 @@ class Stage {
   std::vector<float> before_ = {};  // positions of the frame before, if the box is periodic
   std::uint64_t steps_ = 0, lost_ = 0;
   bool over_ = false;
+  std::vector<float> steps_ms_ = {}, gather_ms_ = {}, hand_over_ms_ = {};  // of the first rank's last frames
 };
 
 }  // namespace tandem_lammps
