@@ -15,14 +15,16 @@ namespace {
 
 // Commands that a world needs again after its atoms came from a restart file, those of the first line before
 // them.
-const Words kBeforeAtoms{"processors", "package", "suffix", "newton"};
-const Words kAfterAtoms{"angle_coeff",    "angle_style",   "balance",      "bond_coeff",     "bond_style",
-                        "comm_modify",    "comm_style",    "compute",      "compute_modify", "dihedral_coeff",
-                        "dihedral_style", "fix",           "fix_modify",   "group",          "improper_coeff",
-                        "improper_style", "kspace_modify", "kspace_style", "mass",           "neigh_modify",
-                        "neighbor",       "pair_coeff",    "pair_modify",  "pair_style",     "region",
-                        "run_style",      "special_bonds", "thermo",       "thermo_modify",  "thermo_style",
-                        "timestep",       "uncompute",     "unfix",        "variable"};
+const Words kBeforeAtoms{"atom_modify", "newton", "package", "processors", "suffix"};
+const Words kAfterAtoms{
+    "angle_coeff",    "angle_style",    "balance",        "bond_coeff",     "bond_style",
+    "comm_modify",    "comm_style",     "compute",        "compute_modify", "dielectric",
+    "dihedral_coeff", "dihedral_style", "dump",           "dump_modify",    "fix",
+    "fix_modify",     "group",          "improper_coeff", "improper_style", "kspace_modify",
+    "kspace_style",   "lattice",        "mass",           "neigh_modify",   "neighbor",
+    "pair_coeff",     "pair_modify",    "pair_style",     "region",         "restart",
+    "run_style",      "special_bonds",  "thermo",         "thermo_modify",  "thermo_style",
+    "timestep",       "uncompute",      "undump",         "unfix",          "variable"};
 
 bool holds(const Words& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();

@@ -40,6 +40,42 @@ timestep 0.01
 fix motion all nve/sphere
 {more}
 """
+# Computes, groups and lengths in lattice units, none of which a restart file has.
+FLOW = """
+dimension 2
+boundary p s p
+atom_style atomic
+neighbor 0.3 bin
+neigh_modify delay 5
+lattice hex 0.7
+region box block 0 20 0 10 -0.25 0.25
+create_box 2 box
+create_atoms 1 box
+reset_atom_ids sort yes
+mass * 1.0
+pair_style lj/cut 1.12246
+pair_coeff * * 1.0 1.0 1.12246
+region low block INF INF INF 1.25 INF INF
+group low region low
+group flow subtract all low
+set group low type 2
+compute mobile flow temp
+velocity flow create 1.0 482748 temp mobile loop geom
+fix 1 all nve
+fix 2 flow temp/rescale 20 1.0 1.0 0.02 1.0
+fix_modify 2 temp mobile
+velocity low set 0 0 0
+fix 3 low setforce 0 0 0
+region hole sphere 10 4 0 3
+delete_atoms region hole
+fix 4 flow indent 100 sphere 10 4 0 4
+fix 5 all enforce2d
+timestep 0.003
+thermo_modify temp mobile
+run 20
+variable more equal 1000
+run ${more}
+"""
 TWO_ATOMS = "create_atoms 1 single 2 5 5 units box\ncreate_atoms 1 single 8 5 5 units box"
 
 
@@ -169,6 +205,20 @@ class Lammps(unittest.TestCase):
             with engine(ranks, PILE, *options, "--capacity", 500) as door:
                 self.assertFalse(door.load(path, frame))
                 door.step()
+
+    def test_what_a_restart_file_lacks_is_said_again(self):
+        script = self.script(FLOW)
+        path = self.folder / "saved"
+        with engine(1, script) as door:
+            door.step(20)  # within the second run
+            door.save(path)
+            frame = door.frame
+            states = [door.step().state() for _ in range(5)]
+        with engine(1, script) as door:
+            self.assertTrue(door.load(path, frame))
+            for state in states:
+                for expected, got in zip(state, door.step().state()):
+                    np.testing.assert_array_equal(expected, got)
 
     def test_engine_check_finds_nothing(self):
         command = [OPTIONS.tandem, "engine-check", "--frames", 20, "--", *mpirun(2, PILE, "--var", "n=6", "--var", "layers=5")]
