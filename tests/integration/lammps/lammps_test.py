@@ -51,7 +51,6 @@ lattice hex 0.7
 region box block 0 20 0 10 -0.25 0.25
 create_box 2 box
 create_atoms 1 box
-reset_atom_ids sort yes
 mass * 1.0
 pair_style lj/cut 1.12246
 pair_coeff * * 1.0 1.0 1.12246
