@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/engine/door/descriptor.hpp"
 #include "services/imd/wire.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
@@ -30,6 +31,7 @@ namespace tandem::tool {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using engine::door::Descriptor;
 constexpr auto kGoLimit = std::chrono::seconds{10};  // the protocol says 1; people type
 constexpr std::size_t kMostViewers = 16;
 
@@ -39,25 +41,6 @@ struct Options {
   int version = 3;
   double scale = 1;
   std::optional<double> seconds;
-};
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
 };
 
 Result<Descriptor> listen_at(const std::string& address) {

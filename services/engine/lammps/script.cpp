@@ -56,7 +56,18 @@ Script::Script(void* lammps, const Ranks& ranks, const std::string& file) : lamm
       fingerprint_ = (fingerprint_ ^ static_cast<std::uint8_t>(c)) * 1099511628211ULL;
 }
 
-void* Script::command(const std::string& line) { return lammps_command(lammps_, line.c_str()); }
+void* Script::command(const std::string& line) {
+  void* const name = lammps_command(lammps_, line.c_str());
+  // Debian's LAMMPS has ended the program by now; one that throws comes back.
+  if (lammps_has_error(lammps_) == 0) return name;
+  char text[512] = "LAMMPS says no more";
+  const bool of_all = lammps_get_last_error_message(lammps_, text, sizeof text) == 1;
+  if (!of_all) {  // the other ranks know nothing of it
+    std::fprintf(stderr, "tandem-lammps: %s\n", text);
+    MPI_Abort(ranks_.comm(), 1);
+  }
+  throw Refusal{std::string(text) + " (" + line + ")"};
+}
 
 std::int64_t Script::step_now() const {
   return lammps_extract_setting(lammps_, "bigint") == 8
@@ -308,6 +319,12 @@ void Script::turn_gravity(const Vec3& value) {
 }
 
 // Files of a server
+
+void Script::write_restart(const std::string& file) {
+  command("write_restart " + file);
+  // It moves atoms between ranks, but not their lists of neighbours.
+  needs_setup_ = true;
+}
 
 std::string Script::save() const {
   std::ostringstream out;

@@ -20,7 +20,8 @@ struct Refusal {
 
 /// Reads a script line by line, gives the lines to LAMMPS, and keeps `run` for itself. `include`, `jump`,
 /// `label` and `next` work; a run inside `if`, `rerun` and `minimize` is made at once. All ranks call all
-/// functions alike. Throws Refusal. LAMMPS itself ends the program on an error, as Debian builds it.
+/// functions alike. Throws Refusal, also for an error of LAMMPS, which Debian builds so that it
+/// ends the program itself.
 class Script {
  public:
   Script(void* lammps, const Ranks& ranks, const std::string& file);
@@ -32,8 +33,6 @@ class Script {
   bool reach_run();
   /// Goes on with the last run for ever, instead of ending.
   void make_endless() { endless_ = true; }
-  /// The next step needs a setup, because atoms have moved between ranks or were loaded.
-  void ask_setup() { needs_setup_ = true; }
 
   [[nodiscard]] const Facts& facts() const { return facts_; }
   /// A gravity that turn_gravity() turns.
@@ -44,6 +43,8 @@ class Script {
 
   /// A number that is the same for the same script, whatever has been executed of it.
   [[nodiscard]] std::uint64_t fingerprint() const { return fingerprint_; }
+  /// Writes a restart file of LAMMPS.
+  void write_restart(const std::string& file);
   /// Lines that bring another LAMMPS to where this one is, beside the restart file.
   [[nodiscard]] std::string save() const;
   /// Clears LAMMPS, reads the restart file and executes what save() gave.

@@ -272,9 +272,7 @@ void Stage::write_columns() {
 
 void Stage::save(const std::string& path) {
   const std::string restart_path = path + ".restart";
-  lammps_command(lammps_, ("write_restart " + restart_path).c_str());
-  // It moved atoms between ranks, but not their lists of neighbours.
-  script_.ask_setup();
+  script_.write_restart(restart_path);
   if (!ranks_.first()) return;
   const std::vector<std::uint8_t> restart = read_file(restart_path);
   std::remove(restart_path.c_str());
