@@ -105,8 +105,11 @@ EDGES = {
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
     "services/engine/door": ["public/result.hpp", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"] + SIMULATION,
+    # A program of another licence: it includes one header, and no library of ours.
+    "services/engine/lammps": ["public/engine.h"],
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
+    "services/imd": ["public/engine.h", "public/result.hpp", "services/commandline"],
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
@@ -130,7 +133,7 @@ EDGES = {
     + CLIENT
     + HOST
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
-    + ["services/doctor", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
+    + ["services/doctor", "services/imd", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
     + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,
     "services/lab/measures": OF_LAB,
@@ -148,6 +151,7 @@ OWNERS = [
     (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/scenes", "services/tandemd", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engine", "services/scenes", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engine/bullet", "tests/bench/trajectories"]),
+    (re.compile(r"^(lammps/|mpi\.h$)"), "LAMMPS and MPI", ["services/engine/lammps"]),
     (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services", "tests/unit/logging"]),
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),

@@ -78,6 +78,7 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("engine_fd", &Config::set_engine_fd);
   flags.add("engine_listen", &Config::mutable_engine_listen);
   flags.add("engine_token", &Config::mutable_engine_token);
+  flags.add("topology", &Config::mutable_topology);
   flags.add("session", &Config::mutable_session);
   flags.add("domain", &Config::set_domain);
   flags.add("secure", &Config::mutable_secure);

@@ -110,6 +110,17 @@ Result<void> read_network(const ServerConfig& config, engine::door::Way& way) {
   return {};
 }
 
+/// The command of an engine: what was given, or tandem-imd for the address of a simulation that speaks IMD.
+std::string engine_command(const ServerConfig& config) {
+  if (!config.engine().starts_with("imd://")) return config.engine();
+  const auto quoted = [](const std::string& word) {
+    std::string text = "'";
+    for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return text + "'";
+  };
+  return fmt::format("exec tandem-imd {} --topology {}", quoted(config.engine()), quoted(config.topology()));
+}
+
 /// Reads how an engine in another process comes, and refuses what belongs to a scene.
 Result<void> read_engine(const ServerConfig& config, Options& options) {
   constexpr std::uint32_t kMostDescriptor = 65535;
@@ -120,11 +131,15 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
                            : config.has_engine_listen() ? "engine-listen"
                            : config.has_engine_socket() ? "engine-socket"
                                                         : "engine-fd";
-  engine::door::Way way{.command = config.engine(),
+  const bool imd = config.engine().starts_with("imd://");
+  if (config.has_topology() && !imd) return refuse("topology", "belongs to --engine imd://HOST:PORT");
+  engine::door::Way way{.command = engine_command(config),
                         .path = config.engine_socket(),
                         .descriptor = config.has_engine_fd() ? static_cast<int>(config.engine_fd()) : -1};
   if (auto good = read_network(config, way); !good) return good;
   if (ways == 0) return {};
+  if (imd && config.topology().empty())
+    return refuse("topology", "imd:// needs a file that says what the atoms are");
   if (ways > 1)
     return refuse(
         flag,

@@ -37,8 +37,9 @@ std::vector<Setting> session_settings(const Options& defaults) {
        quoted(defaults.session)},
       {"engine",
        "Command of an engine in another process, instead of a scene (idl/ENGINE.md). The server starts it with sh, and again "
-       "when it ends by itself, from the last checkpoint if there is one",
-       "a command", "", quoted("python3 boids.py")},
+       "when it ends by itself, from the last checkpoint if there is one. imd://HOST:PORT: a simulation that speaks IMD, by "
+       "tandem-imd",
+       "a command, or imd://HOST:PORT", "", quoted("python3 boids.py")},
       {"engine_socket", "Instead of a command: where the server waits for an engine of the same user",
        "a path", "", quoted("/run/user/1000/tandem-engine")},
       {"engine_fd",
@@ -51,6 +52,9 @@ std::vector<Setting> session_settings(const Options& defaults) {
       {"engine_token",
        "File with the token that such an engine has to show in TANDEM_DOOR_TOKEN; a command may do without",
        "a path that nobody else can read", "", quoted("/etc/tandem/engine-token")},
+      {"topology", "With an engine at imd://: what its atoms are",
+       "a .gro file, a data file of LAMMPS, or lines COUNT NAME RADIUS RRGGBBAA MASS", "",
+       quoted("conf.gro")},
       {"domain", "DDS domain", fmt::format("0 to {}", transport::kMaxDomain),
        fmt::format("{}", defaults.domain), fmt::format("{}", defaults.domain)},
       {"secure", "Identity of the server for DDS Security; those without one are then strangers",

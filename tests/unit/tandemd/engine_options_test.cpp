@@ -34,6 +34,15 @@ TEST(EngineOptions, ComeInOneWayAndWithoutAScene) {
   config.clear_scene();
   config.set_engine_fd(3);
   EXPECT_THAT(refusal(config), HasSubstr("comes in one way"));
+  config.clear_engine_fd();
+  config.set_engine("imd://node7:8888");
+  EXPECT_THAT(refusal(config), HasSubstr("--topology"));
+  config.set_topology("it's.gro");
+  EXPECT_EQ(check_config(config)->engine->command, "exec tandem-imd 'imd://node7:8888' --topology 'it'\\''s.gro'");
+  config.set_engine("python3 boids.py");
+  EXPECT_THAT(refusal(config), HasSubstr("--topology: belongs to --engine imd://"));
+  config.clear_topology();
+  config.set_engine_fd(3);
   config.clear_engine();
   EXPECT_EQ(check_config(config)->engine->descriptor, 3);
   config.set_engine_fd(70000);
