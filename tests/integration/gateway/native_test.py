@@ -5,11 +5,14 @@ native_test.py SCENARIO --tandemd PATH --tandem PATH --gateway PATH --python-pac
 """
 
 import argparse
+import contextlib
 import os
 import pathlib
+import socket
 import subprocess
 import sys
 import tempfile
+import threading
 
 from gateway_test import TOKEN, Failed, WebStage, certificate, check_report, compare
 
@@ -66,6 +69,55 @@ def run_python(stage, *arguments):
     if done.returncode:
         raise Failed(f"the client of Python: {done.stderr}")
     return done.stdout
+
+
+class Proxy:
+    """An HTTP proxy that only knows CONNECT, as between many a building and the Internet."""
+
+    def __init__(self):
+        self.asked = []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        with contextlib.suppress(OSError):
+            while True:
+                threading.Thread(target=self.serve, args=(self.listener.accept()[0],), daemon=True).start()
+
+    def serve(self, client):
+        request = b""
+        while b"\r\n\r\n" not in request:
+            request += client.recv(4096)
+        method, target, _ = request.decode().split(" ", 2)
+        self.asked.append((method, target))
+        host, port = target.rsplit(":", 1)
+        server = socket.create_connection((host, int(port)), timeout=10)
+        server.settimeout(None)
+        client.sendall(b"HTTP/1.1 200 connected\r\n\r\n")
+        threading.Thread(target=self.copy, args=(server, client), daemon=True).start()
+        self.copy(client, server)
+
+    @staticmethod
+    def copy(a, b):
+        with contextlib.suppress(OSError):
+            while data := a.recv(65536):
+                b.sendall(data)
+            b.shutdown(socket.SHUT_WR)
+
+
+def proxied(stage):
+    """Through the proxy that http_proxy names."""
+    proxy = Proxy()
+    stage.server("server")
+    stage.gateway("gateway")
+    stage.environment["http_proxy"] = f"127.0.0.1:{proxy.port}"
+    joins(stage, "client", "--url", url(stage))
+    check_report(stage.stop("client"))
+    stage.stop("server")
+    compare(stage, ["server"], "client", 60)
+    if proxy.asked != [("CONNECT", f"127.0.0.1:{stage.port}")]:
+        raise Failed(f"the proxy was asked for {proxy.asked}")
 
 
 def restarts(stage):
@@ -135,7 +187,7 @@ def doors(stage):
     compare(stage, ["server"], "good", 60)
 
 
-SCENARIOS = {scenario.__name__: scenario for scenario in (plays, restarts, doors)}
+SCENARIOS = {scenario.__name__: scenario for scenario in (plays, proxied, restarts, doors)}
 
 
 def main():
