@@ -166,11 +166,11 @@ def rate(stage, minutes, _):
         standby.stop()
         after = Pace(live, seconds)
         live.stop()
-        kept = attached.hz >= 0.99 * FRAMES_PER_S
+        held = 0.98 * FRAMES_PER_S  # a page may be a quarter of a second old
         rows.append((
             f"30 Hz with a standby on the same machine, {bodies:,} particles",
             "30 frames/s, where the machine makes them without one",
             f"{attached.text}; before it came {before.text}; after it left {after.text}",
-            kept or min(before.hz, after.hz) < 0.99 * FRAMES_PER_S,
+            attached.hz >= held or min(before.hz, after.hz) < held,
         ))  # fmt: skip
     return rows
