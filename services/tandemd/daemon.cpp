@@ -322,6 +322,7 @@ struct Stage {
   Metrics& metrics;
   Service& service;
   SignalWatch& signals;
+  const bool& first;  // of the lives of this server
 };
 
 End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
@@ -342,7 +343,12 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   const double frame_rate_hz = config.frame_rate_hz;
   const std::vector<host::StreamConfig> streams = config.streams;
   auto host = host::Host::create(std::move(config), simulation, port);
-  if (!host) return exits(report_error(host.error(), options.standby ? 1 : 2));
+  if (!host) {
+    const int exit_code = report_error(host.error(), options.standby ? 1 : 2);
+    // Another engine may say what no session can have; the one after it may not.
+    if (stage.served.door != nullptr && !stage.first) return {End::Next::kAnotherEngine, exit_code, true};
+    return exits(exit_code);
+  }
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", stage.served.world.name,
@@ -446,8 +452,9 @@ int run_daemon(Options options, SignalWatch& signals) {
   Restarts restarts;
   bool stands_by = options.standby;
   const engine::door::Door* door = nullptr;  // that the metrics follow
-  const Stage stage{options, served, stands_by, hashes, metrics, service, signals};
-  for (bool first = true;; first = false) {
+  bool first = true;
+  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, first};
+  for (;; first = false) {
     const std::int64_t began_ns = steady_ns();
     auto config = plan(served, options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);

@@ -250,6 +250,24 @@ class Server(unittest.TestCase):
                 self.assertIn("already has a server", said())
                 self.assertIsNone(standby.poll())
 
+    def test_another_engine_that_no_session_can_have_does_not_end_the_server(self):
+        script = pathlib.Path(self.folder) / "moody.py"
+        script.write_text("""
+import os, pathlib, numpy as np, tandem
+starts = pathlib.Path(__file__).with_name("starts")
+count = len(starts.read_text()) if starts.exists() else 0
+starts.write_text("x" * (count + 1))
+with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as server:
+    server.start(position=np.zeros((2, 3)))
+    for frame in server.frames():
+        frame.write(position=np.zeros((2, 3)))
+        if count == 0 and frame.number == 5: os._exit(3)
+""", encoding="utf-8")  # fmt: skip
+        command = [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}", *stage.common("moody")]
+        with running(self.folder, "tandemd", command) as (_, text), tandem.Client("moody", domain=stage.DOMAIN) as client:
+            wait_for("the refusal", lambda: "gravity does not fit" in text())
+            wait_for("the third engine", lambda: client.status().phase == tandem.Phase.PLAYING and client.sample().frame > 10)
+
     def test_an_engine_that_does_not_save_is_told_so(self):
         script = pathlib.Path(self.folder) / "counter.py"
         script.write_text(COUNTER.replace('save=lambda: str(state["frame"]).encode(), load=load, ', ""), encoding="utf-8")
