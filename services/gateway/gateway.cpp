@@ -150,6 +150,10 @@ void Gateway::list_ready(std::int64_t now_ns, std::vector<ViewerId>& out) {
   }
 }
 
+bool Gateway::any_ready(std::int64_t now_ns) {
+  return std::ranges::any_of(viewers_, [&](auto& entry) { return ready(entry.second, now_ns); });
+}
+
 void Gateway::list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const {
   out.clear();
   for (const auto& [id, viewer] : viewers_) {

@@ -65,6 +65,8 @@ class Gateway {
   [[nodiscard]] Next next(ViewerId id, std::int64_t now_ns);
   /// Lists the viewers for which next() has something. Replaces `out`.
   void list_ready(std::int64_t now_ns, std::vector<ViewerId>& out);
+  /// Whether there is a viewer for which next() has something.
+  [[nodiscard]] bool any_ready(std::int64_t now_ns);
   /// Lists the viewers that have to be disconnected because they read nothing. Replaces `out`.
   void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
   /// Lists the viewers that have to be disconnected because they acknowledge nothing. Replaces `out`.

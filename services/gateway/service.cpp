@@ -84,8 +84,7 @@ void Service::follow(const std::stop_token& stop, WebServer& server) {
         logging::set_context(session->session, epoch_);
       }
       watch();
-      gateway_.list_ready(steady_ns(), ready_);
-      ready = !ready_.empty();
+      ready = gateway_.any_ready(steady_ns());
     }
     if (ready) server.wake();
     const std::int64_t wait_ns = std::min(kLongestNs, due_ns - steady_ns());

@@ -76,7 +76,6 @@ class Service final : public WebServer::Handler {
   ServiceNotifier notifier_;
   Epoch epoch_ = 0;                  // that the log names
   std::int64_t quiet_until_ns_ = 0;  // about descriptors
-  std::vector<ViewerId> ready_;      // kept to reuse its memory
   std::int64_t next_figures_ns_ = 0;
   metrics::ClientWatch client_watch_;
   // Not guarded by the lock.
