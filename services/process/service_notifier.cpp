@@ -32,6 +32,11 @@ ServiceNotifier::~ServiceNotifier() {
   if (ready_) send("STOPPING=1");
 }
 
+void ServiceNotifier::starting(const std::string& status, std::int64_t now_ns) {
+  if (ready_ || !wants_status(now_ns)) return;
+  send("EXTEND_TIMEOUT_USEC=" + std::to_string(kStartExtensionNs / 1000) + "\nSTATUS=" + status);
+}
+
 void ServiceNotifier::alive(std::int64_t now_ns) {
   if (!ready_) {
     ready_ = true;

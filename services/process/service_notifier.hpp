@@ -11,6 +11,7 @@ namespace tandem {
 class ServiceNotifier {
  public:
   static constexpr std::int64_t kStatusPeriodNs = 5'000'000'000;
+  static constexpr std::int64_t kStartExtensionNs = 30'000'000'000;
 
   ServiceNotifier();
   ~ServiceNotifier();  ///< says that the program stops, if it was ready
@@ -19,6 +20,9 @@ class ServiceNotifier {
   ServiceNotifier(ServiceNotifier&&) = delete;
   ServiceNotifier& operator=(ServiceNotifier&&) = delete;
 
+  /// Call it often while the program waits for something that it needs, before the first alive(): systemd
+  /// then goes on waiting for the start. `status` is the line for `systemctl status`.
+  void starting(const std::string& status, std::int64_t now_ns);
   /// Call it in the program's loop once it serves. The first call says that it is ready. The others say that
   /// it is alive, four times in the unit's WatchdogSec=, after which systemd restarts a program that hangs.
   /// `now_ns` is a steady clock.

@@ -378,6 +378,14 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   return {End::Next::kExit, exit_code};
 }
 
+Result<host::HostConfig> plan(const ServedWorld& served, const Options& options) {
+  auto config =
+      planning::plan_server(served.world, static_cast<const planning::Wishes&>(options.choice), options);
+  if (config || served.door == nullptr) return config;
+  return fail(config.error().code, fmt::format("the engine {} cannot be served: {}",
+                                               served.door->hello().name, config.error().message));
+}
+
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
 tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
                                            Metrics& metrics, std::int64_t ran_ns, const End& end,
@@ -398,19 +406,20 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
                  static_cast<double>(*wait_ns) * 1e-9);
     const std::int64_t until_ns = steady_ns() + *wait_ns;
-    const auto idle = [&] {
+    const auto idle = [&service, &metrics](bool engine_there) {
       service.watch(steady_ns());
-      metrics.miss_engine(steady_ns());
+      if (!engine_there) metrics.miss_engine(steady_ns());
     };
     while (steady_ns() < until_ns && !stop) {
-      idle();
+      idle(false);
       std::this_thread::sleep_for(std::chrono::milliseconds{20});
     }
     if (stop) return tl::unexpected(0);
     auto served = open_world(options, stop, idle);
-    if (served) return std::move(*served);
+    const auto planned = served ? plan(*served, options) : Result<host::HostConfig>();
+    if (served && planned) return std::move(*served);
     if (stop) return tl::unexpected(0);
-    report_error(served.error().error, 1);
+    report_error(served ? planned.error() : served.error().error, 1);
     ran_ns = 0;
   }
 }
@@ -418,7 +427,11 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
 }  // namespace
 
 int run_daemon(Options options, SignalWatch& signals) {
-  auto opened_world = open_world(options, signals.stop());
+  Metrics metrics;
+  Service service;
+  auto opened_world = open_world(options, signals.stop(), [&service](bool engine_there) {
+    engine_there ? service.watch(steady_ns()) : service.await_engine(steady_ns());
+  });
   if (!opened_world) {
     const NotOpened& why = opened_world.error();
     if (signals.stop()) return signals.finish(0);
@@ -430,16 +443,13 @@ int run_daemon(Options options, SignalWatch& signals) {
     return report_error(named.error(), 2);
   if (const auto good = check_identity(options); !good) return report_error(good.error(), 2);
   HashLog hashes;
-  Metrics metrics;
-  Service service;
   Restarts restarts;
   bool stands_by = options.standby;
   const engine::door::Door* door = nullptr;  // that the metrics follow
   const Stage stage{options, served, stands_by, hashes, metrics, service, signals};
   for (bool first = true;; first = false) {
     const std::int64_t began_ns = steady_ns();
-    auto config =
-        planning::plan_server(served.world, static_cast<const planning::Wishes&>(options.choice), options);
+    auto config = plan(served, options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
     if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));

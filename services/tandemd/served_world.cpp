@@ -44,7 +44,7 @@ tl::unexpected<NotOpened> refuse(Error error, std::string field, int exit_code) 
 }
 
 tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop,
-                                                     const std::function<void()>& idle) {
+                                                     const std::function<void(bool)>& idle) {
   engine::door::Options door{.way = *options.engine};
   door.stop = &stop;
   door.idle = idle;
@@ -106,7 +106,7 @@ planning::World world_of(const Hello& hello) {
 }
 
 tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop,
-                                                const std::function<void()>& idle) {
+                                                const std::function<void(bool)>& idle) {
   if (options.engine) return wait_for_engine(options, stop, idle);
   auto scene = scenes::load_scene(options.scene);
   if (!scene) return refuse(scene.error(), "scene", 2);

@@ -31,9 +31,11 @@ struct NotOpened {
   int exit_code = 2;
 };
 
-/// Loads the scene, or waits for the engine; `stop` ends the wait, and `idle` is called meanwhile.
-[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(
-    const Options& options, const std::atomic<bool>& stop, const std::function<void()>& idle = [] {});
+/// Loads the scene, or waits for the engine; `stop` ends the wait, and `idle` is called meanwhile, and later
+/// as engine::door::Options says.
+[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(const Options& options,
+                                                              const std::atomic<bool>& stop,
+                                                              const std::function<void(bool)>& idle);
 
 /// What the planner needs to know of an engine that said `hello`.
 [[nodiscard]] planning::World world_of(const engine::door::Hello& hello);

@@ -19,7 +19,9 @@ class Service {
   /// Call it in every turn of the loop.
   void watch(const host::Host& host, std::int64_t now_ns);
   void watch(const standby::Standby& standby, const std::string& session, std::int64_t now_ns);
-  /// The same, while another engine is awaited.
+  /// The same, while the first engine is awaited.
+  void await_engine(std::int64_t now_ns) { notifier_.starting("waits for its engine", now_ns); }
+  /// The same, while another engine is awaited, or the engine saves or loads.
   void watch(std::int64_t now_ns) { notifier_.alive(now_ns); }
   /// The same. If the configuration is to be read again, changes what can change live, also in `options`, and
   /// logs the fields that changed and those that cannot, or what is wrong.

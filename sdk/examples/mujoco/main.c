@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <mujoco/mujoco.h>
+#include <sys/stat.h>
 
 enum { MOST = 4096 };
 
@@ -73,7 +74,9 @@ static void act(void) {
     if (mju_dist3(d->xpos + 3 * body[s], v) < v[3]) mju_addTo3(d->qvel + m->jnt_dofadr[m->body_jntadr[body[s]]], v + 4);
 }
 
-/* All that decides the next steps. */
+/* All that decides the next steps: positions, velocities, where the solver begins, gravity. */
+static size_t state_bytes(void) { return sizeof(mjtNum) * (size_t)(m->nq + 2 * m->nv + 3); }
+
 static uint64_t transfer(const char* path, int save) {
   FILE* const file = fopen(path, save ? "wb" : "rb");
   mjtNum* const part[4] = {d->qpos, d->qvel, d->qacc_warmstart, m->opt.gravity};
@@ -115,12 +118,15 @@ int main(int argc, char** argv) {
       case TANDEM_ENGINE_SAVE:
         tandem_engine_saved(&engine, transfer(engine.path, 1));
         break;
-      case TANDEM_ENGINE_LOAD:
-        transfer(engine.path, 0);
+      case TANDEM_ENGINE_LOAD: {
+        struct stat file;
+        const int ours = stat(engine.path, &file) == 0 && (size_t)file.st_size == state_bytes();
+        if (ours) transfer(engine.path, 0);
         mj_forward(m, d);
         fill();
-        tandem_engine_loaded(&engine, 1);
+        tandem_engine_loaded(&engine, ours);
         break;
+      }
       default:
         if (engine.error[0] != 0) fprintf(stderr, "%s\n", engine.error);
         return tandem_engine_close(&engine);

@@ -30,7 +30,7 @@
 #define TANDEM_ENGINE_H
 
 #ifndef _GNU_SOURCE
-#define _GNU_SOURCE /* MSG_CMSG_CLOEXEC; include this header first, or define it yourself */
+#define _GNU_SOURCE /* sockets with names of hosts, in strict C */
 #endif
 #include <errno.h>
 #include <netdb.h>
@@ -44,6 +44,9 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
+#ifndef AI_PASSIVE
+#error "In strict C, include tandem/engine.h before other headers, or compile with -D_GNU_SOURCE."
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -138,10 +141,7 @@ static inline int tandem_engine_receive(tandem_engine* e, void* to, size_t bytes
     memset(&message, 0, sizeof message);
     part.iov_base = TANDEM_ENGINE_AS(unsigned char*, to) + held, part.iov_len = bytes - held;
     message.msg_iov = &part, message.msg_iovlen = 1;
-    if (passed != NULL) {
-      message.msg_control = control.space;
-      message.msg_controllen = sizeof control.space;
-    }
+    if (passed != NULL) message.msg_control = control.space, message.msg_controllen = sizeof control.space;
     got = recvmsg(e->fd, &message, MSG_CMSG_CLOEXEC);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return tandem_engine_fail(e, "the server is gone");

@@ -2,25 +2,21 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <optional>
-#include <system_error>
 #include <utility>
 
 #include "services/engine/door/callers.hpp"
 #include "services/engine/door/channel.hpp"
 #include "services/engine/door/columns.hpp"
 #include "services/engine/door/conversation.hpp"
+#include "services/engine/door/files.hpp"
+#include "services/engine/door/inputs.hpp"
 #include "services/engine/door/process.hpp"
 #include "services/engine/door/segment.hpp"
 
@@ -30,42 +26,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using State = Conversation::State;
 
+/// After this time without an answer the engine's process is looked at.
+constexpr std::chrono::milliseconds kSeemsStill{300};
+
 std::chrono::nanoseconds seconds(double s) { return std::chrono::nanoseconds(std::llround(s * 1e9)); }
-
-/// A folder of this user alone, for a socket and for checkpoints; removed at the end.
-class Folder {
- public:
-  Folder() = default;
-  ~Folder() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  Folder(Folder&&) = delete;
-  Folder& operator=(Folder&&) = delete;
-
-  Result<std::string> file(const std::string& name) {
-    if (path_.empty()) {
-      std::error_code why;
-      std::string path = (std::filesystem::temp_directory_path(why) / "tandem-door-XXXXXX").string();
-      if (why || ::mkdtemp(path.data()) == nullptr)
-        return fail(ErrorCode::kIo, fmt::format("{}: no folder can be made there", path));
-      path_ = path;
-    }
-    return path_ + "/" + name;
-  }
-
- private:
-  std::string path_;
-};
-
-bool write_file(const std::string& path, std::span<const std::byte> bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()),  // NOLINT: as write() wants it
-            static_cast<std::streamsize>(bytes.size()));
-  return static_cast<bool>(out.flush());
-}
 
 // What a checkpoint holds in front of the engine's own bytes.
 struct Saved {
@@ -99,7 +63,9 @@ class Session final : public Door {
   [[nodiscard]] double dt_s() const override { return hello().dt_s; }
   [[nodiscard]] Vec3 gravity() const override { return gravity_; }
   [[nodiscard]] double damping_per_s() const override { return hello().damping_per_s; }
-  [[nodiscard]] Classification classify(const Input& input) const override;
+  [[nodiscard]] Classification classify(const Input& input) const override {
+    return door::classify(hello(), input);
+  }
   void apply(const Input& input) override;
   void step() override;
   void begin_step() override;
@@ -125,8 +91,6 @@ class Session final : public Door {
   void attend();
   void turn_away_another();
   void save_into(std::vector<std::byte>& out);
-  /// Appends what the engine wrote.
-  bool read_saved(const std::string& file, std::vector<std::byte>& out);
   void read_slot(bool with_events);
   /// Waits until the question is answered. False: failure_.
   bool wait_for_answer(std::chrono::nanoseconds limit);
@@ -263,7 +227,7 @@ Result<void> Session::wait_for_engine() {
   while (!channel_.open()) {
     if (options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed))
       return fail(ErrorCode::kTimeout, "stopped before an engine came");
-    options_.idle();
+    options_.idle(false);
     answer_door();
     if (failure_) return tl::unexpected(*failure_);
     if (channel_.open()) break;
@@ -340,7 +304,12 @@ void Session::attend() {
   if (channel_.open()) turn_away_another();
   if (!busy() || !columns_) return;
   const auto waited = attended_ - asked_;
-  if (!told_stopped_ && waited > std::chrono::milliseconds{300} && is_stopped(channel_.peer())) {
+  // A hangup is seen when the last copy of its socket closes, and what it left behind may hold one.
+  if (channel_.open() && process_.started() && waited > kSeemsStill && is_gone(channel_.peer())) {
+    if (const std::string how = process_.ended(); !how.empty())
+      return shut({ErrorCode::kIo, fmt::format("the engine ended with {} {}", how, talk_.where())});
+  }
+  if (!told_stopped_ && waited > kSeemsStill && is_stopped(channel_.peer())) {
     told_stopped_ = true;
     options_.log(fmt::format("the engine, process {}, is stopped {}", channel_.peer(), talk_.where()), true);
   }
@@ -369,50 +338,6 @@ void Session::turn_away_another() {
   if (!told.empty()) options_.log(told, true);
 }
 
-Classification Session::classify(const Input& input) const {
-  const auto refuse = [](std::string why) {
-    Classification refused;
-    refused.reason = std::move(why);
-    return refused;
-  };
-  const auto length = [&input](std::size_t first) {
-    double squared = 0;
-    for (std::size_t i = first; i < first + 3; ++i) squared += input.values[i] * input.values[i];
-    return std::sqrt(squared);
-  };
-  const bool finite = std::ranges::all_of(input.values, [](double v) { return std::isfinite(v); });
-  if (!finite) return refuse("a value is not finite");
-  Classification effect;
-  switch (static_cast<InputKind>(input.kind)) {
-    case InputKind::kGravity:
-      if (!hello().most_gravity) return refuse(hello().name + " takes no gravity");
-      if (input.values.size() != 3 || !input.bytes.empty()) return refuse("gravity takes 3 values");
-      if (!(length(0) <= *hello().most_gravity))
-        return refuse(fmt::format("gravity is at most {:g}", *hello().most_gravity));
-      effect.effect = Classification::Effect::kScheduled;
-      std::copy_n(input.values.begin(), 3, effect.gravity.begin());
-      effect.damping_per_s = hello().damping_per_s;
-      return effect;
-    case InputKind::kPush:
-      if (!hello().most_push) return refuse(hello().name + " takes no pushes");
-      if (input.values.size() != 7 || !input.bytes.empty()) return refuse("a push takes 7 values");
-      if (!(input.values[3] > 0)) return refuse("a push's radius must be above 0");
-      if (!(length(4) <= *hello().most_push))
-        return refuse(fmt::format("a push is at most {:g}", *hello().most_push));
-      effect.effect = Classification::Effect::kImmediate;
-      return effect;
-    case InputKind::kApplication:
-      if (!hello().most_bytes) return refuse(hello().name + " takes no application bytes");
-      if (!input.values.empty()) return refuse("an application's input has bytes only");
-      if (input.bytes.size() > *hello().most_bytes)
-        return refuse(fmt::format("an application's input has at most {} bytes", *hello().most_bytes));
-      effect.effect = Classification::Effect::kImmediate;
-      return effect;
-    default:
-      return refuse(fmt::format("{} takes no input of kind {}", hello().name, input.kind));
-  }
-}
-
 void Session::apply(const Input& input) {
   if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity))
     std::copy_n(input.values.begin(), 3, gravity_.begin());
@@ -434,13 +359,12 @@ bool Session::step_ready() {
   if (failure_ || !busy()) return true;
   const Clock::time_point now = Clock::now();
   if (now - attended_ > std::chrono::milliseconds{20}) attend();
-  if (now - asked_ > seconds(hello().step_limit_s)) {
+  if (!failure_ && now - asked_ > seconds(hello().step_limit_s)) {
     shut({ErrorCode::kTimeout,
           fmt::format("the engine did not answer for {:g} s {}{}", hello().step_limit_s, talk_.where(),
                       is_stopped(channel_.peer()) ? ": it is stopped" : "")});
-    return true;
   }
-  return false;
+  return failure_.has_value();
 }
 
 void Session::step() {
@@ -461,6 +385,7 @@ bool Session::wait_for_answer(std::chrono::nanoseconds limit) {
   for (;;) {
     pump();
     attend();
+    options_.idle(asked != State::kHello && asked != State::kStart);
     if (failure_) return false;
     if (talk_.state() != asked) return true;
     if (Clock::now() - asked_ > limit) {
@@ -490,37 +415,21 @@ void Session::save_into(std::vector<std::byte>& out) {
   append(channel_.out(), Type::kSave, file);
   asked_ = Clock::now();
   const bool saved = wait_for_answer(seconds(options_.start_limit_s)) && talk_.saved_bytes() > 0;
+  channel_.reader().set_limit(talk_.limit());
   if (saved) {
     const Saved head{.frame = frame_, .gravity = gravity_};
     out.resize(sizeof head);
     std::memcpy(out.data(), &head, sizeof head);
     if (callers_) {
       out.insert(out.end(), talk_.saved().begin(), talk_.saved().end());
-    } else if (!read_saved(file, out)) {
+    } else if (const auto read = append_saved(file, talk_.saved_bytes(), out); !read) {
       out.clear();
+      options_.log(fmt::format("the engine says that it saved {} bytes of frame {}, {}: no checkpoint",
+                               talk_.saved_bytes(), frame_, read.error().message),
+                   true);
     }
   }
-  channel_.reader().set_limit(talk_.limit());
-}
-
-bool Session::read_saved(const std::string& file, std::vector<std::byte>& out) {
-  std::ifstream in(file, std::ios::binary | std::ios::ate);
-  const auto bytes = in ? static_cast<std::uint64_t>(in.tellg()) : 0;
-  if (!in || bytes != talk_.saved_bytes()) {
-    options_.log(
-        fmt::format("the engine says that it saved {} bytes of frame {}, but there are {}: no checkpoint",
-                    talk_.saved_bytes(), frame_, bytes),
-        true);
-    return false;
-  }
-  const std::size_t begin = out.size();
-  out.resize(begin + bytes);
-  in.seekg(0);
-  in.read(reinterpret_cast<char*>(out.data()) + begin,  // NOLINT: as read() wants it
-          static_cast<std::streamsize>(bytes));
-  std::error_code ignored;
-  std::filesystem::remove(file, ignored);
-  return static_cast<bool>(in);
+  if (!file.empty()) remove_file(file);
 }
 
 bool Session::load(std::span<const std::byte> bytes) {
@@ -545,8 +454,7 @@ bool Session::load(std::span<const std::byte> bytes) {
   talk_.ask_load(head.frame);
   asked_ = Clock::now();
   const bool loaded = wait_for_answer(seconds(options_.start_limit_s)) && talk_.loaded();
-  std::error_code ignored;
-  if (!file.empty()) std::filesystem::remove(file, ignored);
+  if (!file.empty()) remove_file(file);
   if (!loaded) return false;
   frame_ = head.frame;
   gravity_ = head.gravity;
@@ -567,9 +475,11 @@ void Session::shut(const Error& error) {
       wait_a_while(std::chrono::milliseconds{5});
     }
     attend();
-    if (const std::string how = process_.ended(); !how.empty()) line += fmt::format(" ({})", how);
+    if (const std::string how = process_.ended(); !how.empty() && line.find(how) == std::string::npos)
+      line += fmt::format(" ({})", how);
     // An engine may repeat what it was told.
-    if (!process_.last_lines().empty() && process_.last_lines().back() != error.message)
+    if (!process_.last_lines().empty() &&
+        process_.last_lines().back().find(error.message) == std::string::npos)
       line += fmt::format("; its last words: {}", process_.last_lines().back());
   }
   failure_ = Error{error.code, std::move(line)};
@@ -583,7 +493,7 @@ void Session::end() {
     static_cast<void>(channel_.flush());
   }
   channel_.close();
-  process_.end(failure_ ? 0 : 1000);
+  for (const std::string& line : process_.end(failure_ ? 0 : 1000)) options_.log("engine: " + line, false);
 }
 
 }  // namespace

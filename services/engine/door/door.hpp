@@ -37,8 +37,9 @@ struct Options {
   /// "engine: ".
   std::function<void(const std::string& line, bool warning)> log = [](const std::string&, bool) {};
   const std::atomic<bool>* stop = nullptr;  ///< ends a wait for an engine
-  /// Called at least every 50 ms while an engine is awaited, which may take for ever.
-  std::function<void()> idle = [] {};
+  /// Called at least every 50 ms while the caller waits: for an engine, which may take for ever
+  /// (`engine_there` is false), or until it has saved or loaded.
+  std::function<void(bool engine_there)> idle = [](bool) {};
 };
 
 /// How an engine does.

@@ -37,6 +37,19 @@ constexpr std::size_t kMostLine = 500;
   ::_exit(127);
 }
 
+/// The letter of proc(5), such as T; 0: not known.
+char state_of(pid_t process) {
+  if (process <= 0) return 0;
+  std::FILE* const file = std::fopen(fmt::format("/proc/{}/stat", process).c_str(), "re");
+  if (file == nullptr) return 0;
+  std::array<char, 512> text{};
+  const std::size_t length = std::fread(text.data(), 1, text.size() - 1, file);
+  std::fclose(file);
+  const std::string_view stat(text.data(), length);
+  const std::size_t name_end = stat.rfind(')');  // the name may hold anything
+  return name_end == std::string_view::npos || name_end + 2 >= stat.size() ? '\0' : stat[name_end + 2];
+}
+
 void sleep_ms(long ms) {
   const timespec pause{.tv_sec = 0, .tv_nsec = ms * 1'000'000};
   ::nanosleep(&pause, nullptr);
@@ -119,27 +132,33 @@ std::string Process::ended() {
   return fmt::format("{} {}", how.si_code == CLD_EXITED ? "exit code" : "signal", how.si_status);
 }
 
-void Process::end(int patience_ms) {
-  if (id_ <= 0) return;
-  for (int waited = 0; waited < patience_ms && ended().empty(); waited += 5) sleep_ms(5);
+std::vector<std::string> Process::end(int patience_ms) {
+  std::vector<std::string> lines;
+  if (id_ <= 0) return lines;
+  const auto take = [this, &lines] {
+    for (std::string& line : read()) lines.push_back(std::move(line));
+  };
+  for (int waited = 0; waited < patience_ms && ended().empty(); waited += 5) {
+    take();  // else it might wait for room in the pipe
+    sleep_ms(5);
+  }
   ::kill(-id_, SIGKILL);  // also what its first process left behind
   while (::waitpid(id_, nullptr, 0) < 0 && errno == EINTR) {
   }
-  static_cast<void>(read());
+  take();
   id_ = 0;
+  return lines;
 }
 
 bool is_stopped(pid_t process) {
+  const char state = state_of(process);
+  return state == 'T' || state == 't';
+}
+
+bool is_gone(pid_t process) {
   if (process <= 0) return false;
-  std::FILE* const file = std::fopen(fmt::format("/proc/{}/stat", process).c_str(), "re");
-  if (file == nullptr) return false;
-  std::array<char, 512> text{};
-  const std::size_t length = std::fread(text.data(), 1, text.size() - 1, file);
-  std::fclose(file);
-  const std::string_view stat(text.data(), length);
-  const std::size_t name_end = stat.rfind(')');  // the name may hold anything
-  if (name_end == std::string_view::npos || name_end + 2 >= stat.size()) return false;
-  return stat[name_end + 2] == 'T' || stat[name_end + 2] == 't';
+  const char state = state_of(process);
+  return state == 'Z' || state == 'X' || (state == 0 && ::kill(process, 0) != 0 && errno == ESRCH);
 }
 
 }  // namespace tandem::engine::door

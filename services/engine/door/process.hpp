@@ -38,8 +38,8 @@ class Process {
   [[nodiscard]] const std::deque<std::string>& last_lines() const { return last_; }
   /// How it ended, such as "exit code 1"; empty while it runs.
   [[nodiscard]] std::string ended();
-  /// Waits at most `patience_ms` for its end, then kills its group.
-  void end(int patience_ms);
+  /// Waits at most `patience_ms` for its end, then kills its group. Returns what it still wrote.
+  std::vector<std::string> end(int patience_ms);
 
  private:
   pid_t id_ = 0;
@@ -50,5 +50,7 @@ class Process {
 
 /// True if a process of this machine is stopped, by a signal or a debugger.
 [[nodiscard]] bool is_stopped(pid_t process);
+/// True if there is no such process any more, or it has ended and nobody has asked how.
+[[nodiscard]] bool is_gone(pid_t process);
 
 }  // namespace tandem::engine::door

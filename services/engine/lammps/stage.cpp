@@ -301,10 +301,10 @@ void Stage::load(const std::string& path) {
     const std::vector<std::uint8_t> bytes = read_file(path);
     SavedHead head{.magic = 0};
     if (bytes.size() >= sizeof head) std::memcpy(&head, bytes.data(), sizeof head);
-    const bool fits = head.magic == kMagic && head.fingerprint == script_.fingerprint() &&
-                      head.capacity == slots_->capacity() && head.slot_bytes == head.capacity * 9 &&
-                      head.script_bytes <= bytes.size() &&
-                      head.restart_bytes == bytes.size() - sizeof head - head.script_bytes - head.slot_bytes;
+    const bool ours = head.magic == kMagic && head.fingerprint == script_.fingerprint() &&
+                      head.capacity == slots_->capacity() && head.slot_bytes == head.capacity * 9;
+    const bool fits = ours && head.script_bytes <= bytes.size() && head.restart_bytes <= bytes.size() &&
+                      sizeof head + head.script_bytes + head.slot_bytes + head.restart_bytes == bytes.size();
     const std::span<const std::uint8_t> all(bytes);
     if (fits && slots_->load(all.subspan(sizeof head + head.script_bytes, head.slot_bytes))) {
       script.assign(all.begin() + sizeof head,

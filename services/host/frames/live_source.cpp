@@ -311,9 +311,12 @@ void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lin
   noted_mishaps_ = now;
   const std::string& last = mirror_.last_removed();
   const std::string told = last.empty() ? last : "; the last one that could not be sent: " + last;
+  const auto slowed = mirror_.last_slowed();
+  const std::string turned =
+      slowed ? fmt::format("; the last one that turned too fast: slot {}", *slowed) : "";
   lines.push_back(
-      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}{}",
-                  now.removed, now.clamped, who, told));
+      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}{}{}",
+                  now.removed, now.clamped, who, told, turned));
 }
 
 std::string LiveSource::lost_after(std::uint64_t lost, std::int64_t now_ns) {

@@ -101,7 +101,10 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
     }
     const double unit = kQuaternionOne / std::sqrt(norm);
     const double kept = std::min(1.0, kMostSpin / std::sqrt(std::max(speed, 1.0)));
-    mishaps_.clamped += kept < 1 ? 1 : 0;
+    if (kept < 1) {
+      ++mishaps_.clamped;
+      last_slowed_ = s;
+    }
     for (std::size_t i = 0; i < q.size(); ++i)
       target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
     // Rounds towards zero, so that the result stays within the limit.
@@ -119,8 +122,8 @@ void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
   } else if (target_.groups().orientation) {
     double norm = 0;
     for (const auto& column : bodies.orientation) norm += double{column[slot]} * double{column[slot]};
-    why = fmt::format("its orientation has norm {:.3g}, or its angular velocity is not a number",
-                      std::sqrt(norm));
+    why = std::abs(norm - 1) <= kNormSlack ? "its angular velocity is not a number"
+                                           : fmt::format("its orientation has norm {:.3g}", std::sqrt(norm));
   }
   for (std::size_t i = kPositionChannels; i-- > 0;) {
     const double p = double{bodies.position[i][slot]}, v = double{bodies.velocity[i][slot]};

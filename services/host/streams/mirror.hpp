@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -58,6 +59,8 @@ class Mirror {
   /// The body that was removed last and the reason, such as "slot 3 (its x is not a number)"; empty if there
   /// is none.
   [[nodiscard]] const std::string& last_removed() const { return last_removed_; }
+  /// The body whose turn was slowed last; empty if there is none.
+  [[nodiscard]] std::optional<Slot> last_slowed() const { return last_slowed_; }
   /// Repairs since the start: bodies removed, and turns slowed, each counted once a frame.
   [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
 
@@ -81,6 +84,7 @@ class Mirror {
   std::vector<LifecycleRecord> lifecycle_;
   engine::Mishaps mishaps_;
   std::string last_removed_;
+  std::optional<Slot> last_slowed_;
 };
 
 }  // namespace tandem::host

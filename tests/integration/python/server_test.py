@@ -2,6 +2,7 @@
 """Simulations in numpy that tandemd streams: tandem.Server, the example, and an engine that dies."""
 
 import contextlib
+import importlib.util
 import os
 import pathlib
 import re
@@ -119,6 +120,17 @@ class Server(unittest.TestCase):
             process.send_signal(signal.SIGINT)
             process.wait(stage.LIMIT_S)
             self.assertIsNone(answers(url), "the gateway ended with it")
+
+    @unittest.skipUnless(importlib.util.find_spec("lammps"), "python3-lammps is not installed")
+    def test_lammps_in_python_falls_and_is_tilted(self):
+        command = [sys.executable, "-B", EXAMPLES / "grains.py", *stage.common("grains")]
+        with running(self.folder, "grains", command) as (process, text), tandem.Client("grains", domain=stage.DOMAIN) as client:
+            client.wait_until_playing(stage.LIMIT_S)
+            start = client.sample().positions.mean(axis=0)
+            wait_for("the fall", lambda: client.sample().positions[:, 2].mean() < start[2] - 1)
+            client.send_gravity((20, 0, -5))
+            wait_for("the tilt", lambda: client.sample().positions[:, 0].mean() > start[0] + 0.3)
+            self.assertIsNone(process.poll(), text())
 
     def play_counter(self, *options):
         script = pathlib.Path(self.folder) / "counter.py"

@@ -92,6 +92,13 @@ class Daemons(unittest.TestCase):
     def test_a_server_that_waits_for_participants_is_ready(self):
         self.assertIn("waits for participants", self.check_life(self.server("--wait-for", 3)))
 
+    def test_a_server_that_waits_for_its_engine_asks_for_more_time(self):
+        service = self.start(OPTIONS.tandemd, "--engine-socket", self.folder / "door", "--session", "arena")
+        self.assertIn("waits for its engine", service.hear("EXTEND_TIMEOUT_USEC=", 2))
+        self.assertNotIn("READY=1", service.said)
+        service.process.send_signal(signal.SIGTERM)
+        self.assertEqual(service.process.wait(LIMIT_S), 0)
+
     def test_a_server_that_hangs_is_silent(self):
         service = self.server()
         service.hear("WATCHDOG=1", 2)

@@ -1,11 +1,12 @@
 // Engines for tests of the door, good and bad ones. It speaks through tandem/engine.h alone.
 //
-//     door_engine particles SCENE BODIES SEED [LINE ...]   engine/particles; LINE: more lines of HELLO, '='
-//     for blanks door_engine small MODE [FRAME]                       17 bodies; from FRAME on it misbehaves
-//     as MODE says
+// door_engine particles SCENE BODIES SEED [LINE ...]: engine/particles; LINE: more lines of HELLO, '=' for
+// blanks.
+// door_engine small MODE [FRAME]: 17 bodies; from FRAME on it misbehaves as MODE says.
 #include "tandem/engine.h"
 
 #include <signal.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <chrono>
@@ -168,6 +169,8 @@ bool misbehave(std::string_view mode) {
     std::fprintf(stderr, "the last word\n");
     std::abort();
   }
+  if (mode == "orphan" && ::fork() != 0) std::_Exit(7);  // what is left behind holds the socket
+  if (mode == "orphan") return ::sleep(20) == 0;
   if (mode == "hang") return ::pause() != 0;
   if (mode == "slow") return ::usleep(300'000) != 0;
   if (mode == "stop") return ::raise(SIGSTOP) != 0;
@@ -239,11 +242,25 @@ bool misbehave(std::string_view mode) {
   }
   if (mode == "nan") value("position", 1, 3) = std::numeric_limits<float>::quiet_NaN();
   if (mode == "far") value("position", 2, 4) = 1e30F;
+  if (mode == "turn") value("angular_velocity", 0, 2) = std::numeric_limits<float>::quiet_NaN();
   if (mode == "norm") value("orientation", 0, 5) = 5;
   if (mode == "type") static_cast<std::uint16_t*>(tandem_engine_column(&engine, "type", 0))[6] = 60000;
   if (mode == "dead") static_cast<std::uint8_t*>(tandem_engine_column(&engine, "alive", 0))[7] = 0;
   if (mode == "punch") ::madvise(engine.memory, engine.memory_bytes, MADV_REMOVE);
   return false;
+}
+
+/// Answers a SAVE in a wrong way.
+void save_badly(std::string_view mode) {
+  constexpr std::uint64_t kMuch = 1ULL << 40U;
+  std::ofstream(engine.path) << "12345678";
+  if (mode == "save-much" && ::truncate(engine.path, static_cast<off_t>(kMuch)) == 0) {
+    tandem_engine_saved(&engine, kMuch);
+  } else if (mode == "save-pipe" && ::unlink(engine.path) == 0 && ::mkfifo(engine.path, 0600) == 0) {
+    tandem_engine_saved(&engine, 8);
+  } else {
+    tandem_engine_saved(&engine, mode == "save-none" ? 0 : 9);
+  }
 }
 
 int small(const std::string& mode, std::uint64_t from) {
@@ -252,6 +269,7 @@ int small(const std::string& mode, std::uint64_t from) {
   std::string hello = "name small\ncapacity 17\ndt 0.03125\nturns 1\nstep_limit 1\ninput application 8\n";
   if (mode == "capacity") hello = "name small\ncapacity 99999999\ndt 0.03125\n";
   if (mode == "shared") hello += "memory shared\n";
+  if (mode.starts_with("save")) hello += "save 1\n";
   if (mode == "no-dt") hello = "name small\ncapacity 17\n";
   if (tandem_engine_open(&engine, hello.c_str()) != 0) return complain();
   if (mode == "no-start") return ::pause();
@@ -264,6 +282,9 @@ int small(const std::string& mode, std::uint64_t from) {
         if (engine.frame >= from && misbehave(mode)) break;
         if (engine.frame < from) fill(engine.frame);
         tandem_engine_done(&engine, 0);
+        break;
+      case TANDEM_ENGINE_SAVE:
+        save_badly(mode);
         break;
       default:
         return complain();

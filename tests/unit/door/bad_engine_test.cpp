@@ -20,7 +20,8 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 
 Result<std::unique_ptr<Door>> open_small(const std::string& mode, std::vector<std::string>* lines = nullptr) {
-  Options options{.way = {.command = std::string("exec ") + DOOR_ENGINE + " small " + mode}};
+  Options options{.way = {.command = std::string(mode.find(';') == std::string::npos ? "exec " : "") +
+                                     DOOR_ENGINE + " small " + mode}};
   options.connect_limit_s = 1;
   options.start_limit_s = 1;
   if (lines != nullptr) options.log = [lines](const std::string& line, bool) { lines->push_back(line); };
@@ -46,6 +47,7 @@ TEST_P(BadEngine, GetsOneClearLine) { EXPECT_THAT(failure_of(GetParam().mode), H
 INSTANTIATE_TEST_SUITE_P(Modes, BadEngine,
                          ::testing::Values(Case{"exit", "hung up in frame 3 (exit code 3)"},
                                            Case{"crash", "its last words: the last word"},
+                                           Case{"orphan", "the engine ended with exit code 7 in frame 3"},
                                            Case{"hang", "did not answer for 1 s in frame 3"},
                                            Case{"stop", "in frame 3: it is stopped"},
                                            Case{"wrong-frame", "DONE is of frame 10 in frame 3"},
@@ -88,9 +90,30 @@ std::string mirrored(const std::string& mode) {
 TEST(BadBody, IsHiddenAndNamedWithSlotAndColumn) {
   EXPECT_EQ(mirrored("nan"), "slot 3 (its y is not a number)");
   EXPECT_THAT(mirrored("far"), HasSubstr("slot 4 (its z is 1e+30"));
-  EXPECT_THAT(mirrored("norm"), HasSubstr("slot 5 (its orientation has norm 5"));
+  EXPECT_EQ(mirrored("norm"), "slot 5 (its orientation has norm 5.1)");
+  EXPECT_EQ(mirrored("turn"), "slot 2 (its angular velocity is not a number)");
   EXPECT_THAT(mirrored("type"), HasSubstr("slot 6 (its type is 60000"));
   EXPECT_EQ(mirrored("dead"), "");
+}
+
+// A checkpoint less is no reason to end a session.
+TEST(BadSave, IsNoCheckpointAndTheSessionGoesOn) {
+  const auto said = [](const std::string& mode) {
+    std::vector<std::string> lines;
+    auto door = open_small(mode, &lines);
+    EXPECT_TRUE(door.has_value()) << door.error().message;
+    (*door)->step();
+    std::vector<std::byte> saved;
+    (*door)->save(saved);
+    EXPECT_TRUE(saved.empty()) << mode;
+    (*door)->step();
+    EXPECT_EQ((*door)->failure(), "") << mode;
+    return lines.empty() ? std::string() : lines.front();
+  };
+  EXPECT_THAT(said("save-lie"), HasSubstr("says that it saved 9 bytes of frame 1, but there are 8"));
+  EXPECT_THAT(said("save-much"), HasSubstr("saved 1099511627776 bytes of frame 1, more than the 1073741824"));
+  EXPECT_THAT(said("save-pipe"), HasSubstr("but there is no file"));
+  EXPECT_EQ(said("save-none"), "");
 }
 
 TEST(Door, InputsAreRefusedByWhatTheEngineSaid) {
@@ -125,6 +148,16 @@ TEST(Door, SaysThatAnEngineIsStoppedAndGoesOnWithIt) {
   wait_until([&] { return ready = ready || (*door)->step_ready(); });
   EXPECT_TRUE(ready);
   EXPECT_EQ((*door)->failure(), "");
+}
+
+TEST(Door, WhatAnEngineSaysAtItsEndIsInTheLog) {
+  std::vector<std::string> lines;
+  {
+    auto door = open_small("good; echo all is said", &lines);
+    ASSERT_TRUE(door.has_value()) << door.error().message;
+    (*door)->step();
+  }
+  EXPECT_THAT(lines, Contains("engine: all is said"));
 }
 
 TEST(Door, TheMemoryCannotShrinkOrGrow) {

@@ -114,6 +114,7 @@ TEST_F(MirrorTurnTest, TooFastATurnIsSlowedAboutItsAxis) {
   EXPECT_NEAR(mirror.target().w(1)[2], 0.8 * kSpinLimit, 2);
   EXPECT_TRUE(mirror.lifecycle().empty());
   EXPECT_EQ(mirror.mishaps(), (engine::Mishaps{.removed = 0, .clamped = 3}));
+  EXPECT_EQ(mirror.last_slowed(), 2U);
 }
 
 TEST_F(MirrorTurnTest, ATurnThatIsTooFastByARoundingIsSlowedToo) {

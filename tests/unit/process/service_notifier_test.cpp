@@ -78,6 +78,19 @@ TEST(ServiceNotifier, TellsItsStatusFromTimeToTime) {
   EXPECT_THAT(manager.heard(), ElementsAre("STATUS=frame 7"));
 }
 
+TEST(ServiceNotifier, AsksForMoreTimeWhileAProgramWaitsForWhatItNeeds) {
+  const Manager manager;
+  ServiceNotifier notifier;
+  notifier.starting("waits", 100 * kSecond);
+  notifier.starting("waits", 101 * kSecond);
+  notifier.starting("waits", 106 * kSecond);
+  EXPECT_THAT(manager.heard(), ElementsAre("EXTEND_TIMEOUT_USEC=30000000\nSTATUS=waits",
+                                           "EXTEND_TIMEOUT_USEC=30000000\nSTATUS=waits"));
+  notifier.alive(107 * kSecond);
+  notifier.starting("waits", 120 * kSecond);
+  EXPECT_THAT(manager.heard(), ElementsAre("READY=1", "WATCHDOG=1"));
+}
+
 TEST(ServiceNotifier, SaysThatItReloadsAndThatItStops) {
   const Manager manager;
   {
