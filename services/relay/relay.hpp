@@ -22,7 +22,7 @@ class Relay {
   /// everybody keeps, so that a link that was cut for less costs nobody a snapshot.
   static constexpr std::int64_t kGoneNs = 40 * kSecond;
   /// Time until it is tried again to publish what could not be published.
-  static constexpr std::int64_t kRetryNs = kSecond;
+  static constexpr std::int64_t kRetryNs = 2 * kSecond;
 
   struct Options {
     std::uint32_t client_limit = 256;
