@@ -19,7 +19,7 @@ void Relay::close() {
   if (!host_) return;
   publishing_->closing();
   host_.reset();
-  port_ = {};
+  port_.close();
   upstream_->forget_inputs();
 }
 
@@ -47,7 +47,7 @@ void Relay::open() {
   config.clock_ns = options_.clock_ns;
   auto host = host::Host::create(config, std::make_unique<RelaySource>(*upstream_), *port_.port);
   if (!host) {
-    port_ = {};
+    port_.close();
     return give_up(host.error().message);
   }
   host_ = std::move(*host);

@@ -25,6 +25,12 @@ template <class Port>
 struct WatchedPort {
   std::unique_ptr<Port> port;
   std::shared_ptr<void> watch = nullptr;
+
+  /// Ends both. An assignment would end the port first.
+  void close() {
+    watch.reset();
+    port.reset();
+  }
 };
 
 /// One stream, followed as a client does. Every delta in its queue was applied and had the server's hash. Not

@@ -1,7 +1,6 @@
-// An observer that prints when it applied each frame, for measurements across processes and sites: lines "FRAME NANOSECONDS"
-// of the steady clock of this machine, and "joins" when it has to join anew.
+// An observer that prints when it applied each frame, for measurements across processes and sites: lines
+// "FRAME NANOSECONDS" of the steady clock of this machine, and "joins" when it has to join anew.
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -21,7 +20,7 @@ namespace {
 class Printer final : public client::CoreListener {
  public:
   void on_applied(Epoch /*epoch*/, const client::CompleteDelta& delta) override {
-    say(fmt::format("{} {}\n", delta.frame, transport::steady_ns()));
+    say(std::to_string(delta.frame) + ' ' + std::to_string(transport::steady_ns()) + '\n');
   }
   void on_resync(client::ResyncReason /*reason*/) override { say("joins\n"); }
 

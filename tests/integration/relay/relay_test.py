@@ -64,7 +64,7 @@ class Sites(WebStage):
 
 
 def sites(stage):
-    """Native clients of another domain and browsers over the gateway hold the server's state; inputs act; the hub may be killed."""
+    """Native clients of another domain and browsers over the gateway hold the server's state; inputs act; the hub may be killed, the server too."""
     stage.server("server")
     stage.relays()
     stage.gateway("gateway", "--from", stage.at_hub("south", "o"), "--site", "south")
@@ -88,13 +88,19 @@ def sites(stage):
     print(f"  hub away for {repaired - before:.1f} s; 90 frames later {time.monotonic() - repaired:.1f} s after it was back")
     if stage.metric("tandem_relay_repeated_bytes_total") <= 0:
         raise Failed("nothing was asked for after the hub was killed")
-    reports = {name: stage.stop(name) for name in ("acts", "watches", "web", "native")}
-    stage.stop("server")
+    reports = {"acts": stage.stop("acts")}
+    epochs = {epoch for epoch, _ in stage.hashes("web")}
+    stage.kill("server")
+    stage.server("anew")
+    for name in ("web", "native", "watches"):
+        stage.wait(lambda name=name: sum(epoch not in epochs for epoch, _ in stage.hashes(name)) > 30, f"{name} to follow the server that began anew")
+    reports.update({name: stage.stop(name) for name in ("web", "native", "watches")})
+    stage.stop("anew")
     for name, report in reports.items():
         check_report(report)
         if report["resyncs"]:
             raise Failed(f"{name} joined anew: {report}")
-        compare(stage, ["server"], name, 200)
+        compare(stage, ["server", "anew"], name, 200)
     if reports["acts"]["inputs_acted"] < 8 or reports["acts"]["inputs_unknown"] > 2:
         raise Failed(f"inputs: {reports['acts']}")
     print(f"  {reports['acts']['inputs_acted']} of {reports['acts']['inputs_sent']} inputs acted, latency {reports['acts']['input_latency_ms']}")

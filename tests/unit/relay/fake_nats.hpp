@@ -95,6 +95,8 @@ class FakeNats {
     return std::make_unique<Bus>(*this, std::move(may));
   }
 
+  [[nodiscard]] bool holds(Bus* bus) const { return buses_.contains(bus); }
+
  private:
   friend class Bus;
   std::set<Bus*> buses_;

@@ -136,9 +136,14 @@ class Stage {
         [this, log_bytes](const transport::SessionMessage&) -> Result<WatchedPort<transport::ServerPort>> {
           auto options = nats_options("hub", 0);
           options.log_bytes = log_bytes;
-          auto port = std::make_unique<transport::NatsServerPort>(options, nats.connect());
+          auto bus = nats.connect();
+          // Whatever waits for a port has to end before it.
+          std::shared_ptr<void> watch(&nats, [this, of = bus.get()](void* /*nats*/) {
+            EXPECT_TRUE(nats.holds(of)) << "the port ended before what waits for it";
+          });
+          auto port = std::make_unique<transport::NatsServerPort>(options, std::move(bus));
           published = port.get();
-          return WatchedPort<transport::ServerPort>{std::move(port)};
+          return WatchedPort<transport::ServerPort>{std::move(port), std::move(watch)};
         },
         first_ids_ += 100);
     return *near;
