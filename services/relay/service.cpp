@@ -99,6 +99,7 @@ class Service final : private Relay::Publishing {
   transport::Doorbell bell_;
   std::optional<host::Publisher> publisher_;
   std::vector<transport::ClientStatusMessage> reports_;
+  std::string trouble_;  // with NATS, as it was told last
   std::int64_t next_figures_ns_ = 0;
   metrics::ClientWatch client_watch_;
   metrics::Latest<FiguresNow> latest_;
@@ -169,7 +170,13 @@ Result<WatchedPort<transport::ServerPort>> Service::publish(const transport::Ses
 // Hands over figures a few times a second, because a scrape must not wait for the work.
 void Service::watch(Relay& relay) {
   const std::int64_t now_ns = steady_ns();
-  health_.beat(now_ns, relay.obstacle());
+  auto* const nats = dynamic_cast<transport::NatsServerPort*>(relay.port());
+  // The port that follows tells its client of its troubles, which logs them.
+  std::string trouble = nats == nullptr ? std::string() : nats->trouble();
+  if (trouble != trouble_ && !trouble.empty()) spdlog::warn("{}", trouble);
+  trouble_ = std::move(trouble);
+  health_.beat(now_ns, trouble_.empty() ? relay.obstacle()
+                                        : "the NATS server cannot be reached, or does not permit it");
   notifier_.alive(now_ns);
   if (notifier_.wants_status(now_ns)) {
     notifier_.tell(relay.host() == nullptr
@@ -177,7 +184,7 @@ void Service::watch(Relay& relay) {
                        : fmt::format("frame {}, {} clients", relay.host()->frame(),
                                      relay.host()->participants() + relay.host()->observers()));
   }
-  if (auto* const nats = dynamic_cast<transport::NatsServerPort*>(relay.port())) {
+  if (nats != nullptr) {
     reports_.clear();
     nats->take(reports_);
     for (const transport::ClientStatusMessage& report : reports_) relay.upstream().report(report);
@@ -196,18 +203,18 @@ void Service::watch(Relay& relay) {
     figures.inputs_refused = totals.refused_inputs;
     figures.clients = relay.host()->participants() + relay.host()->observers();
   }
-  if (const auto* const nats = dynamic_cast<const transport::NatsServerPort*>(relay.port())) {
+  if (nats != nullptr) {
     figures.published = nats->counts();
     figures.followers = nats->followers();
   }
   relay.upstream().each_feed([&figures](Feed& feed) {
     figures.joins += feed.joins();
-    if (const auto* const nats = dynamic_cast<const transport::NatsClientPort*>(&feed.port())) {
+    if (const auto* const in = dynamic_cast<const transport::NatsClientPort*>(&feed.port())) {
       if (!figures.followed) figures.followed.emplace();
-      figures.followed->asked += nats->counts().asked;
-      figures.followed->repaired += nats->counts().repaired;
-      figures.followed->given_up += nats->counts().given_up;
-      figures.followed->malformed += nats->dropped();
+      figures.followed->asked += in->counts().asked;
+      figures.followed->repaired += in->counts().repaired;
+      figures.followed->given_up += in->counts().given_up;
+      figures.followed->malformed += in->dropped();
     }
   });
   client_watch_.saw(figures.client.status, now_ns);

@@ -7,8 +7,10 @@
 #include <string_view>
 #include <utility>
 
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
+#include "sdk/transport/units.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -16,7 +18,8 @@ namespace {
 // A dead connection is noticed after kPingMs * (kPings + 1), and made anew.
 constexpr std::int64_t kPingMs = 1000, kConnectMs = 2000, kReconnectMs = 250, kWriteMs = 2000;
 constexpr int kPings = 2;
-constexpr int kReconnectBytes = 1024;  // what cannot be sent now is asked for again, not sent late
+constexpr std::int64_t kPatienceNs = kSecond;  // a connection that is not there yet is no trouble so long
+constexpr int kReconnectBytes = 1024;          // what cannot be sent now is asked for again, not sent late
 constexpr std::size_t kMostQueuedBytes = 128U << 20U;
 constexpr int kMostPending = 1 << 16;
 
@@ -97,7 +100,7 @@ class CnatsBus final : public NatsBus {
     natsOptions_UseGlobalMessageDelivery(made, true);  // one thread for all, so that they keep their order
     natsOptions_SetRetryOnFailedConnect(made, true, &CnatsBus::on_change, this);
     natsOptions_SetReconnectedCB(made, &CnatsBus::on_change, this);
-    natsOptions_SetDisconnectedCB(made, &CnatsBus::on_change, this);
+    natsOptions_SetDisconnectedCB(made, &CnatsBus::on_disconnected, this);
     natsOptions_SetClosedCB(made, &CnatsBus::on_closed, this);
     natsOptions_SetErrorHandler(made, &CnatsBus::on_error, this);
     const natsStatus status = natsConnection_Connect(&connection_, made);
@@ -149,6 +152,7 @@ class CnatsBus final : public NatsBus {
       const std::lock_guard lock(mutex_);
       return refusal_;
     }
+    if (steady_ns() - down_since_ns_.load() < kPatienceNs) return {};
     const char* last = nullptr;
     const natsStatus status = natsConnection_GetLastError(connection_, &last);
     std::string why = last != nullptr && *last != 0 ? last
@@ -180,6 +184,10 @@ class CnatsBus final : public NatsBus {
   static void on_change(natsConnection* /*connection*/, void* self) {
     static_cast<CnatsBus*>(self)->bell_.ring();
   }
+  static void on_disconnected(natsConnection* /*connection*/, void* self) {
+    static_cast<CnatsBus*>(self)->down_since_ns_.store(steady_ns());
+    static_cast<CnatsBus*>(self)->bell_.ring();
+  }
   static void on_closed(natsConnection* /*connection*/, void* self) {
     auto* const bus = static_cast<CnatsBus*>(self);
     bus->bell_.ring();
@@ -207,6 +215,7 @@ class CnatsBus final : public NatsBus {
   std::map<std::string, natsSubscription*> subscriptions_;
   Doorbell bell_;
   std::atomic<bool> closed_{false};
+  std::atomic<std::int64_t> down_since_ns_{steady_ns()};
   std::atomic<std::uint64_t> overrun_{0};
   mutable std::mutex mutex_;
   std::vector<NatsArrival> queue_;
