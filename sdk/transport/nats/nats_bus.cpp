@@ -204,8 +204,10 @@ class CnatsBus final : public NatsBus {
       const char* last = nullptr;
       natsConnection_GetLastError(connection, &last);
       const std::lock_guard lock(bus->mutex_);
-      bus->refusal_ = "the NATS server " + bus->url_ + " does not permit it" +
-                      (last != nullptr && *last != 0 ? ": " + std::string(last) : "");
+      // The first tells enough; others differ by the subject only.
+      if (bus->refusal_.empty())
+        bus->refusal_ = "the NATS server " + bus->url_ + " does not permit it" +
+                        (last != nullptr && *last != 0 ? ": " + std::string(last) : "");
     }
     bus->bell_.ring();
   }
