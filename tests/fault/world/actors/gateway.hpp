@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sdk/transport/websocket/web_port.hpp"
-#include "services/gateway/gateway.hpp"
 #include "services/following/session_client.hpp"
+#include "services/gateway/gateway.hpp"
 #include "tests/fault/world/actors/client.hpp"
 
 namespace tandem::world {
