@@ -11,7 +11,7 @@ namespace tandem::gateway {
 using transport::Reason;
 using transport::Role;
 
-Gateway::Gateway(const Limits& limits, World& world)
+Gateway::Gateway(const Limits& limits, following::World& world)
     : limits_(limits), world_(world), log_(limits.queue_bytes) {
   announce(make_outgoing(transport::AbsentMessage{}));
 }

@@ -79,6 +79,7 @@ void Service::follow(const std::stop_token& stop, WebServer& server) {
     {
       const std::lock_guard lock(mutex_);
       due_ns = client_.poll(gateway_, client::now());
+      due_ns = std::min(due_ns, gateway_.poll(steady_ns()));
       if (const auto& session = gateway_.session(); session && session->epoch != epoch_) {
         epoch_ = session->epoch;
         logging::set_context(session->session, epoch_);

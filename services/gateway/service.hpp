@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "sdk/transport/port.hpp"
+#include "services/following/session_client.hpp"
 #include "services/gateway/doors/admission.hpp"
 #include "services/gateway/doors/guest_book.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/metrics.hpp"
 #include "services/gateway/options.hpp"
-#include "services/gateway/session_client.hpp"
 #include "services/gateway/web_server.hpp"
 #include "services/metrics/address.hpp"
 #include "services/metrics/endpoint.hpp"
@@ -70,7 +70,7 @@ class Service final : public WebServer::Handler {
   std::int64_t next_deeds_ns_ = 0;
 
   std::mutex mutex_;  // guards all below; port_.wait() and wake() need no guard
-  SessionClient client_;
+  following::SessionClient client_;
   Gateway gateway_;
   CountLog log_;
   ServiceNotifier notifier_;

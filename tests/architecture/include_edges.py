@@ -67,6 +67,7 @@ EDGES = {
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
     "sdk/transport/websocket": LAYOUT + ["sdk/transport"],
+    "sdk/transport/nats": LAYOUT + ["sdk/transport"],
     "sdk/transport/network": ["public/result.hpp"],
     "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network", "sdk/transport/secure"],
     "sdk/transport/secure": ["public/result.hpp"],
@@ -120,13 +121,20 @@ EDGES = {
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
-    "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
+    "services/following": OF_CLIENT + CLIENT + ["services/accounts"],
+    "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/following", "services/gateway/refusal.hpp"],
     "services/gateway/doors": ["public/result.hpp", "sdk/transport/units.hpp", "services/accounts", "services/system", "services/tokens"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
+    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/json"]
+    + ["services/following", "services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
+    "services/relay": OF_CLIENT
+    + CLIENT
+    + HOST
+    + SIMULATION
+    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/following"]
+    + ["services/logging", "services/metrics", "services/process"],
     "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
     "services/top/screen": LAYOUT + FIGURES
     + ["sdk/transport", "sdk/transport/dds", "services/json", "services/system", "services/top/model"],
@@ -157,6 +165,7 @@ OWNERS = [
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["sdk/transport/websocket/gateway_link.cpp", "services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
+    (re.compile(r"^nats/"), "libnats", ["sdk/transport/nats/nats_bus.cpp"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
     (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/gateway", "services/pki", "services/tokens", "tests"]),
