@@ -48,7 +48,7 @@ OF_LAB = (
     + ["public", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated", "sdk/statistics"]
     + CLIENT
     + HOST
-    + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
+    + ["services/audience", "services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
     + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
     + DOOR
 )
@@ -118,6 +118,7 @@ EDGES = {
     + ["services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
+    "services/audience": OF_CLIENT + CLIENT + ["services/json", "services/system"],
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
@@ -132,7 +133,7 @@ EDGES = {
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/audience", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/imd", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
     + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,
@@ -158,7 +159,7 @@ OWNERS = [
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["sdk/transport/websocket/gateway_link.cpp", "services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
-    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/gateway", "services/pki", "services/tokens", "tests"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/audience", "services/gateway", "services/pki", "services/tokens", "tests"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
