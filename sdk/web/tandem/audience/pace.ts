@@ -8,10 +8,10 @@ const FIRST_AHEAD_MS = 1250;
 /** A place that ran dry waits until it is so far behind. */
 const ENOUGH_MS = AHEAD_MS - 250;
 /** Farther off, it jumps. */
-const JUMP_MS = 1500;
+const JUMP_MS = 1000;
 const DELAY_MS = 2000;
 /** A change of pace that nobody sees. */
-const MOST_CHANGE = 0.04;
+const MOST_CHANGE = 0.08;
 
 export class Pace {
   /** The place, in milliseconds of the time line. */
@@ -65,6 +65,6 @@ export class Pace {
       this.atMs += error;
       this.#meanError = 0;
     }
-    this.#rate = 1 + Math.min(Math.max(this.#meanError / 10_000, -MOST_CHANGE), MOST_CHANGE);
+    this.#rate = 1 + Math.min(Math.max(this.#meanError / 5000, -MOST_CHANGE), MOST_CHANGE);
   }
 }
