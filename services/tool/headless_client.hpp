@@ -40,6 +40,11 @@ struct HeadlessOptions {
   std::function<void(LogLevel level, const std::string& line)> log;
   std::uint32_t index = 0;  ///< index of this client in live lines
   std::string name;         ///< in front of lines for humans; may be empty
+
+  /// The session to join; empty: whichever the gateway at `url` has.
+  [[nodiscard]] std::string wanted_session() const {
+    return session.empty() && url.empty() ? "default" : session;
+  }
 };
 
 /// What a client has written of its session so far.

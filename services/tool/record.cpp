@@ -81,7 +81,7 @@ class Watch final : public TurnListener {
 };
 
 int run_record(RecordOptions options) {
-  begin_log("tandem record", options.log, options.client.session);
+  begin_log("tandem record", options.log, options.client.wanted_session());
   SignalWatch signals("tandem record");
   const HeapTrimmer trimmer;
   options.client.observe = true;
@@ -97,7 +97,7 @@ int run_record(RecordOptions options) {
   RecordMetrics metrics;
   if (!options.metrics.empty()) {
     const auto served =
-        metrics.serve(*metrics::read_address(options.metrics), options.client.session, target);
+        metrics.serve(*metrics::read_address(options.metrics), options.client.wanted_session(), target);
     if (!served) {
       spdlog::error(served.error().message);
       return 1;
