@@ -48,7 +48,7 @@ OF_LAB = (
     + ["public", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated", "sdk/statistics"]
     + CLIENT
     + HOST
-    + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
+    + ["services/audience", "services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
     + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
     + DOOR
 )
@@ -119,6 +119,7 @@ EDGES = {
     + ["services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
+    "services/audience": OF_CLIENT + CLIENT + ["services/json", "services/system"],
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
     "services/following": OF_CLIENT + CLIENT + ["services/accounts"],
@@ -141,7 +142,7 @@ EDGES = {
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/audience", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/imd", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
     + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,
@@ -168,9 +169,9 @@ OWNERS = [
     (re.compile(r"^nats/"), "libnats", ["sdk/transport/nats/nats_bus.cpp"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
-    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/gateway", "services/pki", "services/tokens", "tests"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/audience", "services/gateway", "services/pki", "services/tokens", "tests"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
-    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
+    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "tests/bench/audience"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]
