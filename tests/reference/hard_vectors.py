@@ -24,12 +24,18 @@ def falling():
     return vector
 
 
+def piled():
+    """Twelve bodies on each other."""
+    return {
+        i: ((40500 * (i % 3) + 300 * (i // 3), 19900 + 40100 * (i // 3), 20000 * (i % 2)), (0, -500 * i, 0))
+        for i in range(12)
+    }
+
+
 def heap():
     """Bodies of different masses come to rest and sleep; gravity wakes them."""
     of = worlds.stream("none", "hard", 16, 3, constants=HEAP)
-    places = {}
-    for i in range(12):
-        places[i] = (40500 * (i % 3) + 300 * (i // 3), 19900 + 40100 * (i // 3), 20000 * (i % 2)), (0, -500 * i, 0)
+    places = piled()
     places[12] = (200000, 30000, 0), (64, 0, 0)
     line = worlds.timeline(of, places, Drive((0, -30000, 0), 200))
     line.world.state.type[:13] = [0, 1, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 2]
@@ -48,7 +54,7 @@ def heap():
 
 def edges():
     """All bodies in one place, beyond the limits of speed, and a cell that is too full."""
-    of = worlds.stream("none", "hard", 64, 3, constants=HEAP)
+    of = worlds.stream("none", "hard", 64, 3, parameters={**worlds.HARD_PARAMETERS, 1: 50000}, constants=HEAP)
     places = {i: ((500000 + i % 5, 400000, i % 3), (0, 0, 0)) for i in range(24)}
     for i in range(24, 30):
         places[i] = (-(2**30) + 60000 * i, 300000, 2**30 - 5), ((-1) ** i * 2**28, -(2**27), 2**26)
@@ -62,13 +68,14 @@ def edges():
 def tracker():
     """With `tracker`: learned parameters, lifecycle, a snapshot."""
     of = worlds.stream("tracker", "hard", 16, 3, constants=HEAP)
-    places = {i: ((41000 * i, 20500, 0), (0, -900, 0)) for i in range(8)}
-    line = worlds.timeline(of, places, Drive((0, -30000, 0), 200))
+    line = worlds.timeline(of, piled(), Drive((0, -30000, 0), 200))
     vector = Vector("hard with tracker: parameters that change, a teleport of a body asleep, a snapshot", line)
-    vector.predict(12)
+    vector.predict(34)
     vector.delta(writer.section(0x82, writer.parameters({1: 3000, 9: 500, 10: -50, 11: 512})))
     vector.predict(2)
-    vector.delta(worlds.teleported({3: ((41000 * 3, 20700, 500), (0, 0, 0))}))
+    state = line.world.state
+    assert state.own[0, 2] == 5, "a body asleep"
+    vector.delta(worlds.teleported({2: ([int(x) for x in state.p[:, 2]], (0, 0, 0))}))
     vector.snapshot(writer.snapshot(line))
     vector.predict(3)
     return vector

@@ -25,7 +25,13 @@ Made make_contact(std::uint32_t capacity, std::span<const std::int32_t> constant
   });
 }
 
+// A slot takes 1.2 kB, and nobody can step more bodies in a frame.
+constexpr std::uint32_t kMostForHard = 1U << 18U;
+
 Made make_hard(std::uint32_t capacity, std::span<const std::int32_t> constants) {
+  if (capacity > kMostForHard)
+    return fail(ErrorCode::kInvalidArgument,
+                "predictor 'hard' takes at most " + std::to_string(kMostForHard) + " slots");
   return read_contact_constants(constants).map([&](ContactConstants&& read) {
     return std::unique_ptr<Predictor>(std::make_unique<Hard>(capacity, std::move(read)));
   });

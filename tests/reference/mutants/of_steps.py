@@ -78,14 +78,14 @@ MUTANTS = [
      "    moving = np.flatnonzero(state.alive & ~state.rest)\n"
      "    if stream.predictor == \"ballistic\":\n"
      "        force_free_step(state, moving, gravity, decay, drive.damping)\n"
-     "    else:\n",
+     "    elif stream.predictor == \"hard\":\n",
      "    awake = ~state.rest\n"
      "    state.rest &= ~np.any(state.c + gravity != 0, axis=0)\n"
      "    moving = np.flatnonzero(state.alive & ~state.rest)\n"
      "    if stream.predictor == \"ballistic\":\n"
      "        force_free_step(state, moving, gravity, decay, drive.damping)\n"
      "        moving = np.flatnonzero(state.alive & awake)\n"
-     "    else:\n"),
+     "    elif stream.predictor == \"hard\":\n"),
     ("predict", "damping slows the turn, too",
      "    if state.orientation:\n",
      "    if state.orientation:\n"

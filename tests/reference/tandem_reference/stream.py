@@ -37,6 +37,8 @@ class Stream:
         require(self.region_blocks == 0, "session", "regions are not played")
         require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
         require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
+        few = self.predictor != "hard" or self.capacity <= 2**18
+        require(few, "session", f"capacity {self.capacity} with the predictor hard")
         self.orientation = "orientation" in self.groups
         needed = self.types if self.orientation else 0
         require(len(self.radii) == needed, "session", f"{len(self.radii)} radii where the groups need {needed}")

@@ -172,6 +172,13 @@ TEST(Hard, AHeavyBodyIsPushedLessAndOneOfNoMobilityNotAtAll) {
   EXPECT_EQ(state.v(0)[3], 0);
 }
 
+TEST(Hard, TakesNoMoreSlotsThanAClientHasMemoryFor) {
+  const std::vector<std::int32_t> constants = write_contact_constants(room());
+  EXPECT_TRUE(make_predictor("hard", 1U << 12U, constants));
+  EXPECT_FALSE(make_predictor("hard", (1U << 18U) + 1, constants));
+  EXPECT_FALSE(make_predictor("hard", 100, {}));
+}
+
 TEST(Hard, KeepsBodiesOutOfBoxesAndBalls) {
   const auto predictor = hard(2, constants_of(1));
   State state = make_state(2);
