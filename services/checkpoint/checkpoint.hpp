@@ -16,6 +16,8 @@ namespace tandem::checkpoint {
 /// An epoch modulo this says who began it, so that two servers whose clocks agree do not begin the same one:
 /// 0 for a server that started, 1 to 7 by rank for one that took over.
 inline constexpr Epoch kBeginners = 8;
+/// Larger epochs are no milliseconds, and clients that count in doubles would confuse larger frames.
+inline constexpr std::uint64_t kLastEpoch = std::uint64_t{1} << 53U, kLastFrame = kLastEpoch;
 /// The epoch near `about` that such a server begins.
 [[nodiscard]] constexpr Epoch begun_by(Epoch beginner, Epoch about) {
   return about / kBeginners * kBeginners + beginner;
@@ -67,8 +69,8 @@ struct Checkpoint {
   std::uint64_t last_input = 0;          ///< number of the last scheduled input that was issued
   std::vector<Scheduled> scheduled;      ///< consecutive numbers up to last_input, ascending by frame
   std::vector<engine::Input> immediate;  ///< inputs of the next frame, in the order of arrival
-  /// Inputs of the frame after that. Only a takeover has them, if the live server ended while a step was under
-  /// way; no file does.
+  /// Inputs of the frame after that. Only a takeover has them, if the live server ended while a step was
+  /// under way; no file does.
   std::vector<engine::Input> later;
   std::vector<ClientState> clients;
   std::uint64_t journal = 0;  ///< number of the last journal entry before the frame was over; not in the file

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -13,14 +14,18 @@ namespace tandem::checkpoint {
 namespace {
 
 constexpr std::string_view kEnding = ".checkpoint";
-constexpr std::string_view kUnfinished = ".checkpoint.part";
-constexpr std::size_t kDigits = 20;  // those of 2^64
+constexpr std::string_view kUnfinished = ".part";  // behind the name
+constexpr std::size_t kDigits = 20;                // those of 2^64
 
 std::optional<std::uint64_t> number(std::string_view digits) {
   std::uint64_t value = 0;
   const char* const end = digits.data() + digits.size();
   const auto [stopped, error] = std::from_chars(digits.data(), end, value);
   return error == std::errc() && stopped == end ? std::optional(value) : std::nullopt;
+}
+
+bool is_unfinished(const std::string& name) {
+  return name.ends_with(kUnfinished) && moment_of(name.substr(0, name.size() - kUnfinished.size()));
 }
 
 }  // namespace
@@ -39,43 +44,52 @@ std::optional<Moment> moment_of(const std::string& file_name) {
   return Moment{*epoch, *frame};
 }
 
-Result<Folder::Found> Folder::newest(const std::function<Result<void>(const Checkpoint&)>& accept) {
+Result<Folder::Found> Folder::newest(const Accept& accept) {
   auto names = disk_->list();
   if (!names) return fail(names.error().code, fmt::format("{}: {}", disk_->name(), names.error().message));
   Found found;
-  std::vector<std::string> files;
+  std::map<Epoch, std::vector<std::string>> runs;  // of servers
   for (const std::string& name : *names) {
-    if (name.ends_with(kUnfinished)) static_cast<void>(disk_->remove(name));  // a read-only folder keeps it
+    if (is_unfinished(name)) static_cast<void>(disk_->remove(name));  // a read-only folder keeps it
     const auto moment = moment_of(name);
     if (!moment) continue;
     found.newest_epoch = std::max(found.newest_epoch, moment->epoch);
-    files.push_back(name);
+    runs[moment->epoch].push_back(name);
   }
-  std::ranges::sort(files);
-  for (; !files.empty() && !found.checkpoint; files.pop_back()) {
-    const std::string& file = files.back();
-    auto read = disk_->read(file, kMostFileBytes)
-                    .and_then([](const std::vector<std::byte>& bytes) { return decode(bytes); })
-                    .and_then([&](Checkpoint checkpoint) -> Result<Checkpoint> {
-                      if (file_name({checkpoint.epoch, checkpoint.frame}) != file)
-                        return fail(ErrorCode::kMalformed, "its name is that of another checkpoint");
-                      if (auto accepted = accept(checkpoint); !accepted)
-                        return tl::unexpected(accepted.error());
-                      return checkpoint;
-                    });
-    if (!read) {
-      found.refused.push_back(fmt::format("{}/{}: {}", disk_->name(), file, read.error().message));
-      continue;
+  // Older runs are asked, too: a file that this server would refuse must not be removed as one of its own. A
+  // run is of one world, so one good file of it is enough. The newest is asked last, as `accept` may load it.
+  for (auto& [epoch, files] : runs) {
+    std::ranges::sort(files);
+    std::vector<std::string> refused;
+    for (; !files.empty(); files.pop_back()) {
+      auto good = read_good(files.back(), accept);
+      if (good) {
+        found.checkpoint = std::move(*good);
+        found.file = files.back();
+        found.refused.clear();
+        ours_.insert(ours_.end(), files.begin(), files.end());
+        break;
+      }
+      refused.push_back(fmt::format("{}/{}: {}", disk_->name(), files.back(), good.error().message));
     }
-    found.checkpoint = std::move(*read);
-    found.file = file;
-    ours_ = files;
+    found.refused.insert(found.refused.begin(), refused.begin(), refused.end());
   }
   return found;
 }
 
+Result<Checkpoint> Folder::read_good(const std::string& file, const Accept& accept) {
+  return disk_->read(file, kMostFileBytes)
+      .and_then([](const std::vector<std::byte>& bytes) { return decode(bytes); })
+      .and_then([&](Checkpoint checkpoint) -> Result<Checkpoint> {
+        if (file_name({checkpoint.epoch, checkpoint.frame}) != file)
+          return fail(ErrorCode::kMalformed, "its name is that of another checkpoint");
+        if (auto accepted = accept(checkpoint); !accepted) return tl::unexpected(accepted.error());
+        return checkpoint;
+      });
+}
+
 Result<void> Folder::write_whole(const std::string& file, std::span<const std::byte> bytes) {
-  const std::string unfinished = file + ".part";
+  const std::string unfinished = file + std::string(kUnfinished);
   auto written = disk_->write(unfinished, bytes)
                      .and_then([&] { return disk_->sync(unfinished); })
                      .and_then([&] { return disk_->rename(unfinished, file); })

@@ -40,17 +40,20 @@ class Folder {
     std::vector<std::string> refused;  ///< newer files that are no good, each in one line with the reason
     Epoch newest_epoch = 0;            ///< the highest that any name in the folder has; 0: none
   };
-  /// Searches for the newest checkpoint that can be read and that `accept` accepts, from the newest file on.
-  /// Removes what unfinished writes left. Errors: kIo, if the folder cannot be listed.
-  [[nodiscard]] Result<Found> newest(const std::function<Result<void>(const Checkpoint&)>& accept);
+  using Accept = std::function<Result<void>(const Checkpoint&)>;
+  /// Searches for the newest checkpoint that can be read and that `accept` accepts. Older ones are asked,
+  /// too; of all that are accepted, it is the last that is asked. Removes what unfinished writes left.
+  /// Errors: kIo, if the folder cannot be listed.
+  [[nodiscard]] Result<Found> newest(const Accept& accept);
 
   /// Stores a file under the name of its moment. When it returns without an error, the file survives a loss
-  /// of power. Then older files are removed, up to kKept; but a file that newest() refused stays where it is,
-  /// as another build may be able to read it. Errors: kIo, naming the file. The files of before are still
-  /// there then.
+  /// of power. Then older files that newest() accepted are removed, up to kKept; one that it refused stays
+  /// where it is, as another build may be able to read it. Errors: kIo, naming the file. The files of before
+  /// are still there then.
   [[nodiscard]] Result<void> store(const Moment& moment, std::span<const std::byte> file);
 
  private:
+  [[nodiscard]] Result<Checkpoint> read_good(const std::string& file, const Accept& accept);
   [[nodiscard]] Result<void> write_whole(const std::string& file, std::span<const std::byte> bytes);
 
   Disk* disk_;

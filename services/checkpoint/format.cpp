@@ -227,7 +227,8 @@ Result<void> check(const Checkpoint& c) {
   if (c.next_reuse.empty() || c.next_reuse.size() > kMaxCapacity)
     return malformed(fmt::format("it has {} slots", c.next_reuse.size()));
   if (c.withheld.size() != c.next_reuse.size()) return malformed("its columns of slots differ in length");
-  if (c.epoch == 0) return malformed("its epoch is 0");
+  if (c.epoch == 0 || c.epoch > kLastEpoch || c.frame > kLastFrame)
+    return malformed(fmt::format("it is of frame {} of epoch {}", c.frame, c.epoch));
   std::uint64_t number = c.last_input - std::min<std::uint64_t>(c.last_input, c.scheduled.size());
   Frame frame = c.frame;
   for (const Scheduled& waiting : c.scheduled) {

@@ -9,12 +9,23 @@ namespace tandem::checkpoint {
 namespace {
 
 constexpr std::int64_t kEndNs = 2'000'000'000;
-constexpr Epoch kLastEpoch = Epoch{1}
-                             << 53U;  // later ones are no milliseconds; some clients count in doubles
-
 constexpr Epoch kEpochsAhead = 1'000'000;  // where a clock went back; in ms a quarter of an hour
 
 tl::unexpected<Error> refuse(std::string why) { return fail(ErrorCode::kInvalidArgument, std::move(why)); }
+
+/// What the simulation would act on without a further look.
+Result<void> check_inputs(const Checkpoint& checkpoint, const engine::Simulation& simulation) {
+  using Effect = engine::Classification::Effect;
+  const auto check = [&simulation](const engine::Input& input, Effect effect) -> Result<void> {
+    if (simulation.classify(input).effect == effect) return {};
+    return refuse(fmt::format("the engine refuses an input of kind {} that waits in it", input.kind));
+  };
+  for (const Scheduled& waiting : checkpoint.scheduled)
+    if (auto good = check(waiting.input, Effect::kScheduled); !good) return good;
+  for (const engine::Input& input : checkpoint.immediate)
+    if (auto good = check(input, Effect::kImmediate); !good) return good;
+  return {};
+}
 
 std::string told_of(const Checkpoint& checkpoint, const std::string& file) {
   return fmt::format("goes on from {}: frame {} of epoch {}, {} bodies", file, checkpoint.frame,
@@ -36,6 +47,19 @@ Result<void> check_world(const Checkpoint& checkpoint, const World& world, std::
     return refuse(fmt::format("it is of steps of {} s, not {} s", checkpoint.dt_s, world.dt_s));
   if (checkpoint.types != world.types) return refuse("its types of bodies are others");
   return {};
+}
+
+Result<void> load_world(const Checkpoint& checkpoint, const World& world, engine::Simulation& simulation) {
+  if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
+  std::vector<std::byte> before;
+  const bool has_inputs = !checkpoint.scheduled.empty() || !checkpoint.immediate.empty();
+  if (has_inputs) simulation.save(before);
+  if (!simulation.load(checkpoint.engine_state))
+    return refuse(
+        "the engine refuses its part: it is of another scene file, number of bodies, seed or build");
+  auto good = check_inputs(checkpoint, simulation);
+  if (!good) static_cast<void>(simulation.load(before));
+  return good;
 }
 
 // A server may announce an epoch and end before it has written a checkpoint of it.
@@ -74,12 +98,8 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
   }
   can_save_ = true;
   if (!disk_) return start;
-  auto found = folder_->newest([&](const Checkpoint& checkpoint) -> Result<void> {
-    if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
-    if (simulation.load(checkpoint.engine_state)) return {};
-    return refuse(
-        "the engine refuses its part: it is of another scene file, number of bodies, seed or build");
-  });
+  auto found = folder_->newest(
+      [&](const Checkpoint& checkpoint) { return load_world(checkpoint, world, simulation); });
   if (!found) return tl::unexpected(found.error());
   for (const std::string& refused : found->refused) start.warnings.push_back("cannot go on from " + refused);
   if (found->newest_epoch < kLastEpoch) start.newest_epoch = found->newest_epoch;
@@ -99,15 +119,17 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
   return start;
 }
 
-Result<Epoch> Keeper::take_over(const World& world, const engine::Simulation& simulation) {
+Result<Epoch> Keeper::take_over(const World& world, engine::Simulation& simulation) {
   std::vector<std::byte> state;
   simulation.save(state);
   can_save_ = !state.empty();
   if (!disk_) return Epoch{0};
   // None is needed; but those of this world are removed when newer ones are there.
   const auto found = folder_->newest(
-      [&](const Checkpoint& checkpoint) { return check_world(checkpoint, world, simulation.capacity()); });
+      [&](const Checkpoint& checkpoint) { return load_world(checkpoint, world, simulation); });
   if (!found) return tl::unexpected(found.error());
+  if (found->checkpoint && !simulation.load(state))
+    return fail(ErrorCode::kIo, "the simulation does not load what it has just saved");
   make_writer(std::move(state));
   return found->newest_epoch < kLastEpoch ? found->newest_epoch : 0;
 }

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include "services/checkpoint/disk.hpp"
@@ -34,7 +35,13 @@ Result<std::vector<std::byte>> read_at(int folder, const std::string& path, std:
     return fail(ErrorCode::kCapacity, "has " + std::to_string(size) + " bytes, more than the maximum of " +
                                           std::to_string(most_bytes));
   }
-  std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+  std::vector<std::byte> bytes;
+  try {
+    bytes.resize(static_cast<std::size_t>(size));
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kCapacity,
+                "has " + std::to_string(size) + " bytes, more than there is memory for");
+  }
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t got = ::read(file.get(), bytes.data() + done, bytes.size() - done);

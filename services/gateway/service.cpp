@@ -103,8 +103,15 @@ Refusal Service::refuse(const Request& request, Refusal why) {
   return why;
 }
 
-tl::expected<Pass, Refusal> Service::look_at(std::string_view token) {
+tl::expected<Pass, Refusal> Service::look_at(std::string_view token) const {
   return admission_.pass(token, wall_s()).map_error(refusal_of);
+}
+
+tl::expected<Pass, Refusal> Service::log_in(const Request& request) {
+  auto pass = look_at(request.token);
+  if (pass) return pass;
+  const std::lock_guard lock(mutex_);
+  return tl::unexpected(refuse(request, pass.error()));
 }
 
 std::variant<ViewerId, Refusal> Service::open(const Request& request) {

@@ -39,7 +39,7 @@ class Service final : public WebServer::Handler {
   [[nodiscard]] Result<void> serve_metrics(const metrics::Address& address, const std::string& session);
 
   std::variant<ViewerId, Refusal> open(const Request& request) override;
-  tl::expected<Pass, Refusal> look_at(std::string_view token) override;
+  tl::expected<Pass, Refusal> log_in(const Request& request) override;
   std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) override;
   Gateway::Next next(ViewerId id) override;
   void closed(ViewerId id) override;
@@ -58,6 +58,7 @@ class Service final : public WebServer::Handler {
   void reload();
   void write_down(const GuestBook::Line& line) const;
   void write_deeds(ViewerId id, std::int64_t now_ns);
+  tl::expected<Pass, Refusal> look_at(std::string_view token) const;
   Refusal refuse(const Request& request, Refusal why);
 
   const Options options_;

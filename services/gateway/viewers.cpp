@@ -99,9 +99,13 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage
   return std::nullopt;
 }
 
-// A viewer's figures are its own word; where and what it plays is not.
+// A viewer's figures are its own word; where and what it plays is not, nor is an id under which another one
+// came before.
 void Gateway::report(Viewer& viewer, transport::ClientStatusMessage&& status, std::int64_t now_ns) {
-  if (!session_ || session_->streams.empty() || !alive_ || status.epoch != session_->epoch ||
+  const bool taken = std::ranges::any_of(viewers_, [&viewer](const auto& other) {
+    return other.first < viewer.id && other.second.client == viewer.client;
+  });
+  if (taken || !session_ || session_->streams.empty() || !alive_ || status.epoch != session_->epoch ||
       !viewer.reports.take(now_ns))
     return;
   status.session = session_->session;

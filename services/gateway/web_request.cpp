@@ -44,10 +44,20 @@ bool names(std::string_view list, std::string_view wanted) {
   return false;
 }
 
-std::string token_of(lws* wsi) {
+bool has_body(lws* wsi) {
+  const std::string length = header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
+  return lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0 ||
+         (!length.empty() && length != "0");
+}
+
+std::string bearer_of(lws* wsi) {
   constexpr std::string_view kBearer = "Bearer ";
-  if (const std::string given = header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION); given.starts_with(kBearer))
-    return given.substr(kBearer.size());
+  const std::string given = header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  return given.starts_with(kBearer) ? given.substr(kBearer.size()) : std::string();
+}
+
+std::string token_of(lws* wsi) {
+  if (std::string given = bearer_of(wsi); !given.empty()) return given;
   std::array<char, tokens::kMostTokenBytes + 64> text{};
   std::size_t size = text.size() - 1;
   if (lws_http_cookie_get(wsi, cookie_name(wsi).c_str(), text.data(), &size) == 0) return text.data();

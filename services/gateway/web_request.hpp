@@ -17,6 +17,13 @@ namespace tandem::gateway {
 /// Whether a list of subprotocols, with commas and spaces between them, has this one.
 [[nodiscard]] bool names(std::string_view list, std::string_view wanted);
 
+/// Whether the request says that a body follows, of whatever length.
+[[nodiscard]] bool has_body(lws* wsi);
+
+/// The token in Authorization: Bearer; empty if it is not there. Untrusted. No page of another site can have
+/// a browser send it.
+[[nodiscard]] std::string bearer_of(lws* wsi);
+
 /// The token of a request; empty if it has none. Untrusted. The first of these counts: Authorization: Bearer,
 /// the gateway's cookie, ?token=.
 [[nodiscard]] std::string token_of(lws* wsi);

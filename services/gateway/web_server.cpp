@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <libwebsockets.h>
+#include <strings.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -216,13 +217,18 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
   return 0;
 }
 
-// The page hands over the token of its address, and has the browser show it from then on.
+// The page hands over the token of its address, and has the browser show it from then on. Only by a header
+// that a link or a picture on a page of another site cannot send: otherwise that page could have browsers
+// show a token of its own choice.
 int WebServer::Impl::log_in(lws* wsi, void* user) {
   Exchange& exchange = *slot<Exchange>(user);
-  const std::string token = token_of(wsi);
-  const auto pass = handler.look_at(token);
+  const std::string token = bearer_of(wsi);
+  const auto pass = handler.log_in({.origin = header(wsi, WSI_TOKEN_ORIGIN),
+                                    .host = header(wsi, WSI_TOKEN_HOST),
+                                    .token = token,
+                                    .address = address_text(visit(wsi).client),
+                                    .inputs = {}});
   if (!pass) {
-    handler.refused(pass.error());
     exchange.own = std::string(closing(pass.error()).reason) + '\n';
   } else {
     exchange.own = pass->may_act ? "act\n" : "watch\n";
@@ -243,6 +249,11 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
     exchange.body = exchange.own;
     return send_head(wsi, user, status, type, "no-store", false);
   };
+  // Nobody here reads a body. libwebsockets would take one that comes in chunks for the next request, and a
+  // proxy in front of it would then give that one's answer to somebody else. Behind a header whose name is
+  // the beginning of another's (as X-A: of X-Auth-Token:) libwebsockets 4.1 even overlooks the next one, such
+  // as Transfer-Encoding; so through a proxy every request is the last of its connection.
+  exchange.last = has_body(wsi) || visits.is_trusted(visit(wsi).peer);
   const bool reads =
       lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 || lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
   if (!visit(wsi).account->requests.take(steady_ns())) {
@@ -313,11 +324,15 @@ int WebServer::Impl::on_http(lws* wsi, lws_callback_reasons reason, void* user, 
   }
 }
 
-// Without this, a client that asks for another WebSocket would see only that the connection ends.
+// Only WebSocket: libwebsockets would also upgrade to HTTP/2, whose streams are no connections of ours. And
+// without this, a client that asks for another WebSocket would see only that the connection ends.
 int WebServer::Impl::confirm_upgrade(lws* wsi) {
   const auto refuse = [&](unsigned status, const char* why) {
     return lws_return_http_status(wsi, status, why) != 0 ? -1 : 1;
   };
+  if (strcasecmp(header(wsi, WSI_TOKEN_UPGRADE).c_str(), "websocket") != 0)
+    return refuse(HTTP_STATUS_BAD_REQUEST, "there is an upgrade to WebSocket only");
+  if (has_body(wsi)) return refuse(HTTP_STATUS_BAD_REQUEST, "a request for a WebSocket has no body");
   if (header(wsi, WSI_TOKEN_GET_URI) != kPath)
     return refuse(HTTP_STATUS_NOT_FOUND, "the WebSocket is at /tandem");
   if (!names(header(wsi, WSI_TOKEN_PROTOCOL), kSubprotocol))

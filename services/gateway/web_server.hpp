@@ -45,8 +45,8 @@ class WebServer {
     };
     virtual ~Handler() = default;
     virtual std::variant<ViewerId, Refusal> open(const Request& request) = 0;
-    /// What a token allows now, without an effect.
-    virtual tl::expected<Pass, Refusal> look_at(std::string_view token) = 0;
+    /// What the token of a request allows now. Joins nobody; counts and logs a refusal.
+    virtual tl::expected<Pass, Refusal> log_in(const Request& request) = 0;
     virtual std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) = 0;
     virtual Gateway::Next next(ViewerId id) = 0;
     virtual void closed(ViewerId id) = 0;

@@ -4,7 +4,6 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sys/eventfd.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -82,8 +81,6 @@ struct Endpoint::Impl {
   Impl& operator=(const Impl&) = delete;
 
   void run(const std::stop_token& stop) {
-    // Of this thread alone: a frame comes before a scrape. Without the right to do so, nothing is lost.
-    static_cast<void>(setpriority(PRIO_PROCESS, 0, kNice));
     pthread_setname_np(pthread_self(), "metrics");
     while (!stop.stop_requested()) {
       wait();
@@ -205,9 +202,6 @@ struct Endpoint::Impl {
     return text;
   }
 
-  /// Lower than the priority of a frame. With 19, a scrape takes 60 ms and more while others use the
-  /// processor.
-  static constexpr int kNice = 5;
   static constexpr std::string_view kPlain = "text/plain; charset=utf-8";
 
   Address address;

@@ -12,8 +12,7 @@
 
 namespace tandem::metrics {
 
-/// Answers GET /metrics, /healthz and /readyz in one thread of the lowest priority, from the constructor to
-/// the destructor. Everything that a stranger can cause is bounded, as EndpointLimits says.
+/// The bounds of what a stranger can cause.
 struct EndpointLimits {
   std::size_t connections = 32;           ///< the oldest one makes room for a new one
   std::int64_t longest_ns = 5 * kSecond;  ///< for a connection, from its start to its end
@@ -22,6 +21,7 @@ struct EndpointLimits {
   std::int64_t page_ns = kSecond / 10;    ///< a page serves all scrapes within this time
 };
 
+/// Answers GET /metrics, /healthz and /readyz in one thread, from the constructor to the destructor.
 class Endpoint {
  public:
   /// Adds the program's figures to the page. Called in the endpoint's thread, so it must not wait for the

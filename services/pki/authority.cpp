@@ -40,7 +40,7 @@ Result<system::Descriptor> lock(const std::string& folder) {
 Result<Signer> read_signer(const std::string& certificate_file, const std::string& key_file) {
   const auto certificate = read_file(certificate_file);
   if (!certificate) return tl::unexpected(certificate.error());
-  const auto key = read_file(key_file);
+  const auto key = read_file(key_file, Readers::kOwner);
   if (!key) return tl::unexpected(key.error());
   Signer signer{secure::read_certificate(*certificate), secure::read_key(*key)};
   if (signer.certificate == nullptr)

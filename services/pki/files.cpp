@@ -1,6 +1,7 @@
 #include "services/pki/files.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -52,9 +53,18 @@ Result<void> write_file(const std::string& path, const std::string& text, Reader
   return {};
 }
 
-Result<std::string> read_file(const std::string& path) {
+Result<std::string> read_file(const std::string& path, Readers readers) {
   const system::Descriptor opened(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!opened.is_open()) return failed(path, "read");
+  struct stat about {};
+  if (::fstat(opened.get(), &about) != 0) return failed(path, "read");
+  if (readers == Readers::kOwner && (about.st_mode & 077U) != 0)
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format(
+            "{} can be read by others than its owner (mode {:04o}): chmod 600 {}, and make new authorities if "
+            "somebody may have read it",
+            path, about.st_mode & 07777U, path));
   std::string text(kMostBytes + 1, '\0');
   std::size_t had = 0;
   for (;;) {
@@ -70,8 +80,15 @@ Result<std::string> read_file(const std::string& path) {
 }
 
 Result<void> make_folder(const std::string& path) {
-  if (::mkdir(path.c_str(), 0700) == 0 || errno == EEXIST) return {};
-  return failed(path, "made");
+  if (::mkdir(path.c_str(), 0700) == 0) return {};
+  if (errno != EEXIST) return failed(path, "made");
+  struct stat about {};
+  if (::stat(path.c_str(), &about) != 0) return failed(path, "used");
+  if (!S_ISDIR(about.st_mode)) return fail(ErrorCode::kIo, path + ": is no folder");
+  if ((about.st_mode & 02U) == 0) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("{} can be changed by everybody (mode {:04o}): chmod 700 {}", path,
+                          about.st_mode & 07777U, path));
 }
 
 }  // namespace tandem::pki

@@ -12,9 +12,10 @@ enum class Readers : unsigned { kOwner = 0600, kAll = 0644 };
 
 /// Writes `path` by way of a file beside it, which is on the disk before it gets the name. Errors: kIo.
 [[nodiscard]] Result<void> write_file(const std::string& path, const std::string& text, Readers readers);
-/// At most 1 MB. Errors: kIo.
-[[nodiscard]] Result<std::string> read_file(const std::string& path);
-/// A folder for its owner alone (0700); no effect if it exists. Errors: kIo.
+/// At most 1 MB. Errors: kIo, kInvalidArgument (it is for its owner alone, and others can read or write it).
+[[nodiscard]] Result<std::string> read_file(const std::string& path, Readers readers = Readers::kAll);
+/// A folder for its owner alone (0700). One that is there already is taken as it is, unless others can write
+/// it. Errors: kIo, kInvalidArgument.
 [[nodiscard]] Result<void> make_folder(const std::string& path);
 
 }  // namespace tandem::pki

@@ -38,13 +38,10 @@ Result<bool> stand_by(Options& options, engine::Simulation& simulation, transpor
   const checkpoint::World world = host::checkpoint_world(config);
   const auto accept = [&](const checkpoint::Checkpoint& checkpoint,
                           const transport::SessionMessage& live) -> Result<void> {
-    if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
     if (live.frame_rate_hz != config.frame_rate_hz)
       return fail(ErrorCode::kInvalidArgument, fmt::format("it is of {} frames a second, not {}",
                                                            live.frame_rate_hz, config.frame_rate_hz));
-    if (simulation.load(checkpoint.engine_state)) return {};
-    return fail(ErrorCode::kInvalidArgument,
-                "the engine refuses its part: it is of another scene file, number of bodies, seed or build");
+    return load_world(checkpoint, world, simulation);
   };
   const auto follows = [&](const checkpoint::Checkpoint& from,
                            std::span<const transport::JournalMessage> journal) {

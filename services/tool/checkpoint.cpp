@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/plain_text.hpp"
 #include "services/checkpoint/disk.hpp"
 #include "services/checkpoint/format.hpp"
 #include "services/json/json.hpp"
@@ -79,8 +80,9 @@ Json json_of(const File& file) {
 
 std::string text_of(const File& file) {
   const Checkpoint& c = file.checkpoint;
+  // A file is untrusted, and a terminal obeys control characters.
   const auto line = [](const char* what, const std::string& value) {
-    return fmt::format("{:<9} {}\n", what, value);
+    return fmt::format("{:<9} {}\n", what, transport::plain_text(value, value.size()));
   };
   std::string text =
       line("session",

@@ -120,6 +120,7 @@ int run_handover(const Options& options) {
     }
     return signals.finish(0);
   }
+  if (signals.stop()) return signals.finish(failed("stopped; the server may hand over all the same"));
   return signals.finish(
       failed(fmt::format("the server of epoch {} did not hand over within {} s; its log says why", epoch,
                          kPatienceNs / kSecond)));

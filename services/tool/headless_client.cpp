@@ -50,7 +50,7 @@ Result<void> HeadlessClient::open() {
     if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
   }
   client::CoreOptions core;
-  core.session = options_.session.empty() && options_.url.empty() ? "default" : options_.session;
+  core.session = options_.wanted_session();
   core.id = client::random_client_id();
   core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options_.lead;
@@ -131,8 +131,7 @@ std::string HeadlessClient::place() const {
     return options_.session.empty() ? "the gateway's session"
                                     : fmt::format("session '{}' of the gateway", options_.session);
   }
-  return fmt::format("session '{}' on domain {}", options_.session.empty() ? "default" : options_.session,
-                     options_.domain);
+  return fmt::format("session '{}' on domain {}", options_.wanted_session(), options_.domain);
 }
 
 void HeadlessClient::finish() {

@@ -37,6 +37,11 @@ struct HeadlessOptions {
   std::function<void(LogLevel level, const std::string& line)> log;
   std::uint32_t index = 0;  ///< index of this client in live lines
   std::string name;         ///< in front of lines for humans; may be empty
+
+  /// The session to join; empty: whichever the gateway at `url` has.
+  [[nodiscard]] std::string wanted_session() const {
+    return session.empty() && url.empty() ? "default" : session;
+  }
 };
 
 /// Sees a client and its recorder, null without one, after every turn of the client's loop.

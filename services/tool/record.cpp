@@ -59,7 +59,7 @@ class Watch final : public TurnListener {
 };
 
 int run_record(RecordOptions options) {
-  begin_log("tandem record", options.log, options.client.session);
+  begin_log("tandem record", options.log, options.client.wanted_session());
   SignalWatch signals("tandem record");
   const HeapTrimmer trimmer;
   options.client.observe = true;
@@ -68,8 +68,8 @@ int run_record(RecordOptions options) {
   if (!options.plain) options.client.compression = recording::Compression::kZstd;
   RecordMetrics metrics;
   if (!options.metrics.empty()) {
-    const auto served = metrics.serve(*metrics::read_address(options.metrics), options.client.session,
-                                      options.client.capture);
+    const auto served = metrics.serve(*metrics::read_address(options.metrics),
+                                      options.client.wanted_session(), options.client.capture);
     if (!served) {
       spdlog::error(served.error().message);
       return 1;

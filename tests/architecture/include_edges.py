@@ -128,7 +128,8 @@ EDGES = {
     + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
     + ["services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
     "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
-    "services/top/screen": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/system", "services/top/model"],
+    "services/top/screen": LAYOUT + FIGURES
+    + ["sdk/transport", "sdk/transport/dds", "services/json", "services/system", "services/top/model"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST

@@ -24,6 +24,7 @@
 namespace tandem::transport::secure {
 namespace {
 
+constexpr mode_t kOthersWrite = 02;
 constexpr const char* kCopyAgain = "copy the whole folder anew from where `tandem pki issue` made it";
 
 tl::unexpected<Error> bad(const std::string& file, const std::string& what, const std::string& cure) {
@@ -72,7 +73,7 @@ class Folder {
       return bad(path, "can be read by others than its owner (mode " + mode_text(about.st_mode) + ")",
                  "chmod 600 " + path + ", and `tandem pki renew` if somebody may have read it");
     }
-    if ((about.st_mode & 02U) != 0)
+    if ((about.st_mode & kOthersWrite) != 0)
       return bad(path, "can be changed by everybody (mode " + mode_text(about.st_mode) + ")",
                  "chmod o-w " + path + ", after comparing it with the original");
     if (about.st_size == 0 || about.st_size > kMostFileBytes)
@@ -218,6 +219,10 @@ Result<Identity> check_identity_folder(const std::string& path, std::int64_t now
     return fail(ErrorCode::kIo, path +
                                     " is no folder that can be read: give the folder of an identity that "
                                     "`tandem pki issue` made");
+  struct stat about {};
+  if (::stat(path.c_str(), &about) != 0 || (about.st_mode & kOthersWrite) != 0)
+    return bad(path, "can be changed by everybody (mode " + mode_text(about.st_mode) + ")",
+               "chmod o-w " + path + ", after comparing its files with the original");
   Identity identity;
   identity.folder = std::filesystem::absolute(path, error).lexically_normal().string();
   while (identity.folder.size() > 1 && identity.folder.back() == '/') identity.folder.pop_back();

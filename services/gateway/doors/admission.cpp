@@ -7,9 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+
+#include "services/tokens/secret_file.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -87,11 +86,9 @@ bool Admission::origin_fits(std::string_view origin, std::string_view host) cons
 }
 
 Result<std::string> read_token(const std::string& path) {
-  std::ifstream in(path);
-  if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
-  std::string token;
-  if (!std::getline(in, token))
-    return fail(ErrorCode::kIo, fmt::format("{}: cannot be read, or is empty", path));
+  const auto text = tokens::read_file(path, tokens::Others::kMayNotWrite);
+  if (!text) return tl::unexpected(text.error());
+  const std::string token = text->substr(0, text->find('\n'));
   if (token.size() < kLeastToken || token.size() > kMostToken ||
       !std::ranges::all_of(token, is_token_character)) {
     return fail(ErrorCode::kInvalidArgument,

@@ -32,16 +32,26 @@ void remember(Checkpoint& world, const transport::InputDecision& decision) {
 }
 
 // `later`: immediate inputs that were accepted while a step was under way, and so act on the one after it.
-void decide(Checkpoint& world, const transport::InputDecision& decision, std::vector<engine::Input>& later) {
+// The journal is another machine's, and the simulation acts on its inputs without a further look.
+Result<void> decide(Checkpoint& world, const engine::Simulation& simulation,
+                    const transport::InputDecision& decision, std::vector<engine::Input>& later) {
+  using Effect = engine::Classification::Effect;
   if (decision.client != 0) remember(world, decision);
-  if (decision.code != static_cast<std::uint32_t>(transport::Reason::kNone)) return;
+  if (decision.code != static_cast<std::uint32_t>(transport::Reason::kNone)) return {};
   engine::Input input{.kind = decision.kind, .values = decision.values, .bytes = decision.bytes};
-  if (decision.scheduled == 0) {
+  const bool immediate = decision.scheduled == 0;
+  if (simulation.classify(input).effect != (immediate ? Effect::kImmediate : Effect::kScheduled))
+    return fail(ErrorCode::kMalformed, "the engine refuses an input that the live server accepted");
+  if (immediate) {
     (decision.frame > world.frame + 1 ? later : world.immediate).push_back(std::move(input));
-    return;
+    return {};
   }
+  const Frame least = world.scheduled.empty() ? world.frame + 1 : world.scheduled.back().frame;
+  if (decision.scheduled != world.last_input + 1 || decision.frame < least)
+    return fail(ErrorCode::kMalformed, "the journal's scheduled inputs are not in order");
   world.scheduled.push_back({decision.scheduled, decision.frame, std::move(input)});
   world.last_input = decision.scheduled;
+  return {};
 }
 
 // In the order of LiveSource.
@@ -65,7 +75,8 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
   StateHasher hasher;
   std::vector<engine::Input> later = std::move(world.later);
   for (const transport::JournalMessage& entry : journal) {
-    for (const transport::InputDecision& decision : entry.decisions) decide(world, decision, later);
+    for (const transport::InputDecision& decision : entry.decisions)
+      if (auto good = decide(world, simulation, decision, later); !good) return tl::unexpected(good.error());
     if (entry.state == transport::JournalState::kNotMade) continue;
     if (entry.frame != world.frame + 1) return fail(ErrorCode::kMalformed, "the journal leaves out a frame");
     apply(world, simulation);

@@ -14,8 +14,8 @@ namespace tandem::host {
 /// behind the last made frame wait in the result as pending inputs. Returns the checkpoint of that frame, but
 /// engine_state stays that of `from`; the simulation holds the new one. Errors, after which the simulation
 /// has to be loaded again: kMismatch (it makes other frames than the server that wrote the journal),
-/// kMalformed (the journal leaves out a frame), kInvalidArgument (`config` does not fit the simulation),
-/// kIo (the simulation failed).
+/// kMalformed (the journal leaves out a frame, has scheduled inputs out of order, or an input that the
+/// simulation refuses), kInvalidArgument (`config` does not fit the simulation), kIo (the simulation failed).
 [[nodiscard]] Result<checkpoint::Checkpoint> roll_forward(const HostConfig& config,
                                                           engine::Simulation& simulation,
                                                           checkpoint::Checkpoint from,

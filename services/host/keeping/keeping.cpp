@@ -30,7 +30,7 @@ Result<Keeping> Keeping::begin(const checkpoint::Settings& settings, engine::Sim
 
 Result<void> Keeping::take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
                                 const transport::ParticipantId& from, Epoch epoch,
-                                const engine::Simulation& simulation, HostConfig& config) {
+                                engine::Simulation& simulation, HostConfig& config) {
   const auto newest = keeper_->take_over(checkpoint_world(config), simulation);
   if (!newest) return tl::unexpected(newest.error());
   checkpoint::Start start;

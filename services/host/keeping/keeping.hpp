@@ -29,7 +29,7 @@ class Keeping {
   /// wanted one. Errors: kIo.
   [[nodiscard]] Result<void> take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
                                        const transport::ParticipantId& from, Epoch epoch,
-                                       const engine::Simulation& simulation, HostConfig& config);
+                                       engine::Simulation& simulation, HostConfig& config);
 
   /// Call after every poll of the session's host, with what it returned.
   void after_poll(Host& host, bool produced, std::int64_t now_ns);

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -13,12 +15,29 @@
 #include "services/planning/number.hpp"
 #include "services/tandemd/configuration/config.hpp"
 #include "services/tandemd/configuration/config_file.hpp"
-#include "services/tandemd/configuration/rehearsal.hpp"
+#include "services/tandemd/configuration/mistakes.hpp"
 #include "services/tandemd/configuration/reload.hpp"
 #include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {
+
+/// "{text,json}" of "text or json", which completions offer; empty for what is no list of words, such as "a
+/// path".
+std::string list_of(std::string_view takes) {
+  std::string list;
+  bool several = false;
+  while (!takes.empty()) {
+    const std::size_t end = std::min(takes.find_first_of(", "), takes.size());
+    const std::string_view word = takes.substr(0, end);
+    if (word.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != std::string_view::npos || word == "a")
+      return {};
+    several = several || end < takes.size();
+    if (!word.empty() && word != "or") list += (list.empty() ? "" : ",") + std::string(word);
+    takes.remove_prefix(std::min(end + 1, takes.size()));
+  }
+  return several ? "{" + list + "}" : std::string();
+}
 
 /// Flags that each set a field of the configuration.
 class Flags {
@@ -36,9 +55,10 @@ class Flags {
           [](const std::string& text) { return planning::number<T>(text) ? "" : "must be a whole number"; });
   }
   void add(const char* field, std::string* (idl::ServerConfig::*text)()) {
-    app_.add_option_function<std::string>(
+    commandline::Option option = app_.add_option_function<std::string>(
         flag_of(field), [config = config_, text](const std::string& value) { *(config->*text)() = value; },
         text_of(*find_setting(field)));
+    if (const std::string list = list_of(find_setting(field)->takes); !list.empty()) option.type_name(list);
   }
 
  private:
@@ -124,10 +144,18 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
 
 CommandLine ended(int exit_code) { return {.options = std::nullopt, .exit_code = exit_code}; }
 
-CommandLine refused(const Error& error) {
-  const char* const hint = error.message.starts_with("--") ? "Run with --help for all flags.\n" : "";
-  print_error(fmt::format("tandemd: {}\n{}", error.message, hint));
+CommandLine refused(const std::vector<Error>& errors) {
+  const auto names_a_flag = [](const Error& error) { return error.message.starts_with("--"); };
+  for (const Error& error : errors) print_error(fmt::format("tandemd: {}\n", error.message));
+  if (std::ranges::any_of(errors, names_a_flag)) print_error("Run with --help for all flags.\n");
   return ended(2);
+}
+CommandLine refused(const Error& error) { return refused(std::vector{error}); }
+
+/// --check-config
+CommandLine checked(const std::string& path, const idl::ServerConfig& flags) {
+  if (const auto mistakes = find_mistakes(path, flags); !mistakes.empty()) return refused(mistakes);
+  return ended(std::fputs("the configuration is good\n", stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0);
 }
 
 }  // namespace
@@ -147,7 +175,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--config", path,
                  "Configuration file (protobuf text); flags override it. --print-config shows its form");
   app.add_flag("--check-config", check,
-               "Check configuration and scene as a start does, say what is wrong, and exit");
+               "Check configuration and scene as a start does, say all that is wrong, and exit");
   app.add_flag("--print-config", print,
                "Print the configuration in force as a file, with what each field means and takes, and exit");
   app.add_option("--probe", question, metrics::kProbeHelp);
@@ -156,6 +184,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   if (!question.empty()) return ended(metrics::probe("tandemd", question));
   Places places;
   const idl::ServerConfig flags = config;
+  if (check) return checked(path, flags);
   if (!path.empty()) {
     auto file = load_config(path);
     if (!file) return refused(file.error());
@@ -168,11 +197,6 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   }
   auto options = check_config(config, places);
   if (!options) return refused(options.error());
-  if (check) {
-    if (const auto good = rehearse(*options); !good) return refused(good.error());
-    std::fputs("the configuration is good\n", stdout);
-    return ended(0);
-  }
   options->json = json;
   CommandLine command{.options = std::move(*options), .exit_code = 0};
   if (!path.empty())

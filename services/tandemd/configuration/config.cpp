@@ -173,10 +173,10 @@ Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
   return {};
 }
 
-Result<void> check_names(const sessions::SessionChoice& choice) {
-  if (const auto known = codec_traits(choice.codec); !known) return refuse("codec", known.error().message);
-  if (choice.predictor == planning::kAutomaticPredictor) return {};
-  if (const auto known = find_predictor(choice.predictor); !known)
+Result<void> check_names(const planning::Wishes& wishes) {
+  if (const auto known = codec_traits(wishes.codec); !known) return refuse("codec", known.error().message);
+  if (wishes.predictor == planning::kAutomaticPredictor) return {};
+  if (const auto known = find_predictor(wishes.predictor); !known)
     return refuse("predictor", known.error().message);
   return {};
 }
@@ -246,8 +246,12 @@ Result<void> check_streams(const ServerConfig& config, const sessions::SessionCh
                     fmt::format("{} conflicts with --stream {}, which sets {}; set it there only",
                                 config.predictor(), stream.name(), stream.predictor()));
     }
-    if (auto good = planning::wishes_of(choice, wishes_of(stream)); !good)
-      return refuse("stream", fmt::format("{}: {}", stream.name(), good.error().message));
+    const auto good = planning::wishes_of(choice, wishes_of(stream)).and_then(check_names);
+    if (!good) {
+      std::string what = good.error().message;
+      if (what.starts_with("--")) what.erase(0, 2);  // in a stream it is no flag
+      return refuse("stream", fmt::format("{}: {}", stream.name(), what));
+    }
     names.emplace_back();
     names.back().name = stream.name();
   }

@@ -86,7 +86,7 @@ std::string line_of(const pb::FieldDescriptor& field, const std::string& value) 
 
 }  // namespace
 
-Result<ConfigFile> load_config(const std::string& path) {
+Result<std::string> read_config_text(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
   // Does not use iterators, because they throw if reading fails, for example for a directory.
@@ -95,12 +95,21 @@ Result<ConfigFile> load_config(const std::string& path) {
   while (in.read(piece.data(), piece.size()), in.gcount() > 0)
     text.append(piece.data(), static_cast<std::size_t>(in.gcount()));
   if (in.bad()) return fail(ErrorCode::kIo, fmt::format("{}: cannot be read", path));
+  return text;
+}
+
+Result<ConfigFile> parse_config(const std::string& text, const std::string& path) {
   ConfigFile file;
   pb::TextFormat::ParseInfoTree tree;
   if (auto parsed = scenes::parse_text(text, path, file.config, tree); !parsed)
     return tl::unexpected(explained(parsed.error()));
   file.places = places_of(path, file.config, tree);
   return file;
+}
+
+Result<ConfigFile> load_config(const std::string& path) {
+  return read_config_text(path).and_then(
+      [&path](const std::string& text) { return parse_config(text, path); });
 }
 
 Places places_beside(const ServerConfig& flags, Places places) {

@@ -14,8 +14,13 @@ struct ConfigFile {
   Places places;
 };
 
-/// Reads a configuration file. Errors: kIo; kMalformed naming file, line and field, and what the field takes.
+/// Reads a configuration file: read_config_text() and parse_config().
 [[nodiscard]] Result<ConfigFile> load_config(const std::string& path);
+/// Errors: kIo.
+[[nodiscard]] Result<std::string> read_config_text(const std::string& path);
+/// `path` names the file in errors and places. Errors: kMalformed naming file, line and field, and what the
+/// field takes.
+[[nodiscard]] Result<ConfigFile> parse_config(const std::string& text, const std::string& path);
 
 /// Leaves out what a flag sets.
 [[nodiscard]] Places places_beside(const idl::ServerConfig& flags, Places places);

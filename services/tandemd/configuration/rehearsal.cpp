@@ -8,6 +8,20 @@
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
+namespace {
+
+Result<scenes::Scene> scene_of(const Options& options) {
+  auto scene = scenes::load_scene(options.scene);
+  if (!scene) return tl::unexpected(placed(options.places, "scene", scene.error()));
+  return scene;
+}
+
+}  // namespace
+
+Result<void> check_scene(const Options& options) {
+  if (options.engine) return {};
+  return scene_of(options).map([](const scenes::Scene& /*scene*/) {});
+}
 
 Result<void> check_identity(const Options& options) {
   if (options.secure.empty()) return {};
@@ -20,8 +34,8 @@ Result<void> check_identity(const Options& options) {
 Result<void> rehearse(const Options& options) {
   if (const auto good = check_identity(options); !good) return good;
   if (options.engine) return {};  // it says what it simulates when it comes
-  const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return tl::unexpected(placed(options.places, "scene", scene.error()));
+  const auto scene = scene_of(options);
+  if (!scene) return tl::unexpected(scene.error());
   const auto config = planning::plan_server(sessions::world_of(*scene, options.choice.bodies),
                                             static_cast<const planning::Wishes&>(options.choice), options);
   if (!config) return tl::unexpected(placed(options.places, "", config.error()));

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "services/json/json.hpp"
 #include "services/system/descriptor.hpp"
 
 namespace tandem::top {
@@ -35,6 +36,16 @@ std::vector<std::string> lines_of(std::string_view text, bool is_part) {
 }
 
 }  // namespace
+
+std::string without_json(const std::string& line) {
+  // journald has its own words before the object.
+  const std::size_t begin = line.find("{\"");
+  if (begin == std::string::npos) return line;
+  const auto object = Json::parse(line.substr(begin));
+  if (!object || !(*object)["message"].is_text()) return line;
+  const auto text = [&object](const char* key) { return (*object)[key].text(); };
+  return text("time") + " [" + text("level") + "] " + text("message");
+}
 
 LogTail::~LogTail() { end_journal(); }
 

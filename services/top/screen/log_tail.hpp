@@ -9,6 +9,9 @@
 
 namespace tandem::top {
 
+/// A line of `--log-format json` as one for people: time, level and message; another line as it is.
+[[nodiscard]] std::string without_json(const std::string& line);
+
 /// Reads at most the last 64 KiB and 500 lines. Never waits: the journal is read by a child process
 /// (journalctl), which is ended after 5 s. Not thread-safe.
 class LogTail {

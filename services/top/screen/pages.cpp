@@ -7,6 +7,7 @@
 #include <ctime>
 
 #include "services/top/screen/details.hpp"
+#include "services/top/screen/log_tail.hpp"
 
 namespace tandem::top {
 namespace {
@@ -163,7 +164,7 @@ Page log(const Overview& overview, const View& view, const Rows& rows, const Sur
     const Style style = !id.empty() && line.find(id) != std::string::npos ? Style::kStrong : Style::kNormal;
     const char* indent = " ";
     for (const std::string& part :
-         wrap(line, size.columns - std::min<std::size_t>(size.columns, 4), alphabet)) {
+         wrap(without_json(line), size.columns - std::min<std::size_t>(size.columns, 4), alphabet)) {
       lines.emplace_back(indent + part, style);
       indent = "   ";
     }
@@ -192,12 +193,19 @@ std::vector<std::string> wrap(std::string_view text, std::size_t columns, Alphab
   std::size_t at = 0;
   while (at < safe.size() && columns > 0) {
     const std::size_t end = std::min(safe.find(' ', at), safe.size());
-    const std::string word = cut(std::string_view(safe).substr(at, end - at), columns);
+    std::string_view word = std::string_view(safe).substr(at, end - at);
     at = end + 1;
     if (word.empty()) continue;
     if (!line.empty() && columns_of(line) + 1 + columns_of(word) > columns)
       lines.push_back(std::exchange(line, {}));
-    line += (line.empty() ? "" : " ") + word;
+    // A word that no line has room for goes on in the next ones.
+    while (columns_of(word) > columns) {
+      const std::size_t bytes = bytes_within(word, columns);
+      if (bytes == 0) return lines;
+      lines.emplace_back(word.substr(0, bytes));
+      word.remove_prefix(bytes);
+    }
+    line += (line.empty() ? "" : " ") + std::string(word);
   }
   if (!line.empty()) lines.push_back(std::move(line));
   return lines;

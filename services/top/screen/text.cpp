@@ -75,19 +75,21 @@ std::size_t columns_of(std::string_view text) {
   return columns;
 }
 
+std::size_t bytes_within(std::string_view text, std::size_t columns) {
+  std::size_t used = 0, bytes = 0;
+  for_each_character(text, [&](std::string_view character) {
+    used += width_of(character);
+    if (used > columns) return false;
+    bytes += character.size();
+    return true;
+  });
+  return bytes;
+}
+
 std::string cut(std::string_view text, std::size_t columns) {
   if (columns_of(text) <= columns) return std::string(text);
   if (columns == 0) return {};
-  std::string out;
-  std::size_t used = 0;
-  for_each_character(text, [&](std::string_view character) {
-    const std::size_t width = width_of(character);
-    if (used + width > columns - 1) return false;
-    used += width;
-    out += character;
-    return true;
-  });
-  return out + '~';
+  return std::string(text.substr(0, bytes_within(text, columns - 1))) + '~';
 }
 
 std::string cell(std::string_view text, std::size_t columns, Align align, Alphabet alphabet) {

@@ -28,6 +28,8 @@ enum class Alphabet : bool {
 /// The beginning of a text that shown() returned, at most `columns` wide; the last character is '~' if
 /// something is left out.
 [[nodiscard]] std::string cut(std::string_view text, std::size_t columns);
+/// The bytes of the longest beginning of such a text that is at most `columns` wide.
+[[nodiscard]] std::size_t bytes_within(std::string_view text, std::size_t columns);
 enum class Align : bool { kLeft, kRight };
 /// shown(), cut and filled up to exactly `columns`.
 [[nodiscard]] std::string cell(std::string_view text, std::size_t columns, Align align, Alphabet alphabet);

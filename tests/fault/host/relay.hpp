@@ -92,12 +92,8 @@ class Cast {
     server.standby = must(standby::Standby::create(
         {.session = "default", .id = 500 + servers.size(), .rank = rank, .epoch = server.config.epoch},
         *server.port,
-        [&server](const checkpoint::Checkpoint& checkpoint,
-                  const transport::SessionMessage&) -> Result<void> {
-          if (auto good = check_world(checkpoint, checkpoint_world(server.config), kSlots); !good)
-            return good;
-          if (server.engine().load(checkpoint.engine_state)) return {};
-          return fail(ErrorCode::kInvalidArgument, "not loaded");
+        [&server](const checkpoint::Checkpoint& checkpoint, const transport::SessionMessage&) {
+          return load_world(checkpoint, checkpoint_world(server.config), server.engine());
         },
         [&server](const checkpoint::Checkpoint& from, std::span<const transport::JournalMessage> journal) {
           return server.engine().load(from.engine_state) &&

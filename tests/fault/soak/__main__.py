@@ -45,6 +45,7 @@ CASES = {
     "killed": Case(restarts.killed, 5),
     "takeover": Case(standbys.takeover, 5),
     "handover": Case(standbys.handover, 5),
+    "rate": Case(standbys.rate, 3),
     "power": Case(restarts.power, 0.1),
     "crowd": Case(crowds.crowd, 10),
     "largest": Case(crowds.largest, 8),

@@ -1,4 +1,4 @@
-"""Cases of a server that stands by: it takes over when the live one is killed, and when it is asked to."""
+"""Cases of a server that stands by: it takes over when the live one is killed, and when it is asked to; and what it costs."""
 
 import itertools
 import pathlib
@@ -8,9 +8,11 @@ import time
 from clients import Group, wait_until
 from restarts import FRAMES_PER_S, check_after_restarts, frames_of, plays
 from stage import Failed
+from watching import FRAME, Durations, port_of, read_page
 
 BODIES = 10_000
 SECONDS_OF_TRAFFIC = 10
+RATE_BODIES = (10_000, 30_000, 50_000)
 
 
 class Relay:
@@ -130,3 +132,45 @@ def handover(stage, minutes, rng):
         f"at most, in which frames go on; {wrong} clients incomplete",
         max(lost) <= 0 and max(pauses_s) <= 0.5 and not wrong,
     )]  # fmt: skip
+
+
+class Pace:
+    """How fast a server makes frames for some seconds."""
+
+    def __init__(self, server, seconds):
+        port = port_of(server, "metrics at")
+        before, began = read_page(port), time.monotonic()
+        time.sleep(seconds)
+        frames = Durations(before, read_page(port), FRAME)
+        self.hz = frames.count / (time.monotonic() - began)
+        self.text = f"{self.hz:.2f} frames/s of {frames.quantile_ms(0.5):.1f} ms (p99 {frames.quantile_ms(0.99):.1f})"
+
+
+def makes_frames(server):
+    """The claim of the name is over."""
+    port = port_of(server, "metrics at")
+    return port is not None and read_page(port).get(f"{FRAME}_count", 0) > FRAMES_PER_S
+
+
+def rate(stage, minutes, _):
+    """A session keeps its 30 frames a second while a server stands by on the same machine."""
+    seconds = minutes * 60 / len(RATE_BODIES) / 3
+    rows = []
+    for bodies in RATE_BODIES:
+        live = stage.serve(bodies, "--scripted", "--metrics", 0)
+        wait_until(lambda: makes_frames(live), 60, "frames")  # noqa: B023
+        before = Pace(live, seconds)
+        standby = stage.serve(bodies, "--scripted", "--standby")
+        wait_until(lambda: said(live, "stands by, from frame"), 60, "a server to stand by")  # noqa: B023
+        attached = Pace(live, seconds)
+        standby.stop()
+        after = Pace(live, seconds)
+        live.stop()
+        held = 0.98 * FRAMES_PER_S  # a page may be a quarter of a second old
+        rows.append((
+            f"30 Hz with a standby on the same machine, {bodies:,} particles",
+            "30 frames/s, where the machine makes them without one",
+            f"{attached.text}; before it came {before.text}; after it left {after.text}",
+            attached.hz >= held or min(before.hz, after.hz) < held,
+        ))  # fmt: skip
+    return rows

@@ -6,6 +6,7 @@ crowds_test.py SCENARIO --tandemd PATH --tandem PATH --gateway PATH --viewer PAT
 
 import argparse
 import contextlib
+import random
 import resource
 import sys
 import tempfile
@@ -151,7 +152,44 @@ def limits(stage):
         connection.close()
 
 
-SCENARIOS = {scenario.__name__: scenario for scenario in (one_address, descriptors, limits)}
+def bytes_of_an_address(stage):
+    """Who has taken too many bytes waits for the rest of a file, and its viewers may send nothing; others notice nothing."""
+    site = stage.folder / "site"
+    site.mkdir()
+    big = random.Random(1).randbytes(300_000)  # of two, 262,144 bytes come at once
+    (site / "big.bin").write_bytes(big)
+    stage.gateway("gateway", "--address-bytes", 65536)
+    viewer, _ = crowds.open_viewer(stage.port, "127.0.0.12", b"")
+
+    def asks(source):
+        connection = crowds.connect(stage.port, source, 20)
+        connection.sendall(b"GET /big.bin HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        return connection
+
+    with viewer, asks("127.0.0.12") as greedy, asks("127.0.0.12") as too:
+        file = greedy.makefile("rb")
+        file.read(100_000)
+        viewer.sendall(b"\x82\x81" + bytes(5))
+        kind, data = crowds.read_frame(viewer.makefile("rb"))
+        if (kind, int.from_bytes(data[:2], "big")) != (8, 4011):
+            raise Failed(f"a message of an address that took too much: {kind}, {data}")
+        print(f"  {data[2:].decode()}")
+        too.settimeout(0.2)
+        got = b""
+        with contextlib.suppress(TimeoutError):
+            while piece := too.recv(65536):
+                got += piece
+        if len(got) > len(big):
+            raise Failed("the file did not wait")
+        too.close()
+        with asks("127.0.0.13") as other:
+            if len(other.makefile("rb").read(200_000)) != 200_000:
+                raise Failed("another address waits")
+        if not file.read().endswith(big[-1000:]):
+            raise Failed("the file never came")
+
+
+SCENARIOS = {scenario.__name__: scenario for scenario in (one_address, descriptors, limits, bytes_of_an_address)}
 
 
 def main():

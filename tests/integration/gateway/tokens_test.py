@@ -100,6 +100,11 @@ def roles(stage):
         raise Failed(f"cookie: {cookie}")
     status, body, headers = stage.get("/login", Authorization="Bearer wrong")
     expect((status, body, headers["set-cookie"]), (401, b"token missing or wrong\n", None), "/login with a wrong token")
+    stage.wait(lambda: log_of(stage).count("audit: refused") == 3, "the wrong token at /login in the log")
+    for what, path, headers in (("the address", f"/login?token={watch}", {}), ("a cookie", "/login", {"Cookie": f"tandem_token_{stage.port}={watch}"})):
+        # A link or a picture of another site's page could do that.
+        status, _, answered = stage.get(path, **headers)
+        expect((status, answered["set-cookie"]), (401, None), f"/login with a token in {what}")
     _, _, headers = stage.get("/")
     for name, part in (("content-security-policy", "default-src 'none'"), ("content-security-policy", "frame-ancestors 'self'"),
                        ("x-content-type-options", "nosniff"), ("referrer-policy", "no-referrer")):  # fmt: skip

@@ -4,9 +4,11 @@ import json
 import os
 import pathlib
 import re
+import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.error
 import urllib.parse
@@ -96,10 +98,10 @@ class Stage:
         assert found, f"{name}: {self.log(name)}"
         return found.group(1)
 
-    def session(self):
+    def session(self, *participant):
         """A server, a participant, a gateway and a recorder. Returns the addresses of their metrics by job."""
         places = {"tandemd": self.server(1000, "--stall-timeout", "off", "--checkpoint-dir", self.folder / "checkpoints")}
-        self.start("participant", self.options.tandem, "join")
+        self.start("participant", self.options.tandem, "join", *participant)
         self.start("gateway", self.options.gateway, "--port", 0, "--viewer", "", "--metrics", "127.0.0.1:0")
         self.start("recorder", self.options.tandem, "record", self.folder / "session.mcap", "--metrics", "127.0.0.1:0")
         places["tandem-gateway"], places["tandem-recorder"] = self.address("gateway"), self.address("recorder")
@@ -109,10 +111,34 @@ class Stage:
         self.processes[name].send_signal(number)
 
 
-class Prometheus:
-    """Debian's, with the deployed configuration: other ports, every second, and rules that wait a second at most."""
+class Halting:
+    """A process that is stopped most of the time, but never for so long that DDS takes it for gone."""
 
-    def __init__(self, stage, places):
+    STOPPED_S, RUNNING_S = 1.2, 0.1
+
+    def __init__(self, process):
+        self.process, self.over = process, threading.Event()
+        self.thread = threading.Thread(target=self.run)
+
+    def run(self):
+        while not self.over.is_set():
+            self.process.send_signal(signal.SIGSTOP)
+            self.over.wait(self.STOPPED_S)
+            self.process.send_signal(signal.SIGCONT)
+            self.over.wait(self.RUNNING_S)
+
+    def __enter__(self):
+        self.thread.start()
+
+    def __exit__(self, *_):
+        self.over.set()
+        self.thread.join()
+
+
+class Prometheus:
+    """Debian's, with the deployed configuration on other ports. `hurried`: it looks every second, and rules wait a second at most."""
+
+    def __init__(self, stage, places, hurried=False):
         folder = stage.folder / "prometheus"
         folder.mkdir()
         config = (DEPLOYED / "prometheus.yml").read_text("utf-8")
@@ -121,11 +147,13 @@ class Prometheus:
             assert target in config
             config = config.replace(target, target.replace(f"127.0.0.1:{default}", places[job]) if job in places else "")
         config = re.sub(r"(?m)^    static_configs:\n\n", "    static_configs: []\n", config)
-        config = re.sub(r"(?m)^  (\w+_interval|scrape_timeout): .*", r"  \1: 1s", config)
+        rules = {name: (DEPLOYED / name).read_text("utf-8") for name in RULES}
+        if hurried:
+            config = re.sub(r"(?m)^  (\w+_interval|scrape_timeout): .*", r"  \1: 1s", config)
+            rules = {name: re.sub(r"(?m)^( +for): .*", r"\1: 1s", text) for name, text in rules.items()}
         (folder / "prometheus.yml").write_text(config, "utf-8")
-        for name in RULES:
-            text = (DEPLOYED / name).read_text("utf-8")
-            (folder / name).write_text(re.sub(r"(?m)^( +for): .*", r"\1: 1s", text), "utf-8")
+        for name, text in rules.items():
+            (folder / name).write_text(text, "utf-8")
         checked("promtool", "check", "config", folder / "prometheus.yml")
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.address = f"127.0.0.1:{free.getsockname()[1]}"

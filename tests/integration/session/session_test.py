@@ -187,6 +187,10 @@ def checkpoint_refusals(stage):
         said = server(1, folder, "--checkpoint", "require", *other, bodies=bodies)
         if f"{file}: {reason}" not in said:
             raise Failed(f"{other}: {said}")
+    for _ in range(2):  # a mistake that is made twice must not cost the world
+        server(0, folder, "--seed", 2)
+    if not file.exists() or len(list(folder.glob("*.checkpoint"))) > 6:
+        raise Failed(f"after two starts with another seed there are {sorted(folder.iterdir())}")
     run(2, stage.options.tandem, "checkpoint", "show")
     run(2, stage.options.tandemd, "--scene", "cube", "--bodies", 5, "--checkpoint", "require")
     run(2, stage.options.tandemd, "--scene", "cube", "--bodies", 5, "--checkpoint-dir", folder, "--checkpoint-interval", 0)

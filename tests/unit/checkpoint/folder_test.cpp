@@ -85,6 +85,50 @@ TEST(Folder, WhatTheServerRefusesIsLeftWhereItIs) {
   EXPECT_EQ(names[0], file_name({kEpoch, 60}));
 }
 
+// As a server that was started with another seed, twice.
+TEST(Folder, WhatTheServerRefusesStaysWhenItIsOlderThanItsOwnToo) {
+  SimulatedDisk disk;
+  {
+    Folder other(disk);
+    for (const Frame frame : {30U, 60U, 90U}) ASSERT_TRUE(store(other, frame));
+  }
+  const auto accept = [](const Checkpoint& c) -> Result<void> {
+    return c.epoch == kEpoch ? fail(ErrorCode::kInvalidArgument, "of another seed") : Result<void>();
+  };
+  for (const Epoch epoch : {kEpoch + 5, kEpoch + 6, kEpoch + 7}) {
+    Folder folder(disk);
+    const auto found = folder.newest(accept);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->refused.size(), epoch == kEpoch + 5 ? 3U : 0U) << "older ones are no news";
+    for (Frame frame = 10; frame <= 60; frame += 10) ASSERT_TRUE(store(folder, frame, epoch));
+  }
+  EXPECT_EQ(newest(disk).checkpoint->epoch, kEpoch + 7);
+  const auto names = names_of(disk);
+  EXPECT_EQ(names.size(), 6U) << "three of another seed, and the last three";
+  EXPECT_EQ(names[0], file_name({kEpoch, 30}));
+  EXPECT_EQ(names[3], file_name({kEpoch + 7, 40}));
+}
+
+TEST(Folder, TheNewestIsTheLastThatIsAccepted) {
+  SimulatedDisk disk;
+  {
+    Folder other(disk);
+    for (const Epoch epoch : {kEpoch, kEpoch + 1}) ASSERT_TRUE(store(other, 30, epoch));
+    ASSERT_TRUE(store(other, 60, kEpoch + 1));
+  }
+  disk.content(file_name({kEpoch + 1, 60}))[200] ^= std::byte{1};
+  std::vector<Epoch> asked;
+  Folder folder(disk);
+  const auto found = folder.newest([&asked](const Checkpoint& c) {
+    asked.push_back(c.epoch);
+    return Result<void>();
+  });
+  ASSERT_TRUE(found && found->checkpoint);
+  EXPECT_EQ(found->checkpoint->frame, 30U);
+  EXPECT_EQ(asked, (std::vector<Epoch>{kEpoch, kEpoch + 1}));
+  EXPECT_EQ(found->refused.size(), 1U);
+}
+
 TEST(Folder, AFileUnderAnotherNameIsRefused) {
   SimulatedDisk disk;
   Folder folder(disk);
@@ -97,12 +141,14 @@ TEST(Folder, AFileUnderAnotherNameIsRefused) {
 
 TEST(Folder, OtherFilesAreNobodysAndStay) {
   SimulatedDisk disk;
-  for (const char* name : {"notes.txt", "1-2.checkpoint", ".", ".."}) ASSERT_TRUE(disk.write(name, {}));
+  for (const char* name : {"notes.txt", "1-2.checkpoint", "copy.checkpoint.part", ".", ".."})
+    ASSERT_TRUE(disk.write(name, {}));
+  ASSERT_TRUE(disk.write(file_name({kEpoch, 7}) + ".part", {}));
   Folder folder(disk);
   ASSERT_TRUE(store(folder, 30));
   const auto found = newest(disk);
   EXPECT_TRUE(found.refused.empty());
-  EXPECT_EQ(disk.list()->size(), 5U);
+  EXPECT_EQ(disk.list()->size(), 6U) << "but for the rest of a write that did not end";
 }
 
 TEST(Folder, AFailureNamesTheFileAndTheReason) {

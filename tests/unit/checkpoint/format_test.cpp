@@ -113,6 +113,13 @@ TEST(Format, AFileThatAnnouncesTenGigabytesIsRefusedByItsRealSize) {
   EXPECT_EQ(reason(file), "it says that it has 10000000000 bytes, but it has " + std::to_string(file.size()));
 }
 
+TEST(Format, AFrameOrEpochThatClientsCannotCountIsRefused) {
+  EXPECT_EQ(reason(encoded(sample(1U, kLastFrame))), "");
+  EXPECT_EQ(reason(encoded(sample(1000, kLastFrame + 1))), "it is of frame 9007199254740993 of epoch 1000");
+  EXPECT_EQ(reason(encoded(sample(kLastEpoch + 1, 7))), "it is of frame 7 of epoch 9007199254740993");
+  EXPECT_EQ(reason(encoded(sample(0, 7))), "it is of frame 7 of epoch 0");
+}
+
 TEST(Format, AnotherVersionByteOrderOrKindOfFileIsNamed) {
   Bytes file = encoded(sample());
   file[10] = std::byte{9};

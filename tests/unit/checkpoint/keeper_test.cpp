@@ -33,6 +33,12 @@ class Number final : public engine::Simulation {
   [[nodiscard]] std::uint32_t capacity() const override { return capacity_; }
   [[nodiscard]] double dt_s() const override { return 0.0625; }
   [[nodiscard]] engine::Vec3 gravity() const override { return {}; }
+  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override {
+    using Effect = engine::Classification::Effect;
+    return {.effect = input.kind == 1   ? Effect::kScheduled
+                      : input.kind < 99 ? Effect::kImmediate
+                                        : Effect::kRefused};
+  }
   void step() override {}
   [[nodiscard]] engine::Bodies bodies() const override { return {}; }
   void save(std::vector<std::byte>& out) const override {
@@ -135,15 +141,19 @@ TEST_F(KeeperTest, WithoutACheckpointItStartsAfreshAndSaysSoOrRefuses) {
 }
 
 TEST_F(KeeperTest, AServerThatTookOverRemovesTheOldOnesOfItsWorld) {
+  run({0xBB}, 500);  // of another seed
   run({30, 60, 90});
   auto keeper = Keeper::open(settings(), &clock_ns);
   ASSERT_TRUE(keeper) << keeper.error().message;
   Number simulation;
+  simulation.value = std::byte{99};
   const auto newest = (*keeper)->take_over(world(), simulation);
   ASSERT_TRUE(newest);
   EXPECT_EQ(*newest, 1000U);
+  EXPECT_EQ(simulation.value, std::byte{99});
   (*keeper)->end(clock_ns(), [&](Checkpoint& out) { out = sample(2000, 100); });
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 3);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 4);
+  EXPECT_TRUE(fs::exists(folder_ / file_name({500, 0xBB})));
 }
 
 TEST_F(KeeperTest, AnEngineWithoutSaveStartsWithAWarningOrIsRefused) {
@@ -182,6 +192,54 @@ TEST_F(KeeperTest, ACheckpointOfAnotherWorldIsRefusedByNameAndTheOneBeforeIsUsed
   EXPECT_EQ(begun->goes_on_from->epoch, 2000U);
   EXPECT_NE(begun->warnings.at(0).find("the engine refuses its part"), std::string::npos);
   EXPECT_GT(begun->epoch(1), 3000U);
+}
+
+TEST_F(KeeperTest, ACheckpointWithAnInputThatTheEngineRefusesIsNotUsed) {
+  using Change = void (*)(Checkpoint&);
+  for (const Change change : {Change([](Checkpoint& c) { c.immediate[0].kind = 99; }),
+                              Change([](Checkpoint& c) { c.immediate[0].kind = 1; }),
+                              Change([](Checkpoint& c) { c.scheduled[0].input.kind = 2; })}) {
+    run({5});
+    {
+      auto keeper = Keeper::open(settings(), &clock_ns);
+      ASSERT_TRUE(keeper) << keeper.error().message;
+      Number simulation;
+      ASSERT_TRUE((*keeper)->start(world(), simulation));
+      (*keeper)->end(clock_ns(), [change](Checkpoint& out) {
+        out = sample(1000, 9);
+        out.engine_state = {std::byte{9}};
+        change(out);
+      });
+    }
+    Number simulation;
+    const auto begun = start(simulation);
+    ASSERT_TRUE(begun && begun->goes_on_from);
+    EXPECT_EQ(begun->goes_on_from->frame, 5U);
+    EXPECT_EQ(simulation.value, std::byte{5});
+    ASSERT_EQ(begun->warnings.size(), 1U);
+    EXPECT_NE(begun->warnings[0].find("that waits in it"), std::string::npos) << begun->warnings[0];
+    fs::remove_all(folder_);
+  }
+}
+
+TEST_F(KeeperTest, ASimulationIsAsItWasWhereNoCheckpointIsUsed) {
+  {
+    auto keeper = Keeper::open(settings(), &clock_ns);
+    ASSERT_TRUE(keeper) << keeper.error().message;
+    Number simulation;
+    ASSERT_TRUE((*keeper)->start(world(), simulation));
+    (*keeper)->end(clock_ns(), [](Checkpoint& out) {
+      out = sample(1000, 9);
+      out.engine_state = {std::byte{9}};
+      out.immediate[0].kind = 99;
+    });
+  }
+  Number simulation;
+  simulation.value = std::byte{1};
+  const auto begun = start(simulation);
+  ASSERT_TRUE(begun);
+  EXPECT_EQ(begun->goes_on_from, nullptr);
+  EXPECT_EQ(simulation.value, std::byte{1});
 }
 
 TEST_F(KeeperTest, ASecondServerOfAFolderIsToldWhoHoldsIt) {

@@ -83,6 +83,13 @@ class Manual(unittest.TestCase):
                 if below:
                     self.assertEqual(self.complete(program, *path, ""), below)
 
+    def test_bash_offers_the_words_that_a_server_takes(self):
+        self.assertEqual(self.complete("tandemd", "--log-format", ""), {"text", "json"})
+        self.assertEqual(self.complete("tandemd", "--checkpoint", ""), {"auto", "require", "off"})
+        self.assertIn("auto", self.complete("tandemd", "--predictor", ""))
+        self.assertEqual(self.complete("tandemd", "--codec", "e"), {"entropy"})
+        self.assertEqual(self.complete("tandemd", "--config", "m"), {"man"})
+
     def test_bash_offers_values_and_files(self):
         if "tandem" not in self.flags or ("bench", "memory") not in self.flags["tandem"]:
             self.skipTest("tandem is built without bench")

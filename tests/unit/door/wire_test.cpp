@@ -70,7 +70,7 @@ TEST(LayoutOfAnOddCapacity, PadsAxesAndAligns) {
   EXPECT_EQ(layout.slot_bytes % 4096, 0U);
   EXPECT_EQ(
       print_layout(layout, "/proc/1/fd/3"),
-      "layout 1.0\nmemory shared\npath /proc/1/fd/3\nbytes 8192\ncapacity 17\npadded 32\nslots 1\nfirst 4096\n"
+      "layout 1.1\nmemory shared\npath /proc/1/fd/3\nbytes 8192\ncapacity 17\npadded 32\nslots 1\nfirst 4096\n"
       "slot_bytes 4096\ncolumn position f32 3 64\ncolumn velocity f32 3 448\ncolumn orientation f32 4 832\n"
       "column angular_velocity f32 3 1344\ncolumn alive u8 1 1728\ncolumn type u16 1 1792\n");
 }

@@ -1,6 +1,7 @@
 #include "services/gateway/doors/admission.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdio>
 #include <fstream>
@@ -112,6 +113,21 @@ TEST(Admission, ATokenIsTheFirstLineOfItsFile) {
   EXPECT_FALSE(read(""));
   std::remove(path.c_str());
   EXPECT_FALSE(read_token(path));
+}
+
+TEST(Admission, ATextThatEverybodyCanChangeIsRefused) {
+  const std::string path = ::testing::TempDir() + "gateway-open-token";
+  std::ofstream(path) << "0123456789abcdef\n";
+  ASSERT_EQ(::chmod(path.c_str(), 0602), 0);
+  const auto read = read_token(path);
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("everybody can write it"), std::string::npos) << read.error().message;
+  ASSERT_EQ(::chmod(path.c_str(), 0640), 0);
+  EXPECT_TRUE(read_token(path));
+  std::remove(path.c_str());
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);  // nobody writes into it, so this must not wait
+  EXPECT_FALSE(read_token(path));
+  std::remove(path.c_str());
 }
 
 }  // namespace

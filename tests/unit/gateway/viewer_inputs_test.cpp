@@ -281,6 +281,21 @@ TEST_F(ViewerInputs, AViewerCannotSpeakAsAnother) {
   EXPECT_EQ(gateway.counts().of(Refusal::kForeignClient), 2U);
 }
 
+TEST_F(ViewerInputs, WhoComesWithTheIdOfAViewerThatIsThereReportsNothingUnderIt) {
+  const ViewerId first = join(1), second = join(1);
+  transport::ClientStatusMessage status;
+  status.session = "default";
+  status.client = 1;
+  status.epoch = kEpoch;
+  EXPECT_FALSE(say(second, status));
+  EXPECT_TRUE(world.reported.empty());
+  EXPECT_FALSE(say(first, status));
+  EXPECT_EQ(world.reported.size(), 1U);
+  gateway.leave(first);
+  EXPECT_FALSE(say(second, status)) << "it was the same one over another connection";
+  EXPECT_EQ(world.reported.size(), 2U);
+}
+
 TEST_F(ViewerInputs, AStatusIsPublishedOnceASecondAsTheGatewayKnowsTheViewer) {
   const ViewerId id = join(1);
   transport::ClientStatusMessage status;

@@ -175,6 +175,7 @@ TEST_F(SlowStepTest, AServerThatStandsByAppliesInputsOfTheJournalInTheirFrames) 
   push.number = 1;
   push.frame = 12;
   push.kind = kPush;
+  push.values = {0, 0, 0, 1, 0, 1, 0};
   push.participant.assign(16, std::byte{1});
   decided.decisions = {push};
   decided.frame = 11;
@@ -198,6 +199,39 @@ TEST_F(SlowStepTest, AServerThatStandsByAppliesInputsOfTheJournalInTheirFrames) 
   ASSERT_TRUE(both.has_value()) << both.error().message;
   ASSERT_EQ(again.applied.size(), 1U);
   EXPECT_EQ(again.applied[0].first, 2U) << "in the second step";
+}
+
+TEST_F(SlowStepTest, AServerThatStandsByActsOnNoInputOfTheJournalThatItsEngineRefuses) {
+  const HostConfig config = test_config();
+  checkpoint::Checkpoint from;
+  from.frame = 10;
+  from.next_reuse.assign(4, 1);
+  from.withheld.assign(4, 0);
+  const auto why_not = [&](std::uint32_t kind, std::vector<double> values, std::uint64_t scheduled,
+                           Frame frame) {
+    FakeSimulation simulation(4);
+    transport::JournalMessage entry;
+    transport::InputDecision decision;
+    decision.frame = frame;
+    decision.kind = kind;
+    decision.values = std::move(values);
+    decision.scheduled = scheduled;
+    entry.decisions = {decision};
+    entry.frame = 11;
+    const auto rolled = roll_forward(config, simulation, from, std::vector{entry});
+    EXPECT_TRUE(simulation.applied.empty());
+    return rolled ? std::string() : rolled.error().message;
+  };
+  const auto refuses = [](const std::string& why) {
+    return why.find("refuses an input") != std::string::npos;
+  };
+  EXPECT_TRUE(refuses(why_not(4711, {}, 0, 11)));
+  EXPECT_TRUE(refuses(why_not(kPush, {}, 1, 12))) << "not a scheduled one";
+  EXPECT_TRUE(refuses(why_not(kGravity, {0, -9, 0}, 0, 11))) << "not an immediate one";
+  EXPECT_EQ(why_not(kGravity, {0, -9, 0}, 1, 12), "");
+  EXPECT_NE(why_not(kGravity, {0, -9, 0}, 3, 12).find("not in order"), std::string::npos)
+      << "two are missing";
+  EXPECT_NE(why_not(kGravity, {0, -9, 0}, 1, 10).find("not in order"), std::string::npos) << "of the past";
 }
 
 TEST_F(SlowStepTest, AFailureEndsTheSessionWithItsLineDuringAStepAndBetweenTwo) {

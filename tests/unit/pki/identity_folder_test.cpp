@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -94,6 +95,39 @@ TEST_F(IdentityFolder, AKeyThatOthersCanReadIsRefused) {
 TEST_F(IdentityFolder, AFileThatEverybodyCanChangeIsRefused) {
   ASSERT_EQ(::chmod(file("identity_ca.pem").c_str(), 0646), 0);
   expect_line(fault(), file("identity_ca.pem"), "chmod o-w");
+}
+
+// Whoever can write the folder can put other files there, or take the list of revoked identities away.
+TEST_F(IdentityFolder, AFolderThatEverybodyCanChangeIsRefused) {
+  for (const mode_t mode : {0777U, 01777U, 0702U}) {
+    ASSERT_EQ(::chmod(folder("bob").c_str(), mode), 0);
+    expect_line(fault(), folder("bob"), "chmod o-w");
+  }
+  ASSERT_EQ(::chmod(folder("bob").c_str(), 0755), 0);
+  EXPECT_EQ(fault(), "");
+}
+
+TEST_F(IdentityFolder, AKeyOfAnAuthorityThatOthersCanReadIsRefused) {
+  for (const char* const name : {"identity_ca.key", "permissions_ca.key"}) {
+    const std::string key = root_ + "/ours/authority/" + name;
+    ASSERT_EQ(::chmod(key.c_str(), 0644), 0);
+    const auto opened = Authority::open(root_ + "/ours");
+    ASSERT_FALSE(opened);
+    expect_line(opened.error().message, key, "chmod 600");
+    ASSERT_EQ(::chmod(key.c_str(), 0600), 0);
+  }
+  EXPECT_TRUE(Authority::open(root_ + "/ours"));
+}
+
+TEST_F(IdentityFolder, AuthoritiesAreNotMadeWhereOthersCanWrite) {
+  const std::string open = root_ + "/open";
+  ASSERT_EQ(::mkdir(open.c_str(), 0700), 0);
+  ASSERT_EQ(::chmod(open.c_str(), 0777), 0);
+  const auto made = Authority::init(open, kNow);
+  ASSERT_FALSE(made);
+  expect_line(made.error().message, open, "chmod");
+  ASSERT_EQ(::symlink((root_ + "/nowhere").c_str(), (root_ + "/link").c_str()), 0);
+  EXPECT_FALSE(Authority::init(root_ + "/link", kNow));
 }
 
 TEST_F(IdentityFolder, EveryFileThatIsMissingIsNamed) {

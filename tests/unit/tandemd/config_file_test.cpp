@@ -11,6 +11,7 @@
 
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/mistakes.hpp"
 #include "services/tandemd/configuration/rehearsal.hpp"
 #include "services/tandemd/configuration/reload.hpp"
 #include "services/tandemd/configuration/settings.hpp"
@@ -130,6 +131,48 @@ TEST_F(ConfigFile, WhatIsMissingOrPlannedWronglyNamesTheFileToo) {
   EXPECT_EQ(said("scene: \"cube\"\nbodies: 10\nthreshold: 1e-9\n")
                 .find(path + ":3: field \"threshold\": threshold 1e-09 is too fine"),
             0U);
+}
+
+TEST_F(ConfigFile, CheckingNamesAllMistakesInTheOrderOfLines) {
+  using ::testing::ElementsAre;
+  using ::testing::HasSubstr;
+  using ::testing::IsEmpty;
+  using ::testing::StartsWith;
+  const auto said = [this](const std::string& text, const Config& flags = {}) {
+    write(text);
+    std::vector<std::string> messages;
+    for (const Error& error : find_mistakes(path, flags)) messages.push_back(error.message);
+    return messages;
+  };
+  const auto at = [this](int line, const std::string& field) {
+    return StartsWith(path + ":" + std::to_string(line) + ": field \"" + field + '"');
+  };
+  EXPECT_THAT(said("scene: \"cube\"\nbodies: 10\n"), IsEmpty());
+  EXPECT_THAT(
+      said("scene: \"cub\"\n"
+           "bodys: 10  # no such field\n"
+           "client_limit: 70000\n"
+           "metrics: 9730\n"
+           "stream { name: \"a\" threshold: -1 }\n"
+           "stream { name: \"b\" predictor: \"none\" }\n"
+           "checkpoint_interval: -1\n"
+           "metrics: \"9730x\"\n"),
+      ElementsAre(at(1, "scene"), at(2, "bodys"), at(3, "client_limit"), at(4, "metrics"), at(5, "stream"),
+                  at(6, "stream"), at(7, "checkpoint_interval"), HasSubstr("\"bodies\" is missing")))
+      << "a second `metrics` was left out: the first one was wrong";
+  EXPECT_THAT(said("scene: cube\nbodies: 10\n"), ElementsAre(at(1, "scene"))) << "it is not missing, too";
+  EXPECT_THAT(said("scene: \"cube\" bodies: 10\nengine_listen: \"nowhere\"\nengine_token: \"none\"\n"),
+              ElementsAre(at(2, "engine_listen")));
+  EXPECT_THAT(said("scene: \"cube\" bodies: many\nlead: 2\n"), ElementsAre(at(1, "bodies")))
+      << "what else is in that line is not known";
+  EXPECT_THAT(said("scene: \"half_pipe\"\nbodies: 1000000\n"), ElementsAre(at(2, "bodies")))
+      << "the scene is checked when all else is good";
+  Config flags;
+  flags.set_lead(2);
+  EXPECT_THAT(said("scene: \"cube\"\nbodies: 10\nlead: 3\nwindow: \"99\"\n", flags),
+              ElementsAre(at(4, "window"), StartsWith("--lead: ")));
+  EXPECT_THAT(find_mistakes(path + ".missing", {}), ::testing::SizeIs(1));
+  EXPECT_THAT(find_mistakes("", flags), ::testing::SizeIs(::testing::Ge(1)));
 }
 
 TEST_F(ConfigFile, AFlagThatOverridesALineIsNamedInstead) {

@@ -1,10 +1,12 @@
 #include "services/top/model/diagnosis.hpp"
 #include "services/top/model/overview.hpp"
 #include "services/top/model/status_json.hpp"
+#include "services/top/screen/log_tail.hpp"
 #include "services/top/screen/pages.hpp"
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -323,6 +325,32 @@ TEST_F(Top, keeps_hostile_text_and_numbers_off_the_terminal) {
     }
   }
   EXPECT_TRUE(nlohmann::json::accept(to_json(overview, at(0))));
+}
+
+TEST_F(Top, wraps_a_long_word_without_losing_any_of_it) {
+  const std::string word = "0123456789abcdefghijklmnopqrstuvwxyz";
+  const auto lines = wrap("see " + word + " here", 10, Alphabet::kAscii);
+  EXPECT_EQ(lines,
+            (std::vector<std::string>{"see", "0123456789", "abcdefghij", "klmnopqrst", "uvwxyz", "here"}));
+}
+
+TEST_F(Top, shows_lines_of_a_json_log_as_lines_for_people) {
+  const std::string object =
+      R"({"time":"2026-11-24T15:47:25.056Z","level":"warning","program":"tandemd","session":"a","epoch":7,"message":"a client \"x\" is gone"})";
+  const std::string wanted = "2026-11-24T15:47:25.056Z [warning] a client \"x\" is gone";
+  EXPECT_EQ(without_json(object), wanted);
+  EXPECT_EQ(without_json("Nov 24 15:47:25 host tandemd[1]: " + object), wanted) << "from the journal";
+  for (const char* other :
+       {"[info] a line {\"of\" text}", "", "{\"time\":1}", "{\"message\":7}", "{\"message\":\"cut"})
+    EXPECT_EQ(without_json(other), other);
+  hear(server("a"), 0);
+  View view;
+  ASSERT_TRUE(view.press(Key::kLog, view.rows(overview, at(0)), 5));
+  Surroundings around;
+  around.log_lines = {object};
+  const Page page =
+      compose(overview, view, view.rows(overview, at(0)), around, {100, 30}, at(0), Alphabet::kAscii);
+  EXPECT_TRUE(std::ranges::any_of(page, [&](const Line& line) { return line.text() == " " + wanted; }));
 }
 
 TEST_F(Top, sorts_by_any_column_and_follows_the_chosen_client) {

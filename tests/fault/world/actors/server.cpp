@@ -156,9 +156,7 @@ void Server::stand_by() {
   const auto accept = [this, world = host::checkpoint_world(config)](
                           const checkpoint::Checkpoint& checkpoint,
                           const transport::SessionMessage& /*live*/) -> Result<void> {
-    if (auto good = check_world(checkpoint, world, engine_->capacity()); !good) return good;
-    if (engine_->load(checkpoint.engine_state)) return {};
-    return fail(ErrorCode::kInvalidArgument, "the engine refuses its part");
+    return load_world(checkpoint, world, *engine_);
   };
   const auto follows = [this](const checkpoint::Checkpoint& from,
                               std::span<const transport::JournalMessage> journal) {
